@@ -1,0 +1,47 @@
+#pragma once
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <variant>
+
+namespace eventgan {
+
+/// Why one sample cannot be used: text of the form "expected X, got Y, in PATH (SAMPLE)".
+/// A fault is a value: it travels through the pipeline in the sample's place, keeps its slot in the
+/// shard and ends in the shard's marker. It never leaves a stage as an exception.
+struct SampleFault {
+  std::string reason;
+  bool operator==(const SampleFault&) const = default;
+};
+
+/// A stage's result for one sample: the value, or why there is none.
+template <class T>
+using Outcome = std::variant<T, SampleFault>;
+
+template <class T>
+bool is_fault(const Outcome<T>& outcome) {
+  return std::holds_alternative<SampleFault>(outcome);
+}
+
+/// The user asked for something that cannot be: bad command line or bad manifest. Exit code 64.
+class UsageError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A whole input (a source's folder, an annotation file, the weights) is missing or cannot be read.
+/// Exit code 66.
+class InputError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// More samples were quarantined than the manifest allows (or any, with policy "fail"). Exit
+/// code 65.
+class TooManyFaults : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+}  // namespace eventgan

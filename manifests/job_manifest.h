@@ -1,0 +1,142 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/image_size.h"
+
+namespace eventgan {
+
+enum class DatasetKind {
+  kKittiObject,
+  kKittiTracking,
+  kKittiRaw,
+  kMpii,
+  kMpiiList,
+  kHuman36m,
+  kFrames
+};
+
+/// How the Human3.6M source is laid out on disk (DESIGN section 8).
+enum class Human36mLayout { kFetch, kExtracted };
+
+/// Where the labelled frame lies in its pair: at the end, at the start, or in the middle.
+enum class PairSide { kBefore, kAfter, kAround };
+
+/// One pair a labelled frame, its gap drawn by the seed; or one pair for each gap.
+enum class PairChoice { kOne, kAll };
+
+struct PairSpec {
+  std::vector<int> gaps;  ///< 1..6, ascending, distinct; even only with kAround
+  PairSide side = PairSide::kBefore;
+  PairChoice choose = PairChoice::kOne;
+  std::int64_t min_pairs = 1;  ///< fewer pairs than this from the source is an error
+};
+
+/// One dataset on disk. Paths are as written in the manifest.
+struct SourceSpec {
+  DatasetKind dataset = DatasetKind::kFrames;
+  std::string root;
+  std::string split = "train";          ///< part of file names, as JobManifest::name
+  std::optional<std::string> raw_root;  ///< kitti_object: KITTI raw, for gaps 4-6
+  std::optional<std::string> devkit;    ///< kitti_object: object devkit, whose mapping leads to raw
+  std::optional<std::string>
+      annotations;  ///< mpii, mpii_list, human36m: the annotation file or folder
+  std::optional<std::string> sequences;     ///< mpii, mpii_list: the folder of video frames
+  std::optional<Human36mLayout> layout;     ///< human36m only, and required there
+  std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
+  PairSpec pairs;
+};
+
+enum class ImageFit { kStretch, kLetterbox, kCrop };
+
+/// Whether the picture is made grey before or after it is resized.
+enum class GreyOrder { kBeforeResize, kAfterResize };
+
+/// How a frame becomes the network's input. Presets (DESIGN section 4): kitti = grey before
+/// resizing and a 3x3 blur; mpii = grey before resizing, no blur; demo = grey after resizing, no
+/// blur. A manifest names a preset or gives both `grey` and `blur`, never a mixture.
+struct ImageSpec {
+  std::optional<ImageSize> size;  ///< sides 16..8192; none: every picture keeps its own size
+  ImageFit fit = ImageFit::kStretch;
+  std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
+  GreyOrder grey = GreyOrder::kBeforeResize;
+  int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
+};
+
+struct GeneratorSpec {
+  std::string weights;  ///< path of a .safetensors file, or "untrained:WIDTH", WIDTH 1..64
+  std::string precision = "float32";
+};
+
+enum class Normalization { kNone, kEta98 };
+
+struct VolumeSpec {
+  int bins = 9;  ///< 1..64
+  Normalization normalize = Normalization::kNone;
+};
+
+enum class StoredType { kFloat32, kFloat16, kUint8 };
+
+struct OutputSpec {
+  std::string directory;
+  int samples_per_shard = 64;  ///< 1..65536
+  StoredType dtype = StoredType::kFloat16;
+  int deflate_level = 1;  ///< 0..9
+};
+
+/// Bytes of one stored value.
+std::size_t stored_size(StoredType type);
+
+enum class ErrorPolicy { kFail, kQuarantine };
+
+struct ErrorSpec {
+  ErrorPolicy policy = ErrorPolicy::kQuarantine;
+  std::int64_t max_count = 100;  ///< ≥ 0
+  double max_fraction = 0.01;    ///< 0..1
+};
+
+/// A conversion job, as manifest.schema.json beside this file describes it.
+struct JobManifest {
+  /// Part of file names: 1..64 of A-Z a-z 0-9 . _ - and neither "." nor "-" first.
+  std::string name;
+  std::uint64_t seed = 0;  ///< 0..2^63-1
+  std::vector<SourceSpec> sources;
+  ImageSpec image;
+  GeneratorSpec generator;
+  VolumeSpec volume;
+  OutputSpec output;
+  ErrorSpec errors;
+
+  std::string text;                 ///< the manifest file, byte for byte
+  std::filesystem::path directory;  ///< absolute folder of the manifest; relative paths start here
+};
+
+/// Reads a manifest. Throws UsageError listing *every* fault, one per line as
+/// "PATH: $.json.path: expected X, got Y"; InputError if the file cannot be read.
+JobManifest read_job_manifest(const std::filesystem::path& file);
+
+/// The same from text; `name` stands for the file in messages. `directory` is made absolute.
+JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
+                               const std::string& name);
+
+/// `path` as the program must open it: below the manifest's folder unless it is absolute.
+std::filesystem::path resolve(const JobManifest& manifest, const std::string& path);
+
+/// The manifest's words for these values, and back into text for shards, plans and reports.
+std::string_view to_string(DatasetKind kind);
+std::string_view to_string(Human36mLayout layout);
+std::string_view to_string(PairSide side);
+std::string_view to_string(PairChoice choice);
+std::string_view to_string(ImageFit fit);
+std::string_view to_string(GreyOrder order);
+std::string_view to_string(Normalization normalization);
+std::string_view to_string(StoredType type);
+std::string_view to_string(ErrorPolicy policy);
+
+}  // namespace eventgan

@@ -1,0 +1,107 @@
+#include "manifests/marker.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/strict_json/strict_json_internal.h"
+
+namespace eventgan {
+namespace {
+
+constexpr char kFormat[] = "eventgan-marker";
+constexpr int kVersion = 1;
+constexpr double kMostSeconds = 1e12;
+
+bool is_shard_name(std::string_view name) {
+  return name.size() > 3 && name.ends_with(".h5") && name.find('/') == name.npos;
+}
+
+std::string read_hash(const StrictValue& value) {
+  return value.text("a SHA-256 of 64 digits 0-9a-f", [](std::string_view text) {
+    return text.size() == 64 && text.find_first_not_of("0123456789abcdef") == text.npos;
+  });
+}
+
+std::vector<QuarantinedSample> read_quarantined(const StrictValue& value, int samples) {
+  std::vector<QuarantinedSample> quarantined;
+  for (const StrictValue& element : value.elements()) {
+    StrictObject object = element.object();
+    const StrictValue slot = object.at("slot");
+    const auto number = slot.sound_integer(0, std::max(samples - 1, 0));
+    if (number && !quarantined.empty() && *number <= quarantined.back().slot) {
+      slot.fault("slots in ascending order");
+    }
+    quarantined.push_back({static_cast<int>(number.value_or(-1)), object.at("sample_id").text(),
+                           object.at("reason").text()});
+    object.finish();
+  }
+  return quarantined;
+}
+
+ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
+  constexpr int kMostSamples = 65536;
+  ShardMarker marker;
+  StrictObject object = StrictValue(document, faults).object();
+  if (!object.has_format(kFormat, kVersion)) return marker;
+  marker.shard = object.at("shard").text("a file name ending in .h5", is_shard_name);
+  marker.plan_hash = read_hash(object.at("plan_hash"));
+  marker.sha256 = read_hash(object.at("sha256"));
+  marker.size_bytes = object.at("size_bytes").integer<std::int64_t>(0, INT64_MAX);
+  marker.samples = object.at("samples").integer(0, kMostSamples);
+  const StrictValue valid = object.at("valid");
+  marker.valid = valid.integer(0, marker.samples);
+  marker.quarantined = read_quarantined(object.at("quarantined"), marker.samples);
+  for (const auto& [stage, seconds] : object.at("stage_seconds").members()) {
+    marker.stage_seconds[stage] = seconds.number(0, kMostSeconds);
+  }
+  object.finish();
+  // A slot is either good or accounted for. Only worth saying if the numbers themselves are sound.
+  const auto lost = static_cast<int>(marker.quarantined.size());
+  if (faults.empty() && marker.valid + lost != marker.samples) {
+    valid.fault(std::to_string(marker.samples - lost) + " (samples less quarantined ones)");
+  }
+  return marker;
+}
+
+}  // namespace
+
+std::string to_json(const ShardMarker& marker) {
+  nlohmann::json quarantined = nlohmann::json::array();
+  for (const QuarantinedSample& sample : marker.quarantined) {
+    quarantined.push_back(
+        {{"slot", sample.slot}, {"sample_id", sample.sample_id}, {"reason", sample.reason}});
+  }
+  for (const auto& [stage, seconds] : marker.stage_seconds) {
+    if (seconds >= 0 && seconds <= kMostSeconds) continue;  // false for NaN
+    throw std::invalid_argument("expected seconds of 0 or more, got " + std::to_string(seconds) +
+                                ", for stage " + stage);
+  }
+  const nlohmann::json json = {
+      {"format", kFormat},          {"version", kVersion},
+      {"shard", marker.shard},      {"plan_hash", marker.plan_hash},
+      {"sha256", marker.sha256},    {"size_bytes", marker.size_bytes},
+      {"samples", marker.samples},  {"valid", marker.valid},
+      {"quarantined", quarantined}, {"stage_seconds", marker.stage_seconds}};
+  // A reason may quote a path, and paths need not be UTF-8, but JSON must be.
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+ShardMarker parse_marker(std::string_view text, const std::string& name) {
+  ShardMarker marker;
+  FaultList faults(name);
+  if (const auto document = parse_json_text(text, faults))
+    marker = read_document(*document, faults);
+  if (!faults.empty()) throw std::runtime_error(faults.text());
+  return marker;
+}
+
+std::string marker_name(const std::string& shard_name) {
+  if (!is_shard_name(shard_name)) {
+    throw std::invalid_argument("expected a shard name ending in .h5, got \"" + shard_name + "\"");
+  }
+  return shard_name.substr(0, shard_name.size() - 3) + ".json";
+}
+
+}  // namespace eventgan

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/image_size.h"
+#include "manifests/pairs.h"
+
+namespace eventgan {
+
+/// One pair with its place: everything a worker needs to make the sample, decided once and for all.
+struct PlannedSample {
+  std::string sample_id;
+  std::string sequence;
+  std::string label_key;
+  FramePair pair;
+  /// Not empty if planning already found that the sample cannot be made (a hole in a sequence): it
+  /// keeps its slot and is quarantined with this reason.
+  std::string fault;
+};
+
+/// One output file: samples of one source and one picture size, in slot order.
+struct PlannedShard {
+  std::string name;  ///< NAME-SPLIT-00012-of-01024.h5
+  int source = 0;    ///< index into the manifest's sources
+  ImageSize volume_size;
+  std::vector<PlannedSample> samples;
+};
+
+/// What planning found out about one source.
+struct SourceSummary {
+  std::int64_t labelled_frames = 0;
+  std::map<int, std::int64_t> pairs_by_gap;
+  /// Labelled frames (with choose = all: frame and gap) without a partner, because their sequence
+  /// does not reach that far: not an error, but never silent.
+  std::int64_t without_partner = 0;
+  std::vector<std::string> without_partner_ids;  ///< in the order of the source
+  std::int64_t faults = 0;                       ///< planned samples with a fault
+  std::vector<std::string> notes;                ///< Dataset::notes()
+};
+
+/// The frozen plan (DESIGN section 6): which pair becomes which slot of which shard, and the
+/// fingerprint of everything that changes bytes. The same manifest and inputs give the same plan on
+/// every machine with one kind of processor and one set of libraries.
+struct Plan {
+  std::string name;
+  std::string
+      manifest_text;  ///< of the run that froze the plan, byte for byte; stands in every shard
+  std::map<std::string, std::string> fingerprint;  ///< field → value; compared field by field
+  std::vector<SourceSummary> sources;
+  std::vector<PlannedShard> shards;
+
+  std::int64_t sample_count() const;
+};
+
+/// Canonical JSON: sorted keys, no spaces but a line a sample, newline at the end. Its SHA-256 is
+/// the plan's hash.
+std::string to_json(const Plan& plan);
+
+/// Throws std::runtime_error listing every fault, as parse_marker does.
+Plan parse_plan(std::string_view text, const std::string& name);
+
+/// Lines "FIELD: expected X, got Y" for each fingerprint field that differs; empty if none does.
+std::vector<std::string> fingerprint_differences(const std::map<std::string, std::string>& frozen,
+                                                 const std::map<std::string, std::string>& now);
+
+}  // namespace eventgan

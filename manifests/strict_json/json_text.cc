@@ -1,0 +1,160 @@
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "manifests/strict_json/json_path_internal.h"
+#include "manifests/strict_json/json_text_internal.h"
+
+namespace eventgan {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr std::size_t kDeepest = 32;
+
+/// Byte of the first character that is not well-formed UTF-8 (no overlong forms, no surrogates), or
+/// of the first NUL; text.size() if there is none. The parser itself looks into strings only.
+std::size_t first_unsound_byte(std::string_view text) {
+  const auto byte = [&](std::size_t i) -> unsigned {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0;
+  };
+  for (std::size_t i = 0; i < text.size();) {
+    const unsigned first = byte(i);
+    const std::size_t more = first < 0x80 ? 0 : first < 0xe0 ? 1 : first < 0xf0 ? 2 : 3;
+    if (first == 0 || (first >= 0x80 && first < 0xc2) || first > 0xf4) return i;
+    for (std::size_t k = 1; k <= more; ++k) {
+      if ((byte(i + k) & 0xc0) != 0x80) return i;
+    }
+    // The second byte tells overlong forms, surrogates and what lies beyond U+10FFFF.
+    const unsigned second = byte(i + 1);
+    if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f) ||
+        (first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f)) {
+      return i;
+    }
+    i += 1 + more;
+  }
+  return text.size();
+}
+
+/// Builds the document from the parser's events, since the parser's own builder lets a second key
+/// overwrite the first without a word.
+class Builder : public nlohmann::json_sax<Json> {
+ public:
+  Builder(std::string_view text, FaultList& faults) : text_(text), faults_(faults) {}
+
+  Json& document() { return document_; }
+
+  bool null() override { return add(nullptr); }
+  bool boolean(bool value) override { return add(value); }
+  bool number_integer(number_integer_t value) override { return add(value); }
+  bool number_unsigned(number_unsigned_t value) override { return add(value); }
+  bool number_float(number_float_t value, const string_t&) override { return add(value); }
+  bool string(string_t& value) override { return add(std::move(value)); }
+  bool binary(binary_t&) override { return false; }  // no such thing in JSON text
+  bool start_object(std::size_t) override { return open(Json::object()); }
+  bool start_array(std::size_t) override { return open(Json::array()); }
+  bool end_object() override { return close(); }
+  bool end_array() override { return close(); }
+
+  bool key(string_t& value) override {
+    Json& object = *open_.back().node;
+    const bool is_new = !object.contains(value);
+    open_.back().key = std::move(value);
+    if (!is_new) faults_.add(path(), "the key once", "it a second time");
+    return true;
+  }
+
+  bool parse_error(std::size_t position, const std::string&,
+                   const Json::exception& error) override {
+    // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error while ...":
+    // what is of use to the reader follows the last of the introductions.
+    std::string reason = error.what();
+    for (const std::string_view introduction : {"] ", "syntax error "}) {
+      const std::size_t at = reason.find(introduction);
+      if (at != std::string::npos) reason.erase(0, at + introduction.size());
+    }
+    constexpr std::size_t kLongest = 200;  // it quotes what it read last, which may be a whole line
+    if (reason.size() > kLongest) {
+      std::size_t end = kLongest;
+      while ((reason[end] & 0xc0) == 0x80) --end;  // not within a character
+      reason = reason.substr(0, end) + "...";
+    }
+    // The parser has read the byte it stumbles over, even if that is the end.
+    faults_.add_at(text_, position == 0 ? 0 : position - 1, "JSON", "an error " + reason);
+    return false;
+  }
+
+ private:
+  struct Level {
+    Json* node;
+    std::string key;
+  };
+
+  /// The place of the next value.
+  std::string path() const {
+    std::string path = "$";
+    for (const Level& level : open_) {
+      // The child of an array that is open is its last element.
+      const bool is_last = &level == &open_.back();
+      path = level.node->is_object() ? json_path(path, level.key)
+                                     : json_path(path, level.node->size() - (is_last ? 0 : 1));
+    }
+    return path;
+  }
+
+  Json* place(Json value) {
+    if (open_.empty()) return &(document_ = std::move(value));
+    Json& parent = *open_.back().node;
+    if (parent.is_object()) return &(parent[open_.back().key] = std::move(value));
+    parent.push_back(std::move(value));
+    return &parent.back();
+  }
+
+  bool add(Json value) {
+    place(std::move(value));
+    return true;
+  }
+
+  bool open(Json container) {
+    if (open_.size() == kDeepest) {
+      faults_.add(path(), "at most " + std::to_string(kDeepest) + " levels of nesting", "more");
+      return false;
+    }
+    open_.push_back({place(std::move(container)), {}});
+    return true;
+  }
+
+  bool close() {
+    open_.pop_back();
+    return true;
+  }
+
+  std::string_view text_;
+  FaultList& faults_;
+  Json document_;
+  std::vector<Level> open_;  // the values that are not closed yet, outermost first
+};
+
+}  // namespace
+
+std::optional<Json> parse_json_text(std::string_view text, FaultList& faults) {
+  if (text.starts_with("\xef\xbb\xbf")) {
+    faults.add_at(text, 0, "UTF-8 without a byte order mark", "a byte order mark");
+    return std::nullopt;
+  }
+  if (const std::size_t at = first_unsound_byte(text); at < text.size()) {
+    constexpr char kHex[] = "0123456789abcdef";
+    const auto byte = static_cast<unsigned char>(text[at]);
+    faults.add_at(text, at, "UTF-8 text",
+                  std::string("the byte 0x") + kHex[byte >> 4] + kHex[byte & 15]);
+    return std::nullopt;
+  }
+  Builder builder(text, faults);
+  const bool strict = true, ignore_comments = true;
+  if (!Json::sax_parse(text, &builder, Json::input_format_t::json, strict, ignore_comments)) {
+    return std::nullopt;
+  }
+  return std::move(builder.document());
+}
+
+}  // namespace eventgan

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string_view>
+
+#include "manifests/strict_json/fault_list_internal.h"
+
+namespace eventgan {
+
+/// Parses a JSON text in which // and /* */ comments are allowed. Stricter than
+/// nlohmann::json::parse: the text must be UTF-8 throughout (comments too), without a byte order
+/// mark and without NUL (where that parser would stop in silence); a key may stand in an object
+/// once; values nest at most 32 deep.
+///
+/// None, and one fault with line and column, if the text cannot be read. A key that is there twice
+/// is a fault too, but leaves a document, so that its other faults are found as well.
+std::optional<nlohmann::json> parse_json_text(std::string_view text, FaultList& faults);
+
+}  // namespace eventgan

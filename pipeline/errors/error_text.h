@@ -1,0 +1,16 @@
+#pragma once
+
+#include <exception>
+#include <string>
+
+namespace eventgan {
+
+/// The message of an exception and of those nested in it, outermost first, one per line and
+/// indented.
+std::string error_text(const std::exception& error);
+
+/// The exit code that stands for an exception: UsageError 64, TooManyFaults 65, InputError 66,
+/// else 1.
+int exit_code_of(const std::exception& error);
+
+}  // namespace eventgan

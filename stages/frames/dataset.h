@@ -1,0 +1,70 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "manifests/faults.h"
+#include "manifests/labels.h"
+#include "manifests/pairs.h"
+
+namespace eventgan {
+
+/// A frame that has an annotation, and so becomes a sample.
+struct LabelledFrame {
+  /// Unique within its source and the same on every machine, whatever the order of the file system;
+  /// what a user of the dataset would call the frame ("001497", "S1/Directions-1/54138969/000006").
+  std::string sample_id;
+  std::string sequence;   ///< the sequence it belongs to; empty if none is known
+  FrameRef frame;         ///< the frame itself; its file may be absent (see Dataset::neighbour)
+  std::string label_key;  ///< what Dataset::annotation takes; stands alone in a frozen plan
+};
+
+/// A frame some steps away from a labelled one.
+struct Neighbour {
+  enum class State {
+    kPresent,  ///< `frame` exists
+    kHole,     ///< the sequence goes on beyond it, but its file is absent: damage; `frame` names it
+    kBeyond    ///< the sequence does not reach that far (or there is none): nothing is wrong
+  };
+  State state = State::kBeyond;
+  FrameRef frame;
+};
+
+/// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
+/// their labels say. Opening one lists files and reads annotation files; it decodes no picture.
+///
+/// Steps between frames are counted in *stored* frames: where a sequence stores every fifth frame
+/// of a video, one step is five frames of that video, and FrameRef::index and time_s tell so.
+///
+/// Thread safety: all methods may be called from several threads at once.
+class Dataset {
+ public:
+  virtual ~Dataset() = default;
+
+  /// What class and joint numbers mean in this source.
+  virtual const LabelSchema& label_schema() const = 0;
+
+  /// Every labelled frame, sorted by sample_id.
+  virtual const std::vector<LabelledFrame>& labelled_frames() const = 0;
+
+  /// The frame `steps` after the labelled one (before it, if negative; itself, if 0).
+  virtual Neighbour neighbour(const LabelledFrame& frame, int steps) const = 0;
+
+  /// Reads one annotation. A fault if it is malformed ("expected X, got Y, in PATH:LINE").
+  virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
+
+  /// Where a person finds that annotation: the file's path as FrameRef::path is written, and the
+  /// place in it (`kitti/training/label_2/001497.txt`, `h36m/S1/Directions-1/annot.h5#5`,
+  /// `mpii/mpii_human_pose_v1_u12_1.mat:annolist[0]`); for messages.
+  virtual std::string label_place(const std::string& label_key) const = 0;
+
+  /// Every file the annotations come from, those with one frame each as well, written as
+  /// FrameRef::path is, sorted; part of the plan's fingerprint.
+  virtual std::vector<std::string> annotation_files() const = 0;
+
+  /// What the user should know about the source and no sample tells ("3 pictures without labels in
+  /// kitti/training/image_2"); one line each.
+  virtual std::vector<std::string> notes() const { return {}; }
+};
+
+}  // namespace eventgan

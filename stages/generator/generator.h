@@ -1,0 +1,34 @@
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "manifests/image_size.h"
+
+namespace eventgan {
+
+/// The EventGAN generator (DESIGN section 4), ready to run; the seam between the pipeline and the
+/// inference engines, and where tests put a fake.
+///
+/// Thread safety: `generate` may be called from several threads at once; the engine keeps no state
+/// between calls, so a volume depends on its two frames alone.
+class Generator {
+ public:
+  virtual ~Generator() = default;
+
+  /// Bins per polarity of the volumes it makes.
+  virtual int bins() const = 0;
+
+  /// frames: [frame, y, x] float32, C order, previous then next, in [-1, 1].
+  /// volume: [2 bins, y, x] float32, C order, dimensionless, ≥ 0 without upper bound; positive
+  /// polarity in time order, then negative. Overwritten whole.
+  /// Throws std::invalid_argument if the spans do not have these sizes, std::runtime_error if the
+  /// engine fails. Values that are not finite are left for the caller to find.
+  virtual void generate(std::span<const float> frames, ImageSize size,
+                        std::span<float> volume) const = 0;
+
+  /// Engine, precision and the libraries that change bytes, for the plan's fingerprint.
+  virtual std::string description() const = 0;
+};
+
+}  // namespace eventgan

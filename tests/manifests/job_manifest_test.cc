@@ -1,0 +1,155 @@
+#include "manifests/job_manifest.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "manifests/faults.h"
+#include "tests/manifests/manifest_cases.h"
+
+namespace eventgan {
+namespace {
+
+using testing::kSoundManifest;
+using testing::ManifestCase;
+
+JobManifest parse(const std::string& text) { return parse_job_manifest(text, "/data", "m.json"); }
+
+std::string faults_of(const std::string& text) {
+  try {
+    parse(text);
+    return "";
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+}
+
+class ManifestFaults : public ::testing::TestWithParam<ManifestCase> {};
+
+TEST_P(ManifestFaults, AreAllReportedWithPathExpectedAndGot) {
+  std::string expected;
+  for (const std::string& line : GetParam().faults) {
+    expected += (expected.empty() ? "m.json: " : "\nm.json: ") + line;
+  }
+  EXPECT_EQ(faults_of(testing::manifest_text(GetParam())), expected);
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, ManifestFaults, ::testing::ValuesIn(testing::manifest_cases()),
+                         [](const auto& entry) {
+                           std::string name = entry.param.name;
+                           std::replace_if(
+                               name.begin(), name.end(), [](char c) { return !std::isalnum(c); },
+                               '_');
+                           return name;
+                         });
+
+TEST(JobManifest, HasTheDefaultsOfItsHeader) {
+  const JobManifest manifest = parse(kSoundManifest);
+  EXPECT_EQ(manifest.seed, 0u);
+  ASSERT_EQ(manifest.sources.size(), 1u);
+  EXPECT_EQ(manifest.sources[0].split, "train");
+  EXPECT_EQ(manifest.sources[0].pairs.side, PairSide::kBefore);
+  EXPECT_EQ(manifest.sources[0].pairs.choose, PairChoice::kOne);
+  EXPECT_EQ(manifest.sources[0].pairs.min_pairs, 1);
+  EXPECT_EQ(manifest.sources[0].raw_root, std::nullopt);
+  EXPECT_EQ(manifest.sources[0].layout, std::nullopt);
+  EXPECT_EQ(manifest.sources[0].frames_per_second, std::nullopt);
+  EXPECT_EQ(manifest.image.fit, ImageFit::kStretch);
+  EXPECT_EQ(manifest.generator.precision, "float32");
+  EXPECT_EQ(manifest.volume.bins, 9);
+  EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
+  EXPECT_EQ(manifest.output.samples_per_shard, 64);
+  EXPECT_EQ(manifest.output.dtype, StoredType::kFloat16);
+  EXPECT_EQ(manifest.output.deflate_level, 1);
+  EXPECT_EQ(manifest.errors.policy, ErrorPolicy::kQuarantine);
+  EXPECT_EQ(manifest.errors.max_count, 100);
+  EXPECT_EQ(manifest.errors.max_fraction, 0.01);
+}
+
+TEST(JobManifest, HoldsEveryValueGiven) {
+  const JobManifest manifest = parse(R"({
+    "format": "eventgan-manifest", "version": 1, "name": "n", "seed": 9223372036854775807,
+    "sources": [
+      {"dataset": "kitti_object", "root": "a", "split": "val", "raw_root": "b", "devkit": "c",
+       "pairs": {"gaps": [6, 1, 4], "side": "after", "choose": "all", "min_pairs": 5}},
+      {"dataset": "mpii", "root": "d", "annotations": "e", "sequences": "f",
+       "pairs": {"gaps": [4], "side": "around"}},
+      {"dataset": "human36m", "root": "g", "layout": "extracted", "pairs": {"gaps": [2]}},
+      {"dataset": "frames", "root": "h", "frames_per_second": 29.97, "pairs": {"gaps": [2]}}],
+    "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
+    "generator": {"weights": "untrained:8", "precision": "float32"},
+    "volume": {"bins": 3, "normalize": "eta98"},
+    "output": {"directory": "o", "samples_per_shard": 7, "dtype": "uint8", "deflate_level": 9},
+    "errors": {"policy": "fail", "max_count": 3, "max_fraction": 0.5}})");
+  EXPECT_EQ(manifest.name, "n");
+  EXPECT_EQ(manifest.seed, 9223372036854775807u);
+  ASSERT_EQ(manifest.sources.size(), 4u);
+  const SourceSpec& kitti = manifest.sources[0];
+  EXPECT_EQ(kitti.dataset, DatasetKind::kKittiObject);
+  EXPECT_EQ(kitti.root, "a");
+  EXPECT_EQ(kitti.split, "val");
+  EXPECT_EQ(kitti.raw_root, "b");
+  EXPECT_EQ(kitti.devkit, "c");
+  EXPECT_THAT(kitti.pairs.gaps, ::testing::ElementsAre(1, 4, 6));  // ascending
+  EXPECT_EQ(kitti.pairs.side, PairSide::kAfter);
+  EXPECT_EQ(kitti.pairs.choose, PairChoice::kAll);
+  EXPECT_EQ(kitti.pairs.min_pairs, 5);
+  EXPECT_EQ(manifest.sources[1].annotations, "e");
+  EXPECT_EQ(manifest.sources[1].sequences, "f");
+  EXPECT_EQ(manifest.sources[1].pairs.side, PairSide::kAround);
+  EXPECT_EQ(manifest.sources[2].layout, Human36mLayout::kExtracted);
+  EXPECT_EQ(manifest.sources[3].frames_per_second, 29.97);
+  EXPECT_EQ(manifest.image.size, (ImageSize{.height = 260, .width = 861}));
+  EXPECT_EQ(manifest.image.fit, ImageFit::kCrop);
+  EXPECT_EQ(manifest.image.preset, "");
+  EXPECT_EQ(manifest.image.grey, GreyOrder::kAfterResize);
+  EXPECT_EQ(manifest.image.blur, 5);
+  EXPECT_EQ(manifest.generator.weights, "untrained:8");
+  EXPECT_EQ(manifest.volume.bins, 3);
+  EXPECT_EQ(manifest.volume.normalize, Normalization::kEta98);
+  EXPECT_EQ(manifest.output.directory, "o");
+  EXPECT_EQ(manifest.output.samples_per_shard, 7);
+  EXPECT_EQ(manifest.output.dtype, StoredType::kUint8);
+  EXPECT_EQ(manifest.output.deflate_level, 9);
+  EXPECT_EQ(manifest.errors.policy, ErrorPolicy::kFail);
+  EXPECT_EQ(manifest.errors.max_count, 3);
+  EXPECT_EQ(manifest.errors.max_fraction, 0.5);
+}
+
+TEST(JobManifest, KeepsItsTextByteForByte) {
+  const std::string text = "// caf\xc3\xa9\r\n\t" + std::string(kSoundManifest) + "\n\n/* end */";
+  EXPECT_EQ(parse(text).text, text);
+}
+
+TEST(JobManifest, PathsStartAtTheFolderOfTheManifest) {
+  const JobManifest manifest = parse(kSoundManifest);
+  EXPECT_EQ(manifest.directory, "/data");
+  EXPECT_EQ(resolve(manifest, "kitti/training"), "/data/kitti/training");
+  EXPECT_EQ(resolve(manifest, "../x"), "/data/../x");
+  EXPECT_EQ(resolve(manifest, "/abs"), "/abs");
+}
+
+TEST(JobManifest, MakesItsFolderAbsolute) {
+  const auto here = std::filesystem::current_path();
+  EXPECT_EQ(parse_job_manifest(kSoundManifest, "a", "m").directory, here / "a");
+  EXPECT_EQ(parse_job_manifest(kSoundManifest, "", "m").directory, here);
+}
+
+TEST(JobManifest, SaysWhatIsWrongWithTextThatIsNoObject) {
+  EXPECT_EQ(faults_of("[1]"), "m.json: $: expected an object, got an array of 1");
+  EXPECT_THAT(faults_of(""), ::testing::StartsWith("m.json:1:1: expected JSON, got an error"));
+  EXPECT_EQ(faults_of("\xef\xbb\xbf{}"),
+            "m.json:1:1: expected UTF-8 without a byte order mark, got a byte order mark");
+}
+
+TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {
+  std::string text = kSoundManifest;
+  text.insert(text.rfind('}'), R"(, "seed": -1, "seed": 2, "sed": 1)");
+  EXPECT_EQ(faults_of(text),
+            "m.json: $.seed: expected the key once, got it a second time\n"
+            "m.json: $.sed: expected the key \"seed\" or none, got an unknown key");
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <ostream>
+#include <string>
+#include <vector>
+
+namespace eventgan::testing {
+
+/// A manifest that is right; cases change it.
+extern const char kSoundManifest[];
+
+/// A change of one place of a document.
+struct Edit {
+  std::string pointer;  ///< JSON pointer
+  std::string value;    ///< JSON text; empty: remove what is there
+};
+
+/// The sound manifest with some changes, and what is wrong with it then.
+struct ManifestCase {
+  std::string name;
+  std::vector<Edit> edits;
+  std::vector<std::string> faults;  ///< lines after the document's name; empty: nothing is wrong
+  bool beyond_schema = false;       ///< JSON Schema cannot express what is wrong
+};
+
+/// The case's manifest as text.
+std::string manifest_text(const ManifestCase& manifest_case);
+
+/// Every rule of the manifest, kept and broken: those of the whole and of its top keys, of its
+/// sources, of its other sections.
+std::vector<ManifestCase> manifest_cases();
+std::vector<ManifestCase> top_cases();
+std::vector<ManifestCase> source_cases();
+std::vector<ManifestCase> setting_cases();
+
+/// What names must be, as messages say it.
+inline const std::string kNameRule =
+    R"(expected 1..64 letters, digits, ".", "_" or "-", not beginning with "." or "-", got )";
+
+inline void PrintTo(const ManifestCase& manifest_case, std::ostream* stream) {
+  *stream << manifest_case.name;
+}
+
+}  // namespace eventgan::testing

@@ -1,0 +1,35 @@
+#include "pipeline/errors/error_text.h"
+
+#include <gtest/gtest.h>
+
+#include "manifests/faults.h"
+#include "pipeline/errors/exit_codes.h"
+
+namespace eventgan {
+namespace {
+
+TEST(ErrorText, TellsTheWholeChain) {
+  try {
+    try {
+      try {
+        throw std::runtime_error("disk full");
+      } catch (...) {
+        std::throw_with_nested(std::runtime_error("cannot write b"));
+      }
+    } catch (...) {
+      std::throw_with_nested(std::runtime_error("cannot write a"));
+    }
+  } catch (const std::exception& error) {
+    EXPECT_EQ(error_text(error), "cannot write a\n  because: cannot write b\n  because: disk full");
+  }
+}
+
+TEST(ExitCodeOf, KnowsTheKindsOfErrors) {
+  EXPECT_EQ(exit_code_of(UsageError("")), kUsage);
+  EXPECT_EQ(exit_code_of(TooManyFaults("")), kTooManyFaults);
+  EXPECT_EQ(exit_code_of(InputError("")), kInputMissing);
+  EXPECT_EQ(exit_code_of(std::runtime_error("")), kFailed);
+}
+
+}  // namespace
+}  // namespace eventgan

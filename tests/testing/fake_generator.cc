@@ -1,0 +1,23 @@
+#include "tests/testing/fake_generator.h"
+
+#include <algorithm>
+#include <limits>
+
+namespace eventgan::testing {
+
+void FakeGenerator::generate(std::span<const float> frames, ImageSize size,
+                             std::span<float> volume) const {
+  ++calls_;
+  const std::size_t plane = size.pixel_count();
+  for (int bin = 0; bin < bins_; ++bin) {
+    const float weight = float(bin + 1) / float(bins_);
+    for (std::size_t i = 0; i < plane; ++i) {
+      const float change = frames[plane + i] - frames[i];
+      volume[bin * plane + i] = std::max(change, 0.0f) * weight;
+      volume[(bins_ + bin) * plane + i] = std::max(-change, 0.0f) * weight;
+    }
+  }
+  if (frames[0] == failing_value_) volume[0] = std::numeric_limits<float>::quiet_NaN();
+}
+
+}  // namespace eventgan::testing

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <atomic>
+
+#include "stages/generator/generator.h"
+
+namespace eventgan::testing {
+
+/// A generator with a known answer and no network: with d = next - previous at a pixel, positive
+/// channel b holds max(d, 0) (b + 1)/B and negative channel b holds max(-d, 0) (b + 1)/B.
+class FakeGenerator final : public Generator {
+ public:
+  explicit FakeGenerator(int bins = 9) : bins_(bins) {}
+
+  /// Frames whose first previous value equals `value` get a volume with NaN in it.
+  void fail_on(float value) { failing_value_ = value; }
+  int calls() const { return calls_; }
+
+  int bins() const override { return bins_; }
+  void generate(std::span<const float> frames, ImageSize size,
+                std::span<float> volume) const override;
+  std::string description() const override { return "fake"; }
+
+ private:
+  int bins_;
+  float failing_value_ = -100;
+  mutable std::atomic<int> calls_ = 0;
+};
+
+}  // namespace eventgan::testing

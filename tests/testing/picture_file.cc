@@ -1,0 +1,15 @@
+#include "tests/testing/picture_file.h"
+
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+namespace eventgan::testing {
+
+void write_flat_picture(const std::filesystem::path& path, ImageSize size, int value) {
+  std::filesystem::create_directories(path.parent_path());
+  const cv::Mat picture(size.height, size.width, CV_8UC1, cv::Scalar(value));
+  if (!cv::imwrite(path.string(), picture))
+    throw std::runtime_error("cannot write " + path.string());
+}
+
+}  // namespace eventgan::testing

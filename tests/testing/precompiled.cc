@@ -1,0 +1,1 @@
+// Nothing: the target it belongs to exists for its precompiled headers.
