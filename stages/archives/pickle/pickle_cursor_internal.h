@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace eventgan {
+
+/// Walks over the bytes of a pickle; nothing is read beyond their end. Every fault is a
+/// std::runtime_error that names the file and the byte at which the opcode at hand starts.
+class PickleCursor {
+ public:
+  PickleCursor(std::span<const std::byte> bytes, std::string name);
+
+  /// The next opcode; messages point at it from now on.
+  std::uint8_t opcode();
+
+  /// The next `count` bytes.
+  std::string_view take(std::uint64_t count);
+
+  /// An unsigned integer of `width` bytes (1..8), little endian.
+  std::uint64_t little_endian(int width);
+
+  /// `width` bytes of length, then as many bytes.
+  std::string_view counted(int width) { return take(little_endian(width)); }
+
+  /// An IEEE 754 double, big endian.
+  double big_endian_double();
+
+  /// Up to the next line feed, which is skipped.
+  std::string_view line();
+
+  std::size_t position() const { return position_; }
+  std::size_t remaining() const { return bytes_.size() - position_; }
+
+  [[noreturn]] void fail(const std::string& expected, const std::string& got) const;
+
+ private:
+  std::string_view bytes_;
+  std::string name_;
+  std::size_t position_ = 0;
+  std::size_t opcode_at_ = 0;
+};
+
+/// Text from a pickle for a message: short, and printable ASCII only.
+std::string printable(std::string_view text);
+
+}  // namespace eventgan

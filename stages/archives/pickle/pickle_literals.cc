@@ -1,0 +1,88 @@
+#include <charconv>
+#include <system_error>
+
+#include "stages/archives/pickle/pickle_literals_internal.h"
+#include "stages/archives/utf8_internal.h"
+
+namespace eventgan {
+namespace {
+
+template <class T, class... Format>
+std::optional<T> parse_whole(std::string_view text, Format... format) {
+  T value{};
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value, format...);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  return value;
+}
+
+std::optional<std::uint32_t> hex_at(std::string_view text, std::size_t at, std::size_t digits) {
+  if (at > text.size() || text.size() - at < digits) return std::nullopt;
+  return parse_whole<std::uint32_t>(text.substr(at, digits), 16);
+}
+
+// The byte that a backslash and `c` stand for; none if it is no simple escape.
+std::optional<char> simple_escape(char c) {
+  constexpr std::string_view kLetters = "abfnrtv\\'\"";
+  constexpr std::string_view kMeanings = "\a\b\f\n\r\t\v\\'\"";
+  const std::size_t at = kLetters.find(c);
+  if (at == std::string_view::npos) return std::nullopt;
+  return kMeanings[at];
+}
+
+}  // namespace
+
+std::optional<std::int64_t> parse_pickle_integer(std::string_view text) {
+  if (text.ends_with('L')) text.remove_suffix(1);
+  return parse_whole<std::int64_t>(text);
+}
+
+std::optional<double> parse_pickle_float(std::string_view text) {
+  return parse_whole<double>(text);
+}
+
+std::optional<std::string> parse_pickle_string(std::string_view text) {
+  if (text.size() < 2 || (text.front() != '\'' && text.front() != '"') ||
+      text.front() != text.back()) {
+    return std::nullopt;
+  }
+  text = text.substr(1, text.size() - 2);
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '\\') {
+      bytes += text[i];
+      continue;
+    }
+    if (++i == text.size()) return std::nullopt;
+    if (text[i] == 'x') {
+      const auto value = hex_at(text, i + 1, 2);
+      if (!value) return std::nullopt;
+      bytes += static_cast<char>(*value);
+      i += 2;
+    } else if (const auto meaning = simple_escape(text[i])) {
+      bytes += *meaning;
+    } else {
+      return std::nullopt;
+    }
+  }
+  return bytes;
+}
+
+std::optional<std::string> parse_pickle_unicode(std::string_view text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool escape =
+        text[i] == '\\' && i + 1 < text.size() && (text[i + 1] == 'u' || text[i + 1] == 'U');
+    if (!escape) {
+      append_utf8(static_cast<unsigned char>(text[i]), result);
+      continue;
+    }
+    const std::size_t digits = text[i + 1] == 'u' ? 4 : 8;
+    const auto code = hex_at(text, i + 2, digits);
+    if (!code || !append_utf8(*code, result)) return std::nullopt;
+    i += 1 + digits;
+  }
+  return result;
+}
+
+}  // namespace eventgan

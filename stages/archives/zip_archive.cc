@@ -1,0 +1,118 @@
+#include "stages/archives/zip_archive.h"
+
+#include <zip.h>
+
+#include <stdexcept>
+#include <system_error>
+
+namespace eventgan {
+namespace {
+
+// No deflate stream grows by more than this factor when it is inflated.
+constexpr zip_uint64_t kDeflateLimit = 1032;
+
+struct CloseMember {
+  void operator()(zip_file_t* member) const { zip_fclose(member); }
+};
+
+std::string text_of(int code) {
+  zip_error_t error;
+  zip_error_init_with_code(&error, code);
+  const std::string text = zip_error_strerror(&error);
+  zip_error_fini(&error);
+  return text;
+}
+
+}  // namespace
+
+struct ZipArchive::State {
+  explicit State(const std::filesystem::path& file) : path(file.string()) {
+    int code = 0;
+    archive = zip_open(path.c_str(), ZIP_RDONLY, &code);
+    if (archive == nullptr) {
+      throw std::runtime_error("expected a zip file, got \"" + text_of(code) + "\", in " + path);
+    }
+    std::error_code error;
+    size_bytes = std::filesystem::file_size(file, error);
+    const zip_int64_t count = zip_get_num_entries(archive, 0);
+    for (zip_int64_t i = 0; i < count; ++i) {
+      const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0);
+      if (name == nullptr) fail("readable member names", zip_strerror(archive), std::to_string(i));
+      names.emplace_back(name);
+    }
+  }
+  ~State() {
+    if (archive != nullptr) zip_discard(archive);
+  }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  [[noreturn]] void fail(const std::string& expected, const std::string& got,
+                         const std::string& member) const {
+    throw std::runtime_error("expected " + expected + ", got \"" + got + "\", in " + path +
+                             " (member " + member + ")");
+  }
+
+  std::string path;
+  std::uintmax_t size_bytes = 0;
+  zip_t* archive = nullptr;
+  std::vector<std::string> names;
+};
+
+ZipArchive::ZipArchive(const std::filesystem::path& file) : state_(new State(file)) {}
+
+ZipArchive::~ZipArchive() = default;
+
+const std::vector<std::string>& ZipArchive::names() const { return state_->names; }
+
+bool ZipArchive::contains(const std::string& name) const {
+  return zip_name_locate(state_->archive, name.c_str(), 0) >= 0;
+}
+
+std::vector<std::byte> ZipArchive::read(const std::string& name) const {
+  const State& state = *state_;
+  const zip_int64_t index = zip_name_locate(state.archive, name.c_str(), 0);
+  if (index < 0) state.fail("a member of that name", "none", name);
+
+  zip_stat_t about;
+  constexpr zip_uint64_t kNeeded = ZIP_STAT_SIZE | ZIP_STAT_COMP_SIZE | ZIP_STAT_COMP_METHOD;
+  if (zip_stat_index(state.archive, static_cast<zip_uint64_t>(index), 0, &about) != 0 ||
+      (about.valid & kNeeded) != kNeeded) {
+    state.fail("a member with a size", zip_strerror(state.archive), name);
+  }
+  if (about.comp_method != ZIP_CM_STORE && about.comp_method != ZIP_CM_DEFLATE) {
+    state.fail("a stored or deflated member", "method " + std::to_string(about.comp_method), name);
+  }
+  const bool stored = about.comp_method == ZIP_CM_STORE;
+  if (about.comp_size > state.size_bytes ||
+      about.size > (stored ? about.comp_size : about.comp_size * kDeflateLimit)) {
+    state.fail(
+        "a member that the file can hold",
+        std::to_string(about.size) + " bytes in a file of " + std::to_string(state.size_bytes),
+        name);
+  }
+
+  const std::unique_ptr<zip_file_t, CloseMember> member(
+      zip_fopen_index(state.archive, static_cast<zip_uint64_t>(index), 0));
+  if (!member) state.fail("a readable member", zip_strerror(state.archive), name);
+  std::vector<std::byte> bytes(about.size);
+  std::size_t filled = 0;
+  while (filled < bytes.size()) {
+    const zip_int64_t got = zip_fread(member.get(), bytes.data() + filled, bytes.size() - filled);
+    if (got < 0) state.fail("readable content", zip_file_strerror(member.get()), name);
+    if (got == 0) {
+      state.fail(std::to_string(bytes.size()) + " bytes", std::to_string(filled), name);
+    }
+    filled += static_cast<std::size_t>(got);
+  }
+  // libzip compares the checksum when it meets the end of the member, so ask for one byte beyond
+  // it.
+  std::byte beyond;
+  const zip_int64_t rest = zip_fread(member.get(), &beyond, 1);
+  if (rest < 0)
+    state.fail("content with the right checksum", zip_file_strerror(member.get()), name);
+  if (rest > 0) state.fail(std::to_string(bytes.size()) + " bytes", "more", name);
+  return bytes;
+}
+
+}  // namespace eventgan
