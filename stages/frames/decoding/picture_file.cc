@@ -1,0 +1,107 @@
+#include "stages/frames/decoding/picture_file.h"
+
+#include <array>
+#include <cstdio>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "stages/frames/decoding/jpeg_picture.h"
+#include "stages/frames/decoding/picture_limits.h"
+#include "stages/frames/decoding/png_picture.h"
+
+namespace eventgan {
+namespace {
+
+enum class Format { kJpeg, kPng, kOther, kNone };
+
+struct FileCloser {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+using OpenFile = std::unique_ptr<std::FILE, FileCloser>;
+
+OpenFile open_file(const std::filesystem::path& path) {
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) throw std::runtime_error("expected a file, got none");
+  if (!std::filesystem::is_regular_file(status)) {
+    throw std::runtime_error("expected a file, got a folder or device");
+  }
+  OpenFile file(std::fopen(path.c_str(), "rb"));
+  if (file == nullptr) throw std::runtime_error("expected a readable file, got no permission");
+  return file;
+}
+
+bool opencv_knows(const std::filesystem::path& file) {
+  try {
+    return cv::haveImageReader(file.string());
+  } catch (const cv::Exception&) {
+    return false;
+  }
+}
+
+/// Leaves `file` at its start.
+Format format_of(std::FILE* file, const std::filesystem::path& path) {
+  std::array<char, 8> start{};
+  const std::size_t length = std::fread(start.data(), 1, start.size(), file);
+  if (length == 0) throw std::runtime_error("expected a picture, got an empty file");
+  std::rewind(file);
+  const std::string_view bytes(start.data(), length);
+  if (bytes.starts_with("\xff\xd8\xff")) return Format::kJpeg;
+  if (bytes == "\x89PNG\r\n\x1a\n") return Format::kPng;
+  return opencv_knows(path) ? Format::kOther : Format::kNone;
+}
+
+ColourFrame decode_with_opencv(const std::filesystem::path& file) {
+  cv::Mat picture;
+  try {
+    picture = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  } catch (const cv::Exception& exception) {
+    throw std::runtime_error(exception.err);
+  }
+  if (picture.empty()) throw std::runtime_error("a damaged one");
+  const ImageSize size{picture.rows, picture.cols};
+  check_picture_size(size);
+  return {size, {picture.data, picture.data + picture.total() * picture.elemSize()}};
+}
+
+/// Calls the one of three readers that fits the file, and completes their errors.
+template <class Jpeg, class Png, class Other>
+auto read_by_format(const std::filesystem::path& path, Jpeg jpeg, Png png, Other other) {
+  const OpenFile file = open_file(path);
+  const Format format = format_of(file.get(), path);
+  if (format == Format::kNone) {
+    throw std::runtime_error("expected a picture, got a file of another kind");
+  }
+  try {
+    if (format == Format::kJpeg) return jpeg(file.get());
+    if (format == Format::kPng) return png(file.get());
+    return other(path);
+  } catch (const std::runtime_error& error) {
+    const char* name = format == Format::kJpeg  ? "JPEG"
+                       : format == Format::kPng ? "PNG"
+                                                : "picture";
+    throw std::runtime_error(std::string("expected a whole ") + name + ", got " + error.what());
+  }
+}
+
+}  // namespace
+
+bool is_picture_file(const std::filesystem::path& file) {
+  return format_of(open_file(file).get(), file) != Format::kNone;
+}
+
+ColourFrame decode_picture_file(const std::filesystem::path& file) {
+  return read_by_format(file, decode_jpeg, decode_png, decode_with_opencv);
+}
+
+ImageSize picture_file_size(const std::filesystem::path& file) {
+  return read_by_format(file, jpeg_size, png_size, [](const std::filesystem::path& path) {
+    return decode_with_opencv(path).size;
+  });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,90 @@
+#include "stages/frames/decoding/png_picture.h"
+
+#include <png.h>
+
+#include <cstddef>
+#include <vector>
+
+#include "stages/frames/decoding/escape_internal.h"
+#include "stages/frames/decoding/picture_limits.h"
+
+namespace eventgan {
+namespace {
+
+[[noreturn]] void leave_with_message(png_structp png, png_const_charp message) {
+  static_cast<Escape*>(png_get_error_ptr(png))->leave(message);
+}
+
+void ignore_warning(png_structp, png_const_charp) {}
+
+class PngFile {
+ public:
+  explicit PngFile(std::FILE* file) {
+    run_guarded(escape_, [&] {
+      png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape_, leave_with_message,
+                                    ignore_warning);
+      if (png_ == nullptr) escape_.leave("cannot start libpng");
+      info_ = png_create_info_struct(png_);
+      if (info_ == nullptr) escape_.leave("cannot start libpng");
+      png_init_io(png_, file);
+      // What is said beside the pixels (colour profiles, text) may be damaged, the pixels may not.
+      png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
+      png_set_benign_errors(png_, 0);
+    });
+  }
+  ~PngFile() { png_destroy_read_struct(&png_, &info_, nullptr); }
+  PngFile(const PngFile&) = delete;
+  PngFile& operator=(const PngFile&) = delete;
+
+  ImageSize read_header() {
+    run_guarded(escape_, [&] { png_read_info(png_, info_); });
+    const ImageSize size{static_cast<int>(png_get_image_height(png_, info_)),
+                         static_cast<int>(png_get_image_width(png_, info_))};
+    check_picture_size(size);
+    return size;
+  }
+
+  ColourFrame read() {
+    ColourFrame frame{read_header(), {}};
+    frame.bgr.resize(3 * frame.size.pixel_count());
+    const std::size_t row_bytes = 3 * static_cast<std::size_t>(frame.size.width);
+    std::vector<png_bytep> rows;
+    for (int y = 0; y < frame.size.height; ++y) rows.push_back(frame.bgr.data() + y * row_bytes);
+    run_guarded(escape_, [&] {
+      set_conversions();
+      png_read_update_info(png_, info_);
+      if (png_get_rowbytes(png_, info_) != row_bytes) escape_.leave("unexpected kind of pixels");
+      png_read_image(png_, rows.data());
+      png_read_end(png_, nullptr);
+    });
+    return frame;
+  }
+
+ private:
+  /// Whatever the file holds, to 8-bit blue, green, red.
+  void set_conversions() {
+    png_set_strip_16(png_);
+    png_set_strip_alpha(png_);
+    png_set_palette_to_rgb(png_);
+    const png_byte kind = png_get_color_type(png_, info_);
+    if ((kind & PNG_COLOR_MASK_COLOR) == 0) {
+      if (png_get_bit_depth(png_, info_) < 8) png_set_expand_gray_1_2_4_to_8(png_);
+      png_set_gray_to_rgb(png_);
+    } else {
+      png_set_bgr(png_);
+    }
+    png_set_interlace_handling(png_);
+  }
+
+  Escape escape_;
+  png_structp png_ = nullptr;
+  png_infop info_ = nullptr;
+};
+
+}  // namespace
+
+ColourFrame decode_png(std::FILE* file) { return PngFile(file).read(); }
+
+ImageSize png_size(std::FILE* file) { return PngFile(file).read_header(); }
+
+}  // namespace eventgan

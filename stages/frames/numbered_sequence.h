@@ -1,0 +1,77 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// Pictures that a folder of frames may hold. Where a frame is there under two of them, the first
+/// counts.
+inline const std::vector<std::string_view> kPictureExtensions = {".png", ".jpg", ".jpeg",
+                                                                 ".bmp", ".tif", ".tiff"};
+
+/// A folder of frames whose names end in their number: "img_000006.jpg" is frame 6. Listed once;
+/// after that no question goes to the disk. A value; reading it from several threads is safe.
+class NumberedSequence {
+ public:
+  using Frame = std::pair<std::int64_t, std::string>;  ///< number, file name
+
+  /// A frame some steps away: what Neighbour says, before the path is known.
+  struct Place {
+    Neighbour::State state = Neighbour::State::kBeyond;
+    std::int64_t number = -1;
+    /// Its file name; for a hole the name it would have. Empty in an empty sequence.
+    std::string name;
+  };
+
+  /// How far apart the frames of a sequence are numbered if none is absent.
+  enum class Stride {
+    kOne,      ///< every frame of the video is stored
+    kInferred  ///< perhaps every nth: the smallest difference there is; 1 if fewer than two frames
+  };
+
+  NumberedSequence() = default;
+
+  /// Takes frames in any order; numbers must be >= 0, distinct and below 10^18.
+  explicit NumberedSequence(std::vector<Frame> frames, Stride stride = Stride::kOne);
+
+  /// Lists the files of `folder` named `prefix` (not ending in a digit), digits (18 at most), one
+  /// of `extensions` (lower case, with the dot; the file's may be in capitals); others are passed
+  /// over. An absent folder gives an empty sequence. Throws InputError if the folder cannot be read
+  /// or two files of one extension have the same number ("1.png", "01.png").
+  static NumberedSequence list(const std::filesystem::path& folder, std::string_view prefix = "",
+                               const std::vector<std::string_view>& extensions = kPictureExtensions,
+                               Stride stride = Stride::kOne);
+
+  bool empty() const { return frames_.empty(); }
+
+  /// Ascending by number.
+  const std::vector<Frame>& frames() const { return frames_; }
+
+  /// The difference of numbers that is one step.
+  std::int64_t stride() const { return stride_; }
+
+  bool contains(std::int64_t number) const;
+
+  /// Frame `number`: present; a hole if there are frames on both sides of it; else beyond.
+  Place find(std::int64_t number) const;
+
+  /// The frame `steps` strides after `number` (before it, if negative). Frame `number` need not be
+  /// there; at 0 steps it is present or a hole, never beyond.
+  Place at(std::int64_t number, int steps) const;
+
+ private:
+  std::vector<Frame>::const_iterator lower_bound(std::int64_t number) const;
+  std::string name_for(std::int64_t number) const;
+
+  std::vector<Frame> frames_;
+  std::int64_t stride_ = 1;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,131 @@
+#include "stages/frames/numbered_sequence.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/faults.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+using Stride = NumberedSequence::Stride;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+using testing::TemporaryFolder;
+using testing::write_file;
+
+NumberedSequence every_fifth() {
+  return NumberedSequence({{16, "img_000016.jpg"}, {1, "img_000001.jpg"}, {6, "img_000006.jpg"}},
+                          Stride::kInferred);
+}
+
+TEST(NumberedSequence, ListsFilesOfItsPatternByNumber) {
+  const TemporaryFolder folder;
+  for (const char* name : {"img_10.jpg", "img_2.JPG", "img_x.jpg", "img_.jpg", "other_3.jpg",
+                           "img_4.txt", "img_5.jpg.part", "img_1234567890123456789.jpg"}) {
+    write_file(folder / name, "");
+  }
+  EXPECT_THAT(NumberedSequence::list(folder.path(), "img_").frames(),
+              ElementsAre(Pair(2, "img_2.JPG"), Pair(10, "img_10.jpg")));
+}
+
+TEST(NumberedSequence, PrefersTheFirstExtension) {
+  const TemporaryFolder folder;
+  for (const char* name : {"7.jpg", "7.png", "8.jpg"}) write_file(folder / name, "");
+  EXPECT_THAT(NumberedSequence::list(folder.path()).frames(),
+              ElementsAre(Pair(7, "7.png"), Pair(8, "8.jpg")));
+}
+
+TEST(NumberedSequence, RefusesTwoFilesForOneNumber) {
+  const TemporaryFolder folder;
+  for (const char* name : {"7.png", "007.png"}) write_file(folder / name, "");
+  try {
+    NumberedSequence::list(folder.path());
+    FAIL() << "listed two frames 7";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(),
+                AllOf(HasSubstr("got 007.png and 7.png"), HasSubstr(folder.path().string())));
+  }
+}
+
+TEST(NumberedSequence, AnAbsentFolderIsEmptyAndAFileIsAnError) {
+  const TemporaryFolder folder;
+  const NumberedSequence absent = NumberedSequence::list(folder / "absent");
+  EXPECT_TRUE(absent.empty());
+  EXPECT_EQ(absent.stride(), 1);
+  EXPECT_EQ(absent.at(3, 1).state, State::kBeyond);
+  EXPECT_EQ(absent.at(3, -1).state, State::kBeyond);
+  EXPECT_EQ(absent.at(3, 0).state, State::kHole);
+
+  write_file(folder / "file", "");
+  EXPECT_THROW(NumberedSequence::list(folder / "file"), InputError);
+}
+
+TEST(NumberedSequence, AnInferredStrideIsTheSmallestDifference) {
+  EXPECT_EQ(every_fifth().stride(), 5);  // 1, 6, 16: differences 5 and 10
+  EXPECT_EQ(NumberedSequence({{4, "4.png"}}, Stride::kInferred).stride(), 1);
+}
+
+TEST(NumberedSequence, WhereEveryFrameIsStoredFarFramesAreNoNeighbours) {
+  const TemporaryFolder folder;
+  for (const char* name : {"1.png", "40.png"}) write_file(folder / name, "");
+  const NumberedSequence sequence = NumberedSequence::list(folder.path());
+  EXPECT_EQ(sequence.stride(), 1);
+  EXPECT_EQ(sequence.at(1, 1).state, State::kHole);
+  EXPECT_EQ(sequence.at(1, 1).name, "2.png");
+  EXPECT_EQ(sequence.at(40, -1).state, State::kHole);
+  EXPECT_EQ(sequence.at(40, 1).state, State::kBeyond);
+
+  const auto inferred =
+      NumberedSequence::list(folder.path(), "", kPictureExtensions, Stride::kInferred);
+  EXPECT_EQ(inferred.at(1, 1).name, "40.png");
+}
+
+TEST(NumberedSequence, FindsFramesHolesAndTheEnd) {
+  const NumberedSequence sequence = every_fifth();
+  const auto found = sequence.at(6, -1);
+  EXPECT_EQ(found.state, State::kPresent);
+  EXPECT_EQ(found.number, 1);
+  EXPECT_EQ(found.name, "img_000001.jpg");
+
+  const auto hole = sequence.at(6, 1);
+  EXPECT_EQ(hole.state, State::kHole);
+  EXPECT_EQ(hole.number, 11);
+  EXPECT_EQ(hole.name, "img_000011.jpg");
+
+  EXPECT_EQ(sequence.at(6, 2).state, State::kPresent);
+  EXPECT_EQ(sequence.at(6, 3).state, State::kBeyond);
+  EXPECT_EQ(sequence.at(6, -2).state, State::kBeyond);
+}
+
+TEST(NumberedSequence, AFrameThatIsNotThereIsAHoleWithNeighbours) {
+  const NumberedSequence sequence = every_fifth();
+  EXPECT_EQ(sequence.at(11, 0).state, State::kHole);
+  EXPECT_EQ(sequence.at(11, 1).state, State::kPresent);
+  EXPECT_EQ(sequence.at(21, 0).state, State::kHole);  // even past the end: its label says it exists
+  EXPECT_EQ(sequence.at(21, -1).number, 16);
+}
+
+TEST(NumberedSequence, FindsByNumberWhateverTheStride) {
+  const NumberedSequence sequence = every_fifth();
+  EXPECT_EQ(sequence.find(6).state, State::kPresent);
+  EXPECT_EQ(sequence.find(7).state, State::kHole);
+  EXPECT_EQ(sequence.find(0).state, State::kBeyond);
+  EXPECT_EQ(sequence.find(17).state, State::kBeyond);
+  EXPECT_EQ(sequence.find(-5).state, State::kBeyond);
+  EXPECT_EQ(NumberedSequence().find(0).state, State::kBeyond);
+}
+
+TEST(NumberedSequence, ContainsOnlyItsFrames) {
+  EXPECT_TRUE(every_fifth().contains(16));
+  EXPECT_FALSE(every_fifth().contains(11));
+  EXPECT_FALSE(NumberedSequence().contains(0));
+}
+
+}  // namespace
+}  // namespace eventgan
