@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "stages/frames/numbered_sequence.h"
+
+namespace eventgan {
+
+/// What lies in a folder of pictures with any names.
+struct PictureFolder {
+  /// If all names are one prefix and then digits, each picture has its number, and a missing number
+  /// is a hole. Otherwise they are counted from 0 in natural order.
+  NumberedSequence frames;
+  /// The .json files (also .JSON) beside them: name without extension to name. Of two that differ
+  /// only in the extension's letters, the first by name counts.
+  std::map<std::string, std::string> sidecars;
+  std::vector<std::string> folders;  ///< names of the folders in it, sorted
+};
+
+/// Lists `folder`, passing over hidden entries and other files. Of two pictures of one name the one
+/// of the extension that stands first in kPictureExtensions counts. An absent
+/// folder is empty. Throws InputError if it cannot be listed.
+PictureFolder list_picture_folder(const std::filesystem::path& folder);
+
+}  // namespace eventgan

@@ -1,0 +1,119 @@
+#include "stages/frames/sequences/pictures_dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+class PicturesDatasetTest : public ::testing::Test {
+ protected:
+  PicturesDatasetTest() { spec_.root = "clip"; }
+  void touch(const std::vector<std::string>& names) const {
+    for (const std::string& name : names) testing::write_file(folder_ / ("clip/" + name), "");
+  }
+  std::unique_ptr<Dataset> open() const { return open_pictures_dataset(spec_, folder_.path()); }
+  std::vector<std::string> ids() const {
+    std::vector<std::string> found;
+    const auto dataset = open();
+    for (const auto& frame : dataset->labelled_frames()) found.push_back(frame.sample_id);
+    return found;
+  }
+
+  testing::TemporaryFolder folder_;
+  SourceSpec spec_;
+};
+
+TEST_F(PicturesDatasetTest, EveryPictureIsASample) {
+  touch({"f9.png", "f10.png", "f12.png"});
+  EXPECT_THAT(ids(), ElementsAre("f10", "f12", "f9"));
+  const auto dataset = open();
+  const LabelledFrame& ten = dataset->labelled_frames()[0];
+  EXPECT_EQ(ten.sequence, "");
+  EXPECT_EQ(ten.frame, (FrameRef{"clip/f10.png", 10}));
+  EXPECT_TRUE(std::isnan(ten.frame.time_s));
+  EXPECT_EQ(dataset->neighbour(ten, 0).frame, ten.frame);
+  EXPECT_EQ(dataset->neighbour(ten, -1).frame, (FrameRef{"clip/f9.png", 9}));
+  EXPECT_EQ(dataset->neighbour(ten, 1).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(ten, 1).frame.path, "clip/f11.png");
+  EXPECT_EQ(dataset->neighbour(ten, 2).frame, (FrameRef{"clip/f12.png", 12}));
+  EXPECT_EQ(dataset->neighbour(ten, 3).state, State::kBeyond);
+  EXPECT_THAT(dataset->annotation_files(), IsEmpty());
+}
+
+TEST_F(PicturesDatasetTest, TheRateGivesTheTime) {
+  touch({"3.png"});
+  spec_.frames_per_second = 24;
+  EXPECT_EQ(open()->labelled_frames()[0].frame.time_s, 3.0 / 24);
+}
+
+TEST_F(PicturesDatasetTest, EachFolderIsASequence) {
+  touch({"b/1.png", "a/1.png", "a/2.png", "empty/readme.txt"});
+  EXPECT_THAT(ids(), ElementsAre("a/1", "a/2", "b/1"));
+  const auto dataset = open();
+  const LabelledFrame& last = dataset->labelled_frames()[1];
+  EXPECT_EQ(last.sequence, "a");
+  EXPECT_EQ(last.frame.path, "clip/a/2.png");
+  EXPECT_EQ(dataset->neighbour(last, -1).frame.path, "clip/a/1.png");
+  EXPECT_EQ(dataset->neighbour(last, 1).state, State::kBeyond);  // never into the next folder
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 folders without pictures in clip"));
+}
+
+TEST_F(PicturesDatasetTest, PicturesBesideFoldersCount) {
+  touch({"1.png", "a/1.png"});
+  EXPECT_THAT(ids(), ElementsAre("1"));
+  EXPECT_THAT(open()->notes(), ElementsAre("1 folders beside the pictures left out in clip"));
+}
+
+TEST_F(PicturesDatasetTest, PassesSidecarsThroughByteForByte) {
+  touch({"a/1.png", "a/2.png", "a/3.png"});
+  const std::string label = "{ \"k\" : 1.50,\n \"k\": [] }\r\n";
+  testing::write_file(folder_ / "clip/a/1.json", label);
+  testing::write_file(folder_ / "clip/a/2.json", "{");
+  const auto dataset = open();
+  const auto annotation = [&](int i) {
+    return dataset->annotation(dataset->labelled_frames()[i].label_key);
+  };
+  const auto first = std::get<Annotation>(annotation(0));
+  EXPECT_EQ(first.original, label);
+  EXPECT_TRUE(first.boxes.empty() && first.persons.empty());
+  ASSERT_TRUE(is_fault(annotation(1)));
+  EXPECT_THAT(std::get<SampleFault>(annotation(1)).reason, HasSubstr("clip/a/2.json"));
+  EXPECT_EQ(std::get<Annotation>(annotation(2)).original, "");
+
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("clip/a/1.json", "clip/a/2.json"));
+  EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key), "clip/a/1.json");
+  EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[2].label_key), "clip/a/3.png");
+
+  // A label that is there when the plan is made must still be there later.
+  std::filesystem::remove(folder_ / "clip/a/1.json");
+  EXPECT_TRUE(is_fault(annotation(0)));
+}
+
+TEST_F(PicturesDatasetTest, ASidecarsExtensionMayBeInCapitals) {
+  touch({"1.png", "unrelated.json"});
+  testing::write_file(folder_ / "clip/1.JSON", "[7]");
+  const auto dataset = open();
+  EXPECT_EQ(std::get<Annotation>(dataset->annotation(dataset->labelled_frames()[0].label_key)),
+            (Annotation{"[7]", {}, {}}));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("clip/1.JSON"));
+}
+
+TEST_F(PicturesDatasetTest, RefusesAFolderWithoutPictures) {
+  touch({"readme.txt", "a/readme.txt"});
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got none, in ")));
+}
+
+}  // namespace
+}  // namespace eventgan
