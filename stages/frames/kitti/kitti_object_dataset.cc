@@ -1,0 +1,161 @@
+#include "stages/frames/kitti/kitti_object_dataset.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/kitti/object_pictures.h"
+#include "stages/frames/kitti/raw_drive.h"
+#include "stages/frames/kitti/raw_mapping.h"
+#include "stages/frames/kitti/text_table.h"
+#include "stages/frames/kitti/timestamps.h"
+#include "stages/frames/source_root.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+
+constexpr std::string_view kRandFile = "mapping/train_rand.txt";
+constexpr std::string_view kMappingFile = "mapping/train_mapping.txt";
+
+RawMapping read_mapping(const SourceRoot& devkit) {
+  return {devkit.read_or_throw(kRandFile), devkit.written(kRandFile),
+          devkit.read_or_throw(kMappingFile), devkit.written(kMappingFile)};
+}
+
+class KittiObjectDataset : public Dataset {
+ public:
+  KittiObjectDataset(const SourceSpec& spec, const std::filesystem::path& base)
+      : root_(spec.root, base), pictures_(root_) {
+    root_.require_folder("label_2");
+    const auto labels = NumberedSequence::list(root_.on_disk("label_2"), "", {".txt"});
+    frames_.reserve(labels.frames().size());
+    for (const auto& [number, name] : labels.frames()) add_frame(number, name);
+    if (spec.raw_root) {
+      follow_to_raw(SourceRoot(*spec.raw_root, base), SourceRoot(*spec.devkit, base));
+    }
+    std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
+    std::ranges::sort(annotation_files_);
+    note(std::ranges::count_if(pictures_.labelled().frames(),
+                               [&](const auto& frame) { return !labels.contains(frame.first); }),
+         "pictures without labels in " + root_.written("image_2"));
+  }
+
+  const LabelSchema& label_schema() const override { return kitti_label_schema(); }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
+  std::vector<std::string> annotation_files() const override { return annotation_files_; }
+  std::vector<std::string> notes() const override { return notes_; }
+
+  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
+    const std::int64_t index = frame.frame.index + steps;
+    const RawDrive* drive = drive_of(frame);
+    Neighbour here;
+    here.frame.index = index;
+    here.frame.time_s =
+        drive ? drive->time_s(index) : static_cast<double>(index) * kKittiFrameSeconds;
+    if (steps <= 0 && steps >= -ObjectPictures::kPrevious) {
+      const auto place = pictures_.at(number_of(frame), frame.sample_id, steps);
+      here.state = place.state;
+      here.frame.path = root_.written(place.path);
+    }
+    if (here.state == State::kPresent || steps == 0 || drive == nullptr) return here;
+
+    // prev_2 may know of a frame still further back where the drive does not: a hole all the same.
+    Neighbour raw = drive->frame(index);
+    if (raw.state == State::kBeyond && here.state == State::kHole) return here;
+    return raw;
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    auto text = root_.read(label_key);
+    if (auto* fault = std::get_if<SampleFault>(&text)) return *fault;
+    return parse_kitti_label(std::get<std::string>(std::move(text)), label_place(label_key));
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return root_.written(label_key);
+  }
+
+ private:
+  void add_frame(std::int64_t number, const std::string& label_name) {
+    LabelledFrame frame;
+    frame.sample_id = label_name.substr(0, label_name.rfind('.'));
+    frame.label_key = "label_2/" + label_name;
+    annotation_files_.push_back(root_.written(frame.label_key));
+    const auto place = pictures_.at(number, frame.sample_id, 0);
+    frame.frame = {root_.written(place.path), 0, -1, 0};
+    frames_.push_back(std::move(frame));
+  }
+
+  void follow_to_raw(const SourceRoot& raw, const SourceRoot& devkit) {
+    raw.require_folder("");
+    const RawMapping mapping = read_mapping(devkit);
+    annotation_files_.push_back(devkit.written(kMappingFile));
+    annotation_files_.push_back(devkit.written(kRandFile));
+    std::int64_t unmapped = 0;
+    std::int64_t without_drive = 0;
+    for (LabelledFrame& frame : frames_) {
+      const auto raw_frame = mapping.find(number_of(frame));
+      if (!raw_frame) {
+        ++unmapped;
+        continue;
+      }
+      frame.sequence = raw_frame->drive;
+      frame.frame.index = raw_frame->number;
+      auto [place, is_new] = drives_.try_emplace(raw_frame->drive, std::nullopt);
+      if (is_new) open_drive(raw, raw_frame->date + "/" + raw_frame->drive, place->second);
+      if (!place->second) ++without_drive;
+      frame.frame.time_s = place->second
+                               ? place->second->time_s(raw_frame->number)
+                               : static_cast<double>(raw_frame->number) * kKittiFrameSeconds;
+    }
+    note(unmapped, "labelled frames that " + devkit.written(kMappingFile) + " does not know");
+    note(without_drive, "labelled frames whose raw drive is missing in " + raw.written(""));
+  }
+
+  void open_drive(const SourceRoot& raw, const std::string& folder,
+                  std::optional<RawDrive>& drive) {
+    RawDrive opened(raw, folder);
+    if (opened.pictures().empty()) return;
+    if (!opened.timestamps_path().empty()) annotation_files_.push_back(opened.timestamps_path());
+    drive = std::move(opened);
+  }
+
+  /// Null if the frame's drive is not known or not there.
+  const RawDrive* drive_of(const LabelledFrame& frame) const {
+    const auto drive = drives_.find(frame.sequence);
+    return drive != drives_.end() && drive->second ? &*drive->second : nullptr;
+  }
+
+  /// The sample_id is the label file's name without ".txt": digits.
+  static std::int64_t number_of(const LabelledFrame& frame) {
+    return parse_number<std::int64_t>(frame.sample_id).value();
+  }
+
+  void note(std::int64_t count, const std::string& what) {
+    if (count > 0) notes_.push_back(std::to_string(count) + " " + what);
+  }
+
+  SourceRoot root_;
+  ObjectPictures pictures_;
+  std::vector<LabelledFrame> frames_;
+  std::map<std::string, std::optional<RawDrive>> drives_;
+  std::vector<std::string> annotation_files_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
+                                                   const std::filesystem::path& base) {
+  if (spec.raw_root.has_value() != spec.devkit.has_value()) {
+    throw UsageError(std::string("kitti_object: expected raw_root and devkit together, got only ") +
+                     (spec.raw_root ? "raw_root" : "devkit"));
+  }
+  return std::make_unique<KittiObjectDataset>(spec, base);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,168 @@
+#include "stages/frames/kitti/kitti_raw_dataset.h"
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <utility>
+
+#include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/kitti/raw_calibration.h"
+#include "stages/frames/kitti/raw_drive.h"
+#include "stages/frames/kitti/text_table.h"
+#include "stages/frames/kitti/tracklet_box.h"
+#include "stages/frames/kitti/tracklets.h"
+#include "stages/frames/source_root.h"
+
+namespace eventgan {
+namespace {
+
+constexpr char kTrackletFile[] = "/tracklet_labels.xml";
+constexpr std::size_t kDateLength = std::string_view("2011_09_26").size();
+
+bool is_date(const std::string& name) {
+  return name.size() == kDateLength && name[4] == '_' && name[7] == '_' &&
+         name.find_first_not_of("0123456789_") == std::string::npos;
+}
+
+bool is_drive_of(const std::string& name, const std::string& date) {
+  return name.starts_with(date + "_drive_") && name.ends_with("_sync");
+}
+
+struct Drive {
+  RawDrive frames;
+  std::optional<Tracklets> tracklets;
+  const RawCalibration* calibration = nullptr;  ///< null if the date has none
+};
+
+class KittiRawDataset : public Dataset {
+ public:
+  KittiRawDataset(const SourceSpec& spec, const std::filesystem::path& base)
+      : root_(spec.root, base) {
+    root_.require_folder("");
+    for (const std::string& date : root_.folders_in("")) {
+      if (is_date(date)) add_date(date);
+    }
+    if (drives_.empty()) {
+      throw InputError("expected DATE/DATE_drive_NNNN_sync folders, got none, in " +
+                       root_.written(""));
+    }
+    std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
+    std::ranges::sort(annotation_files_);
+  }
+
+  const LabelSchema& label_schema() const override { return kitti_label_schema(); }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
+  std::vector<std::string> annotation_files() const override { return annotation_files_; }
+  std::vector<std::string> notes() const override { return notes_; }
+
+  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
+    return drives_.at(frame.sequence).frames.neighbour(frame.frame.index, steps);
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    // "DATE/DRIVE#FRAME"
+    const std::size_t mark = std::min(label_key.rfind('#'), label_key.size());
+    const auto drive =
+        drives_.find(std::filesystem::path(label_key.substr(0, mark)).filename().string());
+    const auto frame = parse_number<std::int64_t>(
+        std::string_view(label_key).substr(std::min(mark + 1, label_key.size())));
+    if (!frame || drive == drives_.end()) {
+      return SampleFault{"expected DATE/DRIVE#FRAME, got " + in_quotes(label_key) + ", in " +
+                         root_.written("")};
+    }
+    return annotate(drive->second, *frame);
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    const std::size_t mark = std::min(label_key.rfind('#'), label_key.size());
+    return root_.written(label_key.substr(0, mark) + kTrackletFile + label_key.substr(mark));
+  }
+
+ private:
+  static Outcome<Annotation> annotate(const Drive& drive, std::int64_t number) {
+    Annotation annotation;
+    if (!drive.tracklets) return annotation;
+    auto outcome = drive.tracklets->frame(number);
+    if (auto* fault = std::get_if<SampleFault>(&outcome)) return std::move(*fault);
+    auto& frame = std::get<TrackletFrame>(outcome);
+    annotation.original = std::move(frame.json);
+    if (drive.calibration == nullptr) return annotation;
+    for (const TrackletPose& pose : frame.poses) {
+      if (const auto box = to_box(pose, *drive.calibration)) annotation.boxes.push_back(*box);
+    }
+    return annotation;
+  }
+
+  void add_date(const std::string& date) {
+    std::vector<std::string> names = root_.folders_in(date);
+    std::erase_if(names, [&](const std::string& name) { return !is_drive_of(name, date); });
+    if (names.empty()) return;
+
+    const RawCalibration* calibration = nullptr;
+    if (auto read = read_raw_calibration(root_, date)) {
+      calibration = &(calibrations_[date] = *read);
+      for (const char* file : {"/calib_cam_to_cam.txt", "/calib_velo_to_cam.txt"}) {
+        annotation_files_.push_back(root_.written(date + file));
+      }
+    }
+    int with_tracklets = 0;
+    for (const std::string& name : names) with_tracklets += add_drive(date, name, calibration);
+    if (calibration == nullptr && with_tracklets > 0) {
+      notes_.push_back(
+          "no boxes from the tracklets of " + std::to_string(with_tracklets) +
+          " drives, since calib_velo_to_cam.txt or calib_cam_to_cam.txt is missing in " +
+          root_.written(date));
+    }
+  }
+
+  /// True if the drive has tracklets.
+  bool add_drive(const std::string& date, const std::string& name,
+                 const RawCalibration* calibration) {
+    const std::string folder = date + "/" + name;
+    Drive drive{RawDrive(root_, folder), std::nullopt, calibration};
+    if (const auto& path = drive.frames.timestamps_path(); !path.empty()) {
+      annotation_files_.push_back(path);
+    }
+    const std::string labels = folder + kTrackletFile;
+    if (root_.has_file(labels)) {
+      annotation_files_.push_back(root_.written(labels));
+      drive.tracklets.emplace(root_.read_or_throw(labels), root_.written(labels));
+      note_labels_without_pictures(drive, root_.written(labels));
+    }
+    for (const auto& [number, file] : drive.frames.pictures().frames()) {
+      LabelledFrame frame;
+      frame.sample_id = name + "/" + file.substr(0, file.rfind('.'));
+      frame.sequence = name;
+      frame.frame = drive.frames.frame(number).frame;
+      frame.label_key = folder + "#" + std::to_string(number);
+      frames_.push_back(std::move(frame));
+    }
+    const bool has_tracklets = drive.tracklets.has_value();
+    drives_.emplace(name, std::move(drive));
+    return has_tracklets;
+  }
+
+  void note_labels_without_pictures(const Drive& drive, const std::string& path) {
+    const auto frames = drive.tracklets->frames();
+    const auto missing = std::ranges::count_if(
+        frames, [&](std::int64_t frame) { return !drive.frames.pictures().contains(frame); });
+    if (missing == 0) return;
+    notes_.push_back(std::to_string(missing) + " frames without a picture in " + path);
+  }
+
+  SourceRoot root_;
+  std::map<std::string, RawCalibration> calibrations_;  ///< by date
+  std::map<std::string, Drive> drives_;                 ///< by name, which holds the date
+  std::vector<LabelledFrame> frames_;
+  std::vector<std::string> annotation_files_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,
+                                                const std::filesystem::path& base) {
+  return std::make_unique<KittiRawDataset>(spec, base);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "manifests/job_manifest.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// KITTI raw, synchronised and rectified: DATE/DATE_drive_NNNN_sync below the root, each with
+/// image_02/data and perhaps image_02/timestamps.txt and tracklet_labels.xml; DATE/calib_*.txt
+/// beside them. Every picture is a labelled frame: without tracklets its annotation is empty, with
+/// them `original` is TrackletFrame::json, and there are boxes if the date's calibration is there.
+/// sample_id "2011_09_26_drive_0052_sync/0000000007".
+std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,
+                                                const std::filesystem::path& base);
+
+}  // namespace eventgan

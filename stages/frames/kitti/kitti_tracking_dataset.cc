@@ -1,0 +1,113 @@
+#include "stages/frames/kitti/kitti_tracking_dataset.h"
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/kitti/text_table.h"
+#include "stages/frames/kitti/timestamps.h"
+#include "stages/frames/kitti/tracking_labels.h"
+#include "stages/frames/numbered_sequence.h"
+#include "stages/frames/padded_number.h"
+#include "stages/frames/source_root.h"
+
+namespace eventgan {
+namespace {
+
+struct Sequence {
+  NumberedSequence pictures;
+  TrackingLabels labels;
+};
+
+class KittiTrackingDataset : public Dataset {
+ public:
+  KittiTrackingDataset(const SourceSpec& spec, const std::filesystem::path& base)
+      : root_(spec.root, base) {
+    root_.require_folder("label_02");
+    root_.require_folder("image_02");
+    for (const std::string& name : root_.files_in("label_02")) {
+      if (name.ends_with(".txt")) add_sequence(name.substr(0, name.size() - 4));
+    }
+    std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
+    const auto pictures = root_.folders_in("image_02");
+    const auto unlabelled = std::ranges::count_if(
+        pictures, [&](const std::string& name) { return !sequences_.contains(name); });
+    if (unlabelled > 0) {
+      notes_.push_back(std::to_string(unlabelled) + " sequences without labels in " +
+                       root_.written("image_02"));
+    }
+  }
+
+  const LabelSchema& label_schema() const override { return kitti_label_schema(); }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
+  std::vector<std::string> annotation_files() const override { return annotation_files_; }
+  std::vector<std::string> notes() const override { return notes_; }
+
+  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
+    const auto place = sequences_.at(frame.sequence).pictures.at(frame.frame.index, steps);
+    return {place.state, frame_ref(frame.sequence, place)};
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    // "label_02/SEQ.txt#FRAME"
+    const std::size_t mark = std::min(label_key.rfind('#'), label_key.size());
+    const std::string name = std::filesystem::path(label_key.substr(0, mark)).stem().string();
+    const auto sequence = sequences_.find(name);
+    const auto frame = parse_number<std::int64_t>(
+        std::string_view(label_key).substr(std::min(mark + 1, label_key.size())));
+    if (!frame || sequence == sequences_.end()) {
+      return SampleFault{"expected label_02/SEQUENCE.txt#FRAME, got " + in_quotes(label_key) +
+                         ", in " + root_.written("")};
+    }
+    return sequence->second.labels.annotation(*frame);
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return root_.written(label_key);
+  }
+
+ private:
+  void add_sequence(const std::string& name) {
+    const std::string label = "label_02/" + name + ".txt";
+    annotation_files_.push_back(root_.written(label));
+    const auto [place, is_new] = sequences_.emplace(
+        name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
+                       TrackingLabels(root_.read_or_throw(label), root_.written(label))});
+    const Sequence& sequence = place->second;
+
+    std::set<std::int64_t> numbers;
+    for (const std::int64_t number : sequence.labels.frames()) numbers.insert(number);
+    for (const auto& [number, file] : sequence.pictures.frames()) numbers.insert(number);
+    for (const std::int64_t number : numbers) {
+      LabelledFrame frame;
+      frame.sample_id = name + "/" + padded_number(number);
+      frame.sequence = name;
+      frame.frame = frame_ref(name, sequence.pictures.at(number, 0));
+      frame.label_key = label + "#" + std::to_string(number);
+      frames_.push_back(std::move(frame));
+    }
+  }
+
+  FrameRef frame_ref(const std::string& sequence, const NumberedSequence::Place& place) const {
+    const std::string name = place.name.empty() ? padded_number(place.number) + ".png" : place.name;
+    return {root_.written("image_02/" + sequence + "/" + name), place.number, -1,
+            static_cast<double>(place.number) * kKittiFrameSeconds};
+  }
+
+  SourceRoot root_;
+  std::map<std::string, Sequence> sequences_;
+  std::vector<LabelledFrame> frames_;
+  std::vector<std::string> annotation_files_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_kitti_tracking_dataset(const SourceSpec& spec,
+                                                     const std::filesystem::path& base) {
+  return std::make_unique<KittiTrackingDataset>(spec, base);
+}
+
+}  // namespace eventgan

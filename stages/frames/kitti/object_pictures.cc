@@ -1,0 +1,43 @@
+#include "stages/frames/kitti/object_pictures.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+
+/// "_01" for the frame one before.
+std::string previous_mark(int steps_back) { return "_0" + std::to_string(steps_back); }
+
+}  // namespace
+
+ObjectPictures::ObjectPictures(const SourceRoot& root) {
+  root.require_folder("image_2");
+  labelled_ = NumberedSequence::list(root.on_disk("image_2"));
+  for (int k = 1; k <= kPrevious; ++k) {
+    // A frame's number in prev_2 is the labelled picture's; the mark counts as part of the
+    // extension.
+    const std::string png = previous_mark(k) + ".png";
+    const std::string jpg = previous_mark(k) + ".jpg";
+    previous_[static_cast<std::size_t>(k - 1)] =
+        NumberedSequence::list(root.on_disk("prev_2"), "", {png, jpg});
+  }
+}
+
+ObjectPictures::Place ObjectPictures::at(std::int64_t number, const std::string& stem,
+                                         int steps) const {
+  if (steps == 0) {
+    const auto place = labelled_.find(number);
+    if (place.state == State::kPresent) return {State::kPresent, "image_2/" + place.name};
+    return {State::kHole, "image_2/" + stem + ".png"};
+  }
+  const auto back = static_cast<std::size_t>(-steps);
+  const auto place = previous_[back - 1].find(number);
+  if (place.state == State::kPresent) return {State::kPresent, "prev_2/" + place.name};
+  State state = State::kBeyond;
+  for (std::size_t further = back; further < previous_.size(); ++further) {
+    if (previous_[further].contains(number)) state = State::kHole;
+  }
+  return {state, "prev_2/" + stem + previous_mark(-steps) + ".png"};
+}
+
+}  // namespace eventgan

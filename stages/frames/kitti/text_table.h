@@ -1,0 +1,45 @@
+#pragma once
+
+#include <charconv>
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <system_error>
+#include <type_traits>
+#include <vector>
+
+namespace eventgan {
+
+/// One line of a text and its number, counted from 1.
+struct TextLine {
+  std::string_view bytes;  ///< with its line end, if it has one
+  int number = 0;
+};
+
+/// The lines of `text`, which concatenated are `text` again. Views into `text`.
+std::vector<TextLine> split_lines(std::string_view text);
+
+/// The columns of a line between spaces, tabs and line ends (LF or CRLF). Views into `line`.
+std::vector<std::string_view> split_columns(std::string_view line);
+
+/// The whole token as a finite number, or nothing.
+template <class Number>
+std::optional<Number> parse_number(std::string_view token) {
+  Number number{};
+  const char* end = token.data() + token.size();
+  const auto [stop, error] = std::from_chars(token.data(), end, number);
+  if (error != std::errc() || stop != end) return std::nullopt;
+  if constexpr (std::is_floating_point_v<Number>) {
+    if (!std::isfinite(number)) return std::nullopt;
+  }
+  return number;
+}
+
+/// Foreign text for a message: in quotes, cut to 40 characters, all but printable ASCII as '?'.
+std::string in_quotes(std::string_view text);
+
+/// "PATH:LINE".
+std::string place_in_file(const std::string& path, int line);
+
+}  // namespace eventgan
