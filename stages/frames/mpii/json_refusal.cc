@@ -1,0 +1,16 @@
+#include <stdexcept>
+
+#include "stages/frames/mpii/json_refusal_internal.h"
+
+namespace eventgan {
+
+void refuse_json(const std::string& where, const std::string& expected,
+                 const nlohmann::ordered_json& got) {
+  constexpr std::size_t kReadable = 80;
+  std::string text =
+      got.dump(-1, ' ', /*ensure_ascii=*/true, nlohmann::ordered_json::error_handler_t::replace);
+  if (text.size() > kReadable) text = text.substr(0, kReadable) + "...";
+  throw std::invalid_argument("expected " + expected + ", got " + text + " at " + where);
+}
+
+}  // namespace eventgan

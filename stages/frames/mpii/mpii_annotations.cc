@@ -1,0 +1,107 @@
+#include "stages/frames/mpii/mpii_annotations.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/frames/mpii/mat_file_internal.h"
+#include "stages/frames/mpii/mat_json_internal.h"
+#include "stages/frames/mpii/mpii_person_internal.h"
+
+namespace eventgan {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// image.name of an element of annolist or annolist_keyframes; empty if it has none.
+std::string image_name(const Json& element) {
+  static const Json::json_pointer kName("/image/name");
+  if (!element.contains(kName) || !element.at(kName).is_string()) return {};
+  return element.at(kName).get<std::string>();
+}
+
+/// Element `index` of RELEASE's array `name`, if it has one. (single_person may be shorter than
+/// annolist.)
+void copy_element(matvar_t* release, const char* name, std::size_t index, Json& entry) {
+  matvar_t* array = mat_field(release, name);
+  if (index < mat_size(array)) entry[name] = mat_element_to_json(array, index);
+}
+
+std::string dump(const Json& json) {
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// Turns what mat_to_json refuses into an error that names the file.
+template <class Read>
+auto reading(const std::filesystem::path& file, Read read) try {
+  return read();
+} catch (const std::invalid_argument& error) {
+  throw InputError(std::string(error.what()) + ", in " + file.string());
+}
+
+std::vector<Json> read_keyframe_elements(const std::filesystem::path& file) {
+  const MatVariable variable = read_mat_variable(file, "annolist_keyframes");
+  return reading(file, [&] {
+    std::vector<Json> elements;
+    for (std::size_t i = 0; i < mat_size(variable.get()); ++i) {
+      elements.push_back(mat_element_to_json(variable.get(), i));
+    }
+    return elements;
+  });
+}
+
+}  // namespace
+
+std::vector<std::string> read_mpii_keyframes(const std::filesystem::path& keyframes) {
+  std::vector<std::string> names;
+  for (const Json& element : read_keyframe_elements(keyframes))
+    names.push_back(image_name(element));
+  return names;
+}
+
+std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annotations,
+                                             const std::filesystem::path& keyframes) {
+  std::vector<Json> keyframe_elements = read_keyframe_elements(keyframes);
+  const MatVariable release = read_mat_variable(annotations, "RELEASE");
+  matvar_t* annolist = mat_field(release.get(), "annolist");
+  matvar_t* img_train = mat_field(release.get(), "img_train");
+  const std::size_t count = mat_size(annolist);
+  const auto expect_count = [count](const char* name, std::size_t got,
+                                    const std::filesystem::path& file) {
+    if (got == count) return;
+    throw InputError("expected " + std::to_string(count) + " elements in " + name +
+                     ", as many as in annolist, got " + std::to_string(got) + ", in " +
+                     file.string());
+  };
+  if (count == 0) {
+    throw InputError("expected images in RELEASE.annolist, got none, in " + annotations.string());
+  }
+  expect_count("img_train", mat_size(img_train), annotations);
+  expect_count("annolist_keyframes", keyframe_elements.size(), keyframes);
+
+  return reading(annotations, [&] {
+    std::vector<MpiiEntry> entries;
+    entries.reserve(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      Json entry = mat_element_to_json(annolist, i);
+      MpiiEntry read;
+      read.image = image_name(entry);
+      if (read.image.empty()) {
+        throw std::invalid_argument("expected image.name in annolist[" + std::to_string(i) +
+                                    "], got none");
+      }
+      read.has_persons = has_mpii_persons(entry);
+      copy_element(release.get(), "img_train", i, entry);
+      read.is_train = entry["img_train"] == 1 || entry["img_train"] == true;
+      copy_element(release.get(), "single_person", i, entry);
+      copy_element(release.get(), "act", i, entry);
+      read.keyframe = image_name(keyframe_elements[i]);
+      entry["annolist_keyframes"] = std::move(keyframe_elements[i]);
+      read.json = dump(entry);
+      entries.push_back(std::move(read));
+    }
+    return entries;
+  });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,115 @@
+#include "stages/frames/mpii/mpii_dataset.h"
+
+#include <malloc.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <unordered_map>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/frames/mpii/mpii_annotations.h"
+#include "stages/frames/mpii/mpii_frames.h"
+#include "stages/frames/mpii/mpii_joints.h"
+#include "stages/frames/mpii/mpii_person_internal.h"
+#include "stages/frames/mpii/mpii_places.h"
+
+namespace eventgan {
+namespace {
+
+class MpiiDataset final : public Dataset {
+ public:
+  MpiiDataset(MpiiPlaces places, const std::filesystem::path& base, const std::string& split)
+      : places_(std::move(places)), frames_(base, places_.image_folders, places_.sequence_folders) {
+    take(read_mpii_annotations(base / places_.annotations, base / places_.keyframes), split);
+    sort_samples(labelled_, places_.annotations);
+  }
+
+  const LabelSchema& label_schema() const override { return mpii_label_schema(); }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
+  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
+    return frames_.neighbour(frame, steps);
+  }
+  std::vector<std::string> notes() const override { return notes_; }
+
+  std::vector<std::string> annotation_files() const override {
+    return {std::min(places_.annotations, places_.keyframes),
+            std::max(places_.annotations, places_.keyframes)};
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    const auto entry = entries_.find(label_key);
+    if (entry == entries_.end()) {
+      return SampleFault{"expected a labelled image, got none under " + label_key + ", in " +
+                         places_.annotations};
+    }
+    try {
+      Annotation annotation;
+      annotation.persons = parse_mpii_persons(nlohmann::ordered_json::parse(entry->second.json));
+      annotation.original = entry->second.json;
+      return annotation;
+    } catch (const std::invalid_argument& error) {
+      return SampleFault{std::string(error.what()) + ", in " + label_place(label_key) +
+                         " (sample " + without_extension(entry->second.image) + ")"};
+    }
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return places_.annotations + ":" + label_key;
+  }
+
+ private:
+  void take(std::vector<MpiiEntry> entries, const std::string& split) {
+    std::size_t other_split = 0, unlabelled = 0, alone = 0, misnamed = 0;
+    std::string first_misnamed;
+    for (std::size_t i = 0; i < entries.size(); ++i) {
+      MpiiEntry& entry = entries[i];
+      if (!entry.has_persons) {
+        ++unlabelled;
+        continue;
+      }
+      if ((split == "train" && !entry.is_train) || (split == "test" && entry.is_train)) {
+        ++other_split;
+        continue;
+      }
+      LabelledFrame frame = frames_.labelled(entry.image, entry.keyframe);
+      frame.label_key = "annolist[" + std::to_string(i) + "]";
+      if (frame.sequence.empty()) ++alone;
+      if (!frame.sequence.empty() && frame.sequence != frame.sample_id && misnamed++ == 0) {
+        first_misnamed = entry.image + " in " + entry.keyframe;
+      }
+      entries_.emplace(frame.label_key, std::move(entry));
+      labelled_.push_back(std::move(frame));
+    }
+    const auto note = [this](std::size_t count, const std::string& what) {
+      if (count > 0) notes_.push_back(std::to_string(count) + " " + what);
+    };
+    note(unlabelled, "images without annotation in " + places_.annotations);
+    note(other_split, "annotated images left out, not of split " + split);
+    note(alone, "annotated images without a sequence folder: they have no neighbours");
+    note(misnamed,
+         "keyframes in a sequence not named as their image (first: " + first_misnamed + ")");
+  }
+
+  MpiiPlaces places_;
+  MpiiFrames frames_;
+  std::unordered_map<std::string, MpiiEntry> entries_;  ///< by label_key
+  std::vector<LabelledFrame> labelled_;
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_mpii_dataset(const SourceSpec& spec,
+                                           const std::filesystem::path& base) {
+  auto dataset = std::make_unique<MpiiDataset>(find_mpii_places(spec, base), base, spec.split);
+#ifdef __GLIBC__
+  // For the real file matio takes some 700 MB in small pieces. Freed, they would stay with the
+  // process; given back, some 50 MB do.
+  malloc_trim(0);
+#endif
+  return dataset;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,129 @@
+#include "stages/frames/mpii/mpii_frames.h"
+
+#include <algorithm>
+#include <charconv>
+#include <optional>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/frames/folder_listing.h"
+#include "stages/frames/mpii/same_bytes.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string joined(const std::string& folder, const std::string& name) {
+  return (fs::path(folder) / name).generic_string();
+}
+
+struct Keyframe {
+  std::string sequence;
+  std::int64_t number = 0;
+};
+
+/// "037454012/00000053.jpg" in its parts; nothing if it has another form.
+std::optional<Keyframe> parse_keyframe(const std::string& keyframe) {
+  const std::size_t slash = keyframe.rfind('/');
+  if (slash == std::string::npos || slash == 0) return std::nullopt;
+  const std::string digits = without_extension(std::string_view(keyframe).substr(slash + 1));
+  Keyframe parsed{keyframe.substr(0, slash), 0};
+  const char* const end = digits.data() + digits.size();
+  const auto [stop, error] = std::from_chars(digits.data(), end, parsed.number);
+  if (error != std::errc() || stop != end || parsed.number < 0) return std::nullopt;
+  return parsed;
+}
+
+}  // namespace
+
+MpiiFrames::MpiiFrames(fs::path base, std::vector<std::string> image_folders,
+                       const std::vector<std::string>& sequence_folders)
+    : base_(std::move(base)), image_folders_(std::move(image_folders)) {
+  for (const std::string& folder : image_folders_) {
+    for (const std::string& name : list_folder(base_ / folder).files) {
+      images_.try_emplace(name, joined(folder, name));
+    }
+  }
+  for (const std::string& folder : sequence_folders) {
+    for (const std::string& name : list_folder(base_ / folder).folders) {
+      if (!name.starts_with(kMpiiBatchPrefix)) {
+        sequences_.try_emplace(name, joined(folder, name));
+        continue;
+      }
+      const std::string batch = joined(folder, name);
+      for (const std::string& inner : list_folder(base_ / batch).folders) {
+        sequences_.try_emplace(inner, joined(batch, inner));
+      }
+    }
+  }
+}
+
+LabelledFrame MpiiFrames::labelled(const std::string& image, const std::string& keyframe) const {
+  LabelledFrame labelled;
+  labelled.sample_id = without_extension(image);
+  if (const auto parsed = parse_keyframe(keyframe)) {
+    labelled.frame.index = parsed->number;
+    if (const auto sequence = sequences_.find(parsed->sequence); sequence != sequences_.end()) {
+      labelled.sequence = parsed->sequence;
+      labelled.frame.path =
+          joined(sequence->second.folder, keyframe.substr(keyframe.rfind('/') + 1));
+      return labelled;
+    }
+  }
+  const auto picture = images_.find(image);
+  labelled.frame.path =
+      picture != images_.end() ? picture->second : joined(image_folders_.front(), image);
+  return labelled;
+}
+
+const NumberedSequence& MpiiFrames::frames_of(const Sequence& sequence) const {
+  std::call_once(sequence.listed,
+                 [&] { sequence.frames = NumberedSequence::list(base_ / sequence.folder); });
+  return sequence.frames;
+}
+
+Neighbour MpiiFrames::neighbour(const LabelledFrame& labelled, int steps) const {
+  using State = Neighbour::State;
+  const auto sequence = sequences_.find(labelled.sequence);
+  if (sequence == sequences_.end()) {
+    if (steps != 0) return {};
+    const bool present = images_.contains(fs::path(labelled.frame.path).filename().string());
+    return {present ? State::kPresent : State::kHole, labelled.frame};
+  }
+  const auto place = frames_of(sequence->second).at(labelled.frame.index, steps);
+  if (place.state == State::kBeyond) return {};
+  if (steps == 0 && place.state == State::kHole) return {State::kHole, labelled.frame};
+  Neighbour neighbour{place.state, {}};
+  neighbour.frame.path = joined(sequence->second.folder, place.name);
+  neighbour.frame.index = place.number;
+  return neighbour;
+}
+
+std::string MpiiFrames::find_keyframe(const std::string& image) const {
+  const auto sequence = sequences_.find(without_extension(image));
+  const auto picture = images_.find(image);
+  if (sequence == sequences_.end() || picture == images_.end()) return {};
+  for (const auto& [number, name] : frames_of(sequence->second).frames()) {
+    if (same_bytes(base_ / picture->second, base_ / sequence->second.folder / name)) {
+      return sequence->first + "/" + name;
+    }
+  }
+  return {};
+}
+
+std::string without_extension(std::string_view name) {
+  const std::size_t dot = name.rfind('.');
+  return std::string(dot == std::string_view::npos || dot == 0 ? name : name.substr(0, dot));
+}
+
+void sort_samples(std::vector<LabelledFrame>& frames, const fs::path& file) {
+  std::ranges::sort(frames, {}, &LabelledFrame::sample_id);
+  const auto twice = std::ranges::adjacent_find(frames, {}, &LabelledFrame::sample_id);
+  if (twice != frames.end()) {
+    throw InputError("expected each image once, got " + twice->sample_id + " twice, in " +
+                     file.string());
+  }
+}
+
+}  // namespace eventgan

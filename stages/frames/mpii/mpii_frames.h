@@ -1,0 +1,72 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <string>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "stages/frames/dataset.h"
+#include "stages/frames/numbered_sequence.h"
+
+namespace eventgan {
+
+/// How the folders that MPII's sequences are downloaded as begin; each holds many sequences.
+inline constexpr std::string_view kMpiiBatchPrefix = "mpii_human_pose_v1_sequences";
+
+/// Where MPII's pictures lie: single ones in folders of images, and the videos around them as one
+/// folder of numbered frames each. All paths are as the manifest writes them; relative ones start
+/// at `base`.
+///
+/// A labelled frame with a sequence *is* its keyframe, FrameRef::index being the keyframe's number;
+/// one without is the single picture and has no neighbours. Times are unknown: the rate differs
+/// from video to video.
+///
+/// Thread safety: const methods may be called from several threads; a sequence is listed when its
+/// first neighbour is asked for.
+class MpiiFrames {
+ public:
+  /// A picture is looked for in `image_folders` in turn. `sequence_folders` hold folders named as
+  /// the sequences, directly or inside the download's mpii_human_pose_v1_sequences_batchN. Absent
+  /// folders count as empty. Throws InputError if a folder cannot be read.
+  MpiiFrames(std::filesystem::path base, std::vector<std::string> image_folders,
+             const std::vector<std::string>& sequence_folders);
+
+  /// The frame labelled through `image` ("037454012.jpg"), whose name without extension is its
+  /// sample_id. It lies in its video if `keyframe` ("037454012/00000053.jpg") has a folder here. No
+  /// label_key.
+  LabelledFrame labelled(const std::string& image, const std::string& keyframe) const;
+
+  /// As Dataset::neighbour. InputError if the sequence's folder cannot be read.
+  Neighbour neighbour(const LabelledFrame& frame, int steps) const;
+
+  /// "NAME/00000053.jpg": the frame of sequence NAME whose file is byte for byte that of `image`;
+  /// empty if there is none. For lists that do not say which frame was labelled. Reads files.
+  std::string find_keyframe(const std::string& image) const;
+
+ private:
+  struct Sequence {
+    explicit Sequence(std::string written) : folder(std::move(written)) {}
+    std::string folder;
+    mutable std::once_flag listed;
+    mutable NumberedSequence frames;
+  };
+
+  const NumberedSequence& frames_of(const Sequence& sequence) const;
+
+  std::filesystem::path base_;
+  std::vector<std::string> image_folders_;
+  std::unordered_map<std::string, std::string> images_;  ///< name to path as written
+  std::map<std::string, Sequence, std::less<>> sequences_;
+};
+
+/// `name` without its last extension.
+std::string without_extension(std::string_view name);
+
+/// Sorts by sample_id. Throws InputError naming `file` if two samples have one.
+void sort_samples(std::vector<LabelledFrame>& frames, const std::filesystem::path& file);
+
+}  // namespace eventgan

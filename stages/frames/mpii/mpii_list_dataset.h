@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "manifests/job_manifest.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// MPII as pose trainers keep it: the manifest's `annotations` is a JSON list of people ("image",
+/// "center", "scale", "joints", "joints_vis") or an HDF5 table of them (valid.h5, train.h5).
+/// Pictures are found by name in ROOT/images, then in ROOT. Rows of one image make one sample of
+/// several persons, in the file's order.
+///
+/// Joints and centre become 0-based; centre and scale are otherwise as the file has them: those of
+/// a table are already moved and multiplied by 1.25 (see parse_mpii_list_row). There are no head
+/// boxes. Annotation::original is a JSON list of the image's rows with all their fields.
+///
+/// A list does not say which frame of a video was labelled. If the manifest gives `sequences`
+/// (SEQUENCES/NAME/00000053.jpg, NAME being the image's), it is taken from
+/// mpii_human_pose_v1_sequences_keyframes.mat beside the annotations, in or beside SEQUENCES, or in
+/// ROOT; without that file it is the frame whose file is byte for byte that of the image, which
+/// reads all of the sequences' file sizes. Images without such a frame, and all without
+/// `sequences`, have no neighbours.
+///
+/// Relative paths start at `base`. Everything is read at opening (HDF5 and matio are not thread
+/// safe). Throws UsageError without `annotations`; InputError if a file or folder is missing or
+/// damaged.
+std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec,
+                                                const std::filesystem::path& base);
+
+}  // namespace eventgan

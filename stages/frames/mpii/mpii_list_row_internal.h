@@ -1,0 +1,34 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "manifests/labels.h"
+
+namespace eventgan {
+
+/// The two forms in which pose trainers keep MPII's people, one row a person. They differ in names,
+/// in how they mark what is missing, and in centre and scale (see parse_mpii_list_row).
+enum class MpiiListForm { kJsonList, kTable };
+
+/// Rows as the file has them: every field, as JSON.
+struct MpiiList {
+  MpiiListForm form = MpiiListForm::kJsonList;
+  std::vector<nlohmann::ordered_json> rows;
+  std::vector<std::string> notes;
+};
+
+/// The field that names the row's image: "image" or "imgname".
+const char* image_field(MpiiListForm form);
+
+/// The person of one row. Joints and centre count pixels from 1 in both forms; one is taken from
+/// them here, once. Centre and scale are as the file has them; a table's are those of stacked
+/// hourglass: the centre is already moved down by 15 scale, the scale already multiplied by 1.25. A
+/// joint is missing at (-1, -1) in a list and (0, 0) in a table, a centre at (-1, -1) in both.
+/// Joints may be absent (the list of test images). Visibility is what the file says; the usual
+/// lists say 1 of every annotated joint, also of a hidden one, where the table says 0. Throws
+/// std::invalid_argument("expected .., got .. at joints").
+Person parse_mpii_list_row(const nlohmann::ordered_json& row, MpiiListForm form);
+
+}  // namespace eventgan

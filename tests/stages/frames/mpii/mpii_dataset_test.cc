@@ -1,0 +1,164 @@
+#include "stages/frames/mpii/mpii_dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "stages/frames/mpii/mpii_joints.h"
+#include "tests/stages/frames/mpii/mpii_fixture.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+namespace mat = testing::mat;
+
+std::vector<std::string> ids(const Dataset& dataset) {
+  std::vector<std::string> found;
+  for (const auto& frame : dataset.labelled_frames()) found.push_back(frame.sample_id);
+  return found;
+}
+
+class MpiiDatasetTest : public ::testing::Test {
+ protected:
+  MpiiDatasetTest() {
+    spec_.dataset = DatasetKind::kMpii;
+    spec_.root = "m";
+    testing::write_file(folder_ / "m/images/b.jpg", "b");
+    testing::write_file(folder_ / "m/sequences/b/00000007.jpg", "b7");
+    testing::write_file(folder_ / "m/sequences/b/00000008.jpg", "b8");
+  }
+  void write_four() {
+    mat::write_mpii(folder_ / "m", {{"c.jpg", mat::centre_only(), false, "c/00000001.jpg"},
+                                    {"b.jpg", mat::two_persons(), true, "b/00000007.jpg"},
+                                    {"d.jpg", mat::empty(), true, "d/00000001.jpg"},
+                                    {"a.jpg", mat::two_persons(), true, "a/00000001.jpg"}});
+  }
+  std::unique_ptr<Dataset> open() const { return open_mpii_dataset(spec_, folder_.path()); }
+
+  testing::TemporaryFolder folder_;
+  SourceSpec spec_;
+};
+
+TEST_F(MpiiDatasetTest, TheSplitChoosesByImgTrain) {
+  write_four();
+  spec_.split = "train";
+  EXPECT_THAT(ids(*open()), ElementsAre("a", "b"));
+  EXPECT_THAT(open()->notes(),
+              ElementsAre("1 images without annotation in m/mpii_human_pose_v1_u12_1.mat",
+                          "1 annotated images left out, not of split train",
+                          "1 annotated images without a sequence folder: they have no neighbours"));
+  spec_.split = "test";
+  EXPECT_THAT(ids(*open()), ElementsAre("c"));
+  spec_.split = "everything";
+  EXPECT_THAT(ids(*open()), ElementsAre("a", "b", "c"));
+}
+
+TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
+  write_four();
+  const auto dataset = open();
+  EXPECT_EQ(dataset->label_schema().joint_names.size(), kMpiiJointCount);
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("m/mpii_human_pose_v1_sequences_keyframes.mat",
+                          "m/mpii_human_pose_v1_u12_1.mat"));
+  const LabelledFrame& frame = dataset->labelled_frames()[1];
+  EXPECT_EQ(frame.label_key, "annolist[1]");
+  EXPECT_EQ(dataset->label_place(frame.label_key), "m/mpii_human_pose_v1_u12_1.mat:annolist[1]");
+  EXPECT_EQ(frame.frame, (FrameRef{"m/sequences/b/00000007.jpg", 7}));
+  EXPECT_EQ(dataset->neighbour(frame, 1).frame, (FrameRef{"m/sequences/b/00000008.jpg", 8}));
+  EXPECT_EQ(dataset->neighbour(frame, 2).state, State::kBeyond);
+
+  const auto outcome = dataset->annotation(frame.label_key);
+  ASSERT_FALSE(is_fault(outcome));
+  const auto& annotation = std::get<Annotation>(outcome);
+  EXPECT_EQ(nlohmann::json::parse(annotation.original)["image"]["name"], "b.jpg");
+  EXPECT_TRUE(annotation.boxes.empty());
+  ASSERT_EQ(annotation.persons.size(), 2u);
+  // The fixture's numbers less one, and its forms of is_visible: 1, '1', [], 0.
+  EXPECT_EQ(annotation.persons[0].joints[0], (Joint{{710, 620}, 1}));
+  EXPECT_EQ(annotation.persons[0].joints[1], (Joint{{714.5, 490}, 1}));
+  EXPECT_EQ(annotation.persons[0].joints[2], (Joint{{704, 370}, -1}));
+  EXPECT_EQ(annotation.persons[0].joints[9], (Joint{{780, 364}, 0}));
+  EXPECT_EQ(annotation.persons[1].center, (Point{99, 119}));
+  EXPECT_FALSE(annotation.persons[1].head_box);
+}
+
+TEST_F(MpiiDatasetTest, AMalformedEntryIsAFaultOfItsSampleOnly) {
+  mat::write_mpii(
+      folder_ / "m",
+      {{"a.jpg", mat::structure({{"annopoints", mat::structure({{"point", mat::number(3)}})}}),
+        true, "a/1.jpg"},
+       {"b.jpg", mat::two_persons(), true, "b/00000007.jpg"}});
+  const auto dataset = open();
+  const auto bad = dataset->annotation("annolist[0]");
+  ASSERT_TRUE(is_fault(bad));
+  EXPECT_EQ(std::get<SampleFault>(bad).reason,
+            "expected x, y and id, got 3 at annorect[0].annopoints.point[0], in "
+            "m/mpii_human_pose_v1_u12_1.mat:annolist[0] (sample a)");
+  EXPECT_FALSE(is_fault(dataset->annotation("annolist[1]")));
+  EXPECT_TRUE(is_fault(dataset->annotation("annolist[2]")));
+}
+
+TEST_F(MpiiDatasetTest, RefusesTwoImagesOfOneName) {
+  mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, ""},
+                                  {"a.png", mat::two_persons(), true, ""}});
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got a twice")));
+}
+
+TEST_F(MpiiDatasetTest, NotesKeyframesInASequenceOfAnotherName) {
+  mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, "b/00000008.jpg"}});
+  EXPECT_THAT(open()->notes(),
+              ElementsAre("1 keyframes in a sequence not named as their image (first: a.jpg in "
+                          "b/00000008.jpg)"));
+}
+
+TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  SourceSpec spec;
+  spec.root = (data / "mpii").string();
+  spec.split = "all";
+  const auto dataset = open_mpii_dataset(spec, "/");
+  EXPECT_THAT(ids(*dataset), ElementsAre("000000001", "052475643"));
+  const LabelledFrame& juggler = dataset->labelled_frames()[0];
+  EXPECT_EQ(juggler.frame.path, spec.root + "/sequences/000000001/00000007.jpg");
+  // Frames 1..13 are there, 7 is labelled: six on either side.
+  for (int step = -6; step <= 6; ++step) {
+    const Neighbour neighbour = dataset->neighbour(juggler, step);
+    EXPECT_EQ(neighbour.state, State::kPresent) << step;
+    EXPECT_EQ(neighbour.frame.index, 7 + step);
+    EXPECT_TRUE(std::filesystem::exists(neighbour.frame.path));
+  }
+  EXPECT_EQ(dataset->neighbour(juggler, 7).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(juggler, -7).state, State::kBeyond);
+
+  const auto annotation = std::get<Annotation>(dataset->annotation(juggler.label_key));
+  ASSERT_EQ(annotation.persons.size(), 2u);
+  const Person& person = annotation.persons[0];
+  EXPECT_EQ(person.joints[0], (Joint{{710, 620}, 1}));         // x 711, y 621, is_visible 1
+  EXPECT_EQ(person.joints[1].visible, 1);                      // '1'
+  EXPECT_EQ(person.joints[2].visible, -1);                     // []
+  EXPECT_EQ(person.joints[3].visible, 0);                      // 0
+  EXPECT_EQ(person.center, (Point{741, 349}));                 // 742, 350
+  EXPECT_EQ(person.head_box, (Rectangle{705, 51, 775, 163}));  // 706, 52, 776, 164
+  EXPECT_EQ(annotation.persons[1].joints, std::vector<Joint>(16, Joint{kMissingPoint, 0}));
+
+  const auto original = nlohmann::json::parse(annotation.original);
+  EXPECT_EQ(original["annorect"][0]["annopoints"]["point"][1]["is_visible"], "1");
+  EXPECT_EQ(original["annorect"][0]["annopoints"]["point"].size(), 16u);
+  EXPECT_EQ(original["act"]["act_name"], "soccer, juggling");
+  EXPECT_EQ(original["annolist_keyframes"]["image"]["name"], "000000001/00000007.jpg");
+
+  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 0).state, State::kPresent);
+  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 1).state, State::kBeyond);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,157 @@
+#include "stages/frames/mpii/mpii_list_dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "tests/stages/frames/mpii/mpii_fixture.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using State = Neighbour::State;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+namespace mat = testing::mat;
+
+class MpiiListDatasetTest : public ::testing::Test {
+ protected:
+  MpiiListDatasetTest() {
+    spec_.dataset = DatasetKind::kMpiiList;
+    spec_.root = "m";
+    spec_.annotations = "labels/list.json";
+    testing::write_file(folder_ / "m/images/b.jpg", "picture");
+    testing::write_file(folder_ / "labels/list.json",
+                        R"([{"image": "b.jpg", "scale": 1}, {"image": "a.jpg", "scale": 2},
+                            {"image": "b.jpg", "scale": 3, "center": [11, 21]}])");
+    for (const char* frame : {"v/b/00000003.jpg", "v/b/00000004.jpg", "v/b/00000005.jpg"}) {
+      testing::write_file(folder_ / frame, frame);
+    }
+  }
+  std::unique_ptr<Dataset> open() const { return open_mpii_list_dataset(spec_, folder_.path()); }
+
+  testing::TemporaryFolder folder_;
+  SourceSpec spec_;
+};
+
+TEST_F(MpiiListDatasetTest, RowsOfOneImageAreOneSample) {
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 2u);
+  const LabelledFrame& frame = dataset->labelled_frames()[1];
+  EXPECT_EQ(frame.sample_id, "b");
+  const auto annotation = std::get<Annotation>(dataset->annotation(frame.label_key));
+  EXPECT_EQ(annotation.original,
+            R"([{"image":"b.jpg","scale":1},{"image":"b.jpg","scale":3,"center":[11,21]}])");
+  ASSERT_EQ(annotation.persons.size(), 2u);
+  EXPECT_EQ(annotation.persons[0].scale, 1);
+  EXPECT_EQ(annotation.persons[1].center, (Point{10, 20}));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("labels/list.json"));
+}
+
+TEST_F(MpiiListDatasetTest, WithoutSequencesThereAreNoNeighbours) {
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  EXPECT_EQ(dataset->neighbour(frames[0], 0).state, State::kHole);  // a.jpg is absent
+  EXPECT_EQ(dataset->neighbour(frames[1], 0).state, State::kPresent);
+  EXPECT_EQ(dataset->neighbour(frames[1], 0).frame.path, "m/images/b.jpg");
+  EXPECT_EQ(dataset->neighbour(frames[1], -1).state, State::kBeyond);
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+}
+
+TEST_F(MpiiListDatasetTest, TheKeyframesFileTellsTheFrame) {
+  spec_.sequences = "v";
+  mat::write_mat(folder_ / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
+                 mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
+  const auto dataset = open();
+  const LabelledFrame& frame = dataset->labelled_frames()[1];
+  EXPECT_EQ(frame.frame, (FrameRef{"v/b/00000004.jpg", 4}));
+  EXPECT_EQ(dataset->neighbour(frame, -1).frame, (FrameRef{"v/b/00000003.jpg", 3}));
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("labels/list.json", "mpii_human_pose_v1_sequences_keyframes.mat"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 images whose frame is in no sequence: they have no neighbours"));
+}
+
+TEST_F(MpiiListDatasetTest, WithoutTheKeyframesFileTheBytesTell) {
+  spec_.sequences = "v";
+  testing::write_file(folder_ / "m/images/b.jpg", "v/b/00000005.jpg");
+  EXPECT_EQ(open()->labelled_frames()[1].frame, (FrameRef{"v/b/00000005.jpg", 5}));
+}
+
+TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
+  testing::write_file(
+      folder_ / "labels/list.json",
+      R"([{"image": "b.jpg"}, {"image": "b.jpg", "scale": "x"}, {"image": "a.jpg"}])");
+  const auto dataset = open();
+  const auto bad = dataset->annotation("b.jpg");
+  ASSERT_TRUE(is_fault(bad));
+  EXPECT_EQ(std::get<SampleFault>(bad).reason,
+            "expected a finite number, got \"x\" at scale of its person 1, in "
+            "labels/list.json:b.jpg (sample b)");
+  EXPECT_EQ(dataset->label_place("b.jpg"), "labels/list.json:b.jpg");
+  EXPECT_FALSE(is_fault(dataset->annotation("a.jpg")));
+  EXPECT_TRUE(is_fault(dataset->annotation("c.jpg")));
+}
+
+TEST_F(MpiiListDatasetTest, RefusesWhatItCannotOpen) {
+  testing::write_file(folder_ / "labels/list.json", R"([{"image": "b.jpg"}, {"image": "b.png"}])");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got b twice")));
+  spec_.sequences = "absent";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent")));
+  spec_.annotations.reset();
+  EXPECT_THROW(open(), UsageError);
+}
+
+/// The same five images in both forms. The table cuts the fractions off (only head joints have
+/// any), marks missing joints by (0, 0), and has moved and enlarged the box: y + 15 scale, 1.25
+/// scale.
+TEST(MpiiListDatasetOnSharedData, ListAndTableAgree) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  SourceSpec spec;
+  spec.root = "mpii_lists";
+  spec.annotations = "mpii_lists/test_mpii.json";
+  const auto list = open_mpii_list_dataset(spec, data);
+  spec.annotations = "mpii_lists/valid.h5";
+  const auto table = open_mpii_list_dataset(spec, data);
+  EXPECT_EQ(list->labelled_frames().size(), 5u);
+  EXPECT_EQ(table->labelled_frames().size(), 2729u);  // 2958 people
+
+  int hidden_in_table = 0;
+  for (const LabelledFrame& frame : list->labelled_frames()) {
+    EXPECT_EQ(list->neighbour(frame, 0).state, State::kPresent);
+    const auto listed = std::get<Annotation>(list->annotation(frame.label_key)).persons.at(0);
+    const auto tabled = std::get<Annotation>(table->annotation(frame.label_key)).persons.at(0);
+    for (int i = 0; i < 16; ++i) {
+      if (listed.joints[i].at == kMissingPoint) {
+        EXPECT_EQ(tabled.joints[i], listed.joints[i]);
+        continue;
+      }
+      EXPECT_EQ(tabled.joints[i].at,
+                (Point{std::floor(listed.joints[i].at.x), std::floor(listed.joints[i].at.y)}));
+      hidden_in_table += tabled.joints[i].visible == 0;
+      EXPECT_EQ(listed.joints[i].visible, 1);  // the list calls hidden joints visible, too
+    }
+    EXPECT_EQ(tabled.center.x, listed.center.x);
+    EXPECT_NEAR(tabled.center.y, listed.center.y + 15 * listed.scale, 1e-4);
+    EXPECT_NEAR(tabled.scale, 1.25 * listed.scale, 1e-5);
+  }
+  EXPECT_EQ(hidden_in_table, 2);
+  const auto person = std::get<Annotation>(list->annotation("005808361.jpg")).persons.at(0);
+  EXPECT_EQ(person.joints[0], (Joint{{803, 710}, 1}));  // 804, 711 in the file
+  const auto original = std::get<Annotation>(table->annotation("005808361.jpg")).original;
+  const auto row = nlohmann::json::parse(original).at(0);
+  for (const char* field : {"center", "imgname", "index", "normalize", "part", "person", "scale",
+                            "torsoangle", "visible"}) {
+    EXPECT_TRUE(row.contains(field)) << field;
+  }
+}
+
+}  // namespace
+}  // namespace eventgan
