@@ -1,0 +1,143 @@
+#include <algorithm>
+#include <map>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "manifests/faults.h"
+#include "stages/frames/human36m/indexed_dataset_internal.h"
+#include "stages/frames/human36m/layouts_internal.h"
+#include "stages/frames/human36m/npz_table_internal.h"
+#include "stages/frames/padded_number.h"
+#include "stages/frames/source_root.h"
+
+namespace eventgan {
+namespace {
+
+constexpr char kCameras[] = "cameras.pkl";
+
+/// The annotation file under both its names.
+struct Annotations {
+  std::string written;
+  std::filesystem::path on_disk;
+};
+
+Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::path& base,
+                               const SourceRoot& root) {
+  if (spec.annotations) return {*spec.annotations, base / *spec.annotations};
+  std::string candidates;
+  std::vector<std::string> fitting;
+  for (const std::string& name : root.files_in("")) {
+    if (!name.ends_with(".npz")) continue;
+    const std::string reason = why_no_human36m_npz(root.on_disk(name));
+    if (reason.empty()) fitting.push_back(name);
+    candidates += (candidates.empty() ? "; there is " : ", ") + name;
+    if (!reason.empty()) candidates += " (not usable: " + reason + ")";
+  }
+  if (fitting.size() == 1) return {root.written(fitting[0]), root.on_disk(fitting[0])};
+  throw UsageError(
+      "expected one .npz with imgname, center, scale, part [N, 17, 3] and S [N, 17, 4], got " +
+      std::to_string(fitting.size()) + ", in " + root.written("") +
+      ": name one under \"annotations\"" + candidates);
+}
+
+/// A video by the names of its labelled pictures.
+struct Video {
+  std::string folder;
+  std::vector<std::int64_t> labelled;
+};
+
+std::map<std::string, Video> videos_of(const NpzTable& table, const std::string& file) {
+  std::map<std::string, Video> videos;
+  for (std::size_t row = 0; row < table.row_count(); ++row) {
+    const ExtractedName& name = table.name(row);
+    Video& video = videos.try_emplace(name.sequence, Video{name.folder, {}}).first->second;
+    if (video.folder != name.folder) {
+      throw InputError("expected the pictures of " + name.sequence + " in one folder, got " +
+                       video.folder + " and " + name.folder + ", in " + file);
+    }
+    video.labelled.push_back(name.number);
+  }
+  return videos;
+}
+
+/// Stored frames by sequence, from one listing of a folder, which may hold several sequences.
+std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root,
+                                                  const std::string& folder) {
+  std::map<std::string, std::map<std::int64_t, std::string>> names;
+  for (const std::string& file : root.files_in(folder)) {
+    if (!file.ends_with(".jpg") && !file.ends_with(".png")) continue;
+    try {
+      const ExtractedName name = parse_extracted_name(file);
+      // Files come sorted, so a frame that is there as .jpg and .png counts once, as .jpg.
+      names[name.sequence].try_emplace(name.number, file);
+    } catch (const std::invalid_argument&) {  // another picture, a segmentation perhaps
+    }
+  }
+  std::map<std::string, NumberedSequence> sequences;
+  for (const auto& [sequence, files] : names) {
+    sequences.emplace(sequence, NumberedSequence({files.begin(), files.end()},
+                                                 NumberedSequence::Stride::kInferred));
+  }
+  return sequences;
+}
+
+void add_videos(const SourceRoot& root, const std::map<std::string, Video>& videos,
+                IndexedDataset& dataset) {
+  std::map<std::string, std::vector<std::string>> sequences_by_folder;
+  for (const auto& [sequence, video] : videos) {
+    sequences_by_folder[video.folder].push_back(sequence);
+  }
+  for (const auto& [folder, sequences] : sequences_by_folder) {
+    auto stored = stored_in(root, folder);
+    for (const std::string& sequence : sequences) {
+      dataset.add_video(
+          sequence, FrameFolder(root.written(folder), sequence + "_", std::move(stored[sequence]),
+                                videos.at(sequence).labelled));
+    }
+  }
+  std::vector<std::string> without_labels;
+  for (const std::string& subject : root.folders_in("")) {
+    if (!subject.starts_with('S')) continue;
+    for (const std::string& sequence : root.folders_in(subject)) {
+      const std::string folder = subject + "/" + sequence;
+      if (!sequences_by_folder.contains(folder)) without_labels.push_back(root.written(folder));
+    }
+  }
+  if (!without_labels.empty()) {
+    dataset.add_note(std::to_string(without_labels.size()) +
+                     " folders of pictures without labels, the first " + without_labels.front());
+  }
+}
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
+                                                 const std::filesystem::path& base) {
+  const SourceRoot root(spec.root, base);
+  root.require_folder("");
+  const Annotations annotations = choose_annotations(spec, base, root);
+  auto dataset = std::make_unique<IndexedDataset>();
+
+  CameraBook cameras;
+  const auto files = root.files_in("");
+  if (std::ranges::binary_search(files, kCameras)) {
+    cameras = read_camera_book(root.on_disk(kCameras));
+    dataset->add_annotation_file(root.written(kCameras));
+  }
+  auto table =
+      std::make_unique<NpzTable>(annotations.on_disk, annotations.written, std::move(cameras));
+  add_videos(root, videos_of(*table, annotations.written), *dataset);
+
+  const std::string key = annotations.on_disk.filename().string();
+  for (std::size_t row = 0; row < table->row_count(); ++row) {
+    const ExtractedName& name = table->name(row);
+    dataset->add_labelled(name.sequence + "_" + padded_number(name.number), name.sequence,
+                          name.number, key, row);
+  }
+  dataset->add_table(key, annotations.written, std::move(table));
+  dataset->finish(root.written(""));
+  return dataset;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,43 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "manifests/job_manifest.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// Opens a Human3.6M source; `spec.layout` says how it lies on disk below `spec.root`:
+///
+/// - fetch (h36m-fetch): S1/Directions-1/imageSequence/54138969/img_000001.jpg with
+/// S1/Directions-1/annot.h5,
+///   whose rows give `pose/2d` [M, J, 2] px, `pose/3d-univ` [M, J, 3] mm in the camera frame,
+///   `camera` and `frame` [M], and `intrinsics/CAMERA` = [fx, cx, fy, cy]. Sample
+///   "S1/Directions-1/54138969/000001", label key "S1/Directions-1/annot.h5#0".
+/// - extracted: S1/S1_Directions_1.54138969/S1_Directions_1.54138969_000001.jpg with one .npz of
+/// `imgname`,
+///   `center` [N, 2] px, `scale` [N], `part` [N, J, 3] (x, y, visible) and `S` [N, J, 4] (x, y, z
+///   in metres, confidence): `spec.annotations`, or else the only such file of 17 joints in the
+///   root. `imgname` is a path below the root, or a bare file name. Intrinsics come from
+///   cameras.pkl in the root, if it is there. Sample "S1_Directions_1.54138969_000001", label key
+///   "FILE.npz#0".
+///
+/// Every row is a sample of one person. Frame numbers are the official ones, from 1 at 50 frames a
+/// second, so time_s = (number - 1) / 50; one step is the smallest distance of two stored frames of
+/// a sequence. A row whose picture is absent stays a labelled frame, a hole at 0 steps. A joint at
+/// (0, 0) that is not visible is how an .npz marks a joint without annotation: it becomes
+/// kMissingPoint. Values that are not finite are a fault of their row; in fields that this program
+/// does not use, JSON makes them null. Annotation::original is an object with every field of the
+/// row, and the camera's.
+///
+/// The annotations are read whole into memory here (about 1-2 kB a row), so that nothing uses HDF5
+/// later: it is not thread safe, and open_human36m_dataset must not run while another thread is in
+/// HDF5.
+///
+/// Throws InputError if a folder or file is missing or malformed or a frame is annotated twice,
+/// UsageError if there is not exactly one .npz to choose.
+std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
+                                               const std::filesystem::path& base);
+
+}  // namespace eventgan

@@ -1,0 +1,305 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "manifests/faults.h"
+#include "stages/frames/human36m/human36m_dataset.h"
+#include "tests/testing/npy_bytes.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+#include "tests/testing/zip_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+using State = Neighbour::State;
+
+const std::string kVideo = "S1_Walking_1.7";
+
+SourceSpec extracted_spec(const std::string& root) {
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kHuman36m;
+  spec.root = root;
+  spec.layout = Human36mLayout::kExtracted;
+  return spec;
+}
+
+/// The members of an .npz. In row r of J joints, joint j lies at (10 r + j, 10 r + j + 0.5), is
+/// visible unless it is joint 1, and at (0.001 j, 0.002, 5) m.
+std::map<std::string, std::string> members(const std::vector<std::string>& names,
+                                           std::size_t joints = 17) {
+  std::vector<double> center;
+  std::vector<double> scale;
+  std::vector<double> part;
+  std::vector<double> pose;
+  for (std::size_t r = 0; r < names.size(); ++r) {
+    const auto row = static_cast<double>(r);
+    center.insert(center.end(), {500 + row, 400});
+    scale.push_back(2 + row);
+    for (std::size_t j = 0; j < joints; ++j) {
+      const auto joint = static_cast<double>(j);
+      part.insert(part.end(), {10 * row + joint, 10 * row + joint + 0.5, j == 1 ? 0.0 : 1.0});
+      pose.insert(pose.end(), {0.001 * joint, 0.002, 5, 1});
+    }
+  }
+  return {{"imgname", testing::npy_strings(names)},
+          {"center", testing::npy_doubles({names.size(), 2}, center)},
+          {"scale", testing::npy_doubles({names.size()}, scale)},
+          {"part", testing::npy_doubles({names.size(), joints, 3}, part)},
+          {"S", testing::npy_doubles({names.size(), joints, 4}, pose)}};
+}
+
+class ExtractedLayoutTest : public ::testing::Test {
+ protected:
+  ExtractedLayoutTest() { std::filesystem::create_directories(folder_ / "h36m"); }
+
+  void add_pictures(const std::vector<std::string>& paths) {
+    for (const std::string& path : paths) testing::write_file(folder_ / "h36m" / path, "");
+  }
+  void add_npz(const std::map<std::string, std::string>& arrays,
+               const std::string& name = "h36m/a.npz") {
+    std::vector<testing::ZipMember> zip;
+    for (const auto& [array, bytes] : arrays) zip.push_back({array + ".npy", bytes, true});
+    testing::write_zip(folder_ / name, zip);
+  }
+  std::unique_ptr<Dataset> open() { return open_human36m_dataset(spec_, folder_.path()); }
+
+  testing::TemporaryFolder folder_;
+  SourceSpec spec_ = extracted_spec("h36m");
+};
+
+TEST_F(ExtractedLayoutTest, GivesEveryRowAsASample) {
+  add_pictures({"S1/" + kVideo + "/" + kVideo + "_000001.jpg",
+                "S1/" + kVideo + "/" + kVideo + "_000006.jpg",
+                "S1/" + kVideo + "/" + kVideo + "_000016.jpg",
+                "S1/" + kVideo + "/" + kVideo + "_000006_mask.png"});
+  // A bare name and a path.
+  add_npz(members({kVideo + "_000006.jpg", "S1/" + kVideo + "/" + kVideo + "_000001.jpg"}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].sample_id, kVideo + "_000001");
+  EXPECT_EQ(frames[0].sequence, kVideo);
+  EXPECT_EQ(frames[0].label_key, "a.npz#1");
+  EXPECT_EQ(dataset->label_place("a.npz#1"), "h36m/a.npz#1");
+  EXPECT_EQ(frames[1].frame.path, "h36m/S1/" + kVideo + "/" + kVideo + "_000006.jpg");
+  EXPECT_EQ(frames[1].frame.index, 6);
+  EXPECT_EQ(frames[1].frame.time_s, 0.1);  // five frames of a fiftieth of a second
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("h36m/a.npz"));
+
+  EXPECT_EQ(dataset->neighbour(frames[1], -1).state, State::kPresent);
+  EXPECT_EQ(dataset->neighbour(frames[1], 1).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.path,
+            "h36m/S1/" + kVideo + "/" + kVideo + "_000011.jpg");
+  EXPECT_EQ(dataset->neighbour(frames[1], 2).frame.index, 16);
+  EXPECT_EQ(dataset->neighbour(frames[1], 3).state, State::kBeyond);
+}
+
+TEST_F(ExtractedLayoutTest, ReadsThePersonOfARow) {
+  add_npz(members({kVideo + "_000001.jpg", kVideo + "_000006.jpg"}));
+  const auto dataset = open();
+  EXPECT_EQ(dataset->label_schema().joint_names.at(16), "right_wrist");
+  const auto outcome = dataset->annotation("a.npz#1");
+  const Person& person = std::get<Annotation>(outcome).persons.at(0);
+  ASSERT_EQ(person.joints.size(), 17u);
+  EXPECT_EQ(person.joints[0], (Joint{{10, 10.5}, 1}));
+  EXPECT_EQ(person.joints[1], (Joint{{11, 11.5}, 0})) << "hidden, but annotated";
+  EXPECT_EQ(person.center, (Point{501, 400}));
+  EXPECT_EQ(person.scale, 3);
+  EXPECT_FALSE(person.camera);
+  EXPECT_EQ(person.joints3d_mm.at(3)[1], 2);
+  EXPECT_DOUBLE_EQ(person.joints3d_mm.at(3)[0], 3);
+  EXPECT_EQ(person.joints3d_mm.at(3)[2], 5000);
+}
+
+TEST_F(ExtractedLayoutTest, JointsWithoutAnnotationAreMissing) {
+  auto arrays = members({kVideo + "_000001.jpg"}, 2);
+  arrays["part"] = testing::npy_doubles({1, 2, 3}, {0, 0, 0, 0, 0, 1});
+  add_npz(arrays);
+  spec_.annotations = "h36m/a.npz";
+  const auto outcome = open()->annotation("a.npz#0");
+  EXPECT_THAT(std::get<Annotation>(outcome).persons.at(0).joints,
+              ElementsAre(Joint{kMissingPoint, 0}, Joint{{0, 0}, 1}));
+}
+
+TEST_F(ExtractedLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
+  auto arrays = members({kVideo + "_000001.jpg", kVideo + "_000006.jpg"});
+  arrays["pose"] =
+      testing::npy_doubles({2, 2}, {0, 0, 1.0 / 3, std::numeric_limits<double>::infinity()});
+  arrays["mean"] = testing::npy_doubles({3}, {1, 2, 3});
+  arrays["keep"] = testing::npy_file("{'descr': '|b1', 'fortran_order': False, 'shape': (2,)}",
+                                     std::string("\0\1", 2));
+  arrays["gender"] =
+      testing::npy_file("{'descr': '|O', 'fortran_order': False, 'shape': (2,)}", "\x80.");
+  add_npz(arrays);
+  const auto dataset = open();
+  const auto outcome = dataset->annotation("a.npz#1");
+  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  std::vector<std::string> names;
+  for (const auto& field : original.items()) names.push_back(field.key());
+  EXPECT_THAT(names, ElementsAre("S", "center", "imgname", "keep", "part", "pose", "scale"));
+  EXPECT_EQ(original["imgname"], kVideo + "_000006.jpg");
+  EXPECT_EQ(original["keep"], true);
+  EXPECT_EQ(original["pose"][0].get<double>(), 1.0 / 3) << "to the last bit";
+  EXPECT_TRUE(original["pose"][1].is_null());
+  EXPECT_EQ(original["part"].size(), 17u);
+  EXPECT_THAT(dataset->notes(), ::testing::Contains(AllOf(HasSubstr("array gender is left out"),
+                                                          HasSubstr("Python objects"))));
+}
+
+TEST_F(ExtractedLayoutTest, ChoosesTheOnlyFileThatFits) {
+  add_npz(members({kVideo + "_000001.jpg"}));
+  add_npz(members({kVideo + "_000001.jpg"}, 24), "h36m/b.npz");
+  testing::write_file(folder_ / "h36m/c.npz", "no zip file");
+  EXPECT_EQ(open()->labelled_frames()[0].label_key, "a.npz#0");
+
+  add_npz(members({kVideo + "_000001.jpg"}), "h36m/d.npz");
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<UsageError>(
+                  AllOf(HasSubstr("\"annotations\""), HasSubstr("got 2"),
+                        HasSubstr("; there is a.npz, b.npz (not usable: expected part of shape "
+                                  "[N, 17, 3], got [1, 24, 3]), c.npz (not usable: expected "),
+                        HasSubstr("), d.npz"))));
+  spec_.annotations = "h36m/b.npz";
+  const auto dataset = open();
+  EXPECT_EQ(dataset->label_schema().joint_names.at(23), "joint_23");
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("h36m/b.npz"));
+}
+
+TEST_F(ExtractedLayoutTest, AsksForAnnotationsWhereNoneFit) {
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr("\"annotations\"")));
+  testing::write_file(folder_ / "h36m/c.npz", "no zip file");
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<UsageError>(HasSubstr("there is c.npz (not usable: expected ")));
+  std::filesystem::remove(folder_ / "h36m/c.npz");
+  auto without_scale = members({kVideo + "_000001.jpg"});
+  without_scale.erase("scale");
+  add_npz(without_scale);
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr(
+                                   "a.npz (not usable: expected an array scale, got none)")));
+  spec_.annotations = "absent.npz";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent.npz")));
+  EXPECT_THROW(open_human36m_dataset(extracted_spec("elsewhere"), folder_.path()), InputError);
+}
+
+TEST_F(ExtractedLayoutTest, RefusesMissingAndMisshapenArrays) {
+  spec_.annotations = "h36m/a.npz";
+  const auto valid = members({kVideo + "_000001.jpg"});
+  const std::map<std::string, std::string> misshapen = {
+      {"imgname", testing::npy_doubles({1}, {1})},
+      {"center", testing::npy_doubles({1, 3}, {1, 2, 3})},
+      {"scale", testing::npy_doubles({1, 1}, {1})},
+      {"part", testing::npy_doubles({1, 17, 2}, std::vector<double>(34))},
+      {"S", testing::npy_doubles({1, 16, 4}, std::vector<double>(64))}};
+  for (const auto& [name, bytes] : misshapen) {
+    auto arrays = valid;
+    arrays[name] = bytes;
+    add_npz(arrays);
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
+                                     AllOf(HasSubstr("h36m/a.npz"), HasSubstr("(" + name + ")"))));
+    arrays[name] = bytes.substr(0, bytes.size() - 1);
+    add_npz(arrays);
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("(" + name + ")")));
+    arrays.erase(name);
+    add_npz(arrays);
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("no such array"),
+                                                                 HasSubstr("(" + name + ")"))));
+  }
+}
+
+TEST_F(ExtractedLayoutTest, RefusesNamesItCannotPlace) {
+  spec_.annotations = "h36m/a.npz";
+  add_npz(members({kVideo + "_000001.jpg", "picture.jpg"}));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("\"picture.jpg\""),
+                                                               HasSubstr("(imgname, row 1)"))));
+  add_npz(members({kVideo + "_000001.jpg", kVideo + "_000001.jpg"}));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("a.npz#0 and a.npz#1")));
+  add_npz(members({kVideo + "_000001.jpg", "x/" + kVideo + "_000006.jpg"}));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("in one folder")));
+}
+
+TEST_F(ExtractedLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
+  for (const char* name : {"part", "S", "center", "scale"}) {
+    auto arrays = members({kVideo + "_000001.jpg", kVideo + "_000006.jpg"});
+    // The last double becomes a quiet NaN, 0x7ff8 in its two highest bytes.
+    arrays[name].replace(arrays[name].size() - 2, 2, "\xf8\x7f");
+    add_npz(arrays);
+    const auto dataset = open();
+    EXPECT_FALSE(is_fault(dataset->annotation("a.npz#0")));
+    const auto outcome = dataset->annotation("a.npz#1");
+    ASSERT_TRUE(is_fault(outcome)) << name;
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
+                HasSubstr("h36m/a.npz (" + std::string(name) + ", row 1)"));
+  }
+}
+
+TEST_F(ExtractedLayoutTest, ReadsOneFolderOfManyVideosOnce) {
+  add_pictures({"all/S1_A.7_000001.jpg", "all/S1_A.7_000006.jpg", "all/S5_B.8_000001.jpg",
+                "all/S5_B.8_000003.png", "all/S5_B.8_000003.jpg"});
+  add_npz(members({"all/S1_A.7_000001.jpg", "./all/S5_B.8_000001.jpg"}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  EXPECT_EQ(dataset->neighbour(frames[0], 1).frame.index, 6);
+  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.path, "h36m/all/S5_B.8_000003.jpg");
+}
+
+TEST_F(ExtractedLayoutTest, TellsOfPicturesWithoutLabels) {
+  add_pictures(
+      {"S1/" + kVideo + "/" + kVideo + "_000001.jpg", "S1/S1_Eating.7/S1_Eating.7_000001.jpg"});
+  add_npz(members({kVideo + "_000001.jpg"}));
+  EXPECT_THAT(open()->notes(),
+              ::testing::Contains("1 folders of pictures without labels, the first "
+                                  "h36m/S1/S1_Eating.7"));
+}
+
+TEST_F(ExtractedLayoutTest, ReadsSharedData) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  SourceSpec spec = extracted_spec("human36m_lists");
+  spec.annotations = "human36m_lists/test_h36m_body3d.npz";
+  const auto dataset = open_human36m_dataset(spec, data);
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("human36m_lists/cameras.pkl", "human36m_lists/test_h36m_body3d.npz"));
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[1].sample_id, "S5_SittingDown.54138969_002061");
+  EXPECT_DOUBLE_EQ(frames[1].frame.time_s, 2060 / 50.0);
+  for (const LabelledFrame& frame : frames) {
+    EXPECT_TRUE(std::filesystem::exists(data / frame.frame.path));
+    EXPECT_EQ(dataset->neighbour(frame, 0).state, State::kPresent);
+    EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
+  }
+  const auto outcome = dataset->annotation(frames[0].label_key);
+  ASSERT_FALSE(is_fault(outcome));
+  const Person& person = std::get<Annotation>(outcome).persons.at(0);
+  ASSERT_TRUE(person.camera);
+  // The intrinsics project the joints in the camera frame onto those in the picture. Lens
+  // distortion, which the intrinsics leave out, stays below 2 px here.
+  for (std::size_t j = 0; j < person.joints.size(); ++j) {
+    const auto& [x, y, z] = person.joints3d_mm[j];
+    EXPECT_NEAR(person.camera->focal_x * x / z + person.camera->centre_x, person.joints[j].at.x, 2);
+    EXPECT_NEAR(person.camera->focal_y * y / z + person.camera->centre_y, person.joints[j].at.y, 2);
+  }
+  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  EXPECT_EQ(original["cameras.pkl"]["name"], "camera1");
+  EXPECT_EQ(original["cameras.pkl"]["w"], 1000);
+  EXPECT_EQ(original["cameras.pkl"]["R"].size(), 3u);
+
+  // Without a choice the list of 17 joints is the only one that fits; the other has 24.
+  spec.annotations.reset();
+  EXPECT_EQ(open_human36m_dataset(spec, data)->labelled_frames()[0].label_key,
+            "test_h36m_body3d.npz#0");
+  spec.annotations = "human36m_lists/test_h36m.npz";
+  EXPECT_EQ(open_human36m_dataset(spec, data)->label_schema().joint_names.size(), 24u);
+}
+
+}  // namespace
+}  // namespace eventgan

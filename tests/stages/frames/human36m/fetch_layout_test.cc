@@ -1,0 +1,288 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+#include "manifests/faults.h"
+#include "stages/frames/human36m/human36m_dataset.h"
+#include "tests/stages/frames/human36m/human36m_fixture.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+using State = Neighbour::State;
+using Datasets = std::map<std::string, testing::Hdf5Dataset>;
+
+SourceSpec fetch_spec(const std::string& root) {
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kHuman36m;
+  spec.root = root;
+  spec.layout = Human36mLayout::kFetch;
+  return spec;
+}
+
+class FetchLayoutTest : public ::testing::Test {
+ protected:
+  void add_pictures(const std::string& camera, const std::vector<int>& numbers,
+                    const std::string& action = "S1/Walking-1") {
+    for (const int number : numbers) {
+      char name[32];
+      std::snprintf(name, sizeof(name), "img_%06d.jpg", number);
+      testing::write_file(folder_ / "h36m" / action / "imageSequence" / camera / name, "");
+    }
+  }
+  void add_annotations(const Datasets& datasets, const std::string& action = "S1/Walking-1") {
+    testing::write_hdf5(folder_ / "h36m" / action / "annot.h5", datasets);
+  }
+  std::unique_ptr<Dataset> open() {
+    return open_human36m_dataset(fetch_spec("h36m"), folder_.path());
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
+  add_pictures("7", {1, 6, 11});
+  add_pictures("8", {1, 6});
+  add_annotations(fetch_annotations({{8, 6}, {7, 11}, {7, 1}}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].sample_id, "S1/Walking-1/7/000001");
+  EXPECT_EQ(frames[0].sequence, "S1/Walking-1/7");
+  EXPECT_EQ(frames[0].label_key, "S1/Walking-1/annot.h5#2");
+  EXPECT_EQ(dataset->label_place(frames[0].label_key), "h36m/S1/Walking-1/annot.h5#2");
+  EXPECT_EQ(frames[0].frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000001.jpg");
+  EXPECT_EQ(frames[0].frame.index, 1);
+  EXPECT_EQ(frames[0].frame.video_frame, -1);
+  EXPECT_EQ(frames[0].frame.time_s, 0);
+  EXPECT_EQ(frames[1].sample_id, "S1/Walking-1/7/000011");
+  EXPECT_EQ(frames[1].frame.time_s, 0.2);  // ten frames of a fiftieth of a second
+  EXPECT_EQ(frames[2].sample_id, "S1/Walking-1/8/000006");
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("h36m/S1/Walking-1/annot.h5"));
+  EXPECT_THAT(dataset->label_schema().joint_names, ElementsAre("joint_0", "joint_1"));
+  EXPECT_TRUE(dataset->label_schema().class_names.empty());
+}
+
+TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
+  add_pictures("7", {1, 6});
+  add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
+  const auto dataset = open();
+  const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
+  ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+  const Annotation& annotation = std::get<Annotation>(outcome);
+  EXPECT_TRUE(annotation.boxes.empty());
+  ASSERT_EQ(annotation.persons.size(), 1u);
+  const Person& person = annotation.persons[0];
+  EXPECT_THAT(person.joints, ElementsAre(Joint{{100.25, 101.25}, -1}, Joint{{110.25, 111.25}, -1}));
+  ASSERT_EQ(person.joints3d_mm.size(), 2u);
+  EXPECT_THAT(person.joints3d_mm[1], ElementsAre(110.25, 111.25, 5000));
+  EXPECT_EQ(person.center, kMissingPoint);
+  EXPECT_EQ(person.scale, -1);
+  EXPECT_FALSE(person.head_box);
+  // The file holds [fx, cx, fy, cy].
+  EXPECT_EQ(person.camera, (Intrinsics{1145, 1143.75, 512.5, 515.5}));
+}
+
+TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
+  add_pictures("7", {1, 6});
+  auto datasets = fetch_annotations({{7, 1}, {7, 6}});
+  datasets["pose/3d"] = {{2, 1}, std::vector<double>{0.1, 1.0 / 3}};
+  datasets["float"] = {{2}, std::vector<float>{0.5f, 0.1f}};
+  datasets["odd"] = {{2}, std::vector<double>{1, std::numeric_limits<double>::quiet_NaN()}};
+  datasets["action"] = {{2}, std::vector<std::string>{"walk", "stand"}};
+  datasets["intrinsics/8"] = {{4}, std::vector<double>(4)};
+  datasets["whole_file"] = {{3}, std::vector<double>(3)};
+  add_annotations(datasets);
+  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#1");
+  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  std::vector<std::string> names;
+  for (const auto& field : original.items()) names.push_back(field.key());
+  EXPECT_THAT(names, ElementsAre("action", "camera", "float", "frame", "intrinsics/7", "odd",
+                                 "pose/2d", "pose/3d", "pose/3d-univ"));
+  EXPECT_EQ(original["action"], "stand");
+  EXPECT_EQ(original["frame"], 6);
+  EXPECT_EQ(original["pose/3d"][0].get<double>(), 1.0 / 3) << "to the last bit";
+  EXPECT_EQ(original["float"].get<float>(), 0.1f);
+  EXPECT_TRUE(original["odd"].is_null());
+  EXPECT_EQ(original["pose/2d"], nlohmann::json::parse("[[100.25, 101.25], [110.25, 111.25]]"));
+  EXPECT_EQ(original["intrinsics/7"][1], 512.5);
+}
+
+TEST_F(FetchLayoutTest, RowsAsManyAsIntrinsicsAreNotMixedUp) {
+  add_pictures("7", {1, 6, 11, 16});
+  add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 11}, {7, 16}}));
+  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
+  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  EXPECT_EQ(original["intrinsics/7"].size(), 4u);
+}
+
+TEST_F(FetchLayoutTest, NeighboursStepByTheStoredStride) {
+  add_pictures("7", {1, 6, 16, 21});  // every fifth; 11 is lost
+  add_annotations(fetch_annotations({{7, 6}, {7, 11}, {7, 26}}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames[0].frame.index, 6);
+  const Neighbour before = dataset->neighbour(frames[0], -1);
+  EXPECT_EQ(before.state, State::kPresent);
+  EXPECT_EQ(before.frame.index, 1);
+  EXPECT_EQ(before.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000001.jpg");
+  EXPECT_EQ(dataset->neighbour(frames[0], 0).state, State::kPresent);
+  const Neighbour hole = dataset->neighbour(frames[0], 1);
+  EXPECT_EQ(hole.state, State::kHole);
+  EXPECT_EQ(hole.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000011.jpg");
+  EXPECT_EQ(dataset->neighbour(frames[0], 2).frame.index, 16);
+  EXPECT_NEAR(dataset->neighbour(frames[0], 2).frame.time_s, 0.3, 1e-12);
+  // A row for frame 26 says that the video goes on to there.
+  EXPECT_EQ(dataset->neighbour(frames[0], 4).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(frames[0], 5).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(frames[0], -2).state, State::kBeyond);
+}
+
+TEST_F(FetchLayoutTest, RowsWithoutPictureStayLabelled) {
+  add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 2u);
+  const Neighbour itself = dataset->neighbour(dataset->labelled_frames()[1], 0);
+  EXPECT_EQ(itself.state, State::kHole);
+  EXPECT_EQ(itself.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000006.jpg");
+  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], -1).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 1).state, State::kBeyond);
+}
+
+TEST_F(FetchLayoutTest, TellsOfPicturesWithoutLabelsAndCamerasWithoutIntrinsics) {
+  add_pictures("7", {1});
+  add_pictures("8", {1});
+  add_pictures("9", {1});
+  add_pictures("7", {1}, "S5/Eating");
+  add_annotations(fetch_annotations({{7, 1}, {8, 1}}));
+  const auto dataset = open();
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("no intrinsics for camera 8, in h36m/S1/Walking-1/annot.h5",
+                          "2 folders of pictures without labels, the first "
+                          "h36m/S1/Walking-1/imageSequence/9"));
+  const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
+  EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
+}
+
+TEST_F(FetchLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
+  for (const char* name : {"pose/2d", "pose/3d-univ", "intrinsics/7"}) {
+    auto datasets = fetch_annotations({{7, 1}, {7, 6}});
+    auto& values = std::get<std::vector<double>>(datasets.at(name).values);
+    values.back() = std::numeric_limits<double>::quiet_NaN();
+    add_annotations(datasets);
+    const auto dataset = open();
+    const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
+    ASSERT_TRUE(is_fault(outcome)) << name;
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
+                AllOf(HasSubstr("expected finite"), HasSubstr("h36m/S1/Walking-1/annot.h5"),
+                      HasSubstr(name)));
+    if (std::string(name) != "intrinsics/7") {
+      EXPECT_FALSE(is_fault(dataset->annotation("S1/Walking-1/annot.h5#0")));
+    }
+  }
+}
+
+TEST_F(FetchLayoutTest, UnknownLabelKeysAreFaults) {
+  add_annotations(fetch_annotations({{7, 1}}));
+  const auto dataset = open();
+  for (const char* key :
+       {"", "#", "S1/Walking-1/annot.h5", "S1/Walking-1/annot.h5#", "S1/Walking-1/annot.h5#1",
+        "S1/Walking-1/annot.h5#-1", "S1/Walking-1/annot.h5#0x", "S2/Walking-1/annot.h5#0"}) {
+    const auto outcome = dataset->annotation(key);
+    ASSERT_TRUE(is_fault(outcome)) << key;
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason, HasSubstr(", in h36m"));
+  }
+}
+
+TEST_F(FetchLayoutTest, RefusesMissingAndMisshapenDatasets) {
+  const auto valid = fetch_annotations({{7, 1}, {7, 6}});
+  const std::map<std::string, testing::Hdf5Dataset> misshapen = {
+      {"pose/2d", {{2, 4}, std::vector<double>(8)}},
+      {"pose/3d-univ", {{2, 2, 2}, std::vector<double>(8)}},
+      {"camera", {{3}, std::vector<std::int64_t>(3)}},
+      {"frame", {{2}, std::vector<std::string>{"1", "6"}}},
+      {"intrinsics/7", {{5}, std::vector<double>(5)}}};
+  for (const auto& [name, dataset] : misshapen) {
+    auto datasets = valid;
+    datasets[name] = dataset;
+    add_annotations(datasets);
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("expected numbers ["),
+                                                                 HasSubstr("annot.h5"),
+                                                                 HasSubstr("(" + name + ")"))));
+    datasets.erase(name);
+    add_annotations(datasets);
+    if (name == "intrinsics/7") continue;  // may be absent
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("no such array"),
+                                                                 HasSubstr("(" + name + ")"))));
+  }
+}
+
+TEST_F(FetchLayoutTest, RefusesOddNumbersAndFilesAndDoubleRows) {
+  auto datasets = fetch_annotations({{7, 1}});
+  for (const double frame : {-1.0, 1.5, 1e9, std::nan("")}) {
+    datasets["frame"] = {{1}, std::vector<double>{frame}};
+    add_annotations(datasets);
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("(frame, row 0)")));
+  }
+  add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 1}}));
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("annot.h5#0 and S1/Walking-1/annot.h5#2"),
+                                              HasSubstr("(S1/Walking-1/7/000001)"))));
+  testing::write_file(folder_ / "h36m/S1/Walking-1/annot.h5", "no HDF5");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("S1/Walking-1/annot.h5")));
+}
+
+TEST_F(FetchLayoutTest, RefusesFilesOfDifferentJoints) {
+  add_annotations(fetch_annotations({{7, 1}}));
+  add_annotations({{"pose/2d", {{1, 3, 2}, std::vector<double>(6)}},
+                   {"pose/3d-univ", {{1, 3, 3}, std::vector<double>(9)}},
+                   {"camera", {{1}, std::vector<std::int64_t>{7}}},
+                   {"frame", {{1}, std::vector<std::int64_t>{1}}}},
+                  "S2/Walking-1");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
+                                   HasSubstr("expected 2 joints as in the files before, got 3")));
+}
+
+TEST_F(FetchLayoutTest, RefusesRootsWithNothingIn) {
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("h36m")));
+  std::filesystem::create_directories(folder_ / "h36m/S1/Walking-1");
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("annot.h5 files, got none, in h36m")));
+  SourceSpec spec = fetch_spec("h36m");
+  spec.layout.reset();
+  EXPECT_THROW(open_human36m_dataset(spec, folder_.path()), UsageError);
+}
+
+TEST_F(FetchLayoutTest, ReadsSharedData) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto dataset = open_human36m_dataset(fetch_spec("human36m_fetch"), data);
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 18u);  // two cameras, nine frames each
+  EXPECT_EQ(frames[1].sample_id, "S1/Directions-1/54138969/000006");
+  EXPECT_TRUE(dataset->notes().empty());
+  EXPECT_EQ(dataset->label_schema().joint_names.size(), 32u);
+  for (const LabelledFrame& frame : frames) {
+    EXPECT_EQ(dataset->neighbour(frame, 0).state, State::kPresent);
+    EXPECT_TRUE(std::filesystem::exists(data / frame.frame.path));
+    EXPECT_FALSE(is_fault(dataset->annotation(frame.label_key)));
+  }
+  EXPECT_EQ(dataset->neighbour(frames[0], 6).frame.index, 31);
+  EXPECT_EQ(dataset->neighbour(frames[0], 9).state, State::kBeyond);
+  const auto outcome = dataset->annotation(frames[17].label_key);
+  // fx, cx, fy, cy = 1149.7, 508.8, 1147.6, 508.1 for camera 55011271.
+  EXPECT_EQ(std::get<Annotation>(outcome).persons[0].camera,
+            (Intrinsics{1149.7, 1147.6, 508.8, 508.1}));
+}
+
+}  // namespace
+}  // namespace eventgan

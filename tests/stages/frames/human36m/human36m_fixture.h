@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "tests/testing/hdf5_file.h"
+
+namespace eventgan {
+
+/// An annot.h5 of two joints, one row for each (camera, frame). In row r, joint j lies at
+/// (100 r + 10 j + 0.25, 100 r + 10 j + 1.25) px and at those, plus 5000 mm deep.
+inline std::map<std::string, testing::Hdf5Dataset> fetch_annotations(
+    const std::vector<std::pair<std::int64_t, std::int64_t>>& rows) {
+  std::vector<double> joints;
+  std::vector<double> joints3d;
+  std::vector<std::int64_t> cameras;
+  std::vector<std::int64_t> frames;
+  for (std::size_t r = 0; r < rows.size(); ++r) {
+    for (int j = 0; j < 2; ++j) {
+      const double x = 100.0 * static_cast<double>(r) + 10 * j + 0.25;
+      joints.insert(joints.end(), {x, x + 1});
+      joints3d.insert(joints3d.end(), {x, x + 1, 5000});
+    }
+    cameras.push_back(rows[r].first);
+    frames.push_back(rows[r].second);
+  }
+  const std::uint64_t count = rows.size();
+  return {{"pose/2d", {{count, 2, 2}, joints}},
+          {"pose/3d-univ", {{count, 2, 3}, joints3d}},
+          {"camera", {{count}, cameras}},
+          {"frame", {{count}, frames}},
+          {"intrinsics/7", {{4}, std::vector<double>{1145, 512.5, 1143.75, 515.5}}}};
+}
+
+}  // namespace eventgan
