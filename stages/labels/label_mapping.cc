@@ -1,0 +1,163 @@
+#include "stages/labels/label_mapping.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <initializer_list>
+#include <optional>
+#include <sstream>
+
+#include "stages/labels/geometry.h"
+
+namespace eventgan {
+namespace {
+
+// Each check returns what was expected and what was got, or nothing if all is well.
+using Complaint = std::optional<std::string>;
+
+template <class Numbers>
+bool all_finite(const Numbers& numbers) {
+  return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
+}
+
+bool is_finite(Point point) { return std::isfinite(point.x) && std::isfinite(point.y); }
+
+bool is_finite(const Rectangle& box) {
+  return all_finite(std::initializer_list<double>{box.left, box.top, box.right, box.bottom});
+}
+
+bool is_finite(const Intrinsics& camera) {
+  return all_finite(std::initializer_list<double>{camera.focal_x, camera.focal_y, camera.centre_x,
+                                                  camera.centre_y});
+}
+
+bool overlaps(const Rectangle& box, ImageSize picture) {
+  return box.left < picture.width && box.right > 0 && box.top < picture.height && box.bottom > 0;
+}
+
+bool contains(ImageSize picture, Point point) {
+  return point.x >= -0.5 && point.x <= picture.width - 0.5 && point.y >= -0.5 &&
+         point.y <= picture.height - 0.5;
+}
+
+std::ostream& operator<<(std::ostream& out, const Rectangle& box) {
+  return out << "left " << box.left << ", top " << box.top << ", right " << box.right << ", bottom "
+             << box.bottom;
+}
+
+std::ostream& operator<<(std::ostream& out, Point point) {
+  return out << "(" << point.x << ", " << point.y << ")";
+}
+
+std::ostream& operator<<(std::ostream& out, ImageSize size) {
+  return out << size.width << " x " << size.height << " pixels";
+}
+
+template <class... Parts>
+std::string text(const Parts&... parts) {
+  std::ostringstream out;
+  (out << ... << parts);
+  return out.str();
+}
+
+Complaint check(const Box& box, ImageSize picture) {
+  if (!is_finite(box.xyxy)) return text("expected finite edges, got ", box.xyxy);
+  if (!std::isfinite(box.truncation) || !std::isfinite(box.alpha) || !all_finite(box.box3d)) {
+    return text("expected finite numbers, got NaN or infinity");
+  }
+  if (box.xyxy.right < box.xyxy.left || box.xyxy.bottom < box.xyxy.top) {
+    return text("expected left <= right and top <= bottom, got ", box.xyxy);
+  }
+  if (!box.ignore && !overlaps(box.xyxy, picture)) {
+    return text("expected an overlap with the picture of ", picture, ", got ", box.xyxy);
+  }
+  return std::nullopt;
+}
+
+Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
+  std::optional<Point> outside;
+  bool any_inside = false;
+  for (const Joint& joint : joints) {
+    if (joint.at == kMissingPoint) continue;
+    if (!is_finite(joint.at)) return text("expected finite joints, got ", joint.at);
+    if (contains(picture, joint.at)) {
+      any_inside = true;
+    } else if (!outside) {
+      outside = joint.at;
+    }
+  }
+  if (any_inside || !outside) return std::nullopt;
+  return text("expected a joint inside the picture of ", picture,
+              ", got all annotated ones outside it, the first at ", *outside);
+}
+
+Complaint check(const Person& person, ImageSize picture) {
+  if (!is_finite(person.center)) return text("expected a finite centre, got ", person.center);
+  if (!std::isfinite(person.scale)) return text("expected a finite scale, got ", person.scale);
+  if (person.head_box && !is_finite(*person.head_box)) {
+    return text("expected a finite head box, got ", *person.head_box);
+  }
+  if (!std::ranges::all_of(person.joints3d_mm, all_finite<std::array<double, 3>>)) {
+    return text("expected finite joints in 3-D, got NaN or infinity");
+  }
+  if (person.camera && !is_finite(*person.camera)) {
+    return text("expected a finite camera, got NaN or infinity");
+  }
+  return check_joints(person.joints, picture);
+}
+
+VolumeBox map(const Box& box, const Placement& placement) {
+  const Rectangle unclipped = to_volume(placement, box.xyxy);
+  const Rectangle clipped = clip(unclipped, placement.volume);
+  return {clipped, unclipped, box.ignore || is_empty(clipped)};
+}
+
+Point map_unless_missing(Point point, const Placement& placement) {
+  return point == kMissingPoint ? point : to_volume(placement, point);
+}
+
+VolumePerson map(const Person& person, const Placement& placement) {
+  VolumePerson mapped;
+  mapped.joints.reserve(person.joints.size());
+  for (const Joint& joint : person.joints) {
+    mapped.joints.push_back(map_unless_missing(joint.at, placement));
+  }
+  mapped.center = map_unless_missing(person.center, placement);
+  // One number for two axes: the geometric mean keeps the person's area right under any stretch.
+  mapped.scale = person.scale < 0
+                     ? person.scale
+                     : person.scale * std::sqrt(placement.scale_x() * placement.scale_y());
+  if (person.head_box) mapped.head_box = to_volume(placement, *person.head_box);
+  if (person.camera) mapped.camera = to_volume(placement, *person.camera);
+  return mapped;
+}
+
+/// Checks and maps one kind of label; "box 2 of 8" says which one is at fault.
+template <class Label, class Mapped>
+std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char* kind,
+                                   const Placement& placement, const std::string& where,
+                                   std::vector<Mapped>& mapped) {
+  mapped.reserve(labels.size());
+  for (const Label& label : labels) {
+    if (const Complaint complaint = check(label, placement.source)) {
+      return SampleFault{text(*complaint, ", in ", kind, " ", mapped.size() + 1, " of ",
+                              labels.size(), ", in ", where)};
+    }
+    mapped.push_back(map(label, placement));
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+Outcome<VolumeLabels> map_labels(const Annotation& annotation, const Placement& placement,
+                                 const std::string& where) {
+  VolumeLabels labels;
+  if (auto fault = map_all(annotation.boxes, "box", placement, where, labels.boxes)) return *fault;
+  if (auto fault = map_all(annotation.persons, "person", placement, where, labels.persons)) {
+    return *fault;
+  }
+  return labels;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,211 @@
+#include "stages/labels/label_mapping.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "stages/labels/geometry.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
+/// A KITTI picture in a volume of half its size.
+const Placement kHalf{{375, 1242}, {188, 621}, {188, 621}, 0, 0};
+
+/// The same picture at its own size, cut to its middle: columns 421..820 and rows 100..274.
+const Placement kMiddle{{375, 1242}, {375, 1242}, {175, 400}, -421, -100};
+
+Box box(double left, double top, double right, double bottom) {
+  Box made;
+  made.xyxy = {left, top, right, bottom};
+  return made;
+}
+
+Person person(std::vector<Joint> joints) {
+  Person made;
+  made.joints = std::move(joints);
+  return made;
+}
+
+VolumeLabels mapped(const Annotation& annotation, const Placement& placement) {
+  const Outcome<VolumeLabels> labels = map_labels(annotation, placement, "a.txt");
+  if (is_fault(labels)) {
+    ADD_FAILURE() << std::get<SampleFault>(labels).reason;
+    return {};
+  }
+  return std::get<VolumeLabels>(labels);
+}
+
+/// The reason of the fault; empty if there is none.
+std::string fault(const Annotation& annotation) {
+  const Outcome<VolumeLabels> labels = map_labels(annotation, kHalf, "label_2/001497.txt");
+  return is_fault(labels) ? std::get<SampleFault>(labels).reason : "";
+}
+
+std::string fault(const Box& one) { return fault(Annotation{"", {one}, {}}); }
+std::string fault(const Person& one) { return fault(Annotation{"", {}, {one}}); }
+
+TEST(MapLabels, AnEmptyAnnotationHasNoLabels) {
+  EXPECT_TRUE(mapped({}, kHalf).boxes.empty());
+  EXPECT_TRUE(mapped({}, kHalf).persons.empty());
+}
+
+TEST(MapLabels, KeepsTheOrderAndMapsEachBox) {
+  const auto labels = mapped({"", {box(0, 0, 1242, 375), box(621, 0, 622, 375)}, {}}, kHalf);
+  ASSERT_EQ(labels.boxes.size(), 2u);
+  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 0, 621, 188}));
+  EXPECT_EQ(labels.boxes[1].unclipped, (Rectangle{310.5, 0, 311, 188}));
+  EXPECT_FALSE(labels.boxes[0].ignore);
+}
+
+TEST(MapLabels, ACropCutsABoxAndKeepsItUncut) {
+  const auto labels = mapped({"", {box(400, 150, 431, 200)}, {}}, kMiddle);
+  // 400 - 421 = -21, 431 - 421 = 10; 150 - 100 = 50, 200 - 100 = 100.
+  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{-21, 50, 10, 100}));
+  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{0, 50, 10, 100}));
+  EXPECT_FALSE(labels.boxes[0].ignore);
+}
+
+TEST(MapLabels, ABoxThatACropLeavesNothingOfStaysAndIsIgnored) {
+  const auto labels = mapped({"", {box(10, 150, 40, 200), box(500, 150, 540, 200)}, {}}, kMiddle);
+  ASSERT_EQ(labels.boxes.size(), 2u);
+  EXPECT_TRUE(is_empty(labels.boxes[0].clipped));
+  EXPECT_TRUE(labels.boxes[0].ignore);
+  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{-411, 50, -381, 100}));
+  EXPECT_FALSE(labels.boxes[1].ignore);
+}
+
+TEST(MapLabels, DontCareStaysIgnored) {
+  Box dont_care = box(10, 10, 20, 20);
+  dont_care.ignore = true;
+  EXPECT_TRUE(mapped({"", {dont_care}, {}}, kHalf).boxes[0].ignore);
+}
+
+TEST(MapLabels, ABoxToIgnoreMayLieOutsideThePictureButMustBeABox) {
+  Box dont_care = box(1300, 20, 1400, 90);
+  dont_care.ignore = true;
+  const auto labels = mapped({"", {dont_care}, {}}, kHalf);
+  ASSERT_EQ(labels.boxes.size(), 1u);
+  EXPECT_TRUE(labels.boxes[0].ignore);
+  EXPECT_TRUE(is_empty(labels.boxes[0].clipped));
+  EXPECT_EQ(labels.boxes[0].unclipped.left, 650);  // 1300 x 621/1242
+  dont_care.xyxy = {20, 10, 10, 30};
+  EXPECT_THAT(fault(dont_care), HasSubstr("expected left <= right"));
+  dont_care.xyxy = {kNan, 10, 20, 30};
+  EXPECT_THAT(fault(dont_care), HasSubstr("expected finite edges"));
+}
+
+TEST(MapLabels, BoxesAtAndSlightlyBeyondTheBorderAreFine) {
+  EXPECT_EQ(fault(box(937, 197, 1241, 374)), "");
+  EXPECT_EQ(fault(box(-2.5, -1, 1243, 376)), "");
+  EXPECT_EQ(fault(box(100, 100, 100, 120)), "");  // no width, but inside
+}
+
+TEST(MapLabels, ABoxOutsideThePictureIsAFaultThatNamesIt) {
+  const std::string reason = fault(Annotation{"", {box(0, 0, 1, 1), box(1300, 20, 1400, 90)}, {}});
+  EXPECT_EQ(reason,
+            "expected an overlap with the picture of 1242 x 375 pixels, got left 1300, top 20, "
+            "right 1400, bottom 90, in box 2 of 2, in label_2/001497.txt");
+  EXPECT_NE(fault(box(-10, 20, 0, 90)), "");
+  EXPECT_NE(fault(box(10, 375, 20, 380)), "");
+  EXPECT_NE(fault(box(10, -5, 20, -1)), "");
+}
+
+TEST(MapLabels, AnInvertedBoxIsAFault) {
+  EXPECT_THAT(fault(box(20, 10, 10, 30)), HasSubstr("expected left <= right"));
+  EXPECT_THAT(fault(box(10, 30, 20, 10)), HasSubstr("expected left <= right and top <= bottom"));
+}
+
+TEST(MapLabels, NumbersOfABoxMustBeFinite) {
+  EXPECT_THAT(fault(box(10, kNan, 20, 30)), HasSubstr("expected finite edges"));
+  EXPECT_NE(fault(box(10, 10, std::numeric_limits<double>::infinity(), 30)), "");
+  Box one = box(10, 10, 20, 30);
+  one.box3d[5] = kInfinity;
+  EXPECT_THAT(fault(one), HasSubstr("box 1 of 1"));
+  one = box(10, 10, 20, 30);
+  one.alpha = std::nanf("");
+  EXPECT_NE(fault(one), "");
+  one = box(10, 10, 20, 30);
+  one.truncation = kInfinity;
+  EXPECT_NE(fault(one), "");
+}
+
+TEST(MapLabels, MissingPointsStayAndOthersMove) {
+  Person one = person({{kMissingPoint, 0}, {{100, 99}, 0}, {{-1, 99}, 1}});
+  const auto labels = mapped({"", {}, {one}}, kMiddle);
+  ASSERT_EQ(labels.persons.size(), 1u);
+  EXPECT_EQ(labels.persons[0].joints,
+            (std::vector<Point>{kMissingPoint, {100 - 421, 99 - 100}, {-1 - 421, 99 - 100}}));
+  EXPECT_EQ(labels.persons[0].center, kMissingPoint);
+  EXPECT_EQ(labels.persons[0].scale, -1);
+  EXPECT_FALSE(labels.persons[0].head_box);
+  EXPECT_FALSE(labels.persons[0].camera);
+}
+
+TEST(MapLabels, ScaleHeadBoxCentreAndCameraFollowThePicture) {
+  const Placement placement{{100, 100}, {25, 400}, {25, 400}, 0, 0};  // x4 wide, /4 high
+  Person one = person({{{10, 10}, 1}});
+  one.center = {9.5, 9.5};
+  one.scale = 3;
+  one.head_box = Rectangle{4, 8, 6, 12};
+  one.camera = Intrinsics{1000, 1000, 49.5, 49.5};
+  const VolumePerson got = mapped({"", {}, {one}}, placement).persons[0];
+  EXPECT_EQ(got.center, (Point{10 * 4 - 0.5, 10 * 0.25 - 0.5}));
+  EXPECT_DOUBLE_EQ(got.scale, 3);  // sqrt(4 x 1/4) = 1
+  EXPECT_EQ(got.head_box, (Rectangle{16, 2, 24, 3}));
+  EXPECT_EQ(got.camera, (Intrinsics{4000, 250, 50 * 4 - 0.5, 50 * 0.25 - 0.5}));
+
+  // kHalf: sqrt(621/1242 x 188/375).
+  EXPECT_DOUBLE_EQ(mapped({"", {}, {one}}, kHalf).persons[0].scale, 3 * std::sqrt(0.5 * 188 / 375));
+}
+
+TEST(MapLabels, APersonWithAllJointsOutsideIsAFault) {
+  EXPECT_EQ(fault(person({{kMissingPoint, 0}, {{1300, 10}, 1}, {{10, 400}, 1}})),
+            "expected a joint inside the picture of 1242 x 375 pixels, got all annotated ones "
+            "outside it, the first at (1300, 10), in person 1 of 1, in label_2/001497.txt");
+}
+
+TEST(MapLabels, OneJointInsideIsEnough) {
+  EXPECT_EQ(fault(person({{{1300, 10}, 1}, {{1241.5, 374.5}, 0}})), "");  // the very corner
+  EXPECT_NE(fault(person({{{1241.6, 10}, 1}})), "");
+}
+
+TEST(MapLabels, APersonWithoutJointsIsFineWhereverItsCentreIs) {
+  EXPECT_EQ(fault(person({})), "");
+  Person only_centre = person({{kMissingPoint, 0}});
+  only_centre.center = {-50, 9000};
+  EXPECT_EQ(fault(only_centre), "");
+}
+
+TEST(MapLabels, NumbersOfAPersonMustBeFinite) {
+  const Person good = person({{{10, 10}, 1}});
+  ASSERT_EQ(fault(good), "");
+  Person one = good;
+  one.joints.push_back({{kNan, 3}, 1});
+  EXPECT_THAT(fault(one), HasSubstr("expected finite joints"));
+  one = good;
+  one.center = {3, kNan};
+  EXPECT_THAT(fault(one), HasSubstr("centre"));
+  one = good;
+  one.scale = kNan;
+  EXPECT_THAT(fault(one), HasSubstr("scale"));
+  one = good;
+  one.head_box = Rectangle{0, 0, kNan, 1};
+  EXPECT_THAT(fault(one), HasSubstr("head box"));
+  one = good;
+  one.joints3d_mm = {{0, 0, 1}, {0, kNan, 1}};
+  EXPECT_THAT(fault(one), HasSubstr("3-D"));
+  one = good;
+  one.camera = Intrinsics{1, 1, kNan, 1};
+  EXPECT_THAT(fault(one), HasSubstr("camera"));
+}
+
+}  // namespace
+}  // namespace eventgan
