@@ -1,0 +1,50 @@
+#include "stages/events/event_volume.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace eventgan {
+namespace {
+
+void check_event(const Event& event, std::size_t number, const VolumeShape& shape) {
+  const bool inside =
+      event.x >= 0 && event.x < shape.size.width && event.y >= 0 && event.y < shape.size.height;
+  if (!inside || !std::isfinite(event.t_s)) {
+    throw std::invalid_argument(
+        "expected an event with a finite time inside " + std::to_string(shape.size.width) + "x" +
+        std::to_string(shape.size.height) + " pixels, got x=" + std::to_string(event.x) +
+        " y=" + std::to_string(event.y) + " t=" + std::to_string(event.t_s) + " as event " +
+        std::to_string(number));
+  }
+}
+
+}  // namespace
+
+std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape) {
+  std::vector<float> volume(shape.value_count(), 0.0f);
+  if (events.empty()) return volume;
+
+  const std::size_t plane = shape.size.pixel_count();
+  const double first = events.front().t_s;
+  const double duration = events.back().t_s - first;
+  const int last_bin = shape.bins - 1;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const Event& event = events[i];
+    check_event(event, i, shape);
+    const double star =
+        duration > 0 ? std::clamp(last_bin * (event.t_s - first) / duration, 0.0, double(last_bin))
+                     : 0.0;
+    // Rounding may carry t* of the last event past the last bin, for which there is no plane.
+    const int bin = std::min(static_cast<int>(star), last_bin);
+    const float above = static_cast<float>(star - bin);
+    float* pixel = volume.data() + (event.positive ? 0 : shape.bins * plane) + bin * plane +
+                   static_cast<std::size_t>(event.y) * shape.size.width + event.x;
+    pixel[0] += 1.0f - above;
+    if (above > 0) pixel[plane] += above;
+  }
+  return volume;
+}
+
+}  // namespace eventgan
