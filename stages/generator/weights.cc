@@ -1,0 +1,74 @@
+#include "stages/generator/weights.h"
+
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+
+namespace eventgan {
+namespace {
+
+constexpr int kLevels = 4;  // encoders and decoders
+constexpr int kResidualBlocks = 2;
+
+std::string shape_text(const Convolution& convolution) {
+  return convolution.name + " [" + std::to_string(convolution.out_channels) + ", " +
+         std::to_string(convolution.in_channels) + ", " + std::to_string(convolution.kernel) +
+         ", " + std::to_string(convolution.kernel) + "]";
+}
+
+bool all_finite(const std::vector<float>& values) {
+  return std::all_of(values.begin(), values.end(),
+                     [](float value) { return std::isfinite(value); });
+}
+
+}  // namespace
+
+std::vector<Convolution> network_layout(int base_channels, int bins) {
+  const int b = base_channels;
+  std::vector<Convolution> layout;
+  const auto add = [&](std::string name, int out, int in, int kernel, int stride) {
+    layout.push_back({std::move(name), out, in, kernel, stride, {}, {}});
+  };
+  add("head", b, 2, 3, 1);
+  for (int level = 0; level < kLevels; ++level) {
+    add("encoders." + std::to_string(level), b << (level + 1), b << level, 3, 2);
+  }
+  for (int block = 0; block < kResidualBlocks; ++block) {
+    for (const char* part : {".conv1", ".conv2"}) {
+      add("resblocks." + std::to_string(block) + part, b << kLevels, b << kLevels, 3, 1);
+    }
+  }
+  for (int level = 0; level < kLevels; ++level) {
+    const int in = b << (kLevels - level);
+    add("decoders." + std::to_string(level), in / 2, in + in / 2, 3, 1);
+  }
+  add("pred", 2 * bins, b, 1, 1);
+  return layout;
+}
+
+void check_weights(const Weights& weights, const std::string& name) {
+  const std::vector<Convolution> layout = network_layout(weights.base_channels, weights.bins);
+  if (weights.convolutions.size() != layout.size()) {
+    throw std::runtime_error("expected " + std::to_string(layout.size()) + " convolutions, got " +
+                             std::to_string(weights.convolutions.size()) + ", in " + name);
+  }
+  for (std::size_t i = 0; i < layout.size(); ++i) {
+    const Convolution& got = weights.convolutions[i];
+    const Convolution& want = layout[i];
+    const std::size_t count =
+        std::size_t(want.out_channels) * want.in_channels * want.kernel * want.kernel;
+    if (got.name != want.name || got.out_channels != want.out_channels ||
+        got.in_channels != want.in_channels || got.kernel != want.kernel ||
+        got.stride != want.stride || got.weight.size() != count ||
+        got.bias.size() != std::size_t(want.out_channels)) {
+      throw std::runtime_error("expected " + shape_text(want) + ", got " + shape_text(got) +
+                               ", in " + name);
+    }
+    if (!all_finite(got.weight) || !all_finite(got.bias)) {
+      throw std::runtime_error("expected finite numbers, got NaN or infinity in " + got.name +
+                               ", in " + name);
+    }
+  }
+}
+
+}  // namespace eventgan

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+
+/// One convolution of the folded network.
+struct Convolution {
+  std::string name;  ///< "head", "encoders.0" .. "decoders.3", "resblocks.0.conv1", "pred"
+  int out_channels = 0;
+  int in_channels = 0;
+  int kernel = 0;  ///< side of the square kernel in pixels; padding is (kernel - 1) / 2
+  int stride = 1;
+  std::vector<float> weight;  ///< [out, in, y, x] float32, C order
+  std::vector<float> bias;    ///< [out] float32
+};
+
+/// The generator's network (DESIGN section 4), spectral and batch norm folded into the
+/// convolutions.
+struct Weights {
+  int base_channels = 0;
+  int bins = 0;                                 ///< per polarity; the last layer has 2 bins outputs
+  std::vector<Convolution> convolutions;        ///< in the order of network_layout()
+  std::map<std::string, std::string> metadata;  ///< origin: where the numbers come from
+};
+
+/// Names and shapes of the network's convolutions for a base width, without numbers: head,
+/// encoders.0-3, resblocks.0-1.conv1-2, decoders.0-3, pred.
+std::vector<Convolution> network_layout(int base_channels, int bins);
+
+/// Throws std::runtime_error "expected X, got Y, in NAME" unless the convolutions have exactly the
+/// layout's names and shapes and all numbers are finite.
+void check_weights(const Weights& weights, const std::string& name);
+
+}  // namespace eventgan

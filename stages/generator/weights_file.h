@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "stages/generator/weights.h"
+
+namespace eventgan {
+
+/// The weights as a safetensors file: tensors NAME.weight and NAME.bias for each convolution;
+/// metadata `format`
+/// ("eventgan-generator"), `format_version`, `base_channels`, `bins` and Weights::metadata.
+/// Deterministic.
+std::string serialize_weights(const Weights& weights);
+
+/// Reads and checks such a file. Throws InputError (with the cause nested) if it is absent,
+/// malformed, or not a generator.
+Weights read_weights(const std::filesystem::path& file);
+
+}  // namespace eventgan

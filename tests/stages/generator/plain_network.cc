@@ -1,0 +1,112 @@
+#include "tests/stages/generator/plain_network.h"
+
+#include <algorithm>
+#include <stdexcept>
+
+namespace eventgan::testing {
+namespace {
+
+struct Planes {
+  int channels = 0;
+  ImageSize size;
+  std::vector<double> values;
+
+  double& at(int c, int y, int x) {
+    return values[(static_cast<std::size_t>(c) * size.height + y) * size.width + x];
+  }
+  double padded(int c, int y, int x) const {
+    if (y < 0 || x < 0 || y >= size.height || x >= size.width) return 0;
+    return values[(static_cast<std::size_t>(c) * size.height + y) * size.width + x];
+  }
+};
+
+Planes make(int channels, ImageSize size) {
+  return {channels, size, std::vector<double>(channels * size.pixel_count(), 0.0)};
+}
+
+const Convolution& find(const Weights& weights, const std::string& name) {
+  for (const Convolution& convolution : weights.convolutions) {
+    if (convolution.name == name) return convolution;
+  }
+  throw std::runtime_error("no layer " + name);
+}
+
+Planes convolve(const Weights& weights, const std::string& name, const Planes& in) {
+  const Convolution& layer = find(weights, name);
+  const int pad = layer.kernel / 2;
+  const auto side = [&](int length) {
+    return (length + 2 * pad - layer.kernel) / layer.stride + 1;
+  };
+  Planes out = make(layer.out_channels, {side(in.size.height), side(in.size.width)});
+  for (int o = 0; o < layer.out_channels; ++o) {
+    for (int y = 0; y < out.size.height; ++y) {
+      for (int x = 0; x < out.size.width; ++x) {
+        double sum = layer.bias[o];
+        for (int i = 0; i < layer.in_channels; ++i) {
+          for (int ky = 0; ky < layer.kernel; ++ky) {
+            for (int kx = 0; kx < layer.kernel; ++kx) {
+              const std::size_t w =
+                  ((std::size_t(o) * layer.in_channels + i) * layer.kernel + ky) * layer.kernel +
+                  kx;
+              sum += double(layer.weight[w]) *
+                     in.padded(i, y * layer.stride + ky - pad, x * layer.stride + kx - pad);
+            }
+          }
+        }
+        out.at(o, y, x) = sum;
+      }
+    }
+  }
+  return out;
+}
+
+Planes activated(Planes planes, double slope) {
+  for (double& value : planes.values) value = value > 0 ? value : slope * value;
+  return planes;
+}
+
+Planes residual(const Weights& weights, const std::string& block, const Planes& in) {
+  Planes out =
+      convolve(weights, block + ".conv2", activated(convolve(weights, block + ".conv1", in), 0.0));
+  for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] += in.values[i];
+  return activated(std::move(out), 0.0);
+}
+
+/// Nearest upsampling to the skip's size, then [x, skip].
+Planes joined(const Planes& x, const Planes& skip) {
+  Planes out = make(x.channels + skip.channels, skip.size);
+  for (int c = 0; c < out.channels; ++c) {
+    for (int y = 0; y < skip.size.height; ++y) {
+      for (int column = 0; column < skip.size.width; ++column) {
+        out.at(c, y, column) = c < x.channels ? x.padded(c, y * x.size.height / skip.size.height,
+                                                         column * x.size.width / skip.size.width)
+                                              : skip.padded(c - x.channels, y, column);
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
+                                 ImageSize size) {
+  constexpr double kSlope = 0.01;
+  Planes x{2, size, {frames.begin(), frames.end()}};
+  x = activated(convolve(weights, "head", x), kSlope);
+  std::vector<Planes> skips;
+  for (int level = 0; level < 4; ++level) {
+    skips.push_back(x);
+    x = activated(convolve(weights, "encoders." + std::to_string(level), x), kSlope);
+  }
+  for (const char* block : {"resblocks.0", "resblocks.1"}) x = residual(weights, block, x);
+  for (int level = 0; level < 4; ++level) {
+    x = activated(
+        convolve(weights, "decoders." + std::to_string(level), joined(x, skips[3 - level])),
+        kSlope);
+  }
+  x = activated(convolve(weights, "pred", x), 0.0);
+  return {x.values.begin(), x.values.end()};
+}
+
+}  // namespace eventgan::testing

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <vector>
+
+#include "manifests/image_size.h"
+#include "stages/generator/weights.h"
+
+namespace eventgan::testing {
+
+/// The generator written from DESIGN section 4 as plain loops in double precision: slow, and with
+/// nothing in common with the engines it judges. frames [2, H, W] → volume [2 bins, H, W].
+std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
+                                 ImageSize size);
+
+}  // namespace eventgan::testing

@@ -1,0 +1,57 @@
+#include "stages/generator/weights_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/faults.h"
+#include "stages/generator/safetensors.h"
+#include "stages/generator/untrained.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+TEST(WeightsFile, RoundTrips) {
+  const testing::TemporaryFolder folder;
+  Weights weights = untrained_weights(2, 9, 3);
+  weights.metadata["origin_sha256"] = "abc";
+  testing::write_file(folder / "w.safetensors", serialize_weights(weights));
+  const Weights back = read_weights(folder / "w.safetensors");
+  EXPECT_EQ(back.base_channels, 2);
+  EXPECT_EQ(back.bins, 9);
+  EXPECT_EQ(back.metadata, weights.metadata);
+  EXPECT_EQ(serialize_weights(back), serialize_weights(weights));
+}
+
+TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {
+  const testing::TemporaryFolder folder;
+  SafetensorsFile content =
+      parse_safetensors(serialize_weights(untrained_weights(1, 9, 3)), "test");
+  const auto refused = [&](const SafetensorsFile& changed) {
+    testing::write_file(folder / "w.safetensors", serialize_safetensors(changed));
+    EXPECT_THROW(read_weights(folder / "w.safetensors"), InputError);
+  };
+  auto changed = content;
+  changed.metadata["format"] = "other";
+  refused(changed);
+  changed = content;
+  changed.metadata["base_channels"] = "2";
+  refused(changed);
+  changed = content;
+  changed.metadata["base_channels"] = "-1";
+  refused(changed);
+  changed = content;
+  changed.tensors.erase("pred.bias");
+  refused(changed);
+  changed = content;
+  changed.tensors["extra"] = {{1}, {0}};
+  refused(changed);
+  changed = content;
+  changed.tensors["pred.bias"].values[0] = 1.0f / 0.0f;
+  refused(changed);
+  EXPECT_THROW(read_weights(folder / "none.safetensors"), InputError);
+}
+
+}  // namespace
+}  // namespace eventgan
