@@ -1,0 +1,127 @@
+#include "stages/shards/atomic_file.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <utility>
+
+#include "stages/shards/temporary_name.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const std::string& what) {
+  throw std::runtime_error(what + ": " + std::strerror(errno));
+}
+
+fs::path folder_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+/// A file under a temporary name, closed and deleted at the end of its scope; after it was
+/// published there is nothing left to delete.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const fs::path& target)
+      : path_(temporary_beside(target)),
+        descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
+    if (descriptor_ < 0) fail("cannot create " + path_.string());
+  }
+  ~TemporaryFile() {
+    if (descriptor_ >= 0) ::close(descriptor_);
+    ::unlink(path_.c_str());
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+
+  const fs::path& path() const { return path_; }
+
+  /// Writes, fsyncs and closes: network file systems report some errors only at the last step.
+  void write(std::string_view text) {
+    while (!text.empty()) {
+      const ssize_t written = ::write(descriptor_, text.data(), text.size());
+      if (written < 0 && errno == EINTR) continue;
+      if (written < 0) fail("cannot write " + path_.string());
+      text.remove_prefix(static_cast<std::size_t>(written));
+    }
+    if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) {
+      fail("cannot write " + path_.string());
+    }
+  }
+
+ private:
+  fs::path path_;
+  int descriptor_;
+};
+
+/// link() and not rename(), because it fails where the target exists. Over NFS its answer can be
+/// lost after it worked; the count of links tells.
+bool link_exclusively(const fs::path& temporary, const fs::path& target) {
+  if (::link(temporary.c_str(), target.c_str()) == 0) return true;
+  const int error = errno;
+  struct stat status {};
+  if (::stat(temporary.c_str(), &status) == 0 && status.st_nlink == 2) return true;
+  if (error == EEXIST) return false;
+  // File systems without links.
+  if (::renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, target.c_str(), RENAME_NOREPLACE) == 0) {
+    return true;
+  }
+  if (errno == EEXIST) return false;
+  fail("cannot link " + temporary.string() + " as " + target.string());
+}
+
+}  // namespace
+
+fs::path temporary_beside(const fs::path& target) {
+  static std::atomic<unsigned> next_attempt{0};
+  fs::path temporary;
+  do {  // a dead process with this one's pid, in a container that was started anew, can have left
+        // its file
+    temporary = folder_of(target) / to_string(TemporaryName{target.filename().string(), host_name(),
+                                                            ::getpid(), next_attempt++});
+  } while (fs::exists(fs::symlink_status(temporary)));
+  return temporary;
+}
+
+void sync_to_disk(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) fail("cannot open " + path.string());
+  const int error = ::fsync(descriptor) == 0 ? 0 : errno;
+  ::close(descriptor);
+  // Some network file systems have no fsync for folders; they make renames durable by themselves.
+  if (error == 0 || (error == EINVAL && fs::is_directory(path))) return;
+  errno = error;
+  fail("cannot flush " + path.string() + " to disk");
+}
+
+void publish(const fs::path& temporary, const fs::path& target) {
+  if (::rename(temporary.c_str(), target.c_str()) != 0) {
+    fail("cannot rename " + temporary.string() + " to " + target.string());
+  }
+  sync_to_disk(folder_of(target));
+}
+
+void write_file_atomically(const fs::path& target, std::string_view text) {
+  TemporaryFile temporary(target);
+  temporary.write(text);
+  publish(temporary.path(), target);
+}
+
+bool create_file_atomically(const fs::path& target, std::string_view text) {
+  if (fs::exists(fs::symlink_status(target))) return false;
+  TemporaryFile temporary(target);
+  temporary.write(text);
+  if (!link_exclusively(temporary.path(), target)) return false;
+  sync_to_disk(folder_of(target));
+  return true;
+}
+
+}  // namespace eventgan

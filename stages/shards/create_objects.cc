@@ -1,0 +1,114 @@
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "stages/hdf5/hdf5_attribute_internal.h"
+#include "stages/hdf5/hdf5_dataset_internal.h"
+#include "stages/hdf5/hdf5_types_internal.h"
+#include "stages/shards/quantization.h"
+#include "stages/shards/shard_objects_internal.h"
+
+namespace eventgan {
+namespace {
+
+constexpr char kVolumePath[] = "/events/volume";
+
+Hdf5Handle open_object(hid_t file, const char* path) {
+  return {H5Oopen(file, path, H5P_DEFAULT), H5Oclose, "open", path};
+}
+
+void write_root_attributes(hid_t file, const ShardHeader& header) {
+  write_attribute(file, "format", std::string(kShardFormat));
+  write_attribute(file, "format_version", std::int32_t{kShardFormatVersion});
+  write_attribute(file, "name", header.name);
+  write_attribute(file, "dataset", header.dataset);
+  write_attribute(file, "split", header.split);
+  write_attribute(file, "plan_hash", header.plan_hash);
+  write_attribute(file, "manifest", header.manifest_text);
+  write_attribute(file, "weights_hash", header.weights_hash);
+  write_attribute(file, "generator", header.generator);
+  write_attribute(file, "program_version", header.program_version);
+  write_attribute(file, "preprocessing", header.preprocessing);
+}
+
+void describe_volume(hid_t volume, const ShardHeader& header) {
+  const int bins = header.volume.bins;
+  write_attribute(volume, "axes", std::string("sample, channel, y, x"));
+  write_attribute(volume, "bins", std::int32_t{bins});
+  write_attribute(volume, "channel_order",
+                  "channels 0.." + std::to_string(bins - 1) + ": positive polarity, channels " +
+                      std::to_string(bins) + ".." + std::to_string(2 * bins - 1) +
+                      ": negative; each in time order");
+  write_attribute(
+      volume, "time_axis",
+      std::string("bin b of a polarity is centred at time b / (bins - 1), where 0 is the "
+                  "previous frame and 1 the next one"));
+  write_attribute(volume, "normalization", std::string(to_string(header.normalization)));
+  write_attribute(volume, "unit", std::string("dimensionless, >= 0; not a count of events"));
+  write_attribute(volume, "scale",
+                  header.dtype == StoredType::kUint8
+                      ? std::string("value = stored number x /events/scale[sample]")
+                      : std::string("value = stored number"));
+}
+
+Hdf5Handle create_volume(hid_t file, const ShardHeader& header) {
+  const Dims dims{static_cast<hsize_t>(header.sample_count),
+                  static_cast<hsize_t>(header.volume.channels()),
+                  static_cast<hsize_t>(header.volume.size.height),
+                  static_cast<hsize_t>(header.volume.size.width)};
+  const Dims chunk{1, dims[1], dims[2], dims[3]};
+  const Hdf5Handle creation = creation_properties(H5P_DATASET_CREATE);
+  checked(H5Pset_chunk(creation, 4, chunk.data()), "chunk", kVolumePath);
+  set_filters(creation, header.deflate_level, kVolumePath);
+  const Hdf5Handle space(H5Screate_simple(4, dims.data(), nullptr), H5Sclose, "create",
+                         kVolumePath);
+  // HDF5's default fill value is zero and its default is to allocate no chunk before it is written:
+  // that is how the slots of quarantined samples read as zeros.
+  return {H5Dcreate2(file, kVolumePath, volume_type(header.dtype), space, H5P_DEFAULT, creation,
+                     H5P_DEFAULT),
+          H5Dclose, "create", kVolumePath};
+}
+
+}  // namespace
+
+std::size_t stored_volume_size(const ShardHeader& header) {
+  const VolumeShape& shape = header.volume;
+  const std::size_t size = shape.value_count() * stored_size(header.dtype);
+  if (header.sample_count < 1 || shape.bins < 1 || shape.size.height < 1 || shape.size.width < 1) {
+    throw std::invalid_argument("expected samples and a volume with values, in " + header.name);
+  }
+  if (size > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::invalid_argument("expected volumes below 4 GiB, got " + std::to_string(size) +
+                                " bytes, in " + header.name);
+  }
+  return size;
+}
+
+Hdf5Handle create_objects(hid_t file, const ShardHeader& header) {
+  write_root_attributes(file, header);
+  const Hdf5Handle creation = creation_properties(H5P_GROUP_CREATE);
+  for (const char* path :
+       {"/events", "/events/statistics", "/pairs", "/labels", "/labels/boxes", "/labels/poses"}) {
+    Hdf5Handle group(H5Gcreate2(file, path, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose, "create",
+                     path);
+    group.close(path);
+  }
+  Hdf5Handle volume = create_volume(file, header);
+  describe_volume(volume, header);
+  return volume;
+}
+
+void describe_columns(hid_t file, const ShardHeader& header) {
+  const LabelSchema& schema = header.label_schema;
+  write_attribute(open_object(file, "/labels/boxes/class_id"), "class_names", schema.class_names);
+  write_attribute(open_object(file, "/labels/poses"), "joint_names", schema.joint_names);
+  write_attribute(open_object(file, "/labels/poses/joints"), "joint_names", schema.joint_names);
+  write_attribute(open_object(file, "/events/statistics/flags"), "bits",
+                  std::vector<std::string>{"empty", "extrapolated", "saturated"});
+  write_attribute(open_object(file, "/pairs/source_to_volume"), "meaning",
+                  std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
+                              "picture to one in the volume; pixel centres are whole numbers"));
+}
+
+}  // namespace eventgan

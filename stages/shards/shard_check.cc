@@ -1,0 +1,121 @@
+#include "stages/shards/shard_check.h"
+
+#include <algorithm>
+#include <exception>
+#include <sstream>
+#include <system_error>
+#include <type_traits>
+
+#include "stages/shards/label_check.h"
+#include "stages/shards/sha256.h"
+#include "stages/shards/shard_reader.h"
+#include "stages/shards/volume_check.h"
+
+namespace eventgan {
+namespace {
+
+class Check {
+ public:
+  Check(const std::filesystem::path& path, const ShardMarker& marker)
+      : path_(path), marker_(marker) {}
+
+  std::vector<std::string> run() {
+    // A file with other bytes is not looked into: HDF5 does not promise to survive that.
+    if (!same_bytes()) return faults_;
+    const ShardReader reader(path_);
+    check_header(reader.header());
+    std::vector<QuarantinedSample> invalid;
+    for (int slot = 0; slot < reader.header().sample_count; ++slot) {
+      const ShardSample sample = reader.sample(slot);
+      if (!sample.valid) invalid.push_back({slot, sample.sample_id, ""});
+      check_sample(reader, slot, sample);
+    }
+    check_quarantined(invalid);
+    return faults_;
+  }
+
+  /// The reader reports all that is wrong with the structure at once, a line each.
+  std::vector<std::string> stopped_by(const std::exception& error) {
+    std::istringstream lines(error.what());
+    for (std::string line; std::getline(lines, line);) {
+      if (line.starts_with(path_.string())) {
+        faults_.push_back(line);
+      } else {
+        fault(line);
+      }
+    }
+    return faults_;
+  }
+
+ private:
+  void fault(const std::string& what) { faults_.push_back(path_.string() + ": " + what); }
+
+  template <class Value>
+  void expect(const std::string& what, const Value& expected, const Value& got) {
+    if (expected == got) return;
+    if constexpr (std::is_arithmetic_v<Value>) {
+      fault("expected " + what + " " + std::to_string(expected) + ", got " + std::to_string(got));
+    } else {
+      fault("expected " + what + " " + expected + ", got " + got);
+    }
+  }
+
+  bool same_bytes() {
+    expect("file name", marker_.shard, path_.filename().string());
+    std::error_code error;
+    const auto size = std::filesystem::file_size(path_, error);
+    if (error) {
+      fault("cannot read: " + error.message());
+    } else if (static_cast<std::int64_t>(size) != marker_.size_bytes) {
+      expect("size in bytes", marker_.size_bytes, static_cast<std::int64_t>(size));
+    } else {
+      expect("SHA-256", marker_.sha256, sha256_of_file(path_));
+    }
+    return faults_.empty();
+  }
+
+  void check_header(const ShardHeader& header) {
+    expect("name", marker_.shard, header.name);
+    expect("plan hash", marker_.plan_hash, header.plan_hash);
+    expect("number of samples", marker_.samples, header.sample_count);
+  }
+
+  void check_sample(const ShardReader& reader, int slot, const ShardSample& sample) {
+    const std::string where = " (sample " + std::to_string(slot) + ", " + sample.sample_id + ")";
+    try {
+      const auto found = volume_fault(reader.header(), sample, reader.volume(slot));
+      if (found) fault(*found + where);
+    } catch (const std::runtime_error& error) {  // checksum
+      faults_.push_back(error.what() + where);
+    }
+    for (const std::string& found : label_faults(reader.header(), sample)) fault(found + where);
+  }
+
+  void check_quarantined(const std::vector<QuarantinedSample>& invalid) {
+    const int samples = marker_.samples;
+    expect("number of valid samples", marker_.valid, samples - static_cast<int>(invalid.size()));
+    std::vector<QuarantinedSample> recorded = marker_.quarantined;
+    for (QuarantinedSample& sample : recorded) sample.reason.clear();
+    if (!std::is_permutation(recorded.begin(), recorded.end(), invalid.begin(), invalid.end())) {
+      fault("expected the samples with valid = 0 to be those that the marker lists, got others");
+    }
+  }
+
+  const std::filesystem::path& path_;
+  const ShardMarker& marker_;
+  std::vector<std::string> faults_;
+};
+
+}  // namespace
+
+std::vector<std::string> check_shard(const std::filesystem::path& shard,
+                                     const ShardMarker& marker) {
+  Check check(shard, marker);
+  try {
+    return check.run();
+  } catch (const std::exception& error) {
+    return check.stopped_by(error);
+  }
+}
+
+}  // namespace eventgan

@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <exception>
+#include <optional>
+#include <stdexcept>
+#include <type_traits>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/hdf5/hdf5_dataset_internal.h"
+#include "stages/hdf5/hdf5_types_internal.h"
+#include "stages/shards/shard_columns.h"
+#include "stages/shards/shard_file_internal.h"
+#include "stages/shards/shard_objects_internal.h"
+
+namespace eventgan {
+namespace {
+
+constexpr char kVolumePath[] = "/events/volume";
+
+Hdf5Handle open_file(const std::filesystem::path& path) {
+  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "create", "access properties");
+  // A shard under its final name never changes, and many cluster file systems have no locks.
+  checked(H5Pset_file_locking(access, false, true), "set", "file locking");
+  return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "the file"};
+}
+
+std::string shape_text(const Dims& dims) {
+  std::string text;
+  for (const hsize_t dim : dims) text += (text.empty() ? "" : ", ") + std::to_string(dim);
+  return "[" + text + "]";
+}
+
+/// Reads column after column and notes what is wrong.
+class ColumnReader {
+ public:
+  ColumnReader(ShardFile& shard, std::string path, std::vector<std::string>& faults)
+      : shard_(shard), path_(std::move(path)), faults_(faults) {}
+
+  template <class Element>
+  void operator()(const ColumnSpec& spec, std::vector<Element>& column) {
+    if (spec.optional && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
+    Dims dims;
+    try {
+      column = read_dataset<Element>(shard_.file, spec.path, dims);
+    } catch (const Hdf5Error& error) {
+      return fault(error.what());
+    }
+    // Rows that faulty offsets should have counted are not worth a line each.
+    const std::optional<hsize_t> rows = expected_rows(spec.rows);
+    Dims expected{rows.value_or(dims.empty() ? 0 : dims[0])};
+    expected.insert(expected.end(), spec.inner.begin(), spec.inner.end());
+    if (dims != expected) {
+      return fault("expected shape " + shape_text(expected) + " of " + spec.path + ", got " +
+                   shape_text(dims));
+    }
+    if constexpr (std::is_same_v<Element, std::int64_t>) {
+      if (spec.rows == Rows::kOffsets) check_offsets(spec, column);
+    }
+  }
+
+ private:
+  void fault(const std::string& what) { faults_.push_back(path_ + ": " + what); }
+
+  std::optional<hsize_t> expected_rows(Rows rows) const {
+    const auto samples = static_cast<hsize_t>(shard_.header.sample_count);
+    switch (rows) {
+      case Rows::kSamples:
+        return samples;
+      case Rows::kOffsets:
+        return samples + 1;
+      case Rows::kBoxes:
+        return boxes_;
+      case Rows::kPersons:
+        return persons_;
+    }
+    return std::nullopt;
+  }
+
+  void check_offsets(const ColumnSpec& spec, const std::vector<std::int64_t>& offsets) {
+    if (offsets.front() != 0 || !std::is_sorted(offsets.begin(), offsets.end())) {
+      return fault("expected " + std::string(spec.path) + " to ascend from 0, got other numbers");
+    }
+    const auto rows = static_cast<hsize_t>(offsets.back());
+    (&offsets == &shard_.tables.boxes.offsets ? boxes_ : persons_) = rows;
+  }
+
+  ShardFile& shard_;
+  std::string path_;
+  std::vector<std::string>& faults_;
+  std::optional<hsize_t> boxes_;
+  std::optional<hsize_t> persons_;
+};
+
+}  // namespace
+
+ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults) {
+  quiet_hdf5_errors();
+  if (std::error_code ignored; !std::filesystem::exists(path, ignored)) {
+    throw InputError("expected a shard, got no file, in " + path.string());
+  }
+  ShardFile shard;
+  try {
+    shard.file = open_file(path);
+    shard.header = read_header(shard.file);
+    shard.volume =
+        Hdf5Handle(H5Dopen2(shard.file, kVolumePath, H5P_DEFAULT), H5Dclose, "open", kVolumePath);
+    stored_volume_size(shard.header);
+  } catch (const std::exception& error) {
+    throw std::runtime_error(path.string() + ": " + error.what());
+  }
+  visit_columns(shard.tables, shard.header.label_schema.joint_names.size(),
+                ColumnReader(shard, path.string(), faults));
+  return shard;
+}
+
+std::vector<std::byte> read_stored_volume(const ShardFile& shard, int slot) {
+  const Dims dims = dims_of(shard.volume, kVolumePath);
+  const Dims start{static_cast<hsize_t>(slot), 0, 0, 0};
+  const Dims count{1, dims[1], dims[2], dims[3]};
+  const Hdf5Handle from(H5Dget_space(shard.volume), H5Sclose, "read", kVolumePath);
+  checked(H5Sselect_hyperslab(from, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
+          "select in", kVolumePath);
+  const Hdf5Handle to(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "read", kVolumePath);
+  std::vector<std::byte> bytes(stored_volume_size(shard.header));
+  // Read as it is stored: HDF5's own conversion from float16 is slow.
+  checked(
+      H5Dread(shard.volume, volume_type(shard.header.dtype), to, from, H5P_DEFAULT, bytes.data()),
+      "read", std::string(kVolumePath) + "[" + std::to_string(slot) + "]");
+  return bytes;
+}
+
+}  // namespace eventgan

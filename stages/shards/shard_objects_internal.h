@@ -1,0 +1,25 @@
+#pragma once
+
+#include "manifests/shard.h"
+#include "stages/hdf5/hdf5_handle_internal.h"
+
+namespace eventgan {
+
+// The objects of a shard that are not columns: root attributes, groups, the volume dataset, and the
+// attributes that explain. All throw Hdf5Error.
+
+/// Bytes of one volume as stored, before compression. Throws std::invalid_argument if HDF5 has no
+/// chunks that large (4 GiB), or the shape is empty.
+std::size_t stored_volume_size(const ShardHeader& header);
+
+/// Everything that is known before the first sample. Returns the open dataset `/events/volume`.
+Hdf5Handle create_objects(hid_t file, const ShardHeader& header);
+
+/// Attributes of the columns, once these are written.
+void describe_columns(hid_t file, const ShardHeader& header);
+
+/// The header again. `name` stays empty if the file does not have it. Throws also if the format or
+/// its version is not ours.
+ShardHeader read_header(hid_t file);
+
+}  // namespace eventgan

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "manifests/shard.h"
+
+namespace eventgan {
+
+/// Reads a shard back, field by field and with every checksum. Errors are std::runtime_error naming
+/// the file and the HDF5 path. Thread safety: as HDF5, one thread at a time.
+class ShardReader {
+ public:
+  /// Reads everything but the volumes. Throws InputError if there is no file, std::runtime_error if
+  /// the file is not a shard of a version this program knows, or not built as the format says: then
+  /// with a line for each fault.
+  explicit ShardReader(const std::filesystem::path& file);
+  ~ShardReader();
+  ShardReader(ShardReader&&) noexcept;
+
+  const ShardHeader& header() const;
+
+  /// Everything about slot `slot` but its volume. `fault` is empty, since it stands in the marker;
+  /// frame times are relative to the previous frame. Throws std::out_of_range.
+  ShardSample sample(int slot) const;
+
+  /// The volume of slot `slot`, decoded to float32 [2 bins, H, W], C order.
+  std::vector<float> volume(int slot) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace eventgan

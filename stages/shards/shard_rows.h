@@ -1,0 +1,18 @@
+#pragma once
+
+#include "manifests/shard.h"
+#include "stages/shards/shard_tables.h"
+
+namespace eventgan {
+
+/// Adds the next sample's row to every table. Throws std::logic_error naming the sample if its
+/// labels do not fit the header's schema or `labels` does not go with `annotation`; the tables are
+/// then unchanged. A sample that is not valid may come without `labels`: then only the original
+/// annotation is kept of it.
+void append_row(const ShardHeader& header, const ShardSample& sample, ShardTables& tables);
+
+/// Row `slot` as it was appended, except that frame times are relative to the previous frame. The
+/// tables must be consistent, as ShardReader sees to.
+ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, int slot);
+
+}  // namespace eventgan

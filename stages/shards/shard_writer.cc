@@ -1,0 +1,160 @@
+// How a shard comes to be under its final name whole or not at all (DESIGN section 6). Steps 2 to 5
+// are `commit`; whatever goes wrong before step 4, the destructor deletes the temporary file.
+//
+//   1. Create FOLDER/.NAME.HOST.PID.ATTEMPT.tmp. The volumes are written to it as they come, in
+//   slot order; the rows
+//      of everything else are kept in memory.
+//   2. Write the rows. Close every object and then the file, checking each close: HDF5 writes
+//      most of its own data only then. The close degree SEMI makes a forgotten object an error.
+//   3. Reopen and fsync, so that the bytes are on disk before the name is; hash them as they are
+//   read back.
+//   4. rename() to FOLDER/NAME. It replaces: of two processes that write the same shard, each
+//   publishes a whole file,
+//      and both files hold the same bytes.
+//   5. fsync FOLDER, so that the name is on disk before the marker can say so.
+//
+// Not everything that a write can meet surfaces in an HDF5 call: see Hdf5OutputFile.
+
+#include "stages/shards/shard_writer.h"
+
+#include <cstdint>
+#include <optional>
+#include <stdexcept>
+#include <system_error>
+#include <vector>
+
+#include "stages/hdf5/hdf5_dataset_internal.h"
+#include "stages/hdf5/hdf5_output_file_internal.h"
+#include "stages/shards/atomic_file.h"
+#include "stages/shards/sha256.h"
+#include "stages/shards/shard_columns.h"
+#include "stages/shards/shard_objects_internal.h"
+#include "stages/shards/shard_rows.h"
+
+namespace eventgan {
+
+struct ShardWriter::State {
+  ShardHeader header;
+  std::filesystem::path target;
+  std::filesystem::path temporary;
+  bool created = false;
+  std::optional<Hdf5OutputFile> file;
+  Hdf5Handle volume;
+  ShardTables tables;
+  int next_slot = 0;
+  bool committed = false;
+
+  ~State();
+
+  /// Runs HDF5 calls; errors name the file.
+  template <class Work>
+  void write(Work&& work) {
+    try {
+      work();
+    } catch (const Hdf5Error& error) {
+      file->check();
+      throw std::runtime_error(target.string() + ": " + error.what());
+    }
+    file->check();
+  }
+
+  void write_chunk(std::span<const std::byte> chunk);
+  void write_columns();
+};
+
+ShardWriter::State::~State() {
+  volume = Hdf5Handle();
+  file.reset();
+  if (!created) return;
+  std::error_code ignored;  // after a commit there is nothing to delete
+  std::filesystem::remove(temporary, ignored);
+}
+
+void ShardWriter::State::write_chunk(std::span<const std::byte> chunk) {
+  const hsize_t offset[4] = {static_cast<hsize_t>(next_slot), 0, 0, 0};
+  constexpr std::uint32_t kNoFilterSkipped = 0;
+  write([&] {
+    checked(
+        H5Dwrite_chunk(volume, H5P_DEFAULT, kNoFilterSkipped, offset, chunk.size(), chunk.data()),
+        "write", "/events/volume");
+  });
+}
+
+void ShardWriter::State::write_columns() {
+  const std::size_t joints = header.label_schema.joint_names.size();
+  const ShardTables& columns = tables;
+  const auto rows = [&](Rows kind) {
+    switch (kind) {
+      case Rows::kSamples:
+        return columns.valid.size();
+      case Rows::kOffsets:
+        return columns.valid.size() + 1;
+      case Rows::kBoxes:
+        return columns.boxes.class_id.size();
+      case Rows::kPersons:
+        return columns.poses.scale.size();
+    }
+    throw std::logic_error("unknown kind of rows");
+  };
+  visit_columns(columns, joints, [&](const ColumnSpec& spec, const auto& column) {
+    if (spec.optional && column.empty()) return;
+    Dims dims{rows(spec.rows)};
+    dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
+    write_dataset(file->id(), spec.path, column, dims, header.deflate_level);
+  });
+}
+
+ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header)
+    : state_(std::make_unique<State>()) {
+  quiet_hdf5_errors();
+  stored_volume_size(header);
+  State& state = *state_;
+  state.header = header;
+  state.target = folder / header.name;
+  state.temporary = temporary_beside(state.target);
+  state.file.emplace(state.temporary, creation_properties(H5P_FILE_CREATE));
+  state.created = true;
+  state.write([&] { state.volume = create_objects(state.file->id(), header); });
+}
+
+ShardWriter::~ShardWriter() { quiet_hdf5_errors(); }
+
+void ShardWriter::append(const ShardSample& sample, std::span<const std::byte> chunk) {
+  quiet_hdf5_errors();
+  State& state = *state_;
+  const std::string where = " (" + sample.sample_id + ", " + state.header.name + ")";
+  if (state.committed || state.next_slot == state.header.sample_count) {
+    throw std::logic_error("expected no sample after the last slot, got one" + where);
+  }
+  if (sample.valid == chunk.empty()) {
+    throw std::logic_error("expected a volume for a valid sample and none for another" + where);
+  }
+  append_row(state.header, sample, state.tables);
+  if (!chunk.empty()) state.write_chunk(chunk);
+  ++state.next_slot;
+}
+
+ShardReceipt ShardWriter::commit() {
+  quiet_hdf5_errors();
+  State& state = *state_;
+  if (state.committed) throw std::logic_error("a shard is committed once: " + state.header.name);
+  if (state.next_slot != state.header.sample_count) {
+    throw std::logic_error("expected " + std::to_string(state.header.sample_count) +
+                           " samples, got " + std::to_string(state.next_slot) + ", in " +
+                           state.header.name);
+  }
+  state.write([&] {
+    state.write_columns();
+    describe_columns(state.file->id(), state.header);
+    state.volume.close("/events/volume");
+    state.file->close();
+  });
+  sync_to_disk(state.temporary);
+  ShardReceipt receipt{sha256_of_file(state.temporary),
+                       static_cast<std::int64_t>(std::filesystem::file_size(state.temporary))};
+  publish(state.temporary, state.target);
+  state.committed = true;
+  return receipt;
+}
+
+}  // namespace eventgan

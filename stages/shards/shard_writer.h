@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "manifests/shard.h"
+
+namespace eventgan {
+
+/// What a committed shard is.
+struct ShardReceipt {
+  std::string sha256;  ///< hex
+  std::int64_t size_bytes = 0;
+};
+
+/// Writes one shard so that it is under its final name whole or not at all. The protocol (DESIGN
+/// section 6):
+///   1. create FOLDER/.NAME.HOST.PID.ATTEMPT.tmp, write samples in slot order;
+///   2. close every HDF5 object and the file, checking each close;
+///   3. reopen, fsync, hash;
+///   4. rename to FOLDER/NAME;
+///   5. fsync the folder.
+/// The marker is the caller's next step (see atomic_file.h). A writer destroyed before `commit`
+/// deletes its temporary file.
+///
+/// The same header and samples give the same bytes. Errors (disk full, no permission) are thrown as
+/// std::runtime_error that names the path. Thread safety: HDF5 has one global lock, so use one
+/// writer, from one thread at a time.
+class ShardWriter {
+ public:
+  /// Throws std::invalid_argument for an empty shape or volumes of 4 GiB and more.
+  ShardWriter(const std::filesystem::path& folder, const ShardHeader& header);
+  ~ShardWriter();
+  ShardWriter(const ShardWriter&) = delete;
+  ShardWriter& operator=(const ShardWriter&) = delete;
+
+  /// The next slot. `chunk` as VolumeCodec encodes a volume of the header's shape, type and level;
+  /// empty for a quarantined sample, whose volume then reads as zeros. Such a sample may come
+  /// without `labels`; then no box and no person of its annotation is stored, only the original.
+  /// Throws std::logic_error beyond the header's sample count or for labels that do not fit the
+  /// schema; after any other error the writer can only be destroyed.
+  void append(const ShardSample& sample, std::span<const std::byte> chunk);
+
+  /// Steps 2-5. Throws std::logic_error if slots are missing. Once.
+  ShardReceipt commit();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,237 @@
+#include "stages/shards/shard_check.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <functional>
+#include <limits>
+
+#include "stages/shards/sha256.h"
+#include "tests/stages/shards/example_shard.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+class ShardCheck : public ::testing::Test {
+ protected:
+  void write(const testing::ExampleShard& example) {
+    marker_ = write_shard(folder_.path(), example);
+    shard_ = folder_ / marker_.shard;
+  }
+
+  /// Changes the file with HDF5 itself and makes the marker agree again, as if a faulty program had
+  /// written both.
+  void change(const std::function<void(hid_t)>& work) {
+    const hid_t file = H5Fopen(shard_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    ASSERT_GE(file, 0);
+    work(file);
+    ASSERT_GE(H5Fclose(file), 0);
+    marker_.sha256 = sha256_of_file(shard_);
+    marker_.size_bytes = static_cast<std::int64_t>(std::filesystem::file_size(shard_));
+  }
+
+  /// Overwrites all numbers of a dataset.
+  template <class Number>
+  void overwrite(const char* path, hid_t type, const std::vector<Number>& numbers) {
+    change([&](hid_t file) {
+      const hid_t dataset = H5Dopen2(file, path, H5P_DEFAULT);
+      ASSERT_GE(H5Dwrite(dataset, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()), 0);
+      H5Dclose(dataset);
+    });
+  }
+
+  std::vector<std::string> faults() {
+    const std::vector<std::string> found = check_shard(shard_, marker_);
+    EXPECT_THAT(found, Each(StartsWith(shard_.string() + ": ")));
+    return found;
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path shard_;
+  ShardMarker marker_;
+};
+
+TEST_F(ShardCheck, SoundShardsHaveNoFaults) {
+  for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    write(testing::example_shard(type));
+    EXPECT_THAT(faults(), IsEmpty());
+  }
+  write(testing::unlabelled_shard());
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(ShardCheck, VolumesThatDoNotFitFloat16AreSoundIfMarked) {
+  testing::ExampleShard example = testing::example_shard(StoredType::kFloat16);
+  example.volumes[0][2] = 1e6f;  // in the place of another that was not zero
+  example.samples[0].statistics.max = 1e6f;
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(ShardCheck, NormalizedVolumesAreSound) {
+  testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
+  example.header.normalization = Normalization::kEta98;
+  // Statistics are of the volume as generated, here twice as large as it is stored.
+  for (std::size_t slot : {0u, 3u, 4u}) {
+    float& eta98 = example.samples[slot].statistics.eta98;
+    eta98 = 0.5f;
+    for (float& value : example.volumes[slot]) value = std::min(value, eta98) / eta98;
+  }
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(ShardCheck, AFlippedBitAnywhereIsFound) {
+  write(testing::example_shard());
+  const std::string bytes = testing::read_file(shard_);
+  for (std::size_t i = 0; i < bytes.size(); i += 997) {
+    std::string flipped = bytes;
+    flipped[i] = static_cast<char>(flipped[i] ^ 4);
+    testing::write_file(shard_, flipped);
+    ASSERT_THAT(faults(), ElementsAre(HasSubstr("expected SHA-256 " + marker_.sha256))) << i;
+  }
+}
+
+TEST_F(ShardCheck, ATruncatedOrMissingFileIsFound) {
+  write(testing::example_shard());
+  std::filesystem::resize_file(shard_, 1000);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected size in bytes " +
+                                              std::to_string(marker_.size_bytes) + ", got 1000")));
+  std::filesystem::remove(shard_);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("No such file")));
+}
+
+TEST_F(ShardCheck, AFileThatIsNoShardIsFound) {
+  write(testing::example_shard());
+  testing::write_file(shard_, "not HDF5");
+  marker_.size_bytes = 8;
+  marker_.sha256 = sha256_hex("not HDF5");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("cannot open")));
+}
+
+TEST_F(ShardCheck, AMarkerOfAnotherShardIsFound) {
+  write(testing::example_shard());
+  marker_.plan_hash = std::string(64, 'c');
+  marker_.samples = 6;
+  EXPECT_THAT(faults(), AllOf(Contains(HasSubstr("expected plan hash cccc")),
+                              Contains(HasSubstr("expected number of samples 6, got 5"))));
+  marker_.shard = "demo-train-00001-of-00002.h5";
+  EXPECT_THAT(faults(), Contains(HasSubstr("expected file name demo-train-00001-of-00002.h5")));
+}
+
+TEST_F(ShardCheck, CountsThatDifferAreFound) {
+  write(testing::example_shard());
+  marker_.valid = 5;
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected number of valid samples 5, got 4")));
+  marker_.valid = 4;
+  marker_.quarantined[0].slot = 1;
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the marker lists")));
+}
+
+TEST_F(ShardCheck, MissingDatasetsAreFoundAllAtOnce) {
+  write(testing::example_shard());
+  change([](hid_t file) {
+    H5Ldelete(file, "/pairs/gap_s", H5P_DEFAULT);
+    H5Ldelete(file, "/labels/poses/visible", H5P_DEFAULT);
+  });
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("/pairs/gap_s"), HasSubstr("/labels/poses/visible")));
+}
+
+/// Puts an empty dataset in the place of another.
+void replace(hid_t file, const char* path, hid_t type, std::vector<hsize_t> dims) {
+  H5Ldelete(file, path, H5P_DEFAULT);
+  const hid_t space = H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr);
+  H5Dclose(H5Dcreate2(file, path, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
+  H5Sclose(space);
+}
+
+TEST_F(ShardCheck, WrongShapesAndTypesAreFound) {
+  write(testing::example_shard());
+  change([](hid_t file) {
+    replace(file, "/valid", H5T_STD_U8LE, {6});
+    replace(file, "/labels/boxes/xyxy", H5T_IEEE_F64LE, {3, 5});
+    replace(file, "/labels/poses/scale", H5T_IEEE_F32LE, {3});
+  });
+  EXPECT_THAT(faults(),
+              ElementsAre(HasSubstr("expected shape [3, 4] of /labels/boxes/xyxy, got [3, 5]"),
+                          HasSubstr("expected type float64 of /labels/poses/scale"),
+                          HasSubstr("expected shape [5] of /valid, got [6]")));
+}
+
+TEST_F(ShardCheck, OffsetsThatDoNotAscendToTheRowsAreFound) {
+  // Right: 0 2 2 2 3 3.
+  write(testing::example_shard());
+  overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {0, 2, 1, 2, 3, 3});
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected /labels/boxes/offsets to ascend from 0")));
+  overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {1, 2, 2, 2, 3, 3});
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected /labels/boxes/offsets to ascend from 0")));
+  overwrite<std::int64_t>("/labels/boxes/offsets", H5T_NATIVE_INT64, {0, 2, 2, 2, 3, 4});
+  EXPECT_THAT(faults(),
+              Contains(HasSubstr("expected shape [4, 4] of /labels/boxes/xyxy, got [3, 4]")));
+}
+
+TEST_F(ShardCheck, VolumesWithNanOrOtherValuesAreFound) {
+  const testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
+  write(example);
+  const std::size_t size = example.header.volume.value_count();
+  std::vector<float> all;
+  for (const auto& volume : example.volumes) {
+    all.insert(all.end(), volume.begin(), volume.end());
+    if (volume.empty()) all.resize(all.size() + size);  // quarantined
+  }
+  std::vector<float> bad = all;
+  bad[size / 3] = std::numeric_limits<float>::quiet_NaN();  // slot 0
+  bad[size + 5] = -1;                                       // slot 1
+  bad[2 * size + 5] = 1;                                    // slot 2, quarantined
+  bad[3 * size] += 0.5f;                                    // slot 3
+  overwrite("/events/volume", H5T_NATIVE_FLOAT, bad);
+  EXPECT_THAT(faults(),
+              ElementsAre(AllOf(HasSubstr("finite"), HasSubstr("(sample 0, 000000)")),
+                          AllOf(HasSubstr("finite"), HasSubstr("(sample 1, 000001)")),
+                          AllOf(HasSubstr("expected zeros"), HasSubstr("(sample 2, 000002)")),
+                          AllOf(HasSubstr("sum of positive"), HasSubstr("(sample 3, 000003)"))));
+  overwrite("/events/volume", H5T_NATIVE_FLOAT, all);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(ShardCheck, ALostChunkIsFound) {
+  testing::ExampleShard example = testing::example_shard();
+  example.volumes[4].assign(example.volumes[4].size(), 0);  // statistics stay those of the full one
+  write(example);
+  EXPECT_THAT(faults(),
+              ElementsAre(AllOf(HasSubstr("largest value"), HasSubstr("(sample 4, 000004)"))));
+}
+
+TEST_F(ShardCheck, LabelsInTheWrongPlaceAreFound) {
+  testing::ExampleShard example = testing::example_shard();
+  example.samples[0].labels.boxes[0].unclipped.left += 0.5;
+  example.samples[0].labels.persons[1].joints[2].y += 0.25;
+  example.samples[3].labels.boxes[0].clipped = example.samples[3].labels.boxes[0].unclipped;
+  example.samples[4].labels.persons[0].center = {3, 3};
+  write(example);
+  EXPECT_THAT(faults(),
+              ElementsAre(HasSubstr("xyxy_unclipped of box 0 where"),
+                          HasSubstr("xyxy of box 0 to be"), HasSubstr("joint 2 of person 1 where"),
+                          HasSubstr("xyxy of box 0 to be"), HasSubstr("center of person 0 where")));
+}
+
+TEST_F(ShardCheck, NanInALabelIsFound) {
+  testing::ExampleShard example = testing::example_shard();
+  example.samples[0].labels.boxes[1].clipped.top = std::numeric_limits<double>::quiet_NaN();
+  write(example);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 1")));
+}
+
+}  // namespace
+}  // namespace eventgan

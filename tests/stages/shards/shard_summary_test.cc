@@ -1,0 +1,84 @@
+#include "stages/shards/shard_summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "stages/shards/shard_counts.h"
+#include "tests/stages/shards/example_shard.h"
+#include "tests/testing/temporary_folder.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+
+class ShardSummary : public ::testing::Test {
+ protected:
+  static ShardReader open(const testing::TemporaryFolder& folder) {
+    return ShardReader(folder / write_shard(folder.path(), testing::example_shard()).shard);
+  }
+
+  testing::TemporaryFolder folder_;
+  ShardReader reader_ = open(folder_);
+};
+
+TEST_F(ShardSummary, Counts) {
+  const ShardCounts counts = count_shard(reader_);
+  EXPECT_EQ(counts.valid, 4);
+  EXPECT_EQ(counts.empty_volumes, 1);
+  EXPECT_EQ(counts.boxes, 3);
+  EXPECT_EQ(counts.persons, 3);
+  EXPECT_THAT(counts.classes, ElementsAre(Pair("Car", 2), Pair("DontCare", 1)));
+  EXPECT_THAT(counts.gaps, ElementsAre(Pair(2, 5)));
+  EXPECT_THAT(counts.quarantined, ElementsAre("000002"));
+}
+
+TEST_F(ShardSummary, FlagsHaveNames) {
+  EXPECT_TRUE(flag_names(0).empty());
+  EXPECT_THAT(flag_names(kFlagEmpty | kFlagExtrapolated | kFlagSaturated),
+              ElementsAre("empty", "extrapolated", "saturated"));
+}
+
+TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
+  const std::string text = describe_shard(reader_);
+  EXPECT_THAT(text, HasSubstr("demo-train-00000-of-00001.h5\n"));
+  EXPECT_THAT(text, HasSubstr("5, valid 4"));
+  EXPECT_THAT(text, HasSubstr("quarantined    000002\n"));
+  EXPECT_THAT(text, HasSubstr("2 polarities x 2 bins, 6 x 8 (height x width), float16, deflate 1"));
+  EXPECT_THAT(text, HasSubstr("3 (Car: 2, DontCare: 1)"));
+}
+
+TEST_F(ShardSummary, TextSaysWhatIsInASample) {
+  const std::string first = describe_sample(reader_, 0);
+  EXPECT_THAT(first, HasSubstr("kitti/prev_2/000000_02.png, frame 10\n"));
+  EXPECT_THAT(first, HasSubstr("Car [1 1 4.25 4.5], source [2 2 8.5 9], track 7\n"));
+  EXPECT_THAT(first, HasSubstr("DontCare [0 0 0.5 0.5], source [0 0 1 1], ignore\n"));
+  EXPECT_THAT(first, HasSubstr("nose (1.5 1.75), visible\n"));
+  EXPECT_THAT(first, HasSubstr("0.2 s"));
+  EXPECT_THAT(describe_sample(reader_, 1), Not(HasSubstr("nan")));
+  EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
+  EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
+  EXPECT_THROW(describe_sample(reader_, -1), std::out_of_range);
+}
+
+TEST_F(ShardSummary, JsonHoldsTheSame) {
+  const auto shard = nlohmann::json::parse(shard_json(reader_));
+  EXPECT_EQ(shard["samples"], 5);
+  EXPECT_EQ(shard["classes"], (nlohmann::json{{"Car", 2}, {"DontCare", 1}}));
+  EXPECT_EQ(shard["size"], (nlohmann::json{{"height", 6}, {"width", 8}}));
+  EXPECT_EQ(shard["dtype"], "float16");
+
+  const auto first = nlohmann::json::parse(sample_json(reader_, 0));
+  EXPECT_EQ(first["boxes"][0]["xyxy"], (nlohmann::json{1, 1, 4.25, 4.5}));
+  EXPECT_EQ(first["persons"][1]["joints"][0]["at_source"], (nlohmann::json{3.5, 4}));
+  EXPECT_TRUE(first["persons"][0]["head_box"].is_null());
+  EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 1))["gap_s"].is_null());
+  EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 2))["source_to_volume"][0].is_null());
+}
+
+}  // namespace
+}  // namespace eventgan

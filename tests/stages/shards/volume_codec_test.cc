@@ -1,0 +1,115 @@
+#include "stages/shards/volume_codec.h"
+
+#include <gtest/gtest.h>
+#include <hdf5.h>
+
+#include <cstdint>
+#include <cstring>
+#include <random>
+#include <string>
+
+#include "tests/testing/temporary_folder.h"
+
+namespace eventgan {
+namespace {
+
+/// About half zeros, the rest in [0, 1): what generated volumes look like.
+std::vector<float> some_volume(std::size_t size) {
+  std::mt19937 random(3);
+  std::vector<float> values(size);
+  for (float& value : values) {
+    value = std::max(0.0f, static_cast<float>(random() % 2001) / 1000 - 1);
+  }
+  return values;
+}
+
+/// The numbers HDF5's own filters make of a chunk; `element` = HDF5's type of them.
+template <class Number>
+std::vector<Number> decoded_by_hdf5(const std::vector<std::byte>& chunk, std::size_t count,
+                                    hid_t element, int deflate_level) {
+  const testing::TemporaryFolder folder;
+  const hsize_t size = count;
+  const hid_t file = H5Fcreate((folder / "x.h5").c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  const hid_t creation = H5Pcreate(H5P_DATASET_CREATE);
+  H5Pset_chunk(creation, 1, &size);
+  H5Pset_shuffle(creation);
+  if (deflate_level > 0) H5Pset_deflate(creation, static_cast<unsigned>(deflate_level));
+  H5Pset_fletcher32(creation);
+  const hid_t space = H5Screate_simple(1, &size, nullptr);
+  const hid_t dataset = H5Dcreate2(file, "d", element, space, H5P_DEFAULT, creation, H5P_DEFAULT);
+  const hsize_t offset = 0;
+  EXPECT_GE(H5Dwrite_chunk(dataset, H5P_DEFAULT, 0, &offset, chunk.size(), chunk.data()), 0);
+  std::vector<Number> numbers(count);
+  EXPECT_GE(H5Dread(dataset, element, H5S_ALL, H5S_ALL, H5P_DEFAULT, numbers.data()), 0);
+  H5Dclose(dataset);
+  H5Sclose(space);
+  H5Pclose(creation);
+  H5Fclose(file);
+  return numbers;
+}
+
+class VolumeCodecLevels : public ::testing::TestWithParam<int> {};
+
+TEST_P(VolumeCodecLevels, Hdf5ReadsEveryType) {
+  const int level = GetParam();
+  for (const std::size_t size : {1u, 7u, 5000u}) {
+    const std::vector<float> values = some_volume(size);
+    EXPECT_EQ(decoded_by_hdf5<float>(VolumeCodec(StoredType::kFloat32, level).encode(values).chunk,
+                                     size, H5T_IEEE_F32LE, level),
+              values);
+    // uint8 and float16 as the integers that hold their bits.
+    const EncodedVolume bytes = VolumeCodec(StoredType::kUint8, level).encode(values);
+    const auto codes = decoded_by_hdf5<std::uint8_t>(bytes.chunk, size, H5T_STD_U8LE, level);
+    const auto halves = decoded_by_hdf5<std::uint16_t>(
+        VolumeCodec(StoredType::kFloat16, level).encode(values).chunk, size, H5T_STD_U16LE, level);
+    for (std::size_t i = 0; i < size; ++i) {
+      ASSERT_NEAR(codes[i] * bytes.scale, values[i], bytes.scale * 0.50001);
+      ASSERT_EQ(halves[i] == 0, values[i] == 0);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Deflate, VolumeCodecLevels, ::testing::Values(0, 1, 6, 9));
+
+TEST(VolumeCodec, WithoutDeflateTheChunkIsShuffledBytesAndAChecksum) {
+  // 1.0f = 00 00 80 3f, 2.0f = 00 00 00 40 in little endian; shuffled: 00 00 | 00 00 | 80 00 |
+  // 3f 40. Fletcher over the words 0000 0000 8000 3f40: first = bf40, second = 8000 + bf40 = 13f40
+  // → 3f41.
+  const std::vector<std::byte> chunk =
+      VolumeCodec(StoredType::kFloat32, 0).encode(std::vector<float>{1, 2}).chunk;
+  const unsigned char expected[] = {0, 0, 0, 0, 0x80, 0, 0x3f, 0x40, 0x40, 0xbf, 0x41, 0x3f};
+  ASSERT_EQ(chunk.size(), sizeof(expected));
+  EXPECT_EQ(std::memcmp(chunk.data(), expected, sizeof(expected)), 0);
+}
+
+TEST(VolumeCodec, DeflateMakesZerosSmallAndNoiseHardlyLarger) {
+  const VolumeCodec codec(StoredType::kFloat32, 1);
+  const std::vector<float> zeros(100000);
+  EXPECT_LT(codec.encode(zeros).chunk.size(), 2000u);
+  std::mt19937 random(5);
+  std::vector<float> noise(100000);
+  for (float& value : noise) {
+    const std::uint32_t bits = random() & 0x7f7fffff;  // any finite number >= 0
+    std::memcpy(&value, &bits, sizeof(bits));
+  }
+  EXPECT_LT(codec.encode(noise).chunk.size(), 401000u);
+}
+
+TEST(VolumeCodec, SameVolumeSameBytes) {
+  const std::vector<float> values = some_volume(30000);
+  const VolumeCodec codec(StoredType::kFloat16, 4);
+  EXPECT_EQ(codec.encode(values).chunk, codec.encode(values).chunk);
+}
+
+TEST(VolumeCodec, PassesOnScaleAndSaturation) {
+  EXPECT_EQ(VolumeCodec(StoredType::kUint8, 1).encode(std::vector<float>{510}).scale, 2);
+  EXPECT_TRUE(VolumeCodec(StoredType::kFloat16, 1).encode(std::vector<float>{1e6}).saturated);
+}
+
+TEST(VolumeCodec, RefusesLevelsThatDoNotExist) {
+  EXPECT_THROW(VolumeCodec(StoredType::kUint8, -1), std::invalid_argument);
+  EXPECT_THROW(VolumeCodec(StoredType::kUint8, 10), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eventgan
