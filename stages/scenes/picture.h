@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "manifests/image_size.h"
+
+namespace eventgan {
+
+/// Light in the three channels, 0..255.
+struct Colour {
+  float blue = 0;
+  float green = 0;
+  float red = 0;
+
+  Colour operator+(const Colour& other) const {
+    return {blue + other.blue, green + other.green, red + other.red};
+  }
+  Colour operator*(float factor) const { return {blue * factor, green * factor, red * factor}; }
+};
+
+/// `share` of `to`, the rest of `from`.
+inline Colour mix(const Colour& from, const Colour& to, float share) {
+  return from * (1 - share) + to * share;
+}
+
+/// A rendered picture: [y, x, 3] uint8, channels blue, green, red, C order.
+struct Picture {
+  ImageSize size;
+  std::vector<std::uint8_t> bgr;
+  bool operator==(const Picture&) const = default;
+};
+
+Picture black_picture(ImageSize size);
+
+/// Rounds to 8 bit and stores.
+void set_pixel(Picture& picture, int x, int y, const Colour& colour);
+
+/// Write the file, whose folder must exist. Throw std::runtime_error naming the path.
+void write_png(const Picture& picture, const std::filesystem::path& path);
+void write_jpeg(const Picture& picture, const std::filesystem::path& path);
+
+}  // namespace eventgan
