@@ -1,0 +1,28 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "manifests/job_manifest.h"
+#include "manifests/plan.h"
+
+namespace eventgan {
+
+/// Everything that changes a shard's bytes (DESIGN section 6), field by field: each
+/// setting of the manifest (see manifest_fields), annotations, frames, weights, engine,
+/// preprocessing, cpu, libraries, program. Annotation files are hashed by content; frames by path
+/// and size only, since their content would mean reading everything twice.
+std::map<std::string, std::string> make_fingerprint(
+    const JobManifest& manifest, const std::vector<PlannedShard>& shards,
+    const std::vector<std::string>& annotation_files, const std::string& weights_hash,
+    const std::string& engine);
+
+/// How frames are prepared, as compact JSON; stands in the fingerprint and in every shard.
+std::string preprocessing_json(const ImageSpec& image);
+
+/// Name and version of this program: "eventgan 0.1.0".
+std::string program_version();
+
+}  // namespace eventgan

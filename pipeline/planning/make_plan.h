@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/job_manifest.h"
+#include "manifests/plan.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// A plan, and the opened datasets it was made from (their annotations are read while converting).
+struct PlannedJob {
+  Plan plan;
+  std::vector<std::unique_ptr<Dataset>> datasets;  ///< one for each source of the manifest
+};
+
+/// Opens every source and decides everything that is random or depends on what is on disk. Freezes
+/// and writes nothing. Throws InputError if a source is missing or yields fewer pairs than its
+/// min_pairs.
+PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
+                     const std::string& engine);
+
+}  // namespace eventgan

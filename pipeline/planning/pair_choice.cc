@@ -1,0 +1,98 @@
+#include "pipeline/planning/pair_choice.h"
+
+#include <string_view>
+
+#include "manifests/counter_random.h"
+
+namespace eventgan {
+namespace {
+
+struct Window {
+  int first = 0;        // steps from the labelled frame to the previous frame
+  int last = 0;         // ... to the next frame
+  double position = 1;  // of the labelled frame within the pair
+};
+
+Window window(PairSide side, int gap) {
+  switch (side) {
+    case PairSide::kBefore:
+      return {-gap, 0, 1.0};
+    case PairSide::kAfter:
+      return {0, gap, 0.0};
+    case PairSide::kAround:
+      return {-gap / 2, gap / 2, 0.5};
+  }
+  return {};
+}
+
+struct Candidate {
+  Neighbour::State state = Neighbour::State::kBeyond;
+  PlannedSample sample;
+};
+
+Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, PairSide side, int gap) {
+  using State = Neighbour::State;
+  const Window place = window(side, gap);
+  const Neighbour previous = dataset.neighbour(frame, place.first);
+  const Neighbour next = dataset.neighbour(frame, place.last);
+
+  Candidate result;
+  result.sample = {frame.sample_id,
+                   frame.sequence,
+                   frame.label_key,
+                   {previous.frame, next.frame, gap, frame.frame.index, place.position},
+                   ""};
+  for (const Neighbour* neighbour : {&previous, &next}) {
+    if (neighbour->state == State::kHole && result.sample.fault.empty()) {
+      result.sample.fault = "expected a frame, got no file, in " + neighbour->frame.path + " (" +
+                            frame.sample_id + ")";
+    }
+  }
+  if (!result.sample.fault.empty()) {
+    result.state = State::kHole;
+  } else if (previous.state == State::kPresent && next.state == State::kPresent) {
+    result.state = State::kPresent;
+  }
+  return result;
+}
+
+PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
+                            const SourceSpec& source, std::uint64_t seed) {
+  std::vector<PlannedSample> present;
+  std::vector<PlannedSample> damaged;
+  for (const int gap : source.pairs.gaps) {
+    Candidate found = candidate(dataset, frame, source.pairs.side, gap);
+    if (found.state == Neighbour::State::kPresent) present.push_back(std::move(found.sample));
+    if (found.state == Neighbour::State::kHole) damaged.push_back(std::move(found.sample));
+  }
+  auto& choices = present.empty() ? damaged : present;
+  if (choices.empty()) return {{}, source.pairs.gaps};
+  const CounterRandom random =
+      CounterRandom(seed).keyed(to_string(source.dataset)).keyed(frame.sample_id);
+  return {{std::move(choices[random.below(0, choices.size())])}, {}};
+}
+
+PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
+                            const SourceSpec& source) {
+  PairChoiceResult result;
+  for (const int gap : source.pairs.gaps) {
+    Candidate found = candidate(dataset, frame, source.pairs.side, gap);
+    if (found.state == Neighbour::State::kBeyond) {
+      result.without_partner.push_back(gap);
+      continue;
+    }
+    found.sample.sample_id += "@" + std::string(to_string(source.pairs.side)) + std::to_string(gap);
+    result.samples.push_back(std::move(found.sample));
+  }
+  return result;
+}
+
+}  // namespace
+
+PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
+                              const SourceSpec& source, std::uint64_t seed) {
+  return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed)
+                                                 : choose_all(dataset, frame, source);
+}
+
+}  // namespace eventgan

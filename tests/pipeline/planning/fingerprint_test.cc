@@ -1,0 +1,58 @@
+#include "pipeline/planning/fingerprint.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+class Fingerprint : public ::testing::Test {
+ protected:
+  Fingerprint() {
+    manifest_.directory = folder_.path();
+    manifest_.text = R"({"seed": 1})";
+    testing::write_file(folder_ / "labels.txt", "Car 1");
+    testing::write_file(folder_ / "a.png", "12345");
+    shards_ = {{"s.h5", 0, {1, 1}, {{"id", "", "", {{"a.png"}, {"b.png"}, 1, 0, 1}, ""}}}};
+  }
+  std::map<std::string, std::string> make() {
+    return make_fingerprint(manifest_, shards_, {"labels.txt"}, "weights", "engine");
+  }
+
+  testing::TemporaryFolder folder_;
+  JobManifest manifest_;
+  std::vector<PlannedShard> shards_;
+};
+
+TEST_F(Fingerprint, IsTheSameForTheSameInputs) { EXPECT_EQ(make(), make()); }
+
+TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
+  const auto before = make();
+  testing::write_file(folder_ / "a.png", "123456");
+  const auto differences = fingerprint_differences(before, make());
+  ASSERT_EQ(differences.size(), 1u);
+  EXPECT_TRUE(differences[0].starts_with("frames: "));
+}
+
+TEST_F(Fingerprint, NoticesAnAnnotationOfTheSameSize) {
+  const auto before = make();
+  testing::write_file(folder_ / "labels.txt", "Van 1");
+  const auto differences = fingerprint_differences(before, make());
+  ASSERT_EQ(differences.size(), 1u);
+  EXPECT_TRUE(differences[0].starts_with("annotations: "));
+}
+
+TEST_F(Fingerprint, NoticesTheManifestAndThePreprocessing) {
+  const auto before = make();
+  manifest_.text = R"({"seed": 2})";
+  manifest_.image.blur = 3;
+  EXPECT_THAT(fingerprint_differences(before, make()),
+              ::testing::ElementsAre("manifest $.seed: expected 1, got 2",
+                                     ::testing::StartsWith("preprocessing: ")));
+}
+
+}  // namespace
+}  // namespace eventgan

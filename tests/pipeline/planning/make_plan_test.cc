@@ -1,0 +1,87 @@
+#include "pipeline/planning/make_plan.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/faults.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/temporary_folder.h"
+
+namespace eventgan {
+namespace {
+
+class MakePlan : public ::testing::Test {
+ protected:
+  MakePlan() {
+    manifest_.name = "job";
+    manifest_.text = "{}";
+    manifest_.directory = folder_.path();
+    manifest_.output.samples_per_shard = 2;
+    for (const char* name : {"f_00.png", "f_01.png", "f_02.png", "f_03.png"}) {
+      testing::write_flat_picture(folder_ / "clip" / name, {4, 6}, 100);
+    }
+    SourceSpec source;
+    source.dataset = DatasetKind::kFrames;
+    source.root = "clip";
+    source.pairs = {{1}, PairSide::kBefore, PairChoice::kOne, 1};
+    manifest_.sources = {source};
+  }
+
+  testing::TemporaryFolder folder_;
+  JobManifest manifest_;
+};
+
+TEST_F(MakePlan, CountsFramesPairsAndWhatHasNoPartner) {
+  const Plan plan = make_plan(manifest_, "w", "e").plan;
+  EXPECT_EQ(plan.sample_count(), 3);
+  ASSERT_EQ(plan.sources.size(), 1u);
+  EXPECT_EQ(plan.sources[0].labelled_frames, 4);
+  EXPECT_EQ(plan.sources[0].without_partner, 1);
+  EXPECT_EQ(plan.sources[0].without_partner_ids.size(), 1u);
+  EXPECT_EQ(plan.sources[0].pairs_by_gap.at(1), 3);
+  EXPECT_EQ(plan.shards.size(), 2u);
+}
+
+TEST_F(MakePlan, KeepsTheSourcesSizeUnlessOneIsGiven) {
+  EXPECT_EQ(make_plan(manifest_, "w", "e").plan.shards[0].volume_size, (ImageSize{4, 6}));
+  manifest_.image.size = ImageSize{16, 20};
+  EXPECT_EQ(make_plan(manifest_, "w", "e").plan.shards[0].volume_size, (ImageSize{16, 20}));
+}
+
+TEST_F(MakePlan, GroupsPicturesBySize) {
+  testing::write_flat_picture(folder_ / "clip" / "f_03.png", {8, 6}, 100);
+  const Plan plan = make_plan(manifest_, "w", "e").plan;
+  ASSERT_EQ(plan.shards.size(), 2u);
+  EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 6}));
+}
+
+TEST_F(MakePlan, TooFewPairsAreAnError) {
+  manifest_.sources[0].pairs.min_pairs = 4;
+  EXPECT_THAT([&] { make_plan(manifest_, "w", "e"); },
+              ::testing::ThrowsMessage<InputError>(
+                  ::testing::HasSubstr("got 3 of 4 labelled frames, in clip")));
+}
+
+TEST_F(MakePlan, AddingASourceDoesNotMoveThePairsOfAnother) {
+  manifest_.sources[0].pairs.gaps = {1, 2, 3};
+  const Plan alone = make_plan(manifest_, "w", "e").plan;
+  for (const char* name : {"g_1.png", "g_2.png", "g_3.png"}) {
+    testing::write_flat_picture(folder_ / "other" / name, {4, 6}, 100);
+  }
+  SourceSpec other = manifest_.sources[0];
+  other.root = "other";
+  manifest_.sources.insert(manifest_.sources.begin(), other);
+  const Plan both = make_plan(manifest_, "w", "e").plan;
+  std::vector<int> before, after;
+  for (const auto& shard : alone.shards) {
+    for (const auto& sample : shard.samples) before.push_back(sample.pair.gap_frames);
+  }
+  for (const auto& shard : both.shards) {
+    if (shard.source != 1) continue;
+    for (const auto& sample : shard.samples) after.push_back(sample.pair.gap_frames);
+  }
+  EXPECT_EQ(before, after);
+}
+
+}  // namespace
+}  // namespace eventgan

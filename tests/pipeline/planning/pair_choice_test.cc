@@ -1,0 +1,112 @@
+#include "pipeline/planning/pair_choice.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "tests/testing/fake_dataset.h"
+
+namespace eventgan {
+namespace {
+
+using testing::FakeDataset;
+
+SourceSpec source(std::vector<int> gaps, PairSide side, PairChoice choose) {
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kKittiObject;
+  spec.pairs = {std::move(gaps), side, choose, 1};
+  return spec;
+}
+
+PairChoiceResult choose(const FakeDataset& dataset, int frame, const SourceSpec& spec,
+                        std::uint64_t seed = 7) {
+  return choose_pairs(dataset, dataset.labelled_frames()[frame], spec, seed);
+}
+
+TEST(ChoosePairs, SideSaysWhereTheLabelledFrameLies) {
+  const FakeDataset dataset("root", 20);
+  const struct {
+    PairSide side;
+    std::int64_t previous, next;
+    double position;
+  } cases[] = {{PairSide::kBefore, 6, 10, 1},
+               {PairSide::kAfter, 10, 14, 0},
+               {PairSide::kAround, 8, 12, 0.5}};
+  for (const auto& expected : cases) {
+    const auto result = choose(dataset, 10, source({4}, expected.side, PairChoice::kOne));
+    ASSERT_EQ(result.samples.size(), 1u);
+    const PlannedSample& sample = result.samples[0];
+    EXPECT_EQ(sample.pair.previous.index, expected.previous);
+    EXPECT_EQ(sample.pair.next.index, expected.next);
+    EXPECT_EQ(sample.pair.label_position, expected.position);
+    EXPECT_EQ(sample.pair.label_index, 10);
+    EXPECT_EQ(sample.pair.gap_frames, 4);
+    EXPECT_NEAR(sample.pair.gap_s(), 0.4, 1e-12);
+    EXPECT_EQ(sample.sample_id, "0010");
+    EXPECT_EQ(sample.fault, "");
+  }
+}
+
+TEST(ChoosePairs, AllGivesEachGapAnIdOfItsOwn) {
+  const FakeDataset dataset("root", 20);
+  const auto result = choose(dataset, 2, source({1, 2, 3}, PairSide::kBefore, PairChoice::kAll));
+  ASSERT_EQ(result.samples.size(), 2u);
+  EXPECT_EQ(result.samples[0].sample_id, "0002@before1");
+  EXPECT_EQ(result.samples[1].sample_id, "0002@before2");
+  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(3));
+}
+
+TEST(ChoosePairs, OneDrawsOnlyGapsWhoseFramesExist) {
+  FakeDataset dataset("root", 20);
+  dataset.make_hole(9);
+  const auto spec = source({1, 2, 3, 4, 5, 6}, PairSide::kBefore, PairChoice::kOne);
+  for (std::uint64_t seed = 0; seed < 50; ++seed) {
+    EXPECT_NE(choose(dataset, 10, spec, seed).samples.at(0).pair.gap_frames, 1);
+    EXPECT_EQ(choose(dataset, 1, spec, seed).samples.at(0).pair.gap_frames, 1);  // the only one
+  }
+}
+
+TEST(ChoosePairs, DrawsEveryGapAboutEquallyOften) {
+  const FakeDataset dataset("root", 3006);
+  std::map<int, int> counts;
+  const auto spec = source({1, 2, 6}, PairSide::kBefore, PairChoice::kOne);
+  for (int frame = 6; frame < 3006; ++frame)
+    ++counts[choose(dataset, frame, spec).samples[0].pair.gap_frames];
+  // 3000 draws of 3: mean 1000, deviation √(3000 · 2/9) = 26; five deviations.
+  for (const int gap : spec.pairs.gaps) EXPECT_NEAR(counts[gap], 1000, 130) << gap;
+}
+
+TEST(ChoosePairs, DependsOnSeedDatasetAndSampleAlone) {
+  const FakeDataset dataset("root", 300), longer("elsewhere", 500);
+  auto spec = source({1, 2, 3, 4, 5, 6}, PairSide::kBefore, PairChoice::kOne);
+  int same = 0;
+  for (int frame = 10; frame < 110; ++frame) {
+    const int gap = choose(dataset, frame, spec, 7).samples[0].pair.gap_frames;
+    EXPECT_EQ(choose(longer, frame, spec, 7).samples[0].pair.gap_frames, gap);
+    same += choose(dataset, frame, spec, 8).samples[0].pair.gap_frames == gap;
+  }
+  EXPECT_LT(same, 40);  // of 100 draws of 6 about 17 agree by chance
+}
+
+TEST(ChoosePairs, BeyondTheSequenceThereIsNoPartnerAndNoSample) {
+  const FakeDataset dataset("root", 3);
+  const auto result = choose(dataset, 0, source({1, 2}, PairSide::kBefore, PairChoice::kOne));
+  EXPECT_TRUE(result.samples.empty());
+  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(1, 2));
+}
+
+TEST(ChoosePairs, AHoleBecomesASampleThatNamesTheMissingFile) {
+  FakeDataset dataset("root", 20);
+  dataset.make_hole(8);
+  const auto result = choose(dataset, 10, source({2}, PairSide::kBefore, PairChoice::kOne));
+  ASSERT_EQ(result.samples.size(), 1u);
+  EXPECT_EQ(result.samples[0].fault, "expected a frame, got no file, in root/0008.png (0010)");
+  dataset.make_hole(10);  // the labelled frame itself
+  EXPECT_THAT(
+      choose(dataset, 10, source({1}, PairSide::kBefore, PairChoice::kAll)).samples.at(0).fault,
+      ::testing::HasSubstr("root/0010.png"));
+}
+
+}  // namespace
+}  // namespace eventgan
