@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "manifests/job_manifest.h"
+#include "stages/generator/generator.h"
+
+namespace eventgan {
+
+/// The generator a manifest asks for.
+struct LoadedGenerator {
+  std::unique_ptr<Generator> generator;
+  std::string weights_hash;  ///< SHA-256 of the weights file (untrained: of what the file would be)
+  std::string warning;       ///< not empty: what the user must know before trusting the volumes
+};
+
+/// Loads the weights, or makes untrained ones for "untrained:WIDTH" (seeded by the manifest).
+/// Throws InputError if the weights cannot be used, UsageError if their bins are not the
+/// manifest's.
+LoadedGenerator load_generator(const JobManifest& manifest);
+
+}  // namespace eventgan

@@ -1,0 +1,53 @@
+#include "pipeline/conversion/conversion_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace eventgan {
+namespace {
+
+ConversionReport report() {
+  ConversionReport result;
+  result.folder = "out";
+  result.planned = 10;
+  result.written = 9;
+  result.quarantined = {{3, "id", "expected a picture, got rubbish, in a.png (id)"}};
+  result.without_partner = 2;
+  result.shards_planned = result.shards_done = 2;
+  result.stored_bytes = 2'000'000;
+  result.volume_bytes = 9'000'000;
+  result.stage_seconds = {{"read", 1.25}, {"write", 0.5}};
+  result.wall_seconds = 3.0;
+  return result;
+}
+
+TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
+  const std::string text = to_text(report());
+  EXPECT_THAT(text, ::testing::HasSubstr("9 of 10 pairs written, 1 quarantined, in 2 of 2 shards"));
+  EXPECT_THAT(text,
+              ::testing::HasSubstr(
+                  "2.0 MB, volumes compressed 4.5x, 3.0 s; busy seconds: read 1.2 write 0.5"));
+  EXPECT_THAT(text, ::testing::HasSubstr("2 labelled frames without a partner"));
+  EXPECT_THAT(text,
+              ::testing::HasSubstr("quarantined: expected a picture, got rubbish, in a.png (id)"));
+}
+
+TEST(ReportText, CountsWhatItDoesNotList) {
+  ConversionReport many = report();
+  many.quarantined.assign(25, many.quarantined[0]);
+  EXPECT_THAT(to_text(many), ::testing::HasSubstr("... and 5 more"));
+}
+
+TEST(ReportText, OfAnEmptyRunHasNoRatioOfNothing) {
+  EXPECT_THAT(to_text(ConversionReport{}), ::testing::HasSubstr("compressed 0.0x"));
+}
+
+TEST(ReportJson, IsOneLine) {
+  const std::string text = to_json(report());
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
+  EXPECT_THAT(text, ::testing::HasSubstr("\"compression_ratio\":4.5"));
+  EXPECT_THAT(text, ::testing::HasSubstr("\"sample_id\":\"id\""));
+}
+
+}  // namespace
+}  // namespace eventgan

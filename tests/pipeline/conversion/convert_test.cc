@@ -1,0 +1,238 @@
+#include "pipeline/conversion/convert.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "manifests/faults.h"
+#include "pipeline/inspection/verify_folder.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/small_job.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// 12 frames: 11 pairs in 3 shards.
+class Convert : public ::testing::Test {
+ protected:
+  Convert() : manifest_(testing::make_small_job(folder_, 12)) {}
+
+  fs::path picture(int frame) const {
+    return folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png");
+  }
+
+  ConversionReport run(const std::string& output = "out", int threads = 2, bool overwrite = false) {
+    ConversionOptions options;
+    options.output = folder_ / output;
+    options.threads = threads;
+    options.overwrite = overwrite;
+    return convert(manifest_, generator_, "weights", options);
+  }
+
+  /// Changes the manifest as a user would.
+  void change(const std::string& from, const std::string& to) {
+    std::string text = manifest_.text;
+    text.replace(text.find(from), from.size(), to);
+    manifest_ = parse_job_manifest(text, folder_.path(), "manifest.json");
+  }
+
+  std::map<std::string, std::string> shards(const std::string& output) const {
+    std::map<std::string, std::string> bytes;
+    for (const auto& entry : fs::directory_iterator(folder_ / output)) {
+      if (entry.path().extension() == ".h5")
+        bytes[entry.path().filename()] = testing::read_file(entry.path());
+    }
+    return bytes;
+  }
+
+  std::vector<std::string> names(const std::string& output) const {
+    std::vector<std::string> result;
+    for (const auto& entry : fs::directory_iterator(folder_ / output))
+      result.push_back(entry.path().filename());
+    std::sort(result.begin(), result.end());
+    return result;
+  }
+
+  testing::TemporaryFolder folder_;
+  JobManifest manifest_;
+  testing::FakeGenerator generator_;
+};
+
+TEST_F(Convert, WritesShardsMarkersAndPlan) {
+  const ConversionReport report = run();
+  EXPECT_EQ(report.planned, 11);
+  EXPECT_EQ(report.written, 11);
+  EXPECT_TRUE(report.quarantined.empty());
+  EXPECT_TRUE(report.complete());
+  EXPECT_FALSE(report.too_many_faults);
+  EXPECT_EQ(report.without_partner, 1);
+  EXPECT_GT(report.stored_bytes, 0);
+  EXPECT_EQ(report.stage_seconds.size(), 4u);
+  EXPECT_THAT(names("out"),
+              ::testing::ElementsAre("job-train-00000-of-00003.h5", "job-train-00000-of-00003.json",
+                                     "job-train-00001-of-00003.h5", "job-train-00001-of-00003.json",
+                                     "job-train-00002-of-00003.h5", "job-train-00002-of-00003.json",
+                                     "plan.json", "run.json"));
+  const FolderCheck check = verify_folder(folder_ / "out");
+  EXPECT_THAT(check.faults, ::testing::IsEmpty());
+  EXPECT_EQ(check.valid, 11);
+}
+
+TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
+  run("one", 1);
+  run("two", 2);
+  run("again", 2);
+  run("five", 5);
+  ASSERT_EQ(shards("one").size(), 3u);
+  EXPECT_EQ(shards("one"), shards("two"));
+  EXPECT_EQ(shards("two"), shards("again"));
+  EXPECT_EQ(shards("one"), shards("five"));
+}
+
+TEST_F(Convert, DoesNotDependOnTheOrderOfTheFileSystem) {
+  run("before");
+  // The same files under the same names, created in the opposite order.
+  std::map<fs::path, std::string> files;
+  for (int frame = 0; frame < 12; ++frame)
+    files[picture(frame)] = testing::read_file(picture(frame));
+  fs::remove_all(folder_ / "clip");
+  for (auto file = files.rbegin(); file != files.rend(); ++file)
+    testing::write_file(file->first, file->second);
+  run("after");
+  EXPECT_EQ(shards("before"), shards("after"));
+}
+
+TEST_F(Convert, AgainDoesOnlyWhatIsMissing) {
+  run();
+  const auto whole = shards("out");
+  const int calls = generator_.calls();
+  EXPECT_EQ(run().shards_done_before, 3);
+  EXPECT_EQ(generator_.calls(), calls);
+  fs::remove(folder_ / "out" / "job-train-00001-of-00003.json");  // not committed: made again
+  const ConversionReport report = run();
+  EXPECT_EQ(report.shards_done_before, 2);
+  EXPECT_EQ(report.written, 11);
+  EXPECT_EQ(generator_.calls(), calls + 4);
+  EXPECT_EQ(shards("out"), whole);
+}
+
+TEST_F(Convert, RefusesAFolderOfAnotherPlanUnlessToldToOverwrite) {
+  run();
+  change(R"("samples_per_shard": 4)", R"("samples_per_shard": 11)");
+  EXPECT_THAT([&] { run(); }, ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr(
+                                  "manifest $.output.samples_per_shard: expected 4, got 11")));
+  EXPECT_EQ(shards("out").size(), 3u);
+  run("out", 2, /*overwrite=*/true);
+  EXPECT_EQ(shards("out").size(), 1u);
+  EXPECT_THAT(verify_folder(folder_ / "out").faults, ::testing::IsEmpty());
+}
+
+TEST_F(Convert, ACommentOrOtherLimitsDoNotMeanStartingOver) {
+  run();
+  const auto whole = shards("out");
+  std::filesystem::remove(folder_ / "out" / "job-train-00001-of-00003.json");
+  change("{", R"({ // a comment
+    "errors": { "policy": "fail" },)");
+  const ConversionReport report = run();
+  EXPECT_EQ(report.shards_done_before, 2);
+  EXPECT_EQ(shards("out"), whole);
+}
+
+TEST_F(Convert, RefusesAPlanThatSomeoneAltered) {
+  run();
+  std::string text = testing::read_file(folder_ / "out" / "plan.json");
+  text.replace(text.find("f_10.png"), 8, "f_11.png");
+  testing::write_file(folder_ / "out" / "plan.json", text);
+  EXPECT_THAT([&] { run(); },
+              ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("altered")));
+  testing::write_file(folder_ / "out" / "plan.json", "{");
+  EXPECT_THROW(run(), std::runtime_error);
+  EXPECT_EQ(run("out", 2, /*overwrite=*/true).written, 11);
+}
+
+TEST_F(Convert, QuarantinesWithinTheLimits) {
+  testing::write_file(picture(5),
+                      "not a picture");  // spoils pairs (4, 5) and (5, 6): slots 4 and 5
+  manifest_.errors = {ErrorPolicy::kQuarantine, 2, 0.5};
+  const ConversionReport report = run();
+  EXPECT_FALSE(report.too_many_faults);
+  EXPECT_EQ(report.written, 9);
+  ASSERT_EQ(report.quarantined.size(), 2u);
+  EXPECT_EQ(report.quarantined[0].slot, 0);  // of the second shard
+  EXPECT_EQ(report.quarantined[1].slot, 1);
+  EXPECT_THAT(report.quarantined[0].reason, ::testing::HasSubstr("clip/f_15.png"));
+  EXPECT_THAT(verify_folder(folder_ / "out").faults, ::testing::IsEmpty());
+  // The other shards are what they are without the fault.
+  const auto damaged = shards("out");
+  testing::write_flat_picture(picture(5), {20, 30}, 100);
+  EXPECT_EQ(run("whole").written, 11);
+  EXPECT_EQ(damaged.size(), shards("whole").size());
+}
+
+TEST_F(Convert, BeyondTheLimitsFinishesTheShardAndStops) {
+  testing::write_file(picture(1), "");
+  manifest_.errors = {ErrorPolicy::kQuarantine, 1, 1.0};
+  const ConversionReport report = run();
+  EXPECT_TRUE(report.too_many_faults);
+  EXPECT_FALSE(report.complete());
+  EXPECT_EQ(report.shards_done, 1);
+  EXPECT_EQ(report.quarantined.size(), 2u);
+  EXPECT_EQ(shards("out").size(), 1u);
+  EXPECT_EQ(report.volume_bytes, 4 * 18 * 20 * 30 * 2);  // of the shard that was made
+  const int calls = generator_.calls();
+  EXPECT_TRUE(run().too_many_faults);  // and again, without doing more
+  EXPECT_EQ(generator_.calls(), calls);
+}
+
+TEST_F(Convert, TheFractionIsOfTheWholePlan) {
+  testing::write_file(picture(11), "");
+  manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0 / 11};
+  EXPECT_FALSE(run("a").too_many_faults);
+  manifest_.errors.max_fraction = 0.05;
+  EXPECT_TRUE(run("b").too_many_faults);
+}
+
+TEST_F(Convert, PolicyFailEndsAtTheFirstFaultAndLeavesNoPartOfAShard) {
+  testing::write_file(picture(6), "");
+  manifest_.errors.policy = ErrorPolicy::kFail;
+  EXPECT_THAT([&] { run(); },
+              ::testing::ThrowsMessage<TooManyFaults>(::testing::HasSubstr("clip/f_16.png")));
+  EXPECT_THAT(names("out"),
+              ::testing::ElementsAre("job-train-00000-of-00003.h5", "job-train-00000-of-00003.json",
+                                     "plan.json", "run.json"));
+}
+
+TEST_F(Convert, AVolumeThatIsNotFiniteIsQuarantined) {
+  generator_.fail_on((20 * 3 / 255.0f - 0.5f) * 2);
+  manifest_.errors.max_fraction = 1;
+  const ConversionReport report = run();
+  ASSERT_EQ(report.quarantined.size(), 1u);
+  EXPECT_THAT(report.quarantined[0].reason, ::testing::HasSubstr("nan"));
+}
+
+TEST_F(Convert, AFolderThatCannotBeWrittenIsAnErrorThatNamesIt) {
+  testing::write_file(folder_ / "file", "");
+  EXPECT_THROW(run("file/out"), std::exception);
+}
+
+TEST_F(Convert, ShowsProgressOfEveryPair) {
+  std::ostringstream shown;
+  ConversionOptions options;
+  options.output = folder_ / "out";
+  options.threads = 2;
+  options.make_progress = [&](std::int64_t total) {
+    EXPECT_EQ(total, 11);
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
+  };
+  convert(manifest_, generator_, "weights", options);
+  EXPECT_THAT(shown.str(), ::testing::HasSubstr("11/11 pairs"));
+}
+
+}  // namespace
+}  // namespace eventgan

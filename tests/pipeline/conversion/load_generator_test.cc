@@ -1,0 +1,52 @@
+#include "pipeline/conversion/load_generator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/faults.h"
+#include "stages/generator/untrained.h"
+#include "stages/generator/weights_file.h"
+#include "stages/shards/sha256.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+TEST(LoadGenerator, ReadsAFileBesideTheManifest) {
+  const testing::TemporaryFolder folder;
+  const std::string bytes = serialize_weights(untrained_weights(1, 9, 1));
+  testing::write_file(folder / "w.safetensors", bytes);
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.generator->bins(), 9);
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(bytes));
+  EXPECT_EQ(loaded.warning, "");
+  manifest.volume.bins = 5;
+  EXPECT_THROW(load_generator(manifest), UsageError);
+}
+
+TEST(LoadGenerator, WarnsLoudlyOfAnUntrainedOne) {
+  JobManifest manifest;
+  manifest.generator.weights = "untrained:2";
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_THAT(loaded.warning, ::testing::HasSubstr("UNTRAINED"));
+  manifest.seed = 1;
+  EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
+}
+
+TEST(LoadGenerator, RefusesAMissingFileAndAWidthThatIsNone) {
+  JobManifest manifest;
+  manifest.directory = "/nowhere";
+  manifest.generator.weights = "w.safetensors";
+  EXPECT_THROW(load_generator(manifest), InputError);
+  for (const char* weights : {"untrained:", "untrained:0", "untrained:8x", "untrained:1000"}) {
+    manifest.generator.weights = weights;
+    EXPECT_THROW(load_generator(manifest), UsageError) << weights;
+  }
+}
+
+}  // namespace
+}  // namespace eventgan

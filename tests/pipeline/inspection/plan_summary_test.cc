@@ -1,0 +1,61 @@
+#include "pipeline/inspection/plan_summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+namespace eventgan {
+namespace {
+
+class PlanSummary : public ::testing::Test {
+ protected:
+  PlanSummary() {
+    manifest_.sources.resize(1);
+    manifest_.sources[0].root = "kitti/training";
+    manifest_.sources[0].dataset = DatasetKind::kKittiObject;
+    SourceSummary source;
+    source.labelled_frames = 12;
+    source.pairs_by_gap = {{1, 2}, {3, 1}};
+    source.without_partner = 9;
+    source.without_partner_ids = {"a", "b", "c", "d", "e", "f"};
+    source.faults = 1;
+    source.notes = {"2 pictures without labels"};
+    plan_.sources = {source};
+    plan_.shards.resize(1);
+    plan_.shards[0].samples.resize(3);
+  }
+
+  JobManifest manifest_;
+  Plan plan_;
+  const TrialEstimate estimate_{2, 0.5, 90, 4e6};
+};
+
+TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
+  EXPECT_EQ(
+      plan_text(manifest_, plan_, estimate_, 2),
+      "kitti_object kitti/training (train)\n"
+      "  labelled frames  12\n"
+      "  pairs            3  (gap 1: 2, 3: 1)\n"
+      "  without partner  9  (a, b, c, d, e, ...)\n"
+      "  to quarantine    1  (a frame is missing inside the sequence)\n"
+      "  note: 2 pictures without labels\n"
+      "  shards           1\n"
+      "in all 3 pairs in 1 shards, about 4.0 MB and 90 s with 2 threads (0.500 s a pair on one "
+      "thread, measured on 2 pairs)\n");
+}
+
+TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
+  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
+}
+
+TEST_F(PlanSummary, JsonHasTheSameNumbers) {
+  const auto json = nlohmann::json::parse(plan_summary_json(manifest_, plan_, estimate_, 2));
+  EXPECT_EQ(json["pairs"], 3);
+  EXPECT_EQ(json["estimated_bytes"], 4e6);
+  EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
+  EXPECT_EQ(json["sources"][0]["without_partner_ids"].size(), 6u);
+}
+
+}  // namespace
+}  // namespace eventgan
