@@ -1,0 +1,19 @@
+#pragma once
+
+namespace CLI {
+class App;
+}
+
+namespace eventgan {
+
+/// Each adds one subcommand to the program. Its callback does the work and sets `exit_code`; errors
+/// leave it as exceptions (see error_text.h).
+void add_convert_command(CLI::App& app, int& exit_code);
+void add_plan_command(CLI::App& app, int& exit_code);
+void add_verify_command(CLI::App& app, int& exit_code);
+void add_inspect_command(CLI::App& app, int& exit_code);
+void add_preview_command(CLI::App& app, int& exit_code);
+void add_make_demo_command(CLI::App& app, int& exit_code);
+void add_import_weights_command(CLI::App& app, int& exit_code);
+
+}  // namespace eventgan

@@ -1,0 +1,59 @@
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "manifests/faults.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/errors/exit_codes.h"
+#include "stages/generator/checkpoint.h"
+#include "stages/generator/fold.h"
+#include "stages/generator/weights_file.h"
+#include "stages/shards/atomic_file.h"
+#include "stages/shards/sha256.h"
+
+namespace eventgan {
+namespace {
+
+/// The published checkpoint's name for the generator.
+constexpr char kGenerator[] = "gen";
+
+struct Arguments {
+  std::string in;
+  std::string out;
+};
+
+int run(const Arguments& arguments) {
+  if (!arguments.out.ends_with(".safetensors")) {
+    throw UsageError("expected an output named *.safetensors, got " + arguments.out);
+  }
+  const StateDict state = read_checkpoint(arguments.in, kGenerator);
+  Weights weights;
+  try {
+    weights = fold_generator(state, arguments.in);
+  } catch (const std::runtime_error&) {
+    std::throw_with_nested(InputError("not the published generator's network"));
+  }
+  weights.metadata["origin"] = "PyTorch checkpoint";
+  weights.metadata["origin_sha256"] = sha256_of_file(arguments.in);
+  const std::string bytes = serialize_weights(weights);
+  write_file_atomically(arguments.out, bytes);
+  std::cout << arguments.out << ": base width " << weights.base_channels << ", " << weights.bins
+            << " bins, SHA-256 " << sha256_hex(bytes) << std::endl;
+  return kComplete;
+}
+
+}  // namespace
+
+void add_import_weights_command(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("import-weights",
+                         "Converts a PyTorch checkpoint of the published generator (zip format, "
+                         "PyTorch 1.6 or later); nothing in it is executed");
+  const auto arguments = std::make_shared<Arguments>();
+  command->add_option("IN", arguments->in, "The checkpoint")->required();
+  command->add_option("OUT", arguments->out, "The weights file to write, *.safetensors")
+      ->required();
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

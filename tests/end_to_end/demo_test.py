@@ -1,0 +1,159 @@
+"""The demo dataset, from nothing to pictures; determinism; what damage to the inputs does."""
+
+import json
+import pathlib
+import shutil
+import struct
+import tempfile
+import unittest
+
+import h5py
+import numpy as np
+
+import program
+from program import run, shard_bytes, text
+
+
+def setUpModule():
+    global demo
+    demo = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-demo-")) / "demo"
+    run("make-demo", demo)
+
+
+def tearDownModule():
+    shutil.rmtree(demo.parent)
+
+
+def rows(folder):
+    """Each sample of a folder's shards: (shard, slot, sample id)."""
+    for path in sorted(pathlib.Path(folder).glob("*.h5")):
+        with h5py.File(path) as shard:
+            for slot, sample in enumerate(shard["pairs/sample_id"][:]):
+                yield path, slot, text(sample)
+
+
+class Demo(program.InFolder):
+    def convert(self, name="out", *more, source=None, expect=0):
+        return run("convert", (source or demo) / "manifest.json", "--output", self.folder / name, "--progress", "none",
+                   *more, expect=expect)
+
+    def test_converts_verifies_and_previews(self):
+        out, err = self.convert()
+        self.assertIn("UNTRAINED", err)
+        self.assertIn("0 quarantined", out)
+        self.assertIn("sound", run("verify", self.folder / "out")[0])
+        shards = sorted((self.folder / "out").glob("*.h5"))
+        self.assertGreaterEqual(len(shards), 3)
+        for shard in shards:
+            pictures, err = run("preview", shard, "--out", self.folder / "p", "--count", "2")
+            self.assertEqual(err, "")
+            for picture in pictures.split():
+                self.assertEqual(pathlib.Path(picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+            self.assertIn("sample", run("inspect", shard)[0])
+            json.loads(run("inspect", shard, "--json")[0])
+            json.loads(run("inspect", shard, "--sample", "0", "--json")[0])
+
+    def test_plan_writes_nothing_and_agrees_with_convert(self):
+        before = sorted(demo.rglob("*"))
+        planned = json.loads(run("plan", demo / "manifest.json", "--json")[0])
+        self.assertEqual(sorted(demo.rglob("*")), before)
+        self.convert()
+        self.assertEqual(planned["pairs"], len(list(rows(self.folder / "out"))))
+        self.assertEqual(planned["shards"], len(list((self.folder / "out").glob("*.h5"))))
+
+    def test_threads_do_not_change_bytes(self):
+        self.convert("one", "--threads", "1")
+        self.convert("two", "--threads", "2")
+        self.convert("again", "--threads", "2")
+        self.assertEqual(shard_bytes(self.folder / "one"), shard_bytes(self.folder / "two"))
+        self.assertEqual(shard_bytes(self.folder / "two"), shard_bytes(self.folder / "again"))
+
+    def test_json_progress_is_json(self):
+        out, err = run("convert", demo / "manifest.json", "--output", self.folder / "out", "--progress", "json")
+        self.assertEqual(json.loads(out)["event"], "report")
+        for line in err.splitlines():
+            self.assertIn(json.loads(line)["event"], ["progress", "warning"])
+
+    def test_kitti_labels_are_the_file_and_lie_in_the_volume(self):
+        self.convert()
+        seen = 0
+        for path, slot, sample in rows(self.folder / "out"):
+            with h5py.File(path) as shard:
+                if shard.attrs["dataset"] != "kitti_object":
+                    continue
+                seen += 1
+                label = demo / "kitti" / "training" / "label_2" / f"{sample.split('@')[0]}.txt"
+                self.assertEqual(bytes(shard["labels/original"][slot]), label.read_bytes())
+                first, last = shard["labels/boxes/offsets"][slot:slot + 2]
+                annotated = [line.split() for line in label.read_text().splitlines()]
+                self.assertEqual(last - first, len(annotated))
+                matrix = shard["pairs/source_to_volume"][slot]
+                for row, columns in zip(range(first, last), annotated):
+                    source = np.array(columns[4:8], float)
+                    np.testing.assert_array_equal(shard["labels/boxes/xyxy_source"][row], source)
+                    # Back from the volume: an edge lies half a pixel before the point of the same number.
+                    unclipped = shard["labels/boxes/xyxy_unclipped"][row].reshape(2, 2) - 0.5
+                    back = (unclipped - matrix[:, 2]) / np.diag(matrix[:, :2]) + 0.5
+                    np.testing.assert_allclose(back.ravel(), source, atol=0.01)
+                    ignore = columns[0] == "DontCare"
+                    self.assertEqual(bool(shard["labels/boxes/ignore"][row]), ignore)
+        self.assertGreater(seen, 0)
+
+    def test_damaged_inputs_are_quarantined_each_with_its_file(self):
+        broken = self.folder / "demo"
+        shutil.copytree(demo, broken)
+        training = broken / "kitti" / "training"
+        ids = sorted(path.stem for path in (training / "label_2").glob("*.txt"))
+        corrupt, empty, gone, malformed, outside = ids[:5]
+        for step in "123":  # whichever gap was drawn
+            previous = training / "prev_2" / f"{corrupt}_0{step}.png"
+            bytes_ = bytearray(previous.read_bytes())
+            bytes_[len(bytes_) // 2] ^= 0xff
+            previous.write_bytes(bytes_)
+        (training / "image_2" / f"{empty}.png").write_bytes(b"")
+        (training / "image_2" / f"{gone}.png").unlink()
+        with open(training / "label_2" / f"{malformed}.txt", "a") as file:
+            file.write("Car 0.00 0 1.5 10.0\n")
+        (training / "label_2" / f"{outside}.txt").write_text(
+            "Car 0.00 0 0.00 5000.00 10.00 5100.00 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.0\n")
+        person = sorted((broken / "mpii" / "sequences").iterdir())[0]
+        for frame in person.iterdir():
+            frame.write_bytes(frame.read_bytes()[:-400])  # truncated JPEG
+        reasons = {corrupt: "prev_2", empty: f"image_2/{empty}.png", gone: f"image_2/{gone}.png",
+                   malformed: f"label_2/{malformed}.txt", outside: f"label_2/{outside}.txt", person.name: person.name}
+
+        out, err = self.convert(source=broken, expect=65)
+        self.assertIn("quarantined", err)
+        # Within the limits the run is complete.
+        settings = (broken / "manifest.json").read_text().replace('"max_fraction": 0.01', '"max_fraction": 0.5')
+        self.assertIn('"max_fraction": 0.5', settings)
+        (broken / "manifest.json").write_text(settings)
+        out, _ = self.convert("whole", source=broken)
+        self.assertIn(f"{len(reasons)} quarantined", out)
+        self.assertIn("sound", run("verify", self.folder / "whole")[0])
+
+        quarantined = {}
+        for marker in (self.folder / "whole").glob("demo-*.json"):
+            for entry in json.loads(marker.read_text())["quarantined"]:
+                quarantined[entry["sample_id"]] = entry["reason"]
+                with h5py.File(marker.with_suffix(".h5")) as shard:
+                    self.assertEqual(shard["valid"][entry["slot"]], 0)
+                    self.assertEqual(text(shard["pairs/sample_id"][entry["slot"]]), entry["sample_id"])
+                    self.assertFalse(shard["events/volume"][entry["slot"]].any())
+        self.assertEqual(set(quarantined), set(reasons))
+        for sample, where in reasons.items():
+            self.assertIn(where, quarantined[sample])
+        # Every other sample holds what it holds without the damage.
+        self.convert("sound")
+        sound = {(path.name, slot): sample for path, slot, sample in rows(self.folder / "sound")}
+        damaged = {(path.name, slot): sample for path, slot, sample in rows(self.folder / "whole")}
+        self.assertEqual(sound, damaged)
+        for (name, slot), sample in sound.items():
+            if sample in quarantined:
+                continue
+            with h5py.File(self.folder / "sound" / name) as a, h5py.File(self.folder / "whole" / name) as b:
+                np.testing.assert_array_equal(a["events/volume"][slot], b["events/volume"][slot])
+
+
+if __name__ == "__main__":
+    program.main()
