@@ -1,0 +1,78 @@
+#!/usr/bin/env bash
+# Sets up a Debian 12 machine, builds eventgan and runs it:
+#   docker/bootstrap.sh demo [DIR]   a small demo dataset in DIR (default: ./demo), converted, checked and drawn
+#   docker/bootstrap.sh test         the whole test suite
+#   docker/bootstrap.sh packages     only installs what is missing
+# Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
+set -euo pipefail
+cd "$(dirname "${BASH_SOURCE[0]}")/.."
+jobs=${JOBS:-$(nproc)}
+
+say() { printf '\n== %s\n' "$*"; }
+
+listed() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "$@"; }
+
+installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'ok installed'; }
+
+# Installs the packages of the given lists that are missing; asks for rights only if there are any.
+install_packages() {
+  local missing=() package
+  while read -r package; do
+    installed "$package" || missing+=("$package")
+  done < <(listed "$@")
+  [ ${#missing[@]} -eq 0 ] && return
+  say "installing ${missing[*]}"
+  local root=()
+  if [ "$(id -u)" -ne 0 ]; then
+    command -v sudo >/dev/null || { echo "expected root or sudo, to install: ${missing[*]}" >&2; exit 1; }
+    root=(sudo)
+  fi
+  "${root[@]}" apt-get update -qq
+  "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
+}
+
+# One preset, configured and built; further arguments are targets (default: all).
+build() {
+  local preset=$1
+  shift
+  say "building ($preset)"
+  cmake --preset "$preset" "${options[@]}"
+  cmake --build --preset "$preset" -j "$jobs" ${1:+--target "$@"}
+}
+
+demo() {
+  local folder=${1:-demo} program=build/release/eventgan
+  install_packages docker/packages/build.txt
+  options=(-DEVENTGAN_TESTS=OFF)
+  build release eventgan
+  if [ ! -e "$folder/manifest.json" ]; then
+    say "making a small dataset in $folder"
+    "$program" make-demo "$folder"
+  fi
+  say "converting it"
+  # The folder may be of an earlier build, which would have written other bytes.
+  "$program" convert "$folder/manifest.json" --overwrite
+  "$program" verify "$folder/events"
+  local shard
+  for shard in "$folder"/events/*.h5; do
+    "$program" preview "$shard" --out "$folder/pictures" --count 3 >/dev/null
+  done
+  say "done"
+  echo "shards:    $folder/events/*.h5"
+  echo "pictures:  $folder/pictures/*.png"
+}
+
+run_tests() {
+  install_packages docker/packages/build.txt docker/packages/test.txt
+  options=()
+  build dev
+  say "testing"
+  ctest --preset dev -j "$jobs"
+}
+
+case "${1:-}" in
+  demo) demo "${@:2}" ;;
+  test) run_tests ;;
+  packages) install_packages docker/packages/build.txt docker/packages/test.txt ;;
+  *) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
+esac
