@@ -1,6 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
+#include <utility>
 
 #include "manifests/faults.h"
 #include "pipeline/commands/commands.h"
@@ -26,10 +27,10 @@ int run(const Arguments& arguments) {
   if (!arguments.out.ends_with(".safetensors")) {
     throw UsageError("expected an output named *.safetensors, got " + arguments.out);
   }
-  const StateDict state = read_checkpoint(arguments.in, kGenerator);
+  StateDict state = read_checkpoint(arguments.in, kGenerator);
   Weights weights;
   try {
-    weights = fold_generator(state, arguments.in);
+    weights = fold_generator(std::move(state), arguments.in);
   } catch (const std::runtime_error&) {
     std::throw_with_nested(InputError("not the published generator's network"));
   }
@@ -47,8 +48,8 @@ int run(const Arguments& arguments) {
 void add_import_weights_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("import-weights",
-                         "Converts a PyTorch checkpoint of the published generator (zip format, "
-                         "PyTorch 1.6 or later); nothing in it is executed");
+                         "Converts a PyTorch checkpoint of the published generator (the zip format "
+                         "and the one before PyTorch 1.6); nothing in it is executed");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("IN", arguments->in, "The checkpoint")->required();
   command->add_option("OUT", arguments->out, "The weights file to write, *.safetensors")

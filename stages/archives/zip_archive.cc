@@ -2,14 +2,38 @@
 
 #include <zip.h>
 
+#include <algorithm>
 #include <stdexcept>
-#include <system_error>
+#include <string_view>
+
+#include "stages/archives/file_bytes.h"
 
 namespace eventgan {
 namespace {
 
 // No deflate stream grows by more than this factor when it is inflated.
 constexpr zip_uint64_t kDeflateLimit = 1032;
+
+// libzip holds some 400 bytes for each member that the directory lists.
+constexpr std::size_t kMostMembers = 65536;
+
+// Every entry of the directory begins with this; wherever the file says that it is.
+constexpr std::string_view kEntrySignature = "PK\1\2";
+
+std::size_t count_signatures(const FileBytes& file) {
+  constexpr std::uint64_t kBlock = 1 << 20;
+  constexpr std::uint64_t kOverlap = kEntrySignature.size() - 1;
+  std::size_t count = 0;
+  for (std::uint64_t at = 0; at < file.size_bytes(); at += kBlock) {
+    const auto bytes = file.read(at, std::min(kBlock + kOverlap, file.size_bytes() - at));
+    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    for (std::size_t hit = text.find(kEntrySignature); hit != std::string_view::npos;
+         hit = text.find(kEntrySignature, hit + 1)) {
+      ++count;
+    }
+  }
+  return count;
+}
 
 struct CloseMember {
   void operator()(zip_file_t* member) const { zip_fclose(member); }
@@ -27,13 +51,17 @@ std::string text_of(int code) {
 
 struct ZipArchive::State {
   explicit State(const std::filesystem::path& file) : path(file.string()) {
+    const FileBytes bytes(file);
+    size_bytes = bytes.size_bytes();
+    if (count_signatures(bytes) > kMostMembers) {
+      throw std::runtime_error("expected a zip file of at most " + std::to_string(kMostMembers) +
+                               " members, got more, in " + path);
+    }
     int code = 0;
     archive = zip_open(path.c_str(), ZIP_RDONLY, &code);
     if (archive == nullptr) {
       throw std::runtime_error("expected a zip file, got \"" + text_of(code) + "\", in " + path);
     }
-    std::error_code error;
-    size_bytes = std::filesystem::file_size(file, error);
     const zip_int64_t count = zip_get_num_entries(archive, 0);
     for (zip_int64_t i = 0; i < count; ++i) {
       const char* name = zip_get_name(archive, static_cast<zip_uint64_t>(i), 0);
@@ -69,7 +97,7 @@ bool ZipArchive::contains(const std::string& name) const {
   return zip_name_locate(state_->archive, name.c_str(), 0) >= 0;
 }
 
-std::vector<std::byte> ZipArchive::read(const std::string& name) const {
+std::vector<std::byte> ZipArchive::read(const std::string& name, std::uint64_t most_bytes) const {
   const State& state = *state_;
   const zip_int64_t index = zip_name_locate(state.archive, name.c_str(), 0);
   if (index < 0) state.fail("a member of that name", "none", name);
@@ -90,6 +118,11 @@ std::vector<std::byte> ZipArchive::read(const std::string& name) const {
         "a member that the file can hold",
         std::to_string(about.size) + " bytes in a file of " + std::to_string(state.size_bytes),
         name);
+  }
+
+  if (about.size > most_bytes) {
+    state.fail("at most " + std::to_string(most_bytes) + " bytes", std::to_string(about.size),
+               name);
   }
 
   const std::unique_ptr<zip_file_t, CloseMember> member(

@@ -1,204 +1,129 @@
 #include "stages/generator/checkpoint.h"
 
-#include <bit>
-#include <cstring>
+#include <algorithm>
 #include <exception>
 #include <map>
+#include <memory>
 #include <stdexcept>
+#include <string_view>
 
 #include "manifests/faults.h"
-#include "stages/archives/pickle/pickle.h"
-#include "stages/archives/zip_archive.h"
+#include "stages/archives/file_bytes.h"
+#include "stages/generator/checkpoint_archive.h"
+#include "stages/generator/checkpoint_limits.h"
+#include "stages/generator/legacy_checkpoint.h"
+#include "stages/generator/stored_tensor.h"
+#include "stages/generator/zip_checkpoint.h"
 
 namespace eventgan {
 namespace {
 
 using Kind = PickleNode::Kind;
 
-/// What a checkpoint of tensors needs; anything else in a pickle is refused by name.
-const std::set<std::string> kAllowedGlobals = {"collections.OrderedDict",
-                                               "torch._utils._rebuild_tensor_v2",
-                                               "torch._utils._rebuild_parameter",
-                                               "torch.FloatStorage",
-                                               "torch.DoubleStorage",
-                                               "torch.HalfStorage",
-                                               "torch.LongStorage",
-                                               "torch.IntStorage",
-                                               "torch.ShortStorage",
-                                               "torch.CharStorage",
-                                               "torch.ByteStorage",
-                                               "torch.BoolStorage"};
-
-template <class T>
-float element(const std::byte* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<float>(value);
-}
-
-struct ElementType {
-  std::size_t size_bytes;
-  float (*to_float)(const std::byte*);
-};
-
-const std::map<std::string, ElementType> kElementTypes = {
-    {"torch.FloatStorage", {4, element<float>}},
-    {"torch.DoubleStorage", {8, element<double>}},
-    {"torch.HalfStorage", {2, element<_Float16>}},
-    {"torch.LongStorage", {8, element<std::int64_t>}},
-    {"torch.IntStorage", {4, element<std::int32_t>}},
-    {"torch.ShortStorage", {2, element<std::int16_t>}},
-    {"torch.CharStorage", {1, element<std::int8_t>}},
-    {"torch.ByteStorage", {1, element<std::uint8_t>}},
-    {"torch.BoolStorage", {1, element<std::uint8_t>}}};
+/// Of a tensor beside its values: its names, shapes and places in maps.
+constexpr std::uint64_t kBytesPerTensor = 1024;
 
 [[noreturn]] void fail(const std::string& expected, const std::string& got) {
   throw std::runtime_error("expected " + expected + ", got " + got);
 }
 
-const PickleNode& item(const PickleNode& node, std::size_t index, Kind kind, const char* what) {
-  if (index >= node.items.size() || node.items[index]->kind != kind) fail(what, "something else");
-  return *node.items[index];
+std::unique_ptr<CheckpointArchive> open_checkpoint(const std::filesystem::path& file) {
+  const FileBytes bytes(file);
+  const std::vector<std::byte> head =
+      bytes.read(0, std::min<std::uint64_t>(bytes.size_bytes(), 512));
+  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  if (text.starts_with("PK")) return open_zip_checkpoint(file);
+  if (text.starts_with('\x80')) return open_legacy_checkpoint(file);
+  const bool is_tar = text.size() > 262 && text.substr(257, 5) == "ustar";
+  fail("a PyTorch checkpoint (a zip file or the format before PyTorch 1.6)",
+       is_tar ? "a tar file, the format before PyTorch 0.1.10" : "another file");
 }
-
-std::vector<std::int64_t> integers(const PickleNode& tuple, const char* what) {
-  std::vector<std::int64_t> result;
-  for (std::size_t i = 0; i < tuple.items.size(); ++i) {
-    result.push_back(item(tuple, i, Kind::kInt, what).integer);
-  }
-  return result;
-}
-
-/// Reads tensors of one archive; a storage that several tensors share is read once.
-class TensorReader {
- public:
-  TensorReader(const ZipArchive& archive, std::string prefix)
-      : archive_(archive), prefix_(std::move(prefix)) {}
-
-  /// `node` is _rebuild_tensor_v2(storage, offset, shape, stride, requires_grad, hooks), or a
-  /// parameter around it.
-  NamedTensor read(const PickleNode& node) {
-    if (node.kind != Kind::kCall) fail("a tensor", "something else");
-    const std::string& function = item(node, 0, Kind::kGlobal, "a function's name").text;
-    const PickleNode& arguments = item(node, 1, Kind::kTuple, "a function's arguments");
-    if (function == "torch._utils._rebuild_parameter") {
-      return read(item(arguments, 0, Kind::kCall, "a parameter's tensor"));
-    }
-    if (function != "torch._utils._rebuild_tensor_v2") fail("a tensor", function);
-
-    const PickleNode& id =
-        item(item(arguments, 0, Kind::kPersistent, "a storage"), 0, Kind::kTuple, "a storage's id");
-    const std::string& type = item(id, 1, Kind::kGlobal, "a storage's type").text;
-    const std::string& key = item(id, 2, Kind::kString, "a storage's key").text;
-    const auto known = kElementTypes.find(type);
-    if (known == kElementTypes.end()) fail("a storage of numbers", type);
-    return gather(storage(key), known->second,
-                  item(arguments, 1, Kind::kInt, "a tensor's offset").integer,
-                  integers(item(arguments, 2, Kind::kTuple, "a tensor's shape"), "a side"),
-                  integers(item(arguments, 3, Kind::kTuple, "a tensor's strides"), "a stride"));
-  }
-
- private:
-  const std::vector<std::byte>& storage(const std::string& key) {
-    auto found = storages_.find(key);
-    if (found == storages_.end()) {
-      found = storages_.emplace(key, archive_.read(prefix_ + "data/" + key)).first;
-    }
-    return found->second;
-  }
-
-  static NamedTensor gather(const std::vector<std::byte>& bytes, ElementType type,
-                            std::int64_t offset, std::vector<std::int64_t> shape,
-                            const std::vector<std::int64_t>& strides) {
-    const auto stored = static_cast<std::int64_t>(bytes.size() / type.size_bytes);
-    if (shape.size() != strides.size()) fail("as many strides as sides", "another number");
-    std::int64_t count = 1;
-    std::int64_t last = offset;
-    for (std::size_t d = 0; d < shape.size(); ++d) {
-      // A tensor never has more values than its storage (an expanded one, with stride 0, is not a
-      // weight).
-      if (shape[d] < 1 || strides[d] < 1 || strides[d] > stored || shape[d] > stored / count) {
-        fail("a tensor inside its storage of " + std::to_string(stored) + " values",
-             "side " + std::to_string(shape[d]) + " with stride " + std::to_string(strides[d]));
-      }
-      count *= shape[d];
-      last += (shape[d] - 1) * strides[d];
-    }
-    if (offset < 0 || last >= stored)
-      fail("a tensor inside its storage", "one that ends beyond it");
-
-    NamedTensor tensor{std::move(shape), {}};
-    tensor.values.reserve(static_cast<std::size_t>(count));
-    std::vector<std::int64_t> index(tensor.shape.size(), 0);
-    for (std::int64_t i = 0; i < count; ++i) {
-      std::int64_t at = offset;
-      for (std::size_t d = 0; d < index.size(); ++d) at += index[d] * strides[d];
-      tensor.values.push_back(
-          type.to_float(bytes.data() + at * static_cast<std::int64_t>(type.size_bytes)));
-      for (std::size_t d = index.size(); d-- > 0 && ++index[d] == tensor.shape[d];) index[d] = 0;
-    }
-    return tensor;
-  }
-
-  const ZipArchive& archive_;
-  std::string prefix_;
-  std::map<std::string, std::vector<std::byte>> storages_;
-};
 
 /// Key and value nodes of a dict or an OrderedDict.
 const std::vector<const PickleNode*>& entries(const PickleNode& node) {
   if (node.kind == Kind::kDict) return node.items;
-  if (node.kind == Kind::kCall && !node.items.empty() &&
-      node.items[0]->text == "collections.OrderedDict") {
+  if (node.kind == Kind::kCall &&
+      expect_item(node, 0, Kind::kGlobal, "a function's name").text == "collections.OrderedDict") {
     return node.assigned;
   }
-  fail("a dict of tensors", "something else");
+  fail("a dict of tensors", describe(node.kind));
+}
+
+bool is_text(const PickleNode& node) {
+  return node.kind == Kind::kString || node.kind == Kind::kBytes;
 }
 
 std::string key_list(const PickleNode& node) {
-  std::string keys;
+  constexpr std::size_t kMost = 40;
   const auto& all = entries(node);
-  for (std::size_t i = 0; i + 1 < all.size(); i += 2)
-    keys += (keys.empty() ? "" : ", ") + all[i]->text;
-  return keys.empty() ? "none" : keys;
+  std::string keys;
+  for (std::size_t i = 0; i + 1 < all.size() && i / 2 < kMost; i += 2) {
+    keys += keys.empty() ? "" : ", ";
+    keys += is_text(*all[i]) ? printable(all[i]->text) : describe(all[i]->kind);
+  }
+  const std::size_t count = all.size() / 2;
+  if (count > kMost) keys += " and " + std::to_string(count - kMost) + " others";
+  return count == 0 ? "no keys" : "the keys " + keys;
 }
 
 const PickleNode& choose_network(const PickleNode& root, const std::string& network) {
   if (const PickleNode* found = root.find(network)) return *found;
-  if (root.find("head.conv2d.weight") != nullptr) return root;  // a bare state dict
-  fail("key '" + network + "' (or a state dict itself)", "the keys " + key_list(root));
+  for (const char* key : {"head.conv2d.weight", "head.weight"}) {
+    if (root.find(key) != nullptr) return root;  // a bare state dict
+  }
+  fail("key '" + network + "' (or a generator's state dict itself)", key_list(root));
 }
 
-std::string find_prefix(const ZipArchive& archive) {
-  for (const std::string& name : archive.names()) {
-    if (name == "data.pkl" || name.ends_with("/data.pkl")) return name.substr(0, name.size() - 8);
+std::map<std::string, StoredTensor> stored_tensors(const PickleNode& state_dict,
+                                                   CheckpointMemory& memory) {
+  std::map<std::string, StoredTensor> tensors;
+  const auto& all = entries(state_dict);
+  for (std::size_t i = 0; i + 1 < all.size(); i += 2) {
+    if (!is_text(*all[i])) fail("text as a tensor's name", describe(all[i]->kind));
+    const std::string& name = all[i]->text;
+    if (name.ends_with("num_batches_tracked")) continue;
+    try {
+      StoredTensor tensor = parse_stored_tensor(*all[i + 1]);
+      memory.take(kBytesPerTensor + sizeof(float) * static_cast<std::uint64_t>(tensor.count));
+      tensors.insert_or_assign(name, std::move(tensor));
+    } catch (const std::runtime_error&) {
+      std::throw_with_nested(std::runtime_error("tensor " + printable(name)));
+    }
   }
-  fail("a PyTorch checkpoint with data.pkl inside", "another zip file");
+  return tensors;
+}
+
+/// Reads each storage once, however many tensors share it, and holds one at a time.
+StateDict convert(const CheckpointArchive& archive,
+                  const std::map<std::string, StoredTensor>& tensors,
+                  const CheckpointMemory& memory) {
+  std::map<std::string, std::vector<const std::pair<const std::string, StoredTensor>*>> by_storage;
+  for (const auto& named : tensors) by_storage[named.second.storage.key].push_back(&named);
+  StateDict state;
+  for (const auto& [key, users] : by_storage) {
+    const std::vector<std::byte> storage = archive.storage(key, memory.left());
+    for (const auto* named : users) {
+      try {
+        state.emplace(named->first, gather(named->second, storage));
+      } catch (const std::runtime_error&) {
+        std::throw_with_nested(std::runtime_error("tensor " + printable(named->first)));
+      }
+    }
+  }
+  return state;
 }
 
 }  // namespace
 
 StateDict read_checkpoint(const std::filesystem::path& file, const std::string& network) try {
-  const ZipArchive archive(file);
-  const std::string prefix = find_prefix(archive);
-  const std::vector<std::byte> pickle = archive.read(prefix + "data.pkl");
-  const PickleDocument document(pickle, kAllowedGlobals, file.string() + ":" + prefix + "data.pkl");
-  TensorReader reader(archive, prefix);
-  StateDict state;
-  const auto& all = entries(choose_network(document.root(), network));
-  for (std::size_t i = 0; i + 1 < all.size(); i += 2) {
-    if (all[i]->kind != Kind::kString) fail("text as a tensor's name", "something else");
-    try {
-      if (!all[i]->text.ends_with("num_batches_tracked"))
-        state[all[i]->text] = reader.read(*all[i + 1]);
-    } catch (const std::runtime_error&) {
-      std::throw_with_nested(std::runtime_error("tensor " + all[i]->text));
-    }
-  }
-  return state;
+  const auto archive = open_checkpoint(file);
+  const PickleDocument& document = archive->document();
+  CheckpointMemory memory(most_checkpoint_memory(FileBytes(file).size_bytes()));
+  memory.take(document.memory_bytes());
+  const auto tensors = stored_tensors(choose_network(document.root(), network), memory);
+  return convert(*archive, tensors, memory);
 } catch (const std::runtime_error&) {
-  std::throw_with_nested(
-      InputError("cannot read a PyTorch checkpoint (zip format) from " + file.string()));
+  std::throw_with_nested(InputError("cannot read a PyTorch checkpoint from " + file.string()));
 }
 
 }  // namespace eventgan

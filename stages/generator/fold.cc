@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <stdexcept>
+#include <utility>
 
 namespace eventgan {
 namespace {
@@ -9,25 +10,45 @@ namespace {
 constexpr double kPowerEpsilon = 1e-12;
 constexpr double kBatchNormEpsilon = 1e-5;
 
+std::string shape_text(const std::vector<std::int64_t>& shape) {
+  std::string text;
+  for (const std::int64_t side : shape) text += (text.empty() ? "" : ", ") + std::to_string(side);
+  return "[" + text + "]";
+}
+
 /// The state dict with messages: every look-up states what it needs.
-class State {
+class FoldedState {
  public:
-  State(const StateDict& tensors, const std::string& name) : tensors_(tensors), name_(name) {}
+  FoldedState(StateDict tensors, const std::string& name)
+      : tensors_(std::move(tensors)), name_(name) {}
 
-  bool contains(const std::string& key) const { return tensors_.count(key) != 0; }
+  bool contains(const std::string& key) const { return tensors_.contains(key); }
 
-  const NamedTensor& tensor(const std::string& key) const {
+  const std::vector<std::int64_t>& shape(const std::string& key) const {
     const auto found = tensors_.find(key);
     if (found == tensors_.end()) fail("key " + key, "none");
-    return found->second;
+    return found->second.shape;
   }
 
-  const std::vector<float>& values(const std::string& key, std::size_t count) const {
-    const NamedTensor& found = tensor(key);
-    if (found.values.size() != count) {
-      fail(std::to_string(count) + " values of " + key, std::to_string(found.values.size()));
+  /// Takes a convolution's weight out of the state dict.
+  std::vector<float> take_weight(const std::string& key, const Convolution& layer) {
+    const std::int64_t side = layer.kernel;
+    const std::vector<std::int64_t> wanted = {layer.out_channels, layer.in_channels, side, side};
+    if (shape(key) != wanted) {
+      fail("shape " + shape_text(wanted) + " of " + key, shape_text(shape(key)));
     }
-    return found.values;
+    return take(key, std::size_t(layer.out_channels) * layer.in_channels * side * side);
+  }
+
+  /// Takes the values out of the state dict.
+  std::vector<float> take(const std::string& key, std::size_t count) {
+    auto node = tensors_.extract(key);
+    if (node.empty()) fail("key " + key, "none");
+    if (node.mapped().values.size() != count) {
+      fail(std::to_string(count) + " values of " + key,
+           std::to_string(node.mapped().values.size()));
+    }
+    return std::move(node.mapped().values);
   }
 
   [[noreturn]] void fail(const std::string& expected, const std::string& got) const {
@@ -35,7 +56,7 @@ class State {
   }
 
  private:
-  const StateDict& tensors_;
+  StateDict tensors_;
   std::string name_;
 };
 
@@ -67,75 +88,94 @@ double spectral_sigma(const std::vector<float>& matrix, const std::vector<float>
 }
 
 /// Where the published code keeps a layer's parts: ConvLayer has conv2d and norm_layer,
-/// ResidualBlock convN and bnN.
+/// ResidualBlock convN and bnN. A network that was folded elsewhere may leave conv2d out.
 struct LayerKeys {
   std::string convolution;
-  std::string batch_norm;  // empty if the layer has none
+  std::string batch_norm;
 };
 
-LayerKeys layer_keys(const std::string& name) {
-  if (name == "head" || name == "pred") return {name + ".conv2d", ""};
+LayerKeys layer_keys(const FoldedState& state, const std::string& name) {
   if (name.starts_with("resblocks.")) {
     std::string norm = name;
     norm.replace(norm.rfind("conv"), 4, "bn");
     return {name, norm};
   }
-  return {name + ".conv2d", name + ".norm_layer"};
+  const bool bare = state.contains(name + ".weight");
+  return {bare ? name : name + ".conv2d", name + ".norm_layer"};
 }
 
-std::vector<double> effective_weight(const State& state, const std::string& key, std::size_t count,
-                                     std::size_t rows) {
+std::vector<double> effective_weight(FoldedState& state, const std::string& key,
+                                     const Convolution& layer) {
   const std::string module = key + ".module";
-  const bool spectral = state.contains(module + ".weight_bar");
-  const std::vector<float>& raw =
-      state.values(spectral ? module + ".weight_bar" : key + ".weight", count);
-  std::vector<double> weight(raw.begin(), raw.end());
-  if (spectral) {
-    const double sigma = spectral_sigma(raw, state.values(module + ".weight_u", rows));
-    if (!(std::abs(sigma) > 0))
-      state.fail("a spectral norm above 0 of " + module, std::to_string(sigma));
-    for (double& value : weight) value /= sigma;
+  if (!state.contains(module + ".weight_bar")) {
+    const std::vector<float> plain = state.take_weight(key + ".weight", layer);
+    return {plain.begin(), plain.end()};
   }
+  const std::vector<float> raw = state.take_weight(module + ".weight_bar", layer);
+  const double sigma = spectral_sigma(raw, state.take(module + ".weight_u", layer.out_channels));
+  if (!(std::abs(sigma) > 0)) {
+    state.fail("a spectral norm above 0 of " + module, std::to_string(sigma));
+  }
+  std::vector<double> weight(raw.begin(), raw.end());
+  for (double& value : weight) value /= sigma;
   return weight;
 }
 
-void fold_layer(const State& state, Convolution& layer) {
-  const LayerKeys keys = layer_keys(layer.name);
+/// The convolution's own bias; zeros if it has none. SpectralNorm keeps it inside the module.
+std::vector<double> own_bias(FoldedState& state, const std::string& key, std::size_t rows) {
+  for (const std::string& place : {key + ".bias", key + ".module.bias"}) {
+    if (!state.contains(place)) continue;
+    const std::vector<float> stored = state.take(place, rows);
+    return {stored.begin(), stored.end()};
+  }
+  return std::vector<double>(rows, 0.0);
+}
+
+void fold_layer(FoldedState& state, Convolution& layer) {
+  const LayerKeys keys = layer_keys(state, layer.name);
   const std::size_t rows = layer.out_channels;
   const std::size_t columns = std::size_t(layer.in_channels) * layer.kernel * layer.kernel;
-  std::vector<double> weight = effective_weight(state, keys.convolution, rows * columns, rows);
-  std::vector<double> bias(rows, 0.0);
-  if (keys.batch_norm.empty()) {
-    const auto& stored = state.values(keys.convolution + ".bias", rows);
-    bias.assign(stored.begin(), stored.end());
-  } else {
-    const auto& gamma = state.values(keys.batch_norm + ".weight", rows);
-    const auto& beta = state.values(keys.batch_norm + ".bias", rows);
-    const auto& mean = state.values(keys.batch_norm + ".running_mean", rows);
-    const auto& variance = state.values(keys.batch_norm + ".running_var", rows);
+  const bool has_bias = state.contains(keys.convolution + ".bias") ||
+                        state.contains(keys.convolution + ".module.bias");
+  std::vector<double> weight = effective_weight(state, keys.convolution, layer);
+  std::vector<double> bias = own_bias(state, keys.convolution, rows);
+  if (state.contains(keys.batch_norm + ".weight")) {
+    const auto gamma = state.take(keys.batch_norm + ".weight", rows);
+    const auto beta = state.take(keys.batch_norm + ".bias", rows);
+    const auto mean = state.take(keys.batch_norm + ".running_mean", rows);
+    const auto variance = state.take(keys.batch_norm + ".running_var", rows);
     for (std::size_t r = 0; r < rows; ++r) {
       const double factor = gamma[r] / std::sqrt(double(variance[r]) + kBatchNormEpsilon);
-      bias[r] = beta[r] - mean[r] * factor;
+      bias[r] = beta[r] + (bias[r] - mean[r]) * factor;
       for (std::size_t c = 0; c < columns; ++c) weight[r * columns + c] *= factor;
     }
+  } else if (!has_bias) {
+    state.fail("key " + keys.batch_norm + ".weight or " + keys.convolution + ".bias", "neither");
   }
   layer.weight.assign(weight.begin(), weight.end());
   layer.bias.assign(bias.begin(), bias.end());
 }
 
+/// Sides of a square convolution's weight, wherever the layer keeps it.
+std::vector<std::int64_t> weight_shape(const FoldedState& state, const std::string& layer) {
+  const std::string key = layer_keys(state, layer).convolution;
+  const std::string bar = key + ".module.weight_bar";
+  return state.shape(state.contains(bar) ? bar : key + ".weight");
+}
+
 }  // namespace
 
-Weights fold_generator(const StateDict& tensors, const std::string& name) {
-  const State state(tensors, name);
-  const NamedTensor& head = state.tensor("head.conv2d.weight");
-  const NamedTensor& pred = state.tensor("pred.conv2d.weight");
-  if (head.shape.size() != 4 || head.shape[1] != 2 || pred.shape.size() != 4 ||
-      pred.shape[0] % 2 != 0 || pred.shape[0] == 0) {
+Weights fold_generator(StateDict tensors, const std::string& name) {
+  FoldedState state(std::move(tensors), name);
+  const std::vector<std::int64_t> head = weight_shape(state, "head");
+  const std::vector<std::int64_t> pred = weight_shape(state, "pred");
+  if (head.size() != 4 || head[0] < 1 || head[0] > kMostBaseChannels || head[1] != 2 ||
+      pred.size() != 4 || pred[0] % 2 != 0 || pred[0] < 2 || pred[0] > 2 * kMostWeightBins) {
     state.fail("a generator of 2 frames to 2 x bins channels", "another network");
   }
   Weights weights;
-  weights.base_channels = static_cast<int>(head.shape[0]);
-  weights.bins = static_cast<int>(pred.shape[0] / 2);
+  weights.base_channels = static_cast<int>(head[0]);
+  weights.bins = static_cast<int>(pred[0] / 2);
   weights.convolutions = network_layout(weights.base_channels, weights.bins);
   for (Convolution& layer : weights.convolutions) fold_layer(state, layer);
   check_weights(weights, name);

@@ -1,11 +1,13 @@
 #include "stages/generator/safetensors.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstring>
-#include <fstream>
-#include <iterator>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+
+#include "stages/archives/file_bytes.h"
 
 namespace eventgan {
 namespace {
@@ -15,6 +17,12 @@ static_assert(std::endian::native == std::endian::little, "tensors are stored li
 using nlohmann::json;
 
 constexpr std::size_t kAlignment = 8;
+
+/// Tensors' names and one text or two: far less is needed, and JSON grows when it is parsed.
+constexpr std::uint64_t kLargestHeader = 1 << 20;
+
+/// {tensor: {"shape": [...]}}: nothing stands deeper.
+constexpr int kDeepest = 3;
 
 [[noreturn]] void fail(const std::string& what, const std::string& name) {
   throw std::runtime_error("expected " + what + ", in " + name);
@@ -33,33 +41,63 @@ std::size_t value_count(const std::vector<std::int64_t>& shape, std::size_t limi
   return count;
 }
 
+/// A list of integers of at least 0: JSON's 1.5, true and -1 would be converted without a word.
+std::vector<std::int64_t> sizes(const json& list, const std::string& key, const std::string& name) {
+  const bool good =
+      list.is_array() && std::all_of(list.begin(), list.end(), [](const json& size) {
+        return size.is_number_unsigned() &&
+               size.get<std::uint64_t>() <= std::uint64_t{std::numeric_limits<std::int64_t>::max()};
+      });
+  if (!good) fail("a list of sizes for " + key + ", got " + list.dump().substr(0, 80), name);
+  return list.get<std::vector<std::int64_t>>();
+}
+
+json parse_header(std::string_view text, const std::string& name) {
+  const auto watch = [&](int depth, json::parse_event_t event, json&) {
+    const bool opens =
+        event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
+    if (opens && depth >= kDeepest) fail("a safetensors header, got deeply nested JSON", name);
+    return true;
+  };
+  // As the format's own reader: no white space before the object.
+  if (!text.starts_with('{')) fail("a header that begins with {, got another one", name);
+  return json::parse(text, watch);
+}
+
 }  // namespace
 
 std::string serialize_safetensors(const SafetensorsFile& content) {
+  std::map<std::string, TensorView> tensors;
+  for (const auto& [name, tensor] : content.tensors) tensors[name] = {tensor.shape, tensor.values};
+  return serialize_safetensors(tensors, content.metadata);
+}
+
+std::string serialize_safetensors(const std::map<std::string, TensorView>& tensors,
+                                  const std::map<std::string, std::string>& metadata) {
   json header = json::object();
-  if (!content.metadata.empty()) header["__metadata__"] = content.metadata;
-  std::size_t offset = 0;
-  for (const auto& [tensor_name, tensor] : content.tensors) {
-    const std::size_t end = offset + tensor.values.size() * sizeof(float);
+  if (!metadata.empty()) header["__metadata__"] = metadata;
+  std::size_t data_size = 0;
+  for (const auto& [tensor_name, tensor] : tensors) {
+    const std::size_t end = data_size + tensor.values.size_bytes();
     header[tensor_name] = {
-        {"dtype", "F32"}, {"shape", tensor.shape}, {"data_offsets", {offset, end}}};
-    offset = end;
+        {"dtype", "F32"}, {"shape", tensor.shape}, {"data_offsets", {data_size, end}}};
+    data_size = end;
   }
   std::string text = header.dump();
   text.resize((text.size() + kAlignment - 1) / kAlignment * kAlignment, ' ');
 
   const std::uint64_t length = text.size();
-  std::string bytes(sizeof length, '\0');
-  std::memcpy(bytes.data(), &length, sizeof length);
+  std::string bytes;
+  bytes.reserve(sizeof length + text.size() + data_size);
+  bytes.append(reinterpret_cast<const char*>(&length), sizeof length);
   bytes += text;
-  for (const auto& [tensor_name, tensor] : content.tensors) {
-    bytes.append(reinterpret_cast<const char*>(tensor.values.data()),
-                 tensor.values.size() * sizeof(float));
+  for (const auto& [tensor_name, tensor] : tensors) {
+    bytes.append(reinterpret_cast<const char*>(tensor.values.data()), tensor.values.size_bytes());
   }
   return bytes;
 }
 
-SafetensorsFile parse_safetensors(const std::string& bytes, const std::string& name) try {
+SafetensorsFile parse_safetensors(std::string_view bytes, const std::string& name) try {
   std::uint64_t length = 0;
   if (bytes.size() < sizeof length)
     fail("a safetensors header of 8 bytes, got a shorter file", name);
@@ -67,9 +105,13 @@ SafetensorsFile parse_safetensors(const std::string& bytes, const std::string& n
   if (length > bytes.size() - sizeof length) {
     fail("a header inside the file, got a length of " + std::to_string(length) + " bytes", name);
   }
-  const char* text = bytes.data() + sizeof length;
-  const json header = json::parse(text, text + length);
-  const char* data = text + length;
+  if (length > kLargestHeader) {
+    fail("a header of at most " + std::to_string(kLargestHeader) + " bytes, got one of " +
+             std::to_string(length),
+         name);
+  }
+  const json header = parse_header(bytes.substr(sizeof length, length), name);
+  const char* data = bytes.data() + sizeof length + length;
   const std::size_t data_size = bytes.size() - sizeof length - length;
 
   SafetensorsFile content;
@@ -82,8 +124,11 @@ SafetensorsFile parse_safetensors(const std::string& bytes, const std::string& n
     }
     if (entry.at("dtype") != "F32")
       fail("dtype F32 for " + key + ", got " + entry.at("dtype").dump(), name);
-    NamedTensor tensor{entry.at("shape").get<std::vector<std::int64_t>>(), {}};
-    const auto [begin, end] = entry.at("data_offsets").get<std::pair<std::size_t, std::size_t>>();
+    NamedTensor tensor{sizes(entry.at("shape"), key, name), {}};
+    const std::vector<std::int64_t> offsets = sizes(entry.at("data_offsets"), key, name);
+    if (offsets.size() != 2) fail("two offsets for " + key, name);
+    const auto begin = static_cast<std::size_t>(offsets[0]);
+    const auto end = static_cast<std::size_t>(offsets[1]);
     const std::size_t count = value_count(tensor.shape, data_size / sizeof(float), name);
     if (begin > end || end > data_size || end - begin != count * sizeof(float)) {
       fail(std::to_string(count * sizeof(float)) + " bytes inside the file for " + key +
@@ -111,10 +156,10 @@ SafetensorsFile parse_safetensors(const std::string& bytes, const std::string& n
 }
 
 SafetensorsFile read_safetensors(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail("a readable weights file, got none", file.string());
-  const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
-  return parse_safetensors(bytes, file.string());
+  const FileBytes bytes(file);
+  const std::vector<std::byte> whole = bytes.read(0, bytes.size_bytes());
+  return parse_safetensors({reinterpret_cast<const char*>(whole.data()), whole.size()},
+                           file.string());
 }
 
 }  // namespace eventgan

@@ -17,6 +17,9 @@ struct Convolution {
   std::vector<float> bias;    ///< [out] float32
 };
 
+constexpr int kMostBaseChannels = 1024;  ///< of Weights::base_channels
+constexpr int kMostWeightBins = 64;      ///< of Weights::bins
+
 /// The generator's network (DESIGN section 4), spectral and batch norm folded into the
 /// convolutions.
 struct Weights {

@@ -12,7 +12,6 @@ namespace {
 
 constexpr char kFormat[] = "eventgan-generator";
 constexpr char kVersion[] = "1";
-constexpr int kLargestWidth = 1024;
 
 int take_number(std::map<std::string, std::string>& metadata, const std::string& key, int largest) {
   const std::string text = metadata[key];
@@ -46,8 +45,8 @@ Weights from_content(SafetensorsFile content) {
   content.metadata.erase("format");
   content.metadata.erase("format_version");
   Weights weights;
-  weights.base_channels = take_number(content.metadata, "base_channels", kLargestWidth);
-  weights.bins = take_number(content.metadata, "bins", 64);
+  weights.base_channels = take_number(content.metadata, "base_channels", kMostBaseChannels);
+  weights.bins = take_number(content.metadata, "bins", kMostWeightBins);
   weights.convolutions = network_layout(weights.base_channels, weights.bins);
   for (Convolution& convolution : weights.convolutions) {
     const std::int64_t out = convolution.out_channels;
@@ -64,31 +63,41 @@ Weights from_content(SafetensorsFile content) {
   return weights;
 }
 
+Weights checked_weights(SafetensorsFile content, const std::string& name) {
+  Weights weights = from_content(std::move(content));
+  check_weights(weights, name);
+  return weights;
+}
+
 }  // namespace
 
 std::string serialize_weights(const Weights& weights) {
-  SafetensorsFile content;
-  content.metadata = weights.metadata;
-  content.metadata["format"] = kFormat;
-  content.metadata["format_version"] = kVersion;
-  content.metadata["base_channels"] = std::to_string(weights.base_channels);
-  content.metadata["bins"] = std::to_string(weights.bins);
+  std::map<std::string, std::string> metadata = weights.metadata;
+  metadata["format"] = kFormat;
+  metadata["format_version"] = kVersion;
+  metadata["base_channels"] = std::to_string(weights.base_channels);
+  metadata["bins"] = std::to_string(weights.bins);
+  std::map<std::string, TensorView> tensors;
   for (const Convolution& convolution : weights.convolutions) {
     const std::int64_t out = convolution.out_channels;
     const std::int64_t side = convolution.kernel;
-    content.tensors[convolution.name + ".weight"] = {{out, convolution.in_channels, side, side},
-                                                     convolution.weight};
-    content.tensors[convolution.name + ".bias"] = {{out}, convolution.bias};
+    tensors[convolution.name + ".weight"] = {{out, convolution.in_channels, side, side},
+                                             convolution.weight};
+    tensors[convolution.name + ".bias"] = {{out}, convolution.bias};
   }
-  return serialize_safetensors(content);
+  return serialize_safetensors(tensors, metadata);
 }
 
 Weights read_weights(const std::filesystem::path& file) try {
-  Weights weights = from_content(read_safetensors(file));
-  check_weights(weights, file.string());
-  return weights;
+  return checked_weights(read_safetensors(file), file.string());
 } catch (const std::runtime_error&) {
   std::throw_with_nested(InputError("cannot use the weights in " + file.string()));
+}
+
+Weights parse_weights(std::string_view bytes, const std::string& name) try {
+  return checked_weights(parse_safetensors(bytes, name), name);
+} catch (const std::runtime_error&) {
+  std::throw_with_nested(InputError("cannot use the weights in " + name));
 }
 
 }  // namespace eventgan

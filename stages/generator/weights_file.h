@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
 
 #include "stages/generator/weights.h"
 
@@ -14,7 +15,10 @@ namespace eventgan {
 std::string serialize_weights(const Weights& weights);
 
 /// Reads and checks such a file. Throws InputError (with the cause nested) if it is absent,
-/// malformed, or not a generator.
+/// malformed, not a generator, or has numbers that are not finite.
 Weights read_weights(const std::filesystem::path& file);
+
+/// The same from bytes; `name` stands for the file in messages.
+Weights parse_weights(std::string_view bytes, const std::string& name);
 
 }  // namespace eventgan

@@ -20,6 +20,8 @@ hid_t new_type(const Hdf5Dataset& dataset) {
       return H5Tcopy(H5T_NATIVE_FLOAT);
     case 2:
       return H5Tcopy(H5T_NATIVE_INT64);
+    case 4:
+      return H5Tcopy(H5T_NATIVE_UINT8);
     default: {
       const hid_t type = H5Tcopy(H5T_C_S1);
       H5Tset_size(type, dataset.text_width == 0 ? H5T_VARIABLE : dataset.text_width);

@@ -14,7 +14,7 @@ namespace eventgan::testing {
 struct Hdf5Dataset {
   std::vector<std::uint64_t> shape;
   std::variant<std::vector<double>, std::vector<float>, std::vector<std::int64_t>,
-               std::vector<std::string>>
+               std::vector<std::string>, std::vector<std::uint8_t>>
       values;
   /// Bytes of each text, padded with zeros; 0: of variable length.
   std::size_t text_width = 0;

@@ -1,14 +1,18 @@
 #include "stages/archives/pickle/pickle.h"
 
+#include <stdexcept>
+
 #include "stages/archives/pickle/pickle_machine_internal.h"
 
 namespace eventgan {
 
 PickleDocument::PickleDocument(std::span<const std::byte> bytes,
                                const std::set<std::string>& allowed_globals,
-                               const std::string& name, std::size_t* used) {
-  PickleMachine machine(PickleCursor(bytes, name), allowed_globals, nodes_);
+                               const std::string& name, std::size_t* used,
+                               std::uint64_t most_memory_bytes) {
+  PickleMachine machine(PickleCursor(bytes, name), allowed_globals, nodes_, most_memory_bytes);
   root_ = machine.run();
+  memory_bytes_ = machine.memory_bytes();
   if (used != nullptr) *used = machine.position();
 }
 
@@ -21,6 +25,24 @@ const PickleNode* PickleNode::find(std::string_view key) const {
     if (is_text && candidate.text == key) return pairs[2 * i + 1];
   }
   return nullptr;
+}
+
+const PickleNode& expect_item(const PickleNode& node, std::size_t index, PickleNode::Kind kind,
+                              const char* what) {
+  const bool there = index < node.items.size();
+  if (!there || node.items[index]->kind != kind) {
+    throw std::runtime_error(std::string("expected ") + what + ", got " +
+                             (there ? describe(node.items[index]->kind) : "nothing"));
+  }
+  return *node.items[index];
+}
+
+std::string printable(std::string_view text) {
+  constexpr std::size_t kLongest = 80;
+  std::string result;
+  for (const char c : text.substr(0, kLongest)) result += c >= ' ' && c <= '~' ? c : '?';
+  if (text.size() > kLongest) result += "...";
+  return result;
 }
 
 const char* describe(PickleNode::Kind kind) {

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <set>
 #include <span>
 #include <string>
@@ -48,6 +49,14 @@ struct PickleNode {
 /// The kind's name for messages: "a list", "an integer", ...
 const char* describe(PickleNode::Kind kind);
 
+/// Item `index` of the node, which must be of that kind. Throws std::runtime_error "expected WHAT,
+/// got Y".
+const PickleNode& expect_item(const PickleNode& node, std::size_t index, PickleNode::Kind kind,
+                              const char* what);
+
+/// Text from a pickle for a message: at most 80 characters, and printable ASCII only.
+std::string printable(std::string_view text);
+
 /// A restricted reader of Python pickles, protocols 0-5, for checkpoints and numpy dictionaries. It
 /// knows the opcodes such files use and refuses every other, by name; it refuses a global that is
 /// not in the allowed set, by name; it never allocates by a length it has not checked against the
@@ -56,9 +65,11 @@ const char* describe(PickleNode::Kind kind);
 /// X, got Y, in NAME at byte N".
 class PickleDocument {
  public:
-  /// `used` (if given) gets the number of bytes up to and including STOP.
+  /// `used` (if given) gets the number of bytes up to and including STOP. A pickle whose values
+  /// take more than `most_memory_bytes` is refused.
   PickleDocument(std::span<const std::byte> bytes, const std::set<std::string>& allowed_globals,
-                 const std::string& name, std::size_t* used = nullptr);
+                 const std::string& name, std::size_t* used = nullptr,
+                 std::uint64_t most_memory_bytes = std::numeric_limits<std::uint64_t>::max());
   PickleDocument(PickleDocument&&) = default;
   PickleDocument(const PickleDocument&) = delete;
   PickleDocument& operator=(PickleDocument&&) = default;
@@ -66,9 +77,16 @@ class PickleDocument {
 
   const PickleNode& root() const { return *root_; }
 
+  /// Every value that the pickle made, in that order, whether the root leads to it or not.
+  const std::deque<PickleNode>& nodes() const { return nodes_; }
+
+  /// What the values take at most.
+  std::uint64_t memory_bytes() const { return memory_bytes_; }
+
  private:
   std::deque<PickleNode> nodes_;  // owns every node; a deque never moves them
   const PickleNode* root_ = nullptr;
+  std::uint64_t memory_bytes_ = 0;
 };
 
 }  // namespace eventgan

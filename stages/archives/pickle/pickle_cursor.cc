@@ -52,12 +52,4 @@ void PickleCursor::fail(const std::string& expected, const std::string& got) con
                            std::to_string(opcode_at_));
 }
 
-std::string printable(std::string_view text) {
-  constexpr std::size_t kLongest = 80;
-  std::string result;
-  for (const char c : text.substr(0, kLongest)) result += c >= ' ' && c <= '~' ? c : '?';
-  if (text.size() > kLongest) result += "...";
-  return result;
-}
-
 }  // namespace eventgan

@@ -44,7 +44,4 @@ class PickleCursor {
   std::size_t opcode_at_ = 0;
 };
 
-/// Text from a pickle for a message: short, and printable ASCII only.
-std::string printable(std::string_view text);
-
 }  // namespace eventgan

@@ -10,9 +10,13 @@
 namespace eventgan {
 
 const PickleNode* PickleMachine::run() {
+  // What one opcode makes at most beside text: a node, its place on the stack, in the memo and in a
+  // container, with what containers hold in reserve.
+  constexpr std::uint64_t kBytesPerOpcode = sizeof(PickleNode) + 80;
   for (;;) {
     const auto opcode = static_cast<PickleOpcode>(cursor_.opcode());
     if (opcode == PickleOpcode::kStop) break;
+    count_memory(kBytesPerOpcode);
     step(opcode);
   }
   const PickleNode* root = pop();
@@ -261,6 +265,7 @@ void PickleMachine::push_integer(Kind kind, std::int64_t value) { push(kind).int
 
 void PickleMachine::push_long(std::string_view bytes) {
   if (bytes.size() > sizeof(std::int64_t)) {
+    count_memory(bytes.size());
     push(Kind::kLong).text = bytes;
     return;
   }
@@ -275,6 +280,7 @@ void PickleMachine::push_long(std::string_view bytes) {
 
 void PickleMachine::push_text(Kind kind, std::string_view text) {
   if (kind == Kind::kString && !is_utf8(text)) cursor_.fail("UTF-8", "other bytes in a string");
+  count_memory(text.size());
   push(kind).text = text;
 }
 

@@ -4,7 +4,15 @@
 
 namespace eventgan {
 
-// The stack, its marks and the memo.
+// The memory, the stack, its marks and the memo.
+
+void PickleMachine::count_memory(std::uint64_t bytes) {
+  if (bytes > most_memory_bytes_ - memory_bytes_) {
+    cursor_.fail("values of at most " + std::to_string(most_memory_bytes_) + " bytes of memory",
+                 "more");
+  }
+  memory_bytes_ += bytes;
+}
 
 PickleNode& PickleMachine::push(Kind kind) {
   PickleNode& node = nodes_.emplace_back();

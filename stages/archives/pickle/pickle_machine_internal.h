@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <limits>
 #include <set>
 #include <span>
 #include <string>
@@ -22,13 +23,18 @@ namespace eventgan {
 class PickleMachine {
  public:
   PickleMachine(PickleCursor cursor, const std::set<std::string>& allowed_globals,
-                std::deque<PickleNode>& nodes)
-      : cursor_(std::move(cursor)), allowed_globals_(allowed_globals), nodes_(nodes) {}
+                std::deque<PickleNode>& nodes,
+                std::uint64_t most_memory_bytes = std::numeric_limits<std::uint64_t>::max())
+      : cursor_(std::move(cursor)),
+        allowed_globals_(allowed_globals),
+        nodes_(nodes),
+        most_memory_bytes_(most_memory_bytes) {}
 
   /// Runs until STOP and gives what is left on the stack then.
   const PickleNode* run();
 
   std::size_t position() const { return cursor_.position(); }
+  std::uint64_t memory_bytes() const { return memory_bytes_; }
 
  private:
   using Kind = PickleNode::Kind;
@@ -39,6 +45,9 @@ class PickleMachine {
   bool push_container(PickleOpcode opcode);
   bool change_container(PickleOpcode opcode);
   bool use_memo(PickleOpcode opcode);
+
+  /// Counts memory before it is taken; refuses what would be too much.
+  void count_memory(std::uint64_t bytes);
 
   PickleNode& push(Kind kind);
   void push_integer(Kind kind, std::int64_t value);
@@ -65,6 +74,8 @@ class PickleMachine {
   PickleCursor cursor_;
   const std::set<std::string>& allowed_globals_;
   std::deque<PickleNode>& nodes_;
+  std::uint64_t most_memory_bytes_;
+  std::uint64_t memory_bytes_ = 0;
   std::vector<PickleNode*> stack_;
   std::vector<std::size_t> marks_;  // sizes of the stack when MARK came
   std::unordered_map<std::uint64_t, PickleNode*> memo_;

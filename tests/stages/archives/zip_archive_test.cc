@@ -87,6 +87,25 @@ TEST_F(ZipArchiveTest, FindsDamageByTheChecksum) {
   }
 }
 
+TEST_F(ZipArchiveTest, ReadsNoMoreBytesThanAllowed) {
+  testing::write_zip(file_, {{"a", "12345"}, {"b", std::string(1000, 'x'), true}});
+  const ZipArchive archive(file_);
+  EXPECT_EQ(text(archive.read("a", 5)), "12345");
+  EXPECT_THAT([&] { archive.read("a", 4); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 4 bytes")));
+  EXPECT_THROW(archive.read("b", 999), std::runtime_error);
+}
+
+TEST_F(ZipArchiveTest, RefusesADirectoryThatWouldFillTheMemory) {
+  std::string signatures;
+  for (int i = 0; i < 65537; ++i) signatures += "PK\1\2 and more than a block of 1 MiB of them";
+  testing::write_file(file_, signatures);
+  EXPECT_THAT([&] { ZipArchive archive(file_); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 65536 members")));
+  testing::write_zip(file_, {{"holds them", signatures.substr(0, 1000)}});
+  EXPECT_EQ(ZipArchive(file_).names().size(), 1u);
+}
+
 TEST_F(ZipArchiveTest, DoesNotTrustTheDeclaredSize) {
   for (const bool deflated : {false, true}) {
     const std::string content(1000, 'x');

@@ -3,69 +3,39 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <cmath>
 
 #include "manifests/faults.h"
 #include "pipeline/errors/error_text.h"
+#include "tests/stages/generator/checkpoint_bytes.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan {
 namespace {
 
-// Pickle opcodes of protocol 2, as Python's pickletools names them.
-std::string text(const std::string& value) {  // BINUNICODE
-  std::string op = "X    ";
-  const std::uint32_t size = value.size();
-  std::memcpy(op.data() + 1, &size, 4);
-  return op + value;
-}
-std::string integer(std::int32_t value) {  // BININT
-  std::string op = "J    ";
-  std::memcpy(op.data() + 1, &value, 4);
-  return op;
-}
-std::string global(const std::string& module, const std::string& name) {
-  return "c" + module + "\n" + name + "\n";
-}
-std::string tuple(const std::string& items) { return "(" + items + "t"; }
-std::string integers(const std::vector<int>& values) {
-  std::string items;
-  for (const int value : values) items += integer(value);
-  return tuple(items);
-}
-std::string dict(const std::string& entries) { return "}(" + entries + "u"; }
-const std::string kStart = "\x80\x02";
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::pickled_dict;
+using testing::pickled_global;
+using testing::pickled_integer;
+using testing::pickled_tensor;
+using testing::pickled_text;
+using testing::PickledTensor;
+using testing::raw_bytes;
 
-struct TensorText {
-  std::string storage = "FloatStorage";
-  std::string key = "0";
-  int offset = 0;
-  std::vector<int> shape = {2, 3};
-  std::vector<int> stride = {3, 1};
-};
-
-std::string tensor(const TensorText& t) {
-  const std::string id =
-      tuple(text("storage") + global("torch", t.storage) + text(t.key) + text("cpu") + integer(6));
-  return global("torch._utils", "_rebuild_tensor_v2") +
-         tuple(id + "Q" + integer(t.offset) + integers(t.shape) + integers(t.stride) + "\x89" +
-               global("collections", "OrderedDict") + ")R") +
-         "R";
+std::string generator_of(const std::string& tensor) {
+  return pickled_dict(pickled_text("gen") + pickled_dict(pickled_text("w") + tensor));
 }
 
-template <class T>
-std::string raw(std::initializer_list<T> values) {
-  return {reinterpret_cast<const char*>(values.begin()), values.size() * sizeof(T)};
-}
-
-class Checkpoint : public ::testing::Test {
+class ZipCheckpointFile : public ::testing::Test {
  protected:
   StateDict read(const std::string& pickle, const std::string& storage, bool deflated = false) {
     const auto file = folder_ / "checkpoint.pt";
-    testing::write_zip(file, {{"name/data.pkl", kStart + pickle + ".", deflated},
+    testing::write_zip(file, {{"name/data.pkl", testing::whole_pickle(pickle), deflated},
                               {"name/data/0", storage, deflated}});
     return read_checkpoint(file, "gen");
   }
@@ -80,83 +50,171 @@ class Checkpoint : public ::testing::Test {
   }
 
   testing::TemporaryFolder folder_;
-  const std::string floats_ = raw<float>({0, 1, 2, 3, 4, 5});
+  const std::string floats_ = raw_bytes<float>({0, 1, 2, 3, 4, 5});
 };
 
-TEST_F(Checkpoint, ReadsATensorOfANamedNetwork) {
-  const auto state = read(dict(text("gen") + dict(text("w") + tensor({}))), floats_);
+TEST_F(ZipCheckpointFile, ReadsATensorOfANamedNetwork) {
+  const auto state = read(generator_of(pickled_tensor({})), floats_);
   EXPECT_EQ(state.at("w").shape, (std::vector<std::int64_t>{2, 3}));
-  EXPECT_THAT(state.at("w").values, ::testing::ElementsAre(0, 1, 2, 3, 4, 5));
+  EXPECT_THAT(state.at("w").values, ElementsAre(0, 1, 2, 3, 4, 5));
 }
 
-TEST_F(Checkpoint, ReadsABareStateDictAndCompressedMembers) {
-  const auto state = read(dict(text("head.conv2d.weight") + tensor({})), floats_, true);
+TEST_F(ZipCheckpointFile, ReadsABareStateDictAndCompressedMembers) {
+  const auto state =
+      read(pickled_dict(pickled_text("head.conv2d.weight") + pickled_tensor({})), floats_, true);
   EXPECT_EQ(state.count("head.conv2d.weight"), 1u);
 }
 
-TEST_F(Checkpoint, FollowsStridesAndOffset) {
-  TensorText transposed;
+TEST_F(ZipCheckpointFile, FollowsStridesAndOffset) {
+  PickledTensor transposed;
   transposed.offset = 1;
   transposed.shape = {2, 2};
   transposed.stride = {1, 3};  // values 1 + i + 3 j
-  const auto state = read(dict(text("gen") + dict(text("w") + tensor(transposed))), floats_);
-  EXPECT_THAT(state.at("w").values, ::testing::ElementsAre(1, 4, 2, 5));
+  const auto state = read(generator_of(pickled_tensor(transposed)), floats_);
+  EXPECT_THAT(state.at("w").values, ElementsAre(1, 4, 2, 5));
 }
 
-TEST_F(Checkpoint, ConvertsOtherNumbers) {
-  TensorText t;
+TEST_F(ZipCheckpointFile, ConvertsOtherNumbers) {
+  PickledTensor t;
+  t.count = 2;
   t.shape = {2};
   t.stride = {1};
   const auto values = [&](const char* storage, const std::string& bytes) {
-    t.storage = storage;
-    return read(dict(text("gen") + dict(text("w") + tensor(t))), bytes).at("w").values;
+    t.type = storage;
+    return read(generator_of(pickled_tensor(t)), bytes).at("w").values;
   };
-  EXPECT_THAT(values("DoubleStorage", raw<double>({0.5, -2})), ::testing::ElementsAre(0.5f, -2));
-  EXPECT_THAT(values("HalfStorage", raw<std::uint16_t>({0x3c00, 0xc000})),
-              ::testing::ElementsAre(1, -2));
-  EXPECT_THAT(values("LongStorage", raw<std::int64_t>({7, -7})), ::testing::ElementsAre(7, -7));
+  EXPECT_THAT(values("DoubleStorage", raw_bytes<double>({0.5, -2})), ElementsAre(0.5f, -2));
+  EXPECT_THAT(values("HalfStorage", raw_bytes<std::uint16_t>({0x3c00, 0xc000})),
+              ElementsAre(1, -2));
+  // The smallest and the largest number, and infinity.
+  EXPECT_THAT(values("HalfStorage", raw_bytes<std::uint16_t>({0x8001, 0x7bff})),
+              ElementsAre(-std::ldexp(1.0f, -24), 65504));
+  EXPECT_THAT(values("HalfStorage", raw_bytes<std::uint16_t>({0xfc00, 0x7c00})),
+              ElementsAre(-INFINITY, INFINITY));
+  EXPECT_THAT(values("BFloat16Storage", raw_bytes<std::uint16_t>({0x3f80, 0xc000})),
+              ElementsAre(1, -2));
+  EXPECT_THAT(values("LongStorage", raw_bytes<std::int64_t>({7, -7})), ElementsAre(7, -7));
 }
 
-TEST_F(Checkpoint, SaysWhichKeysAreThereWhenTheNetworkIsNot) {
-  EXPECT_THAT(refusal(dict(text("state_dict") + dict("") + text("epoch") + integer(3)), floats_),
-              ::testing::HasSubstr("got the keys state_dict, epoch"));
+TEST_F(ZipCheckpointFile, SaysWhichKeysAreThereWhenTheNetworkIsNot) {
+  EXPECT_THAT(refusal(pickled_dict(pickled_text("state_dict") + pickled_dict("") +
+                                   pickled_text("epoch") + pickled_integer(3)),
+                      floats_),
+              HasSubstr("got the keys state_dict, epoch"));
 }
 
-TEST_F(Checkpoint, RefusesTensorsOutsideTheirStorage) {
-  const auto refused = [&](TensorText t) {
-    return refusal(dict(text("gen") + dict(text("w") + tensor(t))), floats_);
+TEST_F(ZipCheckpointFile, RefusesTensorsOutsideTheirStorage) {
+  const auto refused = [&](PickledTensor t) {
+    return refusal(generator_of(pickled_tensor(t)), floats_);
   };
-  TensorText t;
+  PickledTensor t;
   t.offset = 1;
-  EXPECT_THAT(refused(t), ::testing::HasSubstr("inside its storage"));
+  EXPECT_THAT(refused(t), HasSubstr("inside its storage"));
   t = {};
   t.shape = {2000000000, 2000000000};
-  EXPECT_THAT(refused(t), ::testing::HasSubstr("inside its storage"));
+  EXPECT_THAT(refused(t), HasSubstr("inside its storage"));
   t = {};
   t.stride = {3};
-  EXPECT_THAT(refused(t), ::testing::HasSubstr("strides"));
+  EXPECT_THAT(refused(t), HasSubstr("strides"));
   t = {};
   t.stride = {3, 0};
-  EXPECT_THAT(refused(t), ::testing::HasSubstr("inside its storage"));
+  EXPECT_THAT(refused(t), HasSubstr("inside its storage"));
   t = {};
   t.key = "1";
-  EXPECT_THAT(refused(t), ::testing::HasSubstr("data/1"));
+  EXPECT_THAT(refused(t), HasSubstr("data/1"));
 }
 
-TEST_F(Checkpoint, ExecutesNothing) {
-  EXPECT_THAT(refusal(global("os", "system") + tuple(text("true")) + "R", floats_),
-              ::testing::HasSubstr("os.system"));
+TEST_F(ZipCheckpointFile, AStrideAlongASideOf1MayBeAnything) {
+  PickledTensor t;
+  t.shape = {1, 6};
+  t.stride = {1000000, 1};
+  EXPECT_EQ(read(generator_of(pickled_tensor(t)), floats_).at("w").values.size(), 6u);
 }
 
-TEST_F(Checkpoint, RefusesFilesThatAreNoCheckpoint) {
+TEST_F(ZipCheckpointFile, RefusesAStorageThatIsShorterThanItsCount) {
+  PickledTensor t;
+  t.count = 7;
+  EXPECT_THAT(refusal(generator_of(pickled_tensor(t)), floats_),
+              HasSubstr("expected a storage of 7 values of 4 bytes, got 24 bytes"));
+}
+
+TEST_F(ZipCheckpointFile, RefusesTensorsThatShareTheirValuesToFillTheMemory) {
+  // A thousand names for one tensor of a million values: 4 GB out of a file of 1 MB.
+  PickledTensor t;
+  t.type = "ByteStorage";
+  t.count = 1 << 20;
+  t.shape = {1 << 20};
+  t.stride = {1};
+  std::string entries = pickled_text("first") + pickled_tensor(t) + "q\x01";
+  for (int i = 0; i < 1000; ++i) entries += pickled_text(std::to_string(i)) + "h\x01";
+  EXPECT_THAT(refusal(pickled_dict(pickled_text("gen") + pickled_dict(entries)),
+                      std::string(1 << 20, '\1')),
+              HasSubstr("at most twice the file's size"));
+}
+
+TEST_F(ZipCheckpointFile, RefusesAPickleOfTooManyValues) {
+  EXPECT_THAT(refusal(std::string(1 << 19, 'N'), floats_), HasSubstr("bytes of memory, got more"));
+}
+
+TEST_F(ZipCheckpointFile, ReadsAParameterButNoneInsideAnother) {
+  const auto parameter = [](const std::string& inside) {
+    return pickled_global("torch._utils", "_rebuild_parameter") +
+           testing::pickled_tuple(inside + "\x88)") + "R";
+  };
+  const std::string once = parameter(pickled_tensor({}));
+  EXPECT_EQ(read(generator_of(once), floats_).at("w").values.size(), 6u);
+  EXPECT_THAT(refusal(generator_of(parameter(once)), floats_), HasSubstr("expected a tensor"));
+}
+
+TEST_F(ZipCheckpointFile, ListsOnlySomeOfManyKeysAndOnlyPrintableText) {
+  std::string entries = pickled_integer(1) + "N" + pickled_text("a\nb") + "N";
+  for (int i = 0; i < 100; ++i) entries += pickled_text("key" + std::to_string(i)) + "N";
+  EXPECT_THAT(refusal(pickled_dict(entries), floats_),
+              ::testing::AllOf(HasSubstr("got the keys an integer, a?b, key0"),
+                               HasSubstr("key37 and 62 others")));
+  EXPECT_THAT(refusal(pickled_dict(""), floats_), HasSubstr("got no keys"));
+}
+
+TEST_F(ZipCheckpointFile, ExecutesNothing) {
+  EXPECT_THAT(
+      refusal(pickled_global("os", "system") + testing::pickled_tuple(pickled_text("true")) + "R",
+              floats_),
+      HasSubstr("os.system"));
+}
+
+TEST_F(ZipCheckpointFile, RefusesFilesThatAreNoCheckpoint) {
   testing::write_zip(folder_ / "other.zip", {{"readme.txt", "hello"}});
   EXPECT_THROW(read_checkpoint(folder_ / "other.zip", "gen"), InputError);
   EXPECT_THROW(read_checkpoint(folder_ / "absent.pt", "gen"), InputError);
+  EXPECT_THROW(read_checkpoint(folder_.path(), "gen"), InputError);
+  testing::write_file(folder_ / "empty.pt", "");
+  EXPECT_THROW(read_checkpoint(folder_ / "empty.pt", "gen"), InputError);
 }
 
-TEST(CheckpointGolden, EqualsTheStateDict) {
+TEST_F(ZipCheckpointFile, NamesTheTarFormat) {
+  std::string tar(1024, '\0');
+  tar.replace(0, 8, "sys_info");
+  tar.replace(257, 5, "ustar");
+  testing::write_file(folder_ / "old.pt", tar);
+  try {
+    read_checkpoint(folder_ / "old.pt", "gen");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error_text(error), HasSubstr("a tar file, the format before PyTorch 0.1.10"));
+  }
+}
+
+class CheckpointGolden : public ::testing::TestWithParam<const char*> {};
+
+INSTANTIATE_TEST_SUITE_P(Formats, CheckpointGolden,
+                         ::testing::Values("checkpoint_zip.pt", "checkpoint_legacy.pt"),
+                         [](const auto& format) {
+                           return std::string(format.param).substr(11, 3);
+                         });
+
+TEST_P(CheckpointGolden, EqualsTheStateDict) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
-  const StateDict state = read_checkpoint(data / "golden" / "checkpoint_zip.pt", "gen");
+  const StateDict state = read_checkpoint(data / "golden" / GetParam(), "gen");
   const auto golden = data / "golden" / "golden.h5";
   const auto names = testing::member_names(golden, "generator/state");
   ASSERT_FALSE(names.empty());
@@ -165,6 +223,12 @@ TEST(CheckpointGolden, EqualsTheStateDict) {
     const auto expected = testing::read_array(golden, "generator/state/" + name);
     EXPECT_EQ(state.at(name).values, expected.values) << name;
   }
+}
+
+TEST_P(CheckpointGolden, ReadsTheOtherNetworkToo) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const StateDict state = read_checkpoint(data / "golden" / GetParam(), "dis");
+  EXPECT_EQ(state.at("disc.model.0.weight").shape, (std::vector<std::int64_t>{16, 20, 4, 4}));
 }
 
 }  // namespace

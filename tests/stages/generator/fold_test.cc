@@ -70,6 +70,47 @@ TEST(FoldGenerator, DividesBySpectralNormAfterOnePowerIteration) {
               ::testing::Each(::testing::FloatNear(float(1 / std::sqrt(27.0)), 1e-6f)));
 }
 
+/// The network that was folded elsewhere: convolutions with a bias, no batch norm.
+StateDict folded_state(bool published_names) {
+  StateDict state;
+  for (const Convolution& layer : untrained_weights(2, 9, 5).convolutions) {
+    const bool bare = !published_names || layer.name.starts_with("resblocks");
+    const std::string key = layer.name + (bare ? "" : ".conv2d");
+    state[key + ".weight"] = {{layer.out_channels, layer.in_channels, layer.kernel, layer.kernel},
+                              layer.weight};
+    state[key + ".bias"] = {{layer.out_channels}, std::vector<float>(layer.out_channels, 0.25f)};
+  }
+  return state;
+}
+
+TEST(FoldGenerator, TakesAFoldedNetworkAsItIs) {
+  const Weights expected = untrained_weights(2, 9, 5);
+  for (const bool published_names : {true, false}) {
+    const Weights weights = fold_generator(folded_state(published_names), "test");
+    for (std::size_t i = 0; i < expected.convolutions.size(); ++i) {
+      EXPECT_EQ(weights.convolutions[i].weight, expected.convolutions[i].weight);
+      EXPECT_THAT(weights.convolutions[i].bias, ::testing::Each(0.25f));
+    }
+  }
+}
+
+TEST(FoldGenerator, AConvolutionsOwnBiasGoesThroughBatchNorm) {
+  StateDict state = plain_state(1, 1.0f);
+  state["encoders.0.conv2d.bias"] = {{2}, {1, 2}};
+  state["encoders.0.norm_layer.weight"].values = {4, 2};
+  // factor = γ/2 = 2, 1; bias = 3 + (own - 5) factor.
+  EXPECT_THAT(layer(fold_generator(state, "test"), "encoders.0").bias,
+              ::testing::Pointwise(::testing::FloatNear(1e-5f), {-5.0f, 0.0f}));
+}
+
+TEST(FoldGenerator, RefusesALayerWithNeitherBatchNormNorBias) {
+  StateDict state = folded_state(true);
+  state.erase("decoders.1.conv2d.bias");
+  EXPECT_THAT([&] { fold_generator(state, "test"); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("decoders.1.norm_layer.weight or decoders.1.conv2d.bias")));
+}
+
 TEST(FoldGenerator, NamesWhatIsMissing) {
   StateDict state = plain_state(1, 1.0f);
   state.erase("encoders.2.norm_layer.running_var");
@@ -86,6 +127,9 @@ TEST(FoldGenerator, NamesWhatIsMissing) {
 TEST(FoldGenerator, RefusesAnotherShapeAndNumbersThatAreNotFinite) {
   StateDict wrong = plain_state(1, 1.0f);
   wrong["encoders.0.conv2d.weight"].values.pop_back();
+  EXPECT_THROW(fold_generator(wrong, "test"), std::runtime_error);
+  wrong = plain_state(1, 1.0f);
+  std::swap(wrong["encoders.0.conv2d.weight"].shape[0], wrong["encoders.0.conv2d.weight"].shape[1]);
   EXPECT_THROW(fold_generator(wrong, "test"), std::runtime_error);
   EXPECT_THROW(fold_generator(plain_state(1, NAN), "test"), std::runtime_error);
   EXPECT_THROW(fold_generator({}, "test"), std::runtime_error);

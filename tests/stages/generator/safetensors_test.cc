@@ -55,6 +55,10 @@ TEST(Safetensors, RefusesMalformedFiles) {
       with_header(tensor("F32", "[1]", "[4,8]"), data),
       with_header(tensor("F32", "[1]", "[4,0]"), data),
       with_header(tensor("F32", "[-1]", "[0,4]"), data),
+      with_header(tensor("F32", "[1.5]", "[0,4]"), data),
+      with_header(tensor("F32", "[true]", "[0,4]"), data),
+      with_header(tensor("F32", "[1]", "[0,4,4]"), data),
+      with_header(tensor("F32", "[0,9223372036854775808]", "[0,0]"), ""),
       with_header(tensor("F32", "[4611686018427387904,4]", "[0,4]"), data),
       with_header(tensor("F32", "[1]", "[0,4]"), data + "tail"),
       with_header(tensor("F32", "\"x\"", "[0,4]"), data),
@@ -63,6 +67,28 @@ TEST(Safetensors, RefusesMalformedFiles) {
     EXPECT_THROW(parse_safetensors(bytes, "test"), std::runtime_error)
         << bytes.substr(8 < bytes.size() ? 8 : 0);
   }
+}
+
+TEST(Safetensors, RefusesHeadersThatWouldGrow) {
+  const auto message = [](const std::string& bytes) -> std::string {
+    try {
+      parse_safetensors(bytes, "test");
+    } catch (const std::runtime_error& error) {
+      return error.what();
+    }
+    return "not refused";
+  };
+  EXPECT_THAT(message(with_header(R"({"a":)" + std::string(1 << 19, '['), "")),
+              ::testing::HasSubstr("deeply nested"));
+  EXPECT_THAT(message(with_header(std::string((1 << 20) + 1, '{'), "")),
+              ::testing::HasSubstr("at most 1048576 bytes"));
+  EXPECT_THAT(message(with_header(" {}", "")), ::testing::HasSubstr("begins with {"));
+}
+
+TEST(Safetensors, WritesTensorsThatAreElsewhere) {
+  const std::vector<float> values = {1, 2};
+  EXPECT_EQ(serialize_safetensors({{"a", {{2}, values}}}, {{"k", "v"}}),
+            serialize_safetensors({{{"a", {{2}, values}}}, {{"k", "v"}}}));
 }
 
 TEST(Safetensors, SaysWhichFileIsMissing) {

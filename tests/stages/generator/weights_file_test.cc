@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "manifests/faults.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/untrained.h"
@@ -22,6 +24,12 @@ TEST(WeightsFile, RoundTrips) {
   EXPECT_EQ(back.bins, 9);
   EXPECT_EQ(back.metadata, weights.metadata);
   EXPECT_EQ(serialize_weights(back), serialize_weights(weights));
+}
+
+TEST(WeightsFile, ParsesBytes) {
+  const std::string bytes = serialize_weights(untrained_weights(1, 9, 3));
+  EXPECT_EQ(serialize_weights(parse_weights(bytes, "NAME")), bytes);
+  EXPECT_THROW(parse_weights(bytes.substr(1), "NAME"), InputError);
 }
 
 TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {
@@ -49,6 +57,8 @@ TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {
   refused(changed);
   changed = content;
   changed.tensors["pred.bias"].values[0] = 1.0f / 0.0f;
+  refused(changed);
+  changed.tensors["pred.bias"].values[0] = std::numeric_limits<float>::quiet_NaN();
   refused(changed);
   EXPECT_THROW(read_weights(folder / "none.safetensors"), InputError);
 }

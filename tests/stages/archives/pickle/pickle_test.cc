@@ -173,6 +173,25 @@ TEST(PickleTest, TellsHowManyBytesItUsed) {
   EXPECT_EQ(used, 4u);
 }
 
+TEST(PickleTest, TakesNoMoreMemoryThanAllowed) {
+  const std::string pickle = "](NX\x0b\0\0\0"s + std::string(11, 'a') + "e.";
+  const auto run = [&](std::uint64_t most) {
+    return PickleDocument(std::as_bytes(std::span(pickle)), {}, "test.pkl", nullptr, most);
+  };
+  const std::uint64_t needed = read(pickle).memory_bytes();
+  EXPECT_GT(needed, 3 * sizeof(PickleNode) + 11);
+  EXPECT_EQ(run(needed).root().items.size(), 2u);
+  EXPECT_THROW(run(needed - 1), std::runtime_error);
+  EXPECT_THROW(run(0), std::runtime_error);
+}
+
+TEST(PickleTest, ListsEveryValueEvenThoseTheRootDoesNotLeadTo) {
+  const PickleDocument document = read("N0K\x07.");
+  ASSERT_EQ(document.nodes().size(), 2u);
+  EXPECT_EQ(document.nodes()[0].kind, Kind::kNone);
+  EXPECT_EQ(&document.nodes()[1], &document.root());
+}
+
 TEST(PickleTest, PopTakesOffAValueOrAMark) {
   EXPECT_EQ(read("K\x01K\x02"
                  "0.")

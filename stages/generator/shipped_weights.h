@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "stages/generator/weights.h"
+
+namespace eventgan {
+
+// The weights that are part of the program: the repository's files
+// manifests/weights/eventgan-WIDTH.safetensors, embedded when the program is built. All functions
+// are thread safe.
+
+/// Base widths of the shipped weights, ascending; empty if the program was built without any.
+std::vector<int> shipped_widths();
+
+/// The width that the name "shipped" stands for: the largest one that is at most 16 (beyond it a
+/// processor takes seconds for a pair). Throws InputError if there is none.
+int default_shipped_width();
+
+/// The file's bytes as they stand in the repository; they live as long as the program. Throws
+/// InputError, listing the widths there are, if that width is not shipped.
+std::span<const std::byte> shipped_weights_bytes(int width);
+
+/// The weights of that width, read and checked as read_weights reads a file; throws as it does.
+Weights read_shipped_weights(int width);
+
+}  // namespace eventgan

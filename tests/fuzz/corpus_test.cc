@@ -1,0 +1,54 @@
+// Every input that is kept, good or bad, through every reader: it is read or refused, nothing else.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <span>
+
+#include "stages/generator/checkpoint.h"
+#include "stages/generator/safetensors.h"
+#include "tests/fuzz/readers.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using Reader = void (*)(std::span<const std::uint8_t>, const std::filesystem::path&);
+
+class FuzzCorpus : public ::testing::TestWithParam<Reader> {};
+
+INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus,
+                         ::testing::Values(testing::read_checkpoint_input,
+                                           testing::read_zip_pickle_input,
+                                           testing::read_safetensors_input));
+
+TEST_P(FuzzCorpus, IsReadOrRefused) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path corpus =
+      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "tests" / "fuzz" / "corpus";
+  int inputs = 0;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(corpus)) {
+    if (!entry.is_regular_file()) continue;
+    const std::string bytes = testing::read_file(entry.path());
+    const auto* data = reinterpret_cast<const std::uint8_t*>(bytes.data());
+    EXPECT_NO_THROW(GetParam()({data, bytes.size()}, folder / "input")) << entry.path();
+    ++inputs;
+  }
+  EXPECT_GE(inputs, 10);
+}
+
+/// Else every input might be refused at its first byte, and nothing behind it be tried.
+TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
+  const std::filesystem::path corpus =
+      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "tests" / "fuzz" / "corpus";
+  for (const char* name : {"zip", "legacy"}) {
+    EXPECT_FALSE(read_checkpoint(corpus / "checkpoint" / name, "gen").empty()) << name;
+  }
+  const std::string bytes = testing::read_file(corpus / "safetensors" / "two");
+  EXPECT_FALSE(parse_safetensors(bytes, "two").tensors.empty());
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,156 @@
+"""Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, and small weights files.
+
+    python3 tests/fuzz/make_corpus.py tests/fuzz/corpus
+
+Needs no PyTorch: classes of its names stand in for what a pickle refers to. Beside the seeds
+stand inputs that the fuzzer made of them to reach other branches of the readers (found_*).
+"""
+
+import collections
+import io
+import json
+import pathlib
+import pickle
+import struct
+import sys
+import types
+import zipfile
+
+MAGIC = 0x1950A86A20F9469CFC6C
+
+
+def stand_in(module, name):
+    made = sys.modules.setdefault(module, types.ModuleType(module))
+    value = type(name, (), {"__module__": module, "__qualname__": name})
+    setattr(made, name, value)
+    return value
+
+
+stand_in("torch", "nothing")
+STORAGES = {letter: stand_in("torch", name) for letter, name in
+            {"f": "FloatStorage", "d": "DoubleStorage", "e": "HalfStorage", "q": "LongStorage"}.items()}
+REBUILD = stand_in("torch._utils", "_rebuild_tensor_v2")
+PARAMETER = stand_in("torch._utils", "_rebuild_parameter")
+
+
+class Storage:
+    def __init__(self, key, letter, values):
+        self.key, self.letter, self.values = key, letter, values
+
+    def data(self):
+        return struct.pack(f"<{len(self.values)}{self.letter}", *self.values)
+
+
+class Tensor:
+    def __init__(self, storage, shape, offset=0, strides=None, parameter=False):
+        self.storage, self.shape, self.offset, self.parameter = storage, shape, offset, parameter
+        self.strides = strides
+        if strides is None:
+            self.strides, step = [], 1
+            for side in reversed(shape):
+                self.strides.insert(0, step)
+                step *= side
+
+    def __reduce__(self):
+        rebuilt = (REBUILD, (self.storage, self.offset, tuple(self.shape), tuple(self.strides), False,
+                             collections.OrderedDict()))
+        if not self.parameter:
+            return rebuilt
+        inner = Tensor(self.storage, self.shape, self.offset, self.strides)
+        return PARAMETER, (inner, True, collections.OrderedDict())
+
+
+class Pickler(pickle.Pickler):
+    def __init__(self, file, legacy):
+        super().__init__(file, protocol=2)
+        self.legacy, self.storages = legacy, {}
+
+    def persistent_id(self, value):
+        if not isinstance(value, Storage):
+            return None
+        self.storages[value.key] = value
+        known = ("storage", STORAGES[value.letter], value.key, "cpu", len(value.values))
+        return known + (None,) if self.legacy else known
+
+
+def dump(value, legacy):
+    file = io.BytesIO()
+    pickler = Pickler(file, legacy)
+    pickler.dump(value)
+    return file.getvalue(), pickler.storages
+
+
+def legacy_checkpoint(value, little_endian=True):
+    data, storages = dump(value, legacy=True)
+    keys = sorted(storages)
+    machine = {"protocol_version": 1001, "little_endian": little_endian, "type_sizes": {"short": 2, "int": 4, "long": 4}}
+    result = b"".join(pickle.dumps(part, protocol=2) for part in (MAGIC, 1001, machine)) + data
+    result += pickle.dumps(keys, protocol=2)
+    for key in keys:
+        result += struct.pack("<q", len(storages[key].values)) + storages[key].data()
+    return result
+
+
+def zip_checkpoint(value, method):
+    data, storages = dump(value, legacy=False)
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", method) as archive:
+        members = {"archive/data.pkl": data, "archive/version": b"3\n"}
+        members.update({f"archive/data/{key}": storage.data() for key, storage in storages.items()})
+        for name, content in members.items():
+            archive.writestr(zipfile.ZipInfo(name), content, method)
+    return file.getvalue()
+
+
+def checkpoint():
+    shared = Storage("0", "f", [0.5 * i for i in range(12)])
+    half = Storage("1", "e", [1.0, -2.0])
+    count = Storage("2", "q", [7])
+    network = collections.OrderedDict([
+        ("head.conv2d.weight", Tensor(shared, [2, 3])), ("transposed", Tensor(shared, [3, 2], 6, [1, 3])),
+        ("half", Tensor(half, [2])), ("parameter", Tensor(half, [2, 1], parameter=True)),
+        ("norm.num_batches_tracked", Tensor(count, []))])
+    optimizer = {"state": {0: {"step": 3, "exp_avg": Tensor(Storage("3", "d", [0.25, 1.5]), [2])}},
+                 "param_groups": [{"lr": 2e-4, "betas": (0.0, 0.999), "params": [0]}]}
+    return {"gen": network, "dis": collections.OrderedDict(w=Tensor(half, [1], 1)), "optimizer_gen": optimizer,
+            "epoch": 3, "dataset_perm": None, "big": 1 << 70, "done": True}
+
+
+def safetensors(header, data=b""):
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    text += b" " * (-len(text) % 8)
+    return struct.pack("<Q", len(text)) + text + data
+
+
+def main(folder):
+    values = checkpoint()
+    bare = collections.OrderedDict([("head.conv2d.weight", Tensor(Storage("0", "f", [1.0] * 4), [2, 2]))])
+    tensor = {"dtype": "F32", "shape": [2], "data_offsets": [0, 8]}
+    seeds = {
+        "checkpoint/legacy": legacy_checkpoint(values),
+        "checkpoint/legacy_bare": legacy_checkpoint(bare),
+        "checkpoint/legacy_big_endian": legacy_checkpoint(bare, little_endian=False),
+        "checkpoint/legacy_cut": legacy_checkpoint(values)[:-9],
+        "checkpoint/zip": zip_checkpoint(values, zipfile.ZIP_STORED),
+        "checkpoint/zip_deflated": zip_checkpoint(bare, zipfile.ZIP_DEFLATED),
+        "checkpoint/tar": b"sys_info".ljust(257, b"\0") + b"ustar" + bytes(250),
+        "zip_pickle/network": dump({"gen": {"w": Tensor(Storage("0", "f", [1.0] * 16), [4, 4])}}, legacy=False)[0],
+        "zip_pickle/shared": dump({"gen": {str(i): Tensor(Storage("0", "e", [1.0] * 32), [4, 8]) for i in range(4)}},
+                                  legacy=False)[0],
+        "zip_pickle/bare": dump(bare, legacy=False)[0],
+        "safetensors/two": safetensors({"__metadata__": {"format": "eventgan-generator", "format_version": "1",
+                                                         "base_channels": "1", "bins": "9"},
+                                        "head.bias": tensor, "pred.bias": {**tensor, "data_offsets": [8, 16]}},
+                                       bytes(16)),
+        "safetensors/empty": safetensors({}),
+        "safetensors/hole": safetensors({"a": {**tensor, "data_offsets": [4, 12]}}, bytes(12)),
+        "safetensors/deep": safetensors(b'{"a":' + b"[" * 64),
+    }
+    for name, content in seeds.items():
+        path = pathlib.Path(folder) / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(content)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+
+namespace eventgan::testing {
+
+// What a fuzz target does with one input, and the replay of the corpus too: the reader either reads
+// it or throws InputError (safetensors on bytes: std::runtime_error). Anything else leaves as it is
+// and ends the target. `scratch` is a file to use; it is overwritten.
+
+/// A checkpoint of either format: its networks "gen" and "dis".
+void read_checkpoint_input(std::span<const std::uint8_t> input,
+                           const std::filesystem::path& scratch);
+
+/// The pickle of a checkpoint in the zip format, put into a sound zip file with one storage "0" of
+/// 64 bytes: random changes to a whole zip file seldom get past its checksums.
+void read_zip_pickle_input(std::span<const std::uint8_t> input,
+                           const std::filesystem::path& scratch);
+
+/// A weights file.
+void read_safetensors_input(std::span<const std::uint8_t> input,
+                            const std::filesystem::path& scratch);
+
+}  // namespace eventgan::testing
