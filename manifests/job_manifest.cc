@@ -1,17 +1,15 @@
 #include "manifests/job_manifest.h"
 
-#include <charconv>
 #include <cstdint>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/faults.h"
+#include "manifests/generator_spec_internal.h"
 #include "manifests/image_spec_internal.h"
 #include "manifests/job_words_internal.h"
 #include "manifests/manifest_text_internal.h"
+#include "manifests/parse_manifest_internal.h"
 #include "manifests/source_spec_internal.h"
-#include "manifests/strict_json/json_text_internal.h"
 #include "manifests/strict_json/strict_json_internal.h"
 
 namespace eventgan {
@@ -19,32 +17,6 @@ namespace {
 
 constexpr std::string_view kFormat = "eventgan-manifest";
 constexpr int kVersion = 1;
-
-/// A path, or "untrained:WIDTH" with a width that the generator can have.
-bool is_weights(std::string_view text) {
-  constexpr std::string_view kUntrained = "untrained:";
-  if (!text.starts_with(kUntrained)) {
-    return !text.empty() && text.find('\0') == std::string_view::npos;
-  }
-  text.remove_prefix(kUntrained.size());
-  int width = 0;
-  const auto result = std::from_chars(text.data(), text.data() + text.size(), width);
-  return result.ec == std::errc() && result.ptr == text.data() + text.size() && text[0] != '0' &&
-         width >= 1 && width <= 64;
-}
-
-GeneratorSpec read_generator(const StrictValue& value) {
-  GeneratorSpec spec;
-  StrictObject object = value.object();
-  spec.weights = object.at("weights").text(
-      "the path of a .safetensors file, or \"untrained:WIDTH\" with WIDTH in 1..64", is_weights);
-  if (const auto precision = object.find("precision")) {
-    spec.precision = precision->text("\"float32\" (the only precision there is)",
-                                     [](std::string_view text) { return text == "float32"; });
-  }
-  object.finish();
-  return spec;
-}
 
 VolumeSpec read_volume(const StrictValue& value) {
   VolumeSpec spec;
@@ -95,20 +67,20 @@ void check_chunk(const JobManifest& manifest, const StrictValue& image) {
               std::to_string(bytes) + " bytes");
 }
 
-JobManifest read_document(const nlohmann::json& document, FaultList& faults) {
+JobManifest read_document(const StrictValue& document) {
   JobManifest manifest;
-  StrictObject object = StrictValue(document, faults).object();
+  StrictObject object = document.object();
   if (!object.has_format(kFormat, kVersion)) return manifest;
   manifest.name = read_name(object.at("name"));
-  if (const auto seed = object.find("seed")) {
-    manifest.seed = seed->integer<std::int64_t>(0, std::numeric_limits<std::int64_t>::max());
-  }
+  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
   for (const StrictValue& source : object.at("sources").elements(1)) {
     manifest.sources.push_back(read_source(source));
   }
   const StrictValue image = object.at("image");
   manifest.image = read_image(image);
-  manifest.generator = read_generator(object.at("generator"));
+  if (const auto generator = object.find("generator")) {
+    manifest.generator = read_generator(*generator);
+  }
   if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
   manifest.output = read_output(object.at("output"));
   if (const auto errors = object.find("errors")) manifest.errors = read_errors(*errors);
@@ -133,20 +105,11 @@ std::size_t stored_size(StoredType type) {
 
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
-  JobManifest manifest;
-  FaultList faults(name);
-  if (const auto document = parse_json_text(text, faults)) {
-    manifest = read_document(*document, faults);
-  }
-  if (!faults.empty()) throw UsageError(faults.text());
-  manifest.text = text;
-  manifest.directory =
-      directory.empty() ? std::filesystem::current_path() : std::filesystem::absolute(directory);
-  return manifest;
+  return parse_manifest<JobManifest>(text, directory, name, read_document);
 }
 
-std::filesystem::path resolve(const JobManifest& manifest, const std::string& path) {
-  return manifest.directory / path;
+JobManifest read_job_manifest(const std::filesystem::path& file) {
+  return parse_job_manifest(read_manifest_text(file), manifest_folder(file), file.string());
 }
 
 }  // namespace eventgan

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "manifests/image_size.h"
+#include "manifests/manifest_origin.h"
+#include "manifests/sensor_spec.h"
 
 namespace eventgan {
 
@@ -69,9 +71,23 @@ struct ImageSpec {
   int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
 };
 
+/// What makes the volumes: the EventGAN network, or a model to compare it with.
+enum class GeneratorKind {
+  kNetwork,
+  kEsim,       ///< a random affine motion of the previous frame (stages/events/simulation)
+  kDifference  ///< log intensity on a line from the previous frame to the next
+};
+
 struct GeneratorSpec {
-  std::string weights;  ///< path of a .safetensors file, or "untrained:WIDTH", WIDTH 1..64
-  std::string precision = "float32";
+  GeneratorKind kind = GeneratorKind::kNetwork;
+  /// kNetwork: path of a .safetensors file, "shipped" or "shipped:WIDTH" (manifests/weights), or
+  /// "untrained:WIDTH", WIDTH 1..64.
+  std::string weights = "shipped";
+  std::string precision = "float32";  ///< kNetwork
+  SensorSpec sensor;                  ///< kEsim, kDifference
+  double duration_s = 0.1;            ///< kEsim, kDifference: time between the two frames, for the
+                                      ///< noise and the refractory time; 1e-4..10
+  double max_displacement_px = 10;    ///< kEsim: of the random motion, 0.1..100
 };
 
 enum class Normalization { kNone, kEta98 };
@@ -102,7 +118,7 @@ struct ErrorSpec {
 };
 
 /// A conversion job, as manifest.schema.json beside this file describes it.
-struct JobManifest {
+struct JobManifest : ManifestOrigin {
   /// Part of file names: 1..64 of A-Z a-z 0-9 . _ - and neither "." nor "-" first.
   std::string name;
   std::uint64_t seed = 0;  ///< 0..2^63-1
@@ -112,9 +128,6 @@ struct JobManifest {
   VolumeSpec volume;
   OutputSpec output;
   ErrorSpec errors;
-
-  std::string text;                 ///< the manifest file, byte for byte
-  std::filesystem::path directory;  ///< absolute folder of the manifest; relative paths start here
 };
 
 /// Reads a manifest. Throws UsageError listing *every* fault, one per line as
@@ -125,9 +138,6 @@ JobManifest read_job_manifest(const std::filesystem::path& file);
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name);
 
-/// `path` as the program must open it: below the manifest's folder unless it is absolute.
-std::filesystem::path resolve(const JobManifest& manifest, const std::string& path);
-
 /// The manifest's words for these values, and back into text for shards, plans and reports.
 std::string_view to_string(DatasetKind kind);
 std::string_view to_string(Human36mLayout layout);
@@ -135,6 +145,7 @@ std::string_view to_string(PairSide side);
 std::string_view to_string(PairChoice choice);
 std::string_view to_string(ImageFit fit);
 std::string_view to_string(GreyOrder order);
+std::string_view to_string(GeneratorKind kind);
 std::string_view to_string(Normalization normalization);
 std::string_view to_string(StoredType type);
 std::string_view to_string(ErrorPolicy policy);

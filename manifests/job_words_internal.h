@@ -36,6 +36,11 @@ inline constexpr std::array kFitWords{Word<ImageFit>{"stretch", ImageFit::kStret
 inline constexpr std::array kGreyWords{Word<GreyOrder>{"before_resize", GreyOrder::kBeforeResize},
                                        Word<GreyOrder>{"after_resize", GreyOrder::kAfterResize}};
 
+inline constexpr std::array kGeneratorWords{
+    Word<GeneratorKind>{"network", GeneratorKind::kNetwork},
+    Word<GeneratorKind>{"esim", GeneratorKind::kEsim},
+    Word<GeneratorKind>{"difference", GeneratorKind::kDifference}};
+
 inline constexpr std::array kNormalizationWords{
     Word<Normalization>{"none", Normalization::kNone},
     Word<Normalization>{"eta98", Normalization::kEta98}};

@@ -4,11 +4,11 @@
 #include <system_error>
 
 #include "manifests/faults.h"
-#include "manifests/job_manifest.h"
+#include "manifests/manifest_text_internal.h"
 
 namespace eventgan {
 
-JobManifest read_job_manifest(const std::filesystem::path& file) {
+std::string read_manifest_text(const std::filesystem::path& file) {
   const auto fail = [&](const std::string& why) {
     throw InputError("expected a manifest, got \"" + why + "\", in " + file.string());
   };
@@ -19,8 +19,11 @@ JobManifest read_job_manifest(const std::filesystem::path& file) {
   std::ostringstream text;
   if (stream && stream.peek() != std::ifstream::traits_type::eof()) text << stream.rdbuf();
   if (!stream.is_open() || stream.bad()) fail(std::generic_category().message(errno));
-  return parse_job_manifest(text.view(), std::filesystem::absolute(file).parent_path(),
-                            file.string());
+  return std::move(text).str();
+}
+
+std::filesystem::path manifest_folder(const std::filesystem::path& file) {
+  return std::filesystem::absolute(file).parent_path();
 }
 
 }  // namespace eventgan

@@ -1,5 +1,5 @@
 #include <algorithm>
-#include <string_view>
+#include <limits>
 
 #include "manifests/manifest_text_internal.h"
 
@@ -11,17 +11,23 @@ std::string read_path(const StrictValue& value) {
   });
 }
 
-std::string read_name(const StrictValue& value) {
-  constexpr auto is_name = [](std::string_view text) {
-    const auto belongs = [](char c) {
-      return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-             c == '.' || c == '_' || c == '-';
-    };
-    return !text.empty() && text.size() <= 64 && text[0] != '.' && text[0] != '-' &&
-           std::all_of(text.begin(), text.end(), belongs);
+bool is_name(std::string_view text) {
+  const auto belongs = [](char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
+           c == '_' || c == '-';
   };
+  return !text.empty() && text.size() <= 64 && text[0] != '.' && text[0] != '-' &&
+         std::all_of(text.begin(), text.end(), belongs);
+}
+
+std::string read_name(const StrictValue& value) {
   return value.text(
       "1..64 letters, digits, \".\", \"_\" or \"-\", not beginning with \".\" or \"-\"", is_name);
+}
+
+std::uint64_t read_seed(const StrictValue& value) {
+  return static_cast<std::uint64_t>(
+      value.integer<std::int64_t>(0, std::numeric_limits<std::int64_t>::max()));
 }
 
 }  // namespace eventgan

@@ -5,6 +5,21 @@
 
 namespace eventgan {
 
+std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
+  std::vector<int> gaps;
+  for (const StrictValue& element : value.elements(1)) {
+    const auto gap = element.sound_integer(1, 6);
+    if (!gap) continue;
+    if (side == PairSide::kAround && *gap % 2 != 0) {
+      element.fault("an even gap (2, 4 or 6), since side is \"around\"");
+    }
+    if (std::find(gaps.begin(), gaps.end(), *gap) != gaps.end()) element.fault("each gap once");
+    gaps.push_back(static_cast<int>(*gap));
+  }
+  std::sort(gaps.begin(), gaps.end());
+  return gaps;
+}
+
 PairSpec read_pairs(const StrictValue& value) {
   PairSpec spec;
   StrictObject object = value.object();
@@ -13,18 +28,7 @@ PairSpec read_pairs(const StrictValue& value) {
   if (const auto least = object.find("min_pairs")) {
     spec.min_pairs = least->integer<std::int64_t>(0, 1'000'000'000);
   }
-  for (const StrictValue& element : object.at("gaps").elements(1)) {
-    const auto gap = element.sound_integer(1, 6);
-    if (!gap) continue;
-    if (spec.side == PairSide::kAround && *gap % 2 != 0) {
-      element.fault("an even gap (2, 4 or 6), since side is \"around\"");
-    }
-    if (std::find(spec.gaps.begin(), spec.gaps.end(), *gap) != spec.gaps.end()) {
-      element.fault("each gap once");
-    }
-    spec.gaps.push_back(static_cast<int>(*gap));
-  }
-  std::sort(spec.gaps.begin(), spec.gaps.end());
+  spec.gaps = read_gaps(object.at("gaps"), spec.side);
   object.finish();
   return spec;
 }

@@ -16,6 +16,12 @@ namespace eventgan {
 inline constexpr char kShardFormat[] = "eventgan-shard";
 inline constexpr int kShardFormatVersion = 1;
 
+/// What the values of a volume, as generated, are.
+enum class VolumeUnit {
+  kLearned,  ///< a network's: dimensionless, as the volumes of its training were normalised
+  kEvents    ///< a simulator's: a count of events, each spread over the two bins nearest in time
+};
+
 /// What is true of a whole shard; shard_format.md beside this file says where each field stands.
 struct ShardHeader {
   std::string name;  ///< file name: NAME-SPLIT-00012-of-01024.h5
@@ -26,11 +32,12 @@ struct ShardHeader {
   StoredType dtype = StoredType::kFloat16;
   int deflate_level = 1;
   Normalization normalization = Normalization::kNone;
+  VolumeUnit unit = VolumeUnit::kLearned;
   LabelSchema label_schema;
   std::string preprocessing;  ///< JSON: fit, grey, blur, preset
   std::string plan_hash;      ///< SHA-256 of the frozen plan, hex
   std::string manifest_text;
-  std::string weights_hash;  ///< SHA-256 of the weights, hex
+  std::string weights_hash;  ///< SHA-256 of the weights (simulators: of `generator`), hex
   std::string generator;     ///< Generator::description()
   std::string program_version;
 };

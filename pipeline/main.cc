@@ -39,7 +39,7 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 complete; 1 failed; 64 usage or bad manifest; 65 too many bad samples; 66 "
-      "input missing.");
+      "input missing; 75 stopped, run again.");
 
   int exit_code = eventgan::kFailed;
   eventgan::add_convert_command(app, exit_code);
@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   eventgan::add_preview_command(app, exit_code);
   eventgan::add_make_demo_command(app, exit_code);
   eventgan::add_import_weights_command(app, exit_code);
+  eventgan::add_simulate_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

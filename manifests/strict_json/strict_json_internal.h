@@ -51,6 +51,9 @@ class StrictValue {
   /// A number in lowest..highest, whole or not.
   double number(double lowest, double highest) const;
 
+  /// true or false; false after a fault.
+  bool boolean() const;
+
   /// A string, any; or one for which `is_right` holds, which `expected` puts in words.
   std::string text() const;
   std::string text(std::string_view expected, bool (*is_right)(std::string_view)) const;

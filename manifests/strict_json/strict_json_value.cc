@@ -53,6 +53,12 @@ double StrictValue::number(double lowest, double highest) const {
   return lowest;
 }
 
+bool StrictValue::boolean() const {
+  if (node_ != nullptr && node_->is_boolean()) return node_->get<bool>();
+  fault("true or false");
+  return false;
+}
+
 std::string StrictValue::text() const {
   return text("text", [](std::string_view) { return true; });
 }

@@ -4,12 +4,12 @@
 
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/conversion/convert.h"
 #include "pipeline/conversion/load_generator.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/inspection/plan_summary.h"
 #include "pipeline/inspection/trial.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/threads/thread_count.h"
 
 namespace eventgan {
 namespace {

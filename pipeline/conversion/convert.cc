@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <chrono>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "manifests/faults.h"
@@ -13,6 +12,7 @@
 #include "pipeline/conversion/shard_sink.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/threads/thread_count.h"
 #include "stages/shards/stale_temporaries.h"
 
 namespace eventgan {
@@ -44,6 +44,8 @@ ShardHeader make_header(const JobManifest& manifest, const PlannedJob& job,
   header.dtype = manifest.output.dtype;
   header.deflate_level = manifest.output.deflate_level;
   header.normalization = manifest.volume.normalize;
+  header.unit = manifest.generator.kind == GeneratorKind::kNetwork ? VolumeUnit::kLearned
+                                                                   : VolumeUnit::kEvents;
   header.label_schema = job.datasets[source]->label_schema();
   header.preprocessing = preprocessing_json(manifest.image);
   header.plan_hash = frozen.hash;
@@ -116,11 +118,6 @@ std::size_t largest_sample_bytes(const Plan& plan, int bins) {
 }
 
 }  // namespace
-
-int thread_count(int requested) {
-  if (requested > 0) return requested;
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
 
 ConversionReport convert(const JobManifest& manifest, const Generator& generator,
                          const std::string& weights_hash, const ConversionOptions& options) {

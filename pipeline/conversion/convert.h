@@ -30,7 +30,4 @@ struct ConversionOptions {
 ConversionReport convert(const JobManifest& manifest, const Generator& generator,
                          const std::string& weights_hash, const ConversionOptions& options);
 
-/// Number of threads to use for a request: itself, or all cores for 0.
-int thread_count(int requested);
-
 }  // namespace eventgan

@@ -1,8 +1,11 @@
 #include "pipeline/conversion/load_generator.h"
 
-#include <charconv>
+#include <optional>
 
 #include "manifests/faults.h"
+#include "manifests/weights_name.h"
+#include "pipeline/conversion/simulated_generator.h"
+#include "stages/generator/shipped_weights.h"
 #include "stages/generator/torch_generator.h"
 #include "stages/generator/untrained.h"
 #include "stages/generator/weights_file.h"
@@ -11,38 +14,44 @@
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kUntrained = "untrained:";
-constexpr int kLargestUntrainedWidth = 64;
-
-int untrained_width(const std::string& weights) {
-  const char* first = weights.data() + kUntrained.size();
-  const char* last = weights.data() + weights.size();
-  int width = 0;
-  const auto [end, error] = std::from_chars(first, last, width);
-  if (error != std::errc() || end != last || width < 1 || width > kLargestUntrainedWidth) {
-    throw UsageError("$.generator.weights: expected untrained:WIDTH with WIDTH in 1.." +
-                     std::to_string(kLargestUntrainedWidth) + ", got \"" + weights + "\"");
+Weights load_weights(const JobManifest& manifest, LoadedGenerator& loaded) {
+  const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
+  if (!name) {
+    throw UsageError(
+        "$.generator.weights: expected a file, shipped, shipped:WIDTH or untrained:WIDTH with "
+        "WIDTH in 1.." +
+        std::to_string(kLargestNamedWidth) + ", got \"" + manifest.generator.weights + "\"");
   }
-  return width;
+  if (name->origin == WeightsOrigin::kShipped) {
+    const int width = name->width ? *name->width : default_shipped_width();
+    loaded.weights_hash = sha256_hex(shipped_weights_bytes(width));
+    return read_shipped_weights(width);
+  }
+  if (name->origin == WeightsOrigin::kUntrained) {
+    Weights weights = untrained_weights(name->width.value(), manifest.volume.bins, manifest.seed);
+    loaded.weights_hash = sha256_hex(serialize_weights(weights));
+    loaded.warning = "the generator is UNTRAINED (" + manifest.generator.weights +
+                     "): its volumes are random patterns, not events. Fit for trying the program, "
+                     "for nothing else.";
+    return weights;
+  }
+  const auto file = resolve(manifest, name->path);
+  Weights weights = read_weights(file);
+  loaded.weights_hash = sha256_of_file(file);
+  return weights;
 }
 
 }  // namespace
 
 LoadedGenerator load_generator(const JobManifest& manifest) {
-  const std::string& name = manifest.generator.weights;
   LoadedGenerator loaded;
-  Weights weights;
-  if (name.starts_with(kUntrained)) {
-    weights = untrained_weights(untrained_width(name), manifest.volume.bins, manifest.seed);
-    loaded.weights_hash = sha256_hex(serialize_weights(weights));
-    loaded.warning = "the generator is UNTRAINED (" + name +
-                     "): its volumes are random patterns, not events. Fit for trying the program, "
-                     "for nothing else.";
-  } else {
-    const auto file = resolve(manifest, name);
-    weights = read_weights(file);
-    loaded.weights_hash = sha256_of_file(file);
+  if (manifest.generator.kind != GeneratorKind::kNetwork) {
+    loaded.generator =
+        make_simulated_generator(manifest.generator, manifest.volume.bins, manifest.seed);
+    loaded.weights_hash = sha256_hex(loaded.generator->description());
+    return loaded;
   }
+  const Weights weights = load_weights(manifest, loaded);
   if (weights.bins != manifest.volume.bins) {
     throw UsageError("$.volume.bins: expected " + std::to_string(weights.bins) +
                      " as the weights have, got " + std::to_string(manifest.volume.bins));

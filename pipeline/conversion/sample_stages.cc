@@ -142,8 +142,10 @@ void SampleStages::finish(SampleMessage& message) const {
   std::vector<float> volume = framed(std::move(message.volume), message.prepared, shape.channels());
   VolumeStatistics& statistics = message.sample.statistics;
   statistics = volume_statistics(volume, shape);
-  if (message.planned().pair.gap_frames >= kFirstExtrapolatedGap)
+  if (manifest_.generator.kind == GeneratorKind::kNetwork &&
+      message.planned().pair.gap_frames >= kFirstExtrapolatedGap) {
     statistics.flags |= kFlagExtrapolated;
+  }
   if (manifest_.volume.normalize == Normalization::kEta98) normalize(volume, statistics.eta98);
   EncodedVolume encoded = codec_.encode(volume);
   if (encoded.saturated) statistics.flags |= kFlagSaturated;

@@ -42,7 +42,16 @@ std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedSh
   return sha256_hex(listing);
 }
 
-/// The instruction sets that the numeric libraries choose their kernels by.
+}  // namespace
+
+std::string preprocessing_json(const ImageSpec& image) {
+  nlohmann::json json = {{"fit", to_string(image.fit)},
+                         {"grey", to_string(image.grey)},
+                         {"blur", image.blur},
+                         {"preset", image.preset}};
+  return json.dump();
+}
+
 std::string instruction_sets() {
   std::string sets = "x86-64";
 #if defined(__x86_64__)
@@ -56,16 +65,6 @@ std::string instruction_sets() {
   sets = "other";
 #endif
   return sets;
-}
-
-}  // namespace
-
-std::string preprocessing_json(const ImageSpec& image) {
-  nlohmann::json json = {{"fit", to_string(image.fit)},
-                         {"grey", to_string(image.grey)},
-                         {"blur", image.blur},
-                         {"preset", image.preset}};
-  return json.dump();
 }
 
 std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSION; }

@@ -34,12 +34,16 @@ std::chrono::milliseconds interval(ProgressStyle style) {
 }  // namespace
 
 std::string progress_line(const ProgressState& state) {
+  const char* unit = state.unit.name.c_str();
   char text[160];
-  std::snprintf(text, sizeof text, "%lld/%lld pairs, %.2f pairs/s, %.1f MB/s, %s left",
-                static_cast<long long>(state.done), static_cast<long long>(state.total),
-                state.pairs_per_second(), state.megabytes_per_second(),
-                state.done > 0 ? duration_text(state.seconds_left()).c_str() : "?");
+  std::snprintf(text, sizeof text, "%lld/%lld %s, %.2f %s/s, ", static_cast<long long>(state.done),
+                static_cast<long long>(state.total), unit, state.per_second(), unit);
   std::string line = text;
+  if (state.unit.has_bytes) {
+    std::snprintf(text, sizeof text, "%.1f MB/s, ", state.megabytes_per_second());
+    line += text;
+  }
+  line += (state.done > 0 ? duration_text(state.seconds_left()) : "?") + " left";
   if (state.quarantined > 0) line += ", " + std::to_string(state.quarantined) + " quarantined";
   return line;
 }
@@ -52,15 +56,17 @@ std::string progress_bar(const ProgressState& state, int width) {
 }
 
 std::string progress_json(const ProgressState& state) {
-  const nlohmann::json json = {{"event", "progress"},
-                               {"done", state.done},
-                               {"total", state.total},
-                               {"quarantined", state.quarantined},
-                               {"bytes", state.bytes},
-                               {"seconds", state.seconds},
-                               {"pairs_per_s", state.pairs_per_second()},
-                               {"mb_per_s", state.megabytes_per_second()},
-                               {"seconds_left", state.seconds_left()}};
+  nlohmann::json json = {{"event", "progress"},
+                         {"done", state.done},
+                         {"total", state.total},
+                         {"quarantined", state.quarantined},
+                         {"seconds", state.seconds},
+                         {state.unit.name + "_per_s", state.per_second()},
+                         {"seconds_left", state.seconds_left()}};
+  if (state.unit.has_bytes) {
+    json["bytes"] = state.bytes;
+    json["mb_per_s"] = state.megabytes_per_second();
+  }
   return json.dump();
 }
 
@@ -70,7 +76,7 @@ std::string warning_json(const std::string& text) {
 }
 
 Progress::Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
-                   Clock clock)
+                   Clock clock, ProgressUnit unit)
     : stream_(stream),
       style_(style != ProgressStyle::kAuto ? style
              : is_terminal                 ? ProgressStyle::kBar
@@ -79,6 +85,7 @@ Progress::Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, 
       start_(clock_()),
       shown_(start_) {
   state_.total = total;
+  state_.unit = std::move(unit);
 }
 
 void Progress::advance(bool quarantined, std::int64_t bytes) {

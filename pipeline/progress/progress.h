@@ -11,6 +11,12 @@ namespace eventgan {
 /// kAuto is a bar on a terminal and lines elsewhere.
 enum class ProgressStyle { kAuto, kBar, kLines, kJson, kNone };
 
+/// What a run counts.
+struct ProgressUnit {
+  std::string name = "pairs";
+  bool has_bytes = true;  ///< whether the bytes so far are told
+};
+
 /// Where a run stands.
 struct ProgressState {
   std::int64_t done = 0;
@@ -18,10 +24,11 @@ struct ProgressState {
   std::int64_t quarantined = 0;
   std::int64_t bytes = 0;  ///< compressed volumes so far
   double seconds = 0;      ///< since the start
+  ProgressUnit unit;
 
-  double pairs_per_second() const { return seconds > 0 ? double(done) / seconds : 0; }
+  double per_second() const { return seconds > 0 ? double(done) / seconds : 0; }
   double megabytes_per_second() const { return seconds > 0 ? double(bytes) / 1e6 / seconds : 0; }
-  /// 0 until the first pair is done.
+  /// 0 until the first is done.
   double seconds_left() const {
     return done > 0 ? seconds / double(done) * double(total - done) : 0;
   }
@@ -47,14 +54,14 @@ class Progress {
 
   /// kAuto asks whether the stream's terminal is there: `is_terminal`. `clock` is for tests.
   Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
-           Clock clock = std::chrono::steady_clock::now);
+           Clock clock = std::chrono::steady_clock::now, ProgressUnit unit = {});
 
   /// Ends the bar's line if an error has kept `finish` from it.
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  /// One more pair is done.
+  /// One more is done.
   void advance(bool quarantined, std::int64_t bytes);
 
   /// Shows the last state and ends the line.

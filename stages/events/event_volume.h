@@ -3,17 +3,10 @@
 #include <span>
 #include <vector>
 
+#include "manifests/event.h"
 #include "manifests/volume.h"
 
 namespace eventgan {
-
-/// One event of a recording.
-struct Event {
-  int x = 0;
-  int y = 0;
-  double t_s = 0;
-  bool positive = true;
-};
 
 /// V(x,y,b) = Σ_i max(0, 1 - |b - t*_i|), t*_i = (B-1)(t_i - t_1)/(t_N - t_1), per polarity (DESIGN
 /// section 5); [2 bins, H, W] float32, C order. Events in time order. No events → zeros; t_N = t_1

@@ -24,6 +24,11 @@ void normalize(std::span<float> volume, float eta98) {
   for (float& value : volume) value = std::min(value, eta98) / eta98;
 }
 
+std::vector<float> normalized(std::vector<float> volume) {
+  normalize(volume, eta98(volume));
+  return volume;
+}
+
 VolumeStatistics volume_statistics(std::span<const float> volume, const VolumeShape& shape) {
   VolumeStatistics statistics;
   std::size_t nonzero = 0;

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "manifests/volume.h"
 
@@ -14,6 +15,9 @@ float eta98(std::span<const float> volume);
 /// V̂ = min(V, η98)/η98 in place, in [0, 1]; an empty volume stays zero. As the published code, for
 /// volumes ≥ 0, where its max(|2nd percentile|, 98th) is the 98th. Thread safe.
 void normalize(std::span<float> volume, float eta98);
+
+/// The volume of counts divided by its own η98 and clipped: V̂.
+std::vector<float> normalized(std::vector<float> volume);
 
 /// One pass over the volume [2 bins, H, W], plus η98. `flags` has kFlagEmpty or nothing.
 VolumeStatistics volume_statistics(std::span<const float> volume, const VolumeShape& shape);

@@ -8,6 +8,7 @@
 #include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/quantization.h"
 #include "stages/shards/shard_objects_internal.h"
+#include "stages/shards/volume_words_internal.h"
 
 namespace eventgan {
 namespace {
@@ -40,12 +41,9 @@ void describe_volume(hid_t volume, const ShardHeader& header) {
                   "channels 0.." + std::to_string(bins - 1) + ": positive polarity, channels " +
                       std::to_string(bins) + ".." + std::to_string(2 * bins - 1) +
                       ": negative; each in time order");
-  write_attribute(
-      volume, "time_axis",
-      std::string("bin b of a polarity is centred at time b / (bins - 1), where 0 is the "
-                  "previous frame and 1 the next one"));
+  write_attribute(volume, "time_axis", time_axis_text(header.unit));
   write_attribute(volume, "normalization", std::string(to_string(header.normalization)));
-  write_attribute(volume, "unit", std::string("dimensionless, >= 0; not a count of events"));
+  write_attribute(volume, "unit", unit_text(header.unit, header.normalization));
   write_attribute(volume, "scale",
                   header.dtype == StoredType::kUint8
                       ? std::string("value = stored number x /events/scale[sample]")

@@ -4,6 +4,7 @@
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/shard_objects_internal.h"
+#include "stages/shards/volume_words_internal.h"
 
 namespace eventgan {
 namespace {
@@ -55,11 +56,20 @@ Normalization normalization(hid_t volume) {
   throw Hdf5Error("expected a known normalization, got " + word);
 }
 
+VolumeUnit unit(hid_t volume, Normalization normalization) {
+  const std::string text = read_text_attribute(volume, "unit");
+  for (const VolumeUnit candidate : {VolumeUnit::kLearned, VolumeUnit::kEvents}) {
+    if (text == unit_text(candidate, normalization)) return candidate;
+  }
+  throw Hdf5Error("expected a known unit, got " + text);
+}
+
 void read_volume(hid_t file, ShardHeader& header) {
   const Hdf5Handle volume = open_object(file, kVolumePath);
   header.dtype = stored_type(volume);
   header.deflate_level = deflate_level(volume);
   header.normalization = normalization(volume);
+  header.unit = unit(volume, header.normalization);
   header.volume.bins = read_number_attribute(volume, "bins");
   const Dims dims = dims_of(volume, kVolumePath);
   if (dims.size() != 4 || dims[1] != 2 * static_cast<hsize_t>(header.volume.bins)) {

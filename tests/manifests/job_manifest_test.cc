@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "manifests/faults.h"
 #include "tests/manifests/manifest_cases.h"
 
@@ -36,13 +34,7 @@ TEST_P(ManifestFaults, AreAllReportedWithPathExpectedAndGot) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, ManifestFaults, ::testing::ValuesIn(testing::manifest_cases()),
-                         [](const auto& entry) {
-                           std::string name = entry.param.name;
-                           std::replace_if(
-                               name.begin(), name.end(), [](char c) { return !std::isalnum(c); },
-                               '_');
-                           return name;
-                         });
+                         [](const auto& entry) { return testing::test_name(entry.param); });
 
 TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   const JobManifest manifest = parse(kSoundManifest);
@@ -56,6 +48,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.sources[0].layout, std::nullopt);
   EXPECT_EQ(manifest.sources[0].frames_per_second, std::nullopt);
   EXPECT_EQ(manifest.image.fit, ImageFit::kStretch);
+  EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
   EXPECT_EQ(manifest.generator.precision, "float32");
   EXPECT_EQ(manifest.volume.bins, 9);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
@@ -115,6 +108,26 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.errors.policy, ErrorPolicy::kFail);
   EXPECT_EQ(manifest.errors.max_count, 3);
   EXPECT_EQ(manifest.errors.max_fraction, 0.5);
+}
+
+TEST(JobManifest, WithoutAGeneratorHasTheShippedOne) {
+  const JobManifest manifest = parse(testing::edited(kSoundManifest, {{"/generator", ""}}));
+  EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
+  EXPECT_EQ(manifest.generator.weights, "shipped");
+}
+
+TEST(JobManifest, HoldsASimulatorsSettings) {
+  const GeneratorSpec spec = parse(testing::edited(kSoundManifest, {{"/generator", R"({
+    "kind": "esim", "duration_s": 0.03, "max_displacement_px": 4,
+    "sensor": {"positive_threshold": 0.3, "leak_rate_hz": 1}})"}}))
+                                 .generator;
+  EXPECT_EQ(spec.kind, GeneratorKind::kEsim);
+  EXPECT_EQ(spec.duration_s, 0.03);
+  EXPECT_EQ(spec.max_displacement_px, 4);
+  SensorSpec sensor;
+  sensor.positive_threshold = 0.3;
+  sensor.leak_rate_hz = 1;
+  EXPECT_EQ(spec.sensor, sensor);
 }
 
 TEST(JobManifest, KeepsItsTextByteForByte) {

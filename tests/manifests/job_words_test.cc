@@ -28,6 +28,7 @@ TEST(JobWords, GoThereAndBack) {
   expect_one_to_one(kChoiceWords);
   expect_one_to_one(kFitWords);
   expect_one_to_one(kGreyWords);
+  expect_one_to_one(kGeneratorWords);
   expect_one_to_one(kNormalizationWords);
   expect_one_to_one(kStoredTypeWords);
   expect_one_to_one(kPolicyWords);

@@ -1,5 +1,7 @@
 #include "tests/manifests/manifest_cases.h"
 
+#include <algorithm>
+#include <cctype>
 #include <nlohmann/json.hpp>
 
 namespace eventgan::testing {
@@ -14,9 +16,9 @@ const char kSoundManifest[] = R"({
   "errors": {}
 })";
 
-std::string manifest_text(const ManifestCase& manifest_case) {
-  nlohmann::json document = nlohmann::json::parse(kSoundManifest);
-  for (const Edit& edit : manifest_case.edits) {
+std::string edited(const char* sound, const std::vector<Edit>& edits) {
+  nlohmann::json document = nlohmann::json::parse(sound);
+  for (const Edit& edit : edits) {
     const nlohmann::json::json_pointer place(edit.pointer);
     if (!edit.value.empty()) {
       document[place] = nlohmann::json::parse(edit.value);
@@ -27,9 +29,20 @@ std::string manifest_text(const ManifestCase& manifest_case) {
   return document.dump();
 }
 
+std::string manifest_text(const ManifestCase& manifest_case) {
+  return edited(kSoundManifest, manifest_case.edits);
+}
+
+std::string test_name(const ManifestCase& manifest_case) {
+  std::string name = manifest_case.name;
+  std::replace_if(
+      name.begin(), name.end(), [](char c) { return !std::isalnum(c); }, '_');
+  return name;
+}
+
 std::vector<ManifestCase> manifest_cases() {
   std::vector<ManifestCase> all;
-  for (const auto& part : {top_cases(), source_cases(), setting_cases()}) {
+  for (const auto& part : {top_cases(), source_cases(), setting_cases(), generator_cases()}) {
     all.insert(all.end(), part.begin(), part.end());
   }
   return all;

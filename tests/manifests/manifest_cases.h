@@ -23,8 +23,14 @@ struct ManifestCase {
   bool beyond_schema = false;       ///< JSON Schema cannot express what is wrong
 };
 
+/// A JSON text with some changes.
+std::string edited(const char* sound, const std::vector<Edit>& edits);
+
 /// The case's manifest as text.
 std::string manifest_text(const ManifestCase& manifest_case);
+
+/// What a test of all cases calls one: its name in letters, digits and "_".
+std::string test_name(const ManifestCase& manifest_case);
 
 /// Every rule of the manifest, kept and broken: those of the whole and of its top keys, of its
 /// sources, of its other sections.
@@ -32,10 +38,16 @@ std::vector<ManifestCase> manifest_cases();
 std::vector<ManifestCase> top_cases();
 std::vector<ManifestCase> source_cases();
 std::vector<ManifestCase> setting_cases();
+std::vector<ManifestCase> generator_cases();
 
 /// What names must be, as messages say it.
 inline const std::string kNameRule =
     R"(expected 1..64 letters, digits, ".", "_" or "-", not beginning with "." or "-", got )";
+
+/// What the generator's weights must be.
+inline const std::string kWeightsRule =
+    R"(expected the path of a .safetensors file, "shipped", or "shipped:WIDTH" or )"
+    R"("untrained:WIDTH" with WIDTH in 1..64, got )";
 
 inline void PrintTo(const ManifestCase& manifest_case, std::ostream* stream) {
   *stream << manifest_case.name;

@@ -1,8 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "manifests/job_manifest.h"
+#include "manifests/simulation_manifest.h"
+#include "manifests/training_manifest.h"
+#include "tests/manifests/json_schema.h"
 
 namespace eventgan {
 namespace {
@@ -13,10 +18,27 @@ std::filesystem::path examples() {
 
 JobManifest example(const std::string& name) { return read_job_manifest(examples() / name); }
 
-TEST(ManifestExamples, AllAreSound) {
+TEST(ManifestExamples, AllAreSoundAndMatchTheirSchemas) {
+  const std::map<std::string, std::string> schemas = {
+      {"eventgan-manifest", "manifest.schema.json"},
+      {"eventgan-simulation", "simulation.schema.json"},
+      {"eventgan-training", "training.schema.json"}};
+  std::map<std::string, int> counts;
   for (const auto& entry : std::filesystem::directory_iterator(examples())) {
-    EXPECT_NO_THROW(read_job_manifest(entry.path())) << entry.path();
+    const nlohmann::json document = testing::read_commented_json(entry.path());
+    const std::string format = document.at("format");
+    ++counts[format];
+    EXPECT_TRUE(testing::schema_accepts(schemas.at(format), document)) << entry.path();
+    if (format == "eventgan-simulation") {
+      EXPECT_NO_THROW(read_simulation_manifest(entry.path())) << entry.path();
+    } else if (format == "eventgan-training") {
+      EXPECT_NO_THROW(read_training_manifest(entry.path())) << entry.path();
+    } else {
+      EXPECT_NO_THROW(read_job_manifest(entry.path())) << entry.path();
+    }
   }
+  EXPECT_EQ(counts.size(), schemas.size());
+  EXPECT_GE(counts["eventgan-manifest"], 6);
 }
 
 TEST(ManifestExamples, SayWhatTheirNamesSay) {

@@ -2,45 +2,24 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
-#include <valijson/adapters/nlohmann_json_adapter.hpp>
-#include <valijson/schema.hpp>
-#include <valijson/schema_parser.hpp>
-#include <valijson/validation_results.hpp>
-#include <valijson/validator.hpp>
 
 #include "manifests/job_words_internal.h"
+#include "manifests/sensor_spec.h"
+#include "tests/manifests/json_schema.h"
 #include "tests/manifests/manifest_cases.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 using nlohmann::json;
-using valijson::adapters::NlohmannJsonAdapter;
-
-const json& schema_document() {
-  static const json document = json::parse(testing::read_file(
-      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "manifest.schema.json"));
-  return document;
-}
-
-bool schema_accepts(const json& document) {
-  static const valijson::Schema& schema = *[] {
-    auto* parsed = new valijson::Schema;
-    valijson::SchemaParser(valijson::SchemaParser::kDraft7)
-        .populateSchema(NlohmannJsonAdapter(schema_document()), *parsed);
-    return parsed;
-  }();
-  // 9.0 and "9" are no integers here, as in the program.
-  valijson::Validator validator(valijson::Validator::kStrongTypes);
-  return validator.validate(schema, NlohmannJsonAdapter(document), nullptr);
-}
+constexpr char kSchema[] = "manifest.schema.json";
 
 TEST(ManifestSchema, AcceptsAndRejectsWhatTheProgramDoes) {
   // The other test of this table holds the program to `faults`.
   for (const testing::ManifestCase& c : testing::manifest_cases()) {
     const json document = json::parse(testing::manifest_text(c));
-    EXPECT_EQ(schema_accepts(document), c.faults.empty() || c.beyond_schema) << c.name;
+    EXPECT_EQ(testing::schema_accepts(kSchema, document), c.faults.empty() || c.beyond_schema)
+        << c.name;
   }
 }
 
@@ -62,7 +41,7 @@ json words(const std::array<Word<T>, N>& table) {
 
 TEST(ManifestSchema, ListsTheSameWords) {
   const auto listed = [](const char* pointer) {
-    return schema_document().at(json::json_pointer(std::string(pointer) + "/enum"));
+    return testing::schema_document(kSchema).at(json::json_pointer(std::string(pointer) + "/enum"));
   };
   EXPECT_EQ(listed("/definitions/source/properties/dataset"), words(kDatasetWords));
   EXPECT_EQ(listed("/definitions/source/properties/layout"), words(kLayoutWords));
@@ -70,15 +49,14 @@ TEST(ManifestSchema, ListsTheSameWords) {
   EXPECT_EQ(listed("/definitions/pairs/properties/choose"), words(kChoiceWords));
   EXPECT_EQ(listed("/definitions/image/properties/fit"), words(kFitWords));
   EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
+  EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
   EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
   EXPECT_EQ(listed("/properties/output/properties/dtype"), words(kStoredTypeWords));
   EXPECT_EQ(listed("/properties/errors/properties/policy"), words(kPolicyWords));
 }
 
 TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
-  const auto stated = [](const char* pointer) {
-    return schema_document().at(json::json_pointer(std::string(pointer) + "/default"));
-  };
+  const auto stated = [](const char* pointer) { return testing::stated_default(kSchema, pointer); };
   const JobManifest manifest;
   const SourceSpec source;
   EXPECT_EQ(stated("/properties/seed"), manifest.seed);
@@ -87,7 +65,13 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/definitions/pairs/properties/choose"), to_string(source.pairs.choose));
   EXPECT_EQ(stated("/definitions/pairs/properties/min_pairs"), source.pairs.min_pairs);
   EXPECT_EQ(stated("/definitions/image/properties/fit"), to_string(manifest.image.fit));
-  EXPECT_EQ(stated("/properties/generator/properties/precision"), manifest.generator.precision);
+  const GeneratorSpec& generator = manifest.generator;
+  EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
+  EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
+  EXPECT_EQ(stated("/properties/generator/properties/precision"), generator.precision);
+  EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
+  EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
+            generator.max_displacement_px);
   EXPECT_EQ(stated("/properties/volume/properties/bins"), manifest.volume.bins);
   EXPECT_EQ(stated("/properties/volume/properties/normalize"),
             to_string(manifest.volume.normalize));
@@ -100,37 +84,19 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/errors/properties/max_fraction"), manifest.errors.max_fraction);
 }
 
-/// Every object of the schema that has properties must be closed, and each property described.
-void expect_closed_and_described(const json& node, const std::string& place) {
-  if (node.is_object() && node.value("type", json()) == "object") {
-    EXPECT_EQ(node.value("additionalProperties", json()), false) << place;
-    for (const auto& [name, property] : node.at("properties").items()) {
-      const bool is_told = property.contains("description") || property.contains("const") ||
-                           property.contains("$ref");
-      EXPECT_TRUE(is_told) << place << "/properties/" << name;
-    }
-  }
-  if (!node.is_structured()) return;
-  for (const auto& [key, child] : node.items()) {
-    expect_closed_and_described(child, place + "/" + key);
-  }
-}
-
 TEST(ManifestSchema, EveryObjectIsClosedAndEveryPropertyDescribed) {
-  expect_closed_and_described(schema_document(), "#");
+  EXPECT_EQ(testing::open_or_undescribed(kSchema), "");
 }
 
-TEST(ManifestSchema, AcceptsTheExamples) {
-  int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(
-           std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "examples")) {
-    const bool allow_exceptions = true, ignore_comments = true;
-    const json document =
-        json::parse(testing::read_file(entry.path()), nullptr, allow_exceptions, ignore_comments);
-    EXPECT_TRUE(schema_accepts(document)) << entry.path();
-    ++count;
+TEST(SensorSchema, IsTheSameInBothManifestsAndStatesTheDefaults) {
+  const json& sensor = testing::schema_document(kSchema).at("definitions").at("sensor");
+  EXPECT_EQ(sensor,
+            testing::schema_document("simulation.schema.json").at("definitions").at("sensor"));
+  json defaults;
+  for (const auto& [key, property] : sensor.at("properties").items()) {
+    defaults[key] = property.at("default").get<double>();
   }
-  EXPECT_GE(count, 6);
+  EXPECT_EQ(defaults, json::parse(to_json(SensorSpec())));
 }
 
 }  // namespace

@@ -8,10 +8,10 @@
 
 namespace eventgan {
 
-VideoClip measure_video(const std::filesystem::path& file) try {
+VideoClip measure_video(const std::filesystem::path& file, std::int64_t enough) try {
   cv::VideoCapture capture(file.string(), cv::CAP_FFMPEG);
   VideoClip clip;
-  while (capture.isOpened() && capture.grab()) ++clip.frame_count;
+  while (clip.frame_count < enough && capture.isOpened() && capture.grab()) ++clip.frame_count;
   if (clip.frame_count == 0) {
     throw InputError("expected a video, got no frames, in " + file.string());
   }

@@ -2,20 +2,23 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <optional>
 
 namespace eventgan {
 
 /// What a video file holds.
 struct VideoClip {
-  std::int64_t frame_count = 0;      ///< that can be decoded
+  std::int64_t frame_count = 0;      ///< that can be decoded, as far as they were counted
   std::int64_t announced_count = 0;  ///< as the container says, often an estimate; 0 if it does not
   std::optional<double> frames_per_second;  ///< as the container says; none if it does not
 };
 
 /// Counts the frames of a video by decoding it once to its end: what containers say about their own
-/// length is often an estimate. Takes about the time of the decoding. Throws InputError if it
-/// cannot be opened or has no frames. Thread safe.
-VideoClip measure_video(const std::filesystem::path& file);
+/// length is often an estimate. Takes about the time of the decoding; `enough` > 0 frames end the
+/// count for a caller that needs no more. Throws InputError if the video cannot be opened or has no
+/// frames. Thread safe.
+VideoClip measure_video(const std::filesystem::path& file,
+                        std::int64_t enough = std::numeric_limits<std::int64_t>::max());
 
 }  // namespace eventgan

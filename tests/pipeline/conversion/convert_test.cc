@@ -4,9 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <map>
+#include <nlohmann/json.hpp>
+#include <set>
 
 #include "manifests/faults.h"
+#include "pipeline/conversion/load_generator.h"
 #include "pipeline/inspection/verify_folder.h"
+#include "stages/shards/shard_reader.h"
+#include "stages/shards/shard_summary.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/small_job.h"
@@ -232,6 +237,101 @@ TEST_F(Convert, ShowsProgressOfEveryPair) {
   };
   convert(manifest_, generator_, "weights", options);
   EXPECT_THAT(shown.str(), ::testing::HasSubstr("11/11 pairs"));
+}
+
+TEST_F(Convert, TheSameManifestGoesWithEveryKindOfGenerator) {
+  // Frames are 20 grey levels apart, so the difference has events; a flat picture has none however
+  // it moves.
+  std::map<std::string, std::string> first_shards;
+  for (const std::string kind : {"network", "esim", "difference"}) {
+    const std::string settings =
+        kind == "network" ? R"({ "weights": "untrained:1" })" : R"({ "kind": ")" + kind + R"(" })";
+    std::string text = manifest_.text;
+    const std::string before = R"({ "weights": "untrained:1" })";
+    text.replace(text.find(before), before.size(), settings);
+    const JobManifest manifest = parse_job_manifest(text, folder_.path(), "manifest.json");
+    const LoadedGenerator loaded = load_generator(manifest);
+    ConversionOptions options;
+    options.output = folder_ / kind;
+    const ConversionReport report =
+        convert(manifest, *loaded.generator, loaded.weights_hash, options);
+    EXPECT_EQ(report.written, 11) << kind;
+    EXPECT_EQ(verify_folder(folder_ / kind).faults.size(), 0u) << kind;
+
+    const ShardReader reader(folder_ / kind / "job-train-00000-of-00003.h5");
+    const bool is_network = kind == "network";
+    EXPECT_EQ(reader.header().unit, is_network ? VolumeUnit::kLearned : VolumeUnit::kEvents);
+    EXPECT_EQ(reader.header().weights_hash, loaded.weights_hash);
+    const double events = reader.sample(1).statistics.sum_positive;
+    if (kind == "esim") {
+      EXPECT_EQ(events, 0);
+    }
+    if (kind == "difference") {
+      EXPECT_GT(events, 20 * 30);
+    }
+    first_shards[kind] = testing::read_file(folder_ / kind / "job-train-00000-of-00003.h5");
+  }
+  EXPECT_NE(first_shards["esim"], first_shards["difference"]);
+
+  // A folder of one kind is not gone on with by another.
+  change(R"({ "weights": "untrained:1" })", R"({ "kind": "esim" })");
+  EXPECT_THROW(run("network"), UsageError);
+}
+
+/// Six labelled KITTI pictures, each with three frames before it.
+void write_kitti(const fs::path& root) {
+  for (int i = 0; i < 6; ++i) {
+    const std::string id = "00000" + std::to_string(i);
+    testing::write_flat_picture(root / "image_2" / (id + ".png"), {24, 36}, 10 + i);
+    for (const char* before : {"_01", "_02", "_03"}) {
+      testing::write_flat_picture(root / "prev_2" / (id + before + ".png"), {24, 36}, 90 + 9 * i);
+    }
+    testing::write_file(root / "label_2" / (id + ".txt"),
+                        "Car 0.00 0 -1.58 " + std::to_string(3 + i) +
+                            ".5 4 21 17 1.65 1.67 3.64 -0.65 1.71 46.70 -1.59\n");
+  }
+}
+
+/// All that a shard says of a sample besides its volume and what is counted in it.
+std::string beside_the_volume(const ShardReader& reader, int slot) {
+  nlohmann::json json = nlohmann::json::parse(sample_json(reader, slot));
+  EXPECT_EQ(json.erase("statistics"), 1u);
+  return json.dump(2) + reader.sample(slot).annotation.original;
+}
+
+TEST(ConvertKinds, GivePairsAndLabelsAlike) {
+  const testing::TemporaryFolder folder;
+  write_kitti(folder / "kitti");
+  std::vector<std::string> rows;  // of the first kind
+  for (const std::string generator : {R"({ "weights": "untrained:1" })", R"({ "kind": "esim" })",
+                                      R"({ "kind": "difference" })"}) {
+    const JobManifest manifest = parse_job_manifest(R"({
+      "format": "eventgan-manifest", "version": 1, "name": "job", "seed": 3,
+      "sources": [{ "dataset": "kitti_object", "root": "kitti",
+                    "pairs": { "gaps": [1, 2, 3], "side": "before", "choose": "one" } }],
+      "image": { "width": 18, "height": 16, "fit": "stretch", "preset": "kitti" },
+      "generator": )" + generator + R"(,
+      "output": { "directory": "out", "dtype": "float32" } })",
+                                                    folder.path(), "manifest.json");
+    const LoadedGenerator loaded = load_generator(manifest);
+    ConversionOptions options;
+    options.overwrite = true;
+    ASSERT_EQ(convert(manifest, *loaded.generator, loaded.weights_hash, options).written, 6);
+    const ShardReader reader(folder / "out/job-train-00000-of-00001.h5");
+    ASSERT_EQ(reader.header().sample_count, 6);
+    for (int slot = 0; slot < 6; ++slot) {
+      const ShardSample sample = reader.sample(slot);
+      EXPECT_THAT(sample.annotation.original, ::testing::StartsWith("Car"));
+      EXPECT_EQ(sample.annotation.boxes.size(), 1u);
+      const std::string row = beside_the_volume(reader, slot);
+      if (rows.size() < 6) {
+        rows.push_back(row);
+      } else {
+        EXPECT_EQ(row, rows[static_cast<std::size_t>(slot)]) << generator;
+      }
+    }
+  }
+  EXPECT_EQ(std::set<std::string>(rows.begin(), rows.end()).size(), 6u);  // they say something
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
+#include "stages/generator/shipped_weights.h"
 #include "stages/generator/untrained.h"
 #include "stages/generator/weights_file.h"
 #include "stages/shards/sha256.h"
@@ -37,12 +38,42 @@ TEST(LoadGenerator, WarnsLoudlyOfAnUntrainedOne) {
   EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
 }
 
+TEST(LoadGenerator, SetsUpSimulators) {
+  JobManifest manifest;
+  manifest.volume.bins = 5;
+  manifest.generator.kind = GeneratorKind::kDifference;
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.generator->bins(), 5);
+  EXPECT_EQ(loaded.warning, "");
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(loaded.generator->description()));
+  manifest.generator.kind = GeneratorKind::kEsim;
+  EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
+}
+
+TEST(LoadGenerator, FindsTheShippedWeightsOrSaysThatThereAreNone) {
+  JobManifest manifest;
+  EXPECT_EQ(manifest.generator.weights, "shipped");
+  if (shipped_widths().empty()) {
+    EXPECT_THROW(load_generator(manifest), InputError);
+    return;
+  }
+  const int width = default_shipped_width();
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(shipped_weights_bytes(width)));
+  EXPECT_EQ(loaded.warning, "");
+  manifest.generator.weights = "shipped:" + std::to_string(width);
+  EXPECT_EQ(load_generator(manifest).weights_hash, loaded.weights_hash);
+  manifest.generator.weights = "shipped:63";
+  EXPECT_THROW(load_generator(manifest), InputError);
+}
+
 TEST(LoadGenerator, RefusesAMissingFileAndAWidthThatIsNone) {
   JobManifest manifest;
   manifest.directory = "/nowhere";
   manifest.generator.weights = "w.safetensors";
   EXPECT_THROW(load_generator(manifest), InputError);
-  for (const char* weights : {"untrained:", "untrained:0", "untrained:8x", "untrained:1000"}) {
+  for (const char* weights :
+       {"untrained:", "untrained:0", "untrained:8x", "untrained:1000", "shipped:", "shipped:0"}) {
     manifest.generator.weights = weights;
     EXPECT_THROW(load_generator(manifest), UsageError) << weights;
   }

@@ -19,7 +19,7 @@ struct HandClock {
   }
 };
 
-ProgressState state() { return {30, 120, 0, 60'000'000, 15}; }
+ProgressState state() { return {30, 120, 0, 60'000'000, 15, {}}; }
 
 TEST(ProgressLine, GivesRatesAndTimeLeft) {
   // 30 pairs in 15 s: 2 a second, 90 left: 45 s; 60 MB in 15 s: 4 MB/s.
@@ -32,12 +32,21 @@ TEST(ProgressLine, GivesRatesAndTimeLeft) {
 }
 
 TEST(ProgressLine, AtTheStartTimeLeftIsUnknown) {
-  EXPECT_EQ(progress_line({0, 10, 0, 0, 0}), "0/10 pairs, 0.00 pairs/s, 0.0 MB/s, ? left");
+  EXPECT_EQ(progress_line({0, 10, 0, 0, 0, {}}), "0/10 pairs, 0.00 pairs/s, 0.0 MB/s, ? left");
+}
+
+TEST(ProgressLine, CountsWhatItIsToldTo) {
+  ProgressState frames = state();
+  frames.unit = {"frames", /*has_bytes=*/false};
+  EXPECT_EQ(progress_line(frames), "30/120 frames, 2.00 frames/s, 0m45s left");
+  const std::string json = progress_json(frames);
+  EXPECT_THAT(json, ::testing::HasSubstr("\"frames_per_s\":2.0"));
+  EXPECT_THAT(json, ::testing::Not(::testing::HasSubstr("mb_per_s")));
 }
 
 TEST(ProgressBar, FillsInProportion) {
   EXPECT_THAT(progress_bar(state(), 8), ::testing::StartsWith("[##......] 30/120"));
-  EXPECT_THAT(progress_bar({0, 0, 0, 0, 0}, 4), ::testing::StartsWith("[....]"));
+  EXPECT_THAT(progress_bar({0, 0, 0, 0, 0, {}}, 4), ::testing::StartsWith("[....]"));
 }
 
 TEST(ProgressJson, IsOneLineThatMachinesRead) {

@@ -85,5 +85,11 @@ TEST(FirstUnsoundValue, FindsNanInfinityAndNegativeValues) {
   }
 }
 
+TEST(Normalized, DividesByTheVolumesOwnEta98) {
+  // Two values that are not zero: k = max(int(1.96), 1) = 1, the lower one.
+  EXPECT_EQ(normalized({0, 2, 8, 0}), (std::vector<float>{0, 1, 1, 0}));
+  EXPECT_EQ(normalized({0, 0}), (std::vector<float>{0, 0}));
+}
+
 }  // namespace
 }  // namespace eventgan

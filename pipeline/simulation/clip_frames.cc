@@ -1,0 +1,110 @@
+#include "pipeline/simulation/clip_frames.h"
+
+#include <limits>
+
+#include "manifests/faults.h"
+#include "pipeline/simulation/sensor_picture.h"
+#include "stages/frames/sequences/picture_folder.h"
+#include "stages/frames/sequences/video_clip.h"
+#include "stages/frames/sequences/video_dataset.h"
+#include "stages/shards/sha256.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kUsualRate_hz = 30;
+constexpr int kKeptFrames = 1;  // frames are asked for once and in order
+
+/// The frames of a clip, timed by their own rate: all, or at least as many as were asked for.
+struct ListedClip {
+  double rate_hz = 0;
+  std::vector<FrameRef> frames;
+  std::string files;  ///< a line "NAME<tab>SIZE" for each
+};
+
+std::string file_line(const fs::path& file) {
+  return file.filename().string() + '\t' + std::to_string(fs::file_size(file)) + '\n';
+}
+
+ListedClip list_video(const fs::path& path, std::optional<double> rate_hz, std::int64_t enough) {
+  const VideoClip video = measure_video(path, enough);
+  const double rate = rate_hz.value_or(video.frames_per_second.value_or(kUsualRate_hz));
+  ListedClip clip{rate, {}, file_line(path)};
+  for (std::int64_t i = 0; i < video.frame_count; ++i) {
+    clip.frames.push_back({path.string(), i, i, static_cast<double>(i) / rate});
+  }
+  return clip;
+}
+
+ListedClip list_pictures(const fs::path& path, std::optional<double> rate_hz) {
+  const PictureFolder folder = list_picture_folder(path);
+  const double rate = rate_hz.value_or(kUsualRate_hz);
+  ListedClip clip{rate, {}, {}};
+  for (const auto& [number, name] : folder.frames.frames()) {
+    const auto steps = static_cast<double>(number) / static_cast<double>(folder.frames.stride());
+    const auto index = static_cast<std::int64_t>(clip.frames.size());
+    clip.frames.push_back({(path / name).string(), index, -1, steps / rate});
+    clip.files += file_line(path / name);
+  }
+  return clip;
+}
+
+ListedClip list_clip(const fs::path& path, std::optional<double> rate_hz, std::int64_t enough) {
+  if (!fs::exists(path)) {
+    throw InputError("expected a video or a folder of pictures, got none, in " + path.string());
+  }
+  return is_video_name(path) ? list_video(path, rate_hz, enough) : list_pictures(path, rate_hz);
+}
+
+/// Frames a clip must have for the source, counted from its own first.
+std::int64_t frames_needed(const SimulationSource& source) {
+  if (source.frame_count == 0) return std::numeric_limits<std::int64_t>::max();
+  return source.first_frame + (source.frame_count - 1) * source.frame_step + 1;
+}
+
+}  // namespace
+
+ClipFrames::ClipFrames(const SimulationSource& source, const SimulationManifest& manifest) try
+    : path_(resolve(manifest, source.path)), size_(manifest.size), decoder_("", kKeptFrames) {
+  const ListedClip clip = list_clip(path_, source.frames_per_second, frames_needed(source));
+  rate_hz_ = clip.rate_hz;
+  files_hash_ = sha256_hex(clip.files);
+  const auto length = static_cast<std::int64_t>(clip.frames.size());
+  const bool to_the_end = source.frame_count == 0;
+  for (std::int64_t i = source.first_frame; i < length; i += source.frame_step) {
+    if (!to_the_end && count() == source.frame_count) break;
+    frames_.push_back(clip.frames[at(i)]);
+    frames_.back().time_s -= clip.frames[at(source.first_frame)].time_s;
+  }
+  const std::int64_t least = !to_the_end                                  ? source.frame_count
+                             : source.method == SimulationMethod::kAffine ? 1
+                                                                          : 2;
+  if (count() < least) {
+    throw InputError("expected " + std::to_string(least) + " frames or more from frame " +
+                     std::to_string(source.first_frame) + " on by steps of " +
+                     std::to_string(source.frame_step) + ", got " + std::to_string(count()) +
+                     " of a clip of " + std::to_string(length) + ", in " + path_.string());
+  }
+} catch (const fs::filesystem_error&) {
+  std::throw_with_nested(InputError("expected a readable clip, got an error, in " + source.path));
+}
+
+GreyImage ClipFrames::frame(std::int64_t position) {
+  const FrameRef& ref = frames_[at(position)];
+  const Outcome<ColourFrame> decoded = decoder_.decode(ref);
+  if (is_fault(decoded)) throw InputError(std::get<SampleFault>(decoded).reason);
+  const auto& frame = std::get<ColourFrame>(decoded);
+  if (!frame_size_) frame_size_ = frame.size;
+  if (frame.size != *frame_size_) {
+    const auto text = [](ImageSize size) {
+      return std::to_string(size.width) + "x" + std::to_string(size.height);
+    };
+    throw InputError("expected a frame of " + text(*frame_size_) + " as the first one, got " +
+                     text(frame.size) + ", in " + ref.path);
+  }
+  return sensor_picture(frame, size_);
+}
+
+}  // namespace eventgan

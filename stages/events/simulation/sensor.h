@@ -1,0 +1,64 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "manifests/counter_random.h"
+#include "manifests/event.h"
+#include "manifests/image_size.h"
+#include "manifests/sensor_spec.h"
+#include "stages/events/simulation/pixel_noise.h"
+
+namespace eventgan {
+
+/// The pixels of a simulated event camera, fed with intensity pictures at rising times. A pixel
+/// remembers a level ℓ and compares with it the log intensity L = ln(I + ε), which moves on a
+/// straight line from one picture to the next (ESIM, Rebecq et al. 2018, eq. 2):
+///
+///   d(t) = L(t) - ℓ(t);   positive event where d rises to C₊, negative one where it falls to -C₋.
+///
+/// - Reset: every event of a pixel, noise included, sets its level to its log intensity, so after a
+///   crossing the next is a full threshold away.
+/// - Refractory time R: after an event at t the pixel is held in reset until t + R. Noise and
+///   crossings in between are lost, and at t + R the level is L(t + R).
+/// - Leak: the level of a pixel that is not held falls by C₊ · leak_rate_hz a second (v2e, Hu et
+///   al. 2021): without motion a positive event each 1/leak_rate_hz (+ R) seconds.
+/// - Shot noise and hot pixels: see PixelNoise.
+/// - Thresholds: see draw_thresholds, one draw a pixel and polarity.
+///
+/// All randomness is a function of `random` and of the pixel: the same pictures give the same
+/// events. Not thread safe; one object a recording.
+class Sensor {
+ public:
+  Sensor(const SensorSpec& spec, ImageSize size, CounterRandom random);
+
+  /// intensity: [y, x] float32, C order, linear, in [0, 1]. The first call sets every pixel's level
+  /// to what it sees and gives no events. Returns the events in (time before, t_s], ordered by
+  /// time, then y, x, polarity (negative first). Throws std::invalid_argument, and changes nothing,
+  /// if the time is not finite or does not rise, the size is another, or a value is not finite or
+  /// below 0.
+  std::vector<Event> step(std::span<const float> intensity, double t_s);
+
+ private:
+  struct Step;
+
+  void check(std::span<const float> intensity, double t_s) const;
+  void start(std::span<const float> intensity, double t_s);
+  void run_pixel(std::size_t pixel, float log_change, const Step& step, std::vector<Event>& events);
+
+  SensorSpec spec_;
+  ImageSize size_;
+  CounterRandom random_;
+  std::vector<float> positive_threshold_;
+  std::vector<float> negative_threshold_;
+
+  // State at time_s_; noise_ is set by the first picture.
+  double time_s_ = 0;
+  std::optional<PixelNoise> noise_;
+  std::vector<float> log_intensity_;
+  std::vector<double> difference_;    ///< d; 0 where the pixel is still held
+  std::vector<double> held_until_s_;  ///< end of the last refractory time
+};
+
+}  // namespace eventgan

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <vector>
+
+#include "manifests/counter_random.h"
+#include "manifests/event.h"
+#include "manifests/grey_image.h"
+#include "manifests/sensor_spec.h"
+#include "stages/events/simulation/interval.h"
+#include "stages/events/simulation/sensor.h"
+
+namespace eventgan {
+
+/// Shows the sensor pictures 1..steps() of the interval, evenly spaced in (from_s, to_s], and
+/// appends what it sees to `events`, in order of time. The sensor must have seen picture 0 (or the
+/// last of the interval before) at from_s. Throws as Sensor::step.
+void feed_interval(Sensor& sensor, const Interval& interval, double from_s, double to_s,
+                   std::vector<Event>& events);
+
+/// Events of one interval of `duration_s` > 0, ordered by time, from a sensor that starts at rest
+/// at t = 0. Throws std::invalid_argument if the duration is not above 0. Thread safe, as all
+/// below.
+std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec& sensor,
+                                     double duration_s, CounterRandom random);
+
+/// ESIM as the EventGAN paper compares with: one picture (the previous frame) under a random affine
+/// motion whose largest displacement is drawn uniformly from [0, max_displacement_px); the next
+/// frame is not looked at. Throws std::invalid_argument if max_displacement_px is below 0.
+std::vector<Event> simulate_affine(const GreyImage& picture, double max_displacement_px,
+                                   const SensorSpec& sensor, double duration_s,
+                                   CounterRandom random);
+
+/// The earlier works in the paper: each pixel's log intensity moves on a line from its value in the
+/// previous frame to that in the next, whatever moved in between: floor(|L1 - L0| / C) events a
+/// pixel, evenly spaced. Throws std::invalid_argument if the frames differ in size.
+std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
+                                       const SensorSpec& sensor, double duration_s,
+                                       CounterRandom random);
+
+}  // namespace eventgan

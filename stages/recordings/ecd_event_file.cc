@@ -1,0 +1,113 @@
+#include <algorithm>
+#include <limits>
+#include <string>
+
+#include "manifests/faults.h"
+#include "stages/recordings/ecd_event_file_internal.h"
+#include "stages/recordings/ecd_event_line_internal.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::int64_t kLongestLine = 256;
+constexpr std::int64_t kUsualLine = 21;  // "0.003811000 96 133 0\n"
+constexpr std::int64_t kWindow = 16 * kLongestLine;
+constexpr std::int64_t kBytesPerRead = std::int64_t{1} << 20;
+
+/// Calls `take(line, offset)` with each line of `text`, until it gives false.
+template <class Take>
+void for_each_line(std::string_view text, Take take) {
+  std::size_t begin = 0;
+  while (begin < text.size()) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    if (!take(text.substr(begin, end - begin), begin)) return;
+    begin = end + 1;
+  }
+}
+
+[[noreturn]] void refuse_length() {
+  throw EventFault("expected lines of up to " + std::to_string(kLongestLine) +
+                   " bytes, got a longer one");
+}
+
+}  // namespace
+
+void EcdEventFile::refuse(const EventFault& fault, std::int64_t line_begin) const {
+  std::int64_t line = 1;
+  for (std::int64_t begin = 0; begin < line_begin; begin += kBytesPerRead) {
+    const std::string bytes = file_.read(begin, std::min(begin + kBytesPerRead, line_begin));
+    line += std::ranges::count(bytes, '\n');
+  }
+  throw InputError(std::string(fault.what()) + ", in " + file_.name() + " (line " +
+                   std::to_string(line) + ")");
+}
+
+EcdEventFile::Line EcdEventFile::line_from(std::int64_t byte) const {
+  const std::string bytes =
+      file_.read(byte - 1, std::min(byte + 2 * kLongestLine, file_.size_bytes()));
+  const std::size_t before = bytes.find('\n');
+  const std::size_t begin = before + 1;
+  const std::size_t end = before == std::string::npos ? before : bytes.find('\n', begin);
+  const std::int64_t line_begin = byte + static_cast<std::int64_t>(begin) - 1;
+  try {
+    if (end == std::string::npos) refuse_length();
+    return {line_begin, byte + static_cast<std::int64_t>(end),
+            parse_ecd_event_time(std::string_view(bytes).substr(begin, end - begin))};
+  } catch (const EventFault& fault) {
+    refuse(fault, before == std::string::npos ? byte : line_begin);
+  }
+}
+
+std::int64_t EcdEventFile::first_byte_after(double time_s) const {
+  // Lines before `low` are at or before the time, those from `high` on are after it.
+  std::int64_t low = 0;
+  std::int64_t high = file_.size_bytes();
+  while (high - low > kWindow) {
+    const Line line = line_from(low + (high - low) / 2);
+    (line.time_s > time_s ? high : low) = line.time_s > time_s ? line.begin : line.end;
+  }
+  const std::string bytes = file_.read(low, high);
+  std::int64_t found = high;
+  double previous_s = std::numeric_limits<double>::lowest();
+  for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
+    const std::int64_t begin = low + static_cast<std::int64_t>(offset);
+    try {
+      const double line_s = parse_ecd_event_time(line);
+      check_event_time(previous_s, line_s);
+      previous_s = line_s;
+      if (line_s <= time_s) return true;
+    } catch (const EventFault& fault) {
+      refuse(fault, begin);
+    }
+    found = begin;
+    return false;
+  });
+  return found;
+}
+
+std::vector<Event> EcdEventFile::events(std::int64_t begin, std::int64_t end,
+                                        EventCheck check) const {
+  if (end < begin) refuse(EventFault("expected times that never fall, got others"), end);
+  std::vector<Event> events;
+  events.reserve(static_cast<std::size_t>((end - begin) / kUsualLine));
+  while (begin < end) {
+    std::string bytes = file_.read(begin, std::min(begin + kBytesPerRead, end));
+    const bool whole = begin + static_cast<std::int64_t>(bytes.size()) == end;
+    if (!whole) bytes.resize(bytes.rfind('\n') + 1);  // none: nothing, and npos + 1 is 0
+    std::size_t at = 0;
+    try {
+      if (bytes.empty()) refuse_length();
+      for_each_line(bytes, [&](std::string_view line, std::size_t offset) {
+        at = offset;
+        events.push_back(check.take(parse_ecd_event(line)));
+        return true;
+      });
+    } catch (const EventFault& fault) {
+      refuse(fault, begin + static_cast<std::int64_t>(at));
+    }
+    begin += static_cast<std::int64_t>(bytes.size());
+  }
+  return events;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,99 @@
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/frames/decoding/picture_file.h"
+#include "stages/recordings/ecd_recording_internal.h"
+#include "stages/recordings/frame_range_internal.h"
+
+namespace eventgan {
+namespace {
+
+/// Frames are looked for when a recording is opened, not hours later.
+EcdImageList list_of_present_images(const std::filesystem::path& folder) {
+  std::error_code ignored;
+  if (!std::filesystem::is_directory(folder, ignored)) {
+    throw InputError("expected a folder with images.txt and events.txt, got none, in " +
+                     folder.string());
+  }
+  EcdImageList images = read_ecd_image_list(folder / "images.txt");
+  for (std::size_t i = 0; i < images.paths.size(); ++i) {
+    const std::filesystem::path picture = folder / images.paths[i];
+    if (std::filesystem::is_regular_file(picture, ignored)) continue;
+    throw InputError("expected a picture, got none, in " + picture.string() + " (frame " +
+                     std::to_string(i) + ")");
+  }
+  return images;
+}
+
+/// Runs `read` on a picture file; errors become InputError.
+template <class Read>
+auto read_picture(const std::filesystem::path& file, Read read) {
+  try {
+    return read(file);
+  } catch (const std::runtime_error& error) {
+    std::throw_with_nested(InputError(std::string(error.what()) + ", in " + file.string()));
+  }
+}
+
+std::string describe_size(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// Decoding gives colour; of a grey picture all three channels are one.
+GreyImage grey_of(const ColourFrame& colour) {
+  GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
+  for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
+    const std::uint8_t* const bgr = &colour.bgr[3 * i];
+    if (bgr[0] != bgr[1] || bgr[1] != bgr[2]) {
+      throw std::runtime_error("expected a grey picture, got colour");
+    }
+    grey.pixels[i] = bgr[0];
+  }
+  return grey;
+}
+
+}  // namespace
+
+EcdRecording::EcdRecording(const std::filesystem::path& folder)
+    : folder_(folder),
+      name_(folder.string()),
+      images_(list_of_present_images(folder)),
+      events_(folder / "events.txt"),
+      size_(read_picture(folder / images_.paths.front(), picture_file_size)),
+      boundaries_(images_.times_s.size()) {}
+
+double EcdRecording::frame_time_s(std::int64_t index) const {
+  return images_.times_s[frame_position(index, frame_count(), name_)];
+}
+
+GreyImage EcdRecording::frame(std::int64_t index) const {
+  const std::size_t position = frame_position(index, frame_count(), name_);
+  return read_picture(folder_ / images_.paths[position], [&](const std::filesystem::path& file) {
+    GreyImage image = grey_of(decode_picture_file(file));
+    if (image.size == size_) return image;
+    throw std::runtime_error("expected frames of one size, " + describe_size(size_) + ", got " +
+                             describe_size(image.size));
+  });
+}
+
+std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,
+                                                std::int64_t last_frame) const {
+  const FrameRange range = frame_range(first_frame, last_frame, frame_count(), name_);
+  const std::int64_t begin = first_byte_after(range.first);
+  const std::int64_t end = first_byte_after(range.last);
+  return events_.events(
+      begin, end, EventCheck(size_, images_.times_s[range.first], images_.times_s[range.last]));
+}
+
+std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
+  frame_position(index, frame_count() - 1, name_);
+  return std::nullopt;
+}
+
+std::int64_t EcdRecording::first_byte_after(std::size_t frame) const {
+  return boundaries_.at(frame, [&] { return events_.first_byte_after(images_.times_s[frame]); });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/recordings/ecd_event_file_internal.h"
+#include "stages/recordings/ecd_image_list_internal.h"
+#include "stages/recordings/event_boundaries_internal.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// A folder as those of the Event Camera Dataset (ECD): `images.txt`, the pictures it names, and
+/// `events.txt`. It knows no flow.
+class EcdRecording final : public Recording {
+ public:
+  /// Throws InputError, also if a picture is not there.
+  explicit EcdRecording(const std::filesystem::path& folder);
+
+  const std::string& name() const override { return name_; }
+  ImageSize size() const override { return size_; }
+  std::int64_t frame_count() const override {
+    return static_cast<std::int64_t>(images_.times_s.size());
+  }
+  double frame_time_s(std::int64_t index) const override;
+  GreyImage frame(std::int64_t index) const override;
+  std::vector<Event> events_between(std::int64_t first_frame,
+                                    std::int64_t last_frame) const override;
+  std::optional<FlowField> flow(std::int64_t index) const override;
+
+ private:
+  std::int64_t first_byte_after(std::size_t frame) const;
+
+  std::filesystem::path folder_;
+  std::string name_;
+  EcdImageList images_;
+  EcdEventFile events_;
+  ImageSize size_;
+  EventBoundaries boundaries_;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/recordings/event_boundaries_internal.h"
+#include "stages/recordings/event_check_internal.h"
+#include "stages/recordings/hdf5_recording_tables_internal.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// A recording in an HDF5 file. Events are read by ranges; where a frame's events end is looked up
+/// by time, the file's own event index being only a guess, since its meaning differs among files.
+class Hdf5Recording final : public Recording {
+ public:
+  /// Throws InputError.
+  Hdf5Recording(const std::filesystem::path& path, const Hdf5Layout& layout);
+  ~Hdf5Recording() override;
+
+  const std::string& name() const override { return name_; }
+  ImageSize size() const override { return tables_->size; }
+  std::int64_t frame_count() const override {
+    return static_cast<std::int64_t>(tables_->frame_times_s.size());
+  }
+  double frame_time_s(std::int64_t index) const override;
+  GreyImage frame(std::int64_t index) const override;
+  std::vector<Event> events_between(std::int64_t first_frame,
+                                    std::int64_t last_frame) const override;
+  std::optional<FlowField> flow(std::int64_t index) const override;
+
+ private:
+  std::int64_t event_count() const { return static_cast<std::int64_t>(tables_->events.dims()[0]); }
+  std::int64_t events_until(std::size_t frame) const;
+  std::vector<double> event_times(std::int64_t first, std::int64_t count) const;
+  std::vector<Event> read_events(std::int64_t begin, std::int64_t end, double after_s,
+                                 double until_s) const;
+
+  [[noreturn]] void refuse(const EventFault& fault, std::int64_t event) const;
+
+  /// Runs `read` in this thread's turn; "expected readable WHAT, got damage" if HDF5 fails.
+  template <class Read>
+  auto read_in_turn(const std::string& what, Read read) const;
+
+  std::string name_;
+  std::optional<Hdf5RecordingTables> tables_;
+  EventBoundaries boundaries_;
+};
+
+}  // namespace eventgan

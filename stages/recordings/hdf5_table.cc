@@ -1,0 +1,134 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "manifests/faults.h"
+#include "stages/recordings/hdf5_table_internal.h"
+
+namespace eventgan {
+namespace {
+
+// No deflate stream grows by more than this factor when it is inflated.
+constexpr hsize_t kDeflateLimit = 1032;
+
+constexpr std::size_t kUsualCacheBytes = std::size_t{1} << 20;
+constexpr std::size_t kLargestCacheBytes = std::size_t{16} << 20;
+constexpr std::size_t kChunkCacheSlots = 1009;
+constexpr double kPreferReadChunks = 1;
+
+/// Bytes of the chunks that rows next to each other lie in; 0 where there are no chunks.
+std::size_t bytes_of_a_layer(hid_t dataset, const std::string& path) {
+  const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, "read the layout of", path);
+  if (H5Pget_layout(creation) != H5D_CHUNKED) return 0;
+  const Dims dims = dims_of(dataset, path);
+  Dims chunk(dims.size());
+  checked(H5Pget_chunk(creation, static_cast<int>(chunk.size()), chunk.data()),
+          "read the chunks of", path);
+  const Hdf5Handle type(H5Dget_type(dataset), H5Tclose, "read the type of", path);
+  // In floating point, since a damaged file's sides may be of any size.
+  double bytes = static_cast<double>(H5Tget_size(type)) * static_cast<double>(chunk[0]);
+  for (std::size_t i = 1; i < dims.size(); ++i) {
+    const double chunks = std::ceil(static_cast<double>(dims[i]) / static_cast<double>(chunk[i]));
+    bytes *= chunks * static_cast<double>(chunk[i]);
+  }
+  return static_cast<std::size_t>(std::min(bytes, static_cast<double>(kLargestCacheBytes)));
+}
+
+/// A layer of events may be larger than HDF5's usual cache, and would be inflated anew for every
+/// read. A larger cache for all would be filled, in each of a training's many recordings.
+Hdf5Handle open_dataset(hid_t file, const std::string& path) {
+  Hdf5Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "open", path);
+  const std::size_t bytes = bytes_of_a_layer(dataset, path);
+  if (bytes <= kUsualCacheBytes) return dataset;
+  dataset = {};  // the cache is set up by who opens first
+  const Hdf5Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose, "create", "access properties");
+  checked(H5Pset_chunk_cache(access, kChunkCacheSlots, bytes, kPreferReadChunks), "set",
+          "the chunk cache");
+  return {H5Dopen2(file, path.c_str(), access), H5Dclose, "open", path};
+}
+
+/// numpy's name of a type of numbers; of others "text", "no numbers".
+std::string describe_type(hid_t type) {
+  const std::string bits = std::to_string(8 * H5Tget_size(type));
+  switch (H5Tget_class(type)) {
+    case H5T_FLOAT:
+      return "float" + bits;
+    case H5T_INTEGER:
+      return (H5Tget_sign(type) == H5T_SGN_NONE ? "uint" : "int") + bits;
+    case H5T_STRING:
+      return "text";
+    default:
+      return "no numbers";
+  }
+}
+
+std::string describe_shape(const Dims& dims) {
+  std::string text;
+  for (const hsize_t dim : dims) text += (text.empty() ? "" : ", ") + std::to_string(dim);
+  return "[" + text + "]";
+}
+
+/// How many values of `width` bytes the dataset's share of the file can give.
+hsize_t most_values(hid_t dataset, std::size_t width) {
+  constexpr hsize_t kMost = std::numeric_limits<hsize_t>::max();
+  const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, "read", "the layout");
+  const H5D_layout_t layout = H5Pget_layout(creation);
+  if (layout == H5D_VIRTUAL || H5Pget_external_count(creation) > 0) return kMost;
+  const hsize_t stored = H5Dget_storage_size(dataset);
+  const hsize_t growth = layout == H5D_CHUNKED ? kDeflateLimit : 1;
+  return stored > kMost / growth ? kMost : stored * growth / width;
+}
+
+bool holds_at_most(const Dims& dims, hsize_t limit) {
+  hsize_t count = 1;
+  for (const hsize_t dim : dims) {
+    if (dim == 0) return true;
+  }
+  for (const hsize_t dim : dims) {
+    if (dim > limit / count) return false;
+    count *= dim;
+  }
+  return true;
+}
+
+}  // namespace
+
+bool has_object(hid_t file, const std::string& path) {
+  return H5Lexists(file, path.c_str(), H5P_DEFAULT) > 0 &&
+         H5Oexists_by_name(file, path.c_str(), H5P_DEFAULT) > 0;
+}
+
+Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& file_name)
+    : place_(file_name + " (dataset " + path + ")") {
+  if (!has_object(file, path)) throw InputError("expected a dataset, got none, in " + place_);
+  try {
+    dataset_ = open_dataset(file, path);
+    const Hdf5Handle type(H5Dget_type(dataset_), H5Tclose, "read the type of", path);
+    type_ = describe_type(type);
+    is_float_ = type_ == "float32" || type_ == "float64";
+    dims_ = dims_of(dataset_, path);
+    if (type_ == "text" || type_ == "no numbers") refuse("numbers");
+    if (!holds_at_most(dims_, most_values(dataset_, H5Tget_size(type)))) {
+      refuse("what its " + std::to_string(H5Dget_storage_size(dataset_)) +
+             " stored bytes can hold");
+    }
+  } catch (const Hdf5Error&) {
+    std::throw_with_nested(InputError("expected a readable dataset, got damage, in " + place_));
+  }
+}
+
+void Hdf5Table::refuse(const std::string& expected) const {
+  throw InputError("expected " + expected + ", got " + type_ + " " + describe_shape(dims_) +
+                   ", in " + place_);
+}
+
+void Hdf5Table::read(const Dims& start, const Dims& count, hid_t memory_type, void* values) const {
+  const Hdf5Handle from(H5Dget_space(dataset_), H5Sclose, "read", place_);
+  checked(H5Sselect_hyperslab(from, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
+          "select in", place_);
+  const Hdf5Handle to(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr),
+                      H5Sclose, "read", place_);
+  checked(H5Dread(dataset_, memory_type, to, from, H5P_DEFAULT, values), "read", place_);
+}
+
+}  // namespace eventgan

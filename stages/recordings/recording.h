@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/event.h"
+#include "manifests/grey_image.h"
+
+namespace eventgan {
+
+/// Flow of one frame interval: where each pixel of frame i lies in frame i + 1.
+struct FlowField {
+  ImageSize size;
+  std::vector<float> x_px;  ///< [y, x] float32, displacement to the right
+  std::vector<float> y_px;  ///< [y, x] float32, displacement down
+};
+
+/// A recording of an event camera with frames: frames, their times, and the events, all on one
+/// clock and one pixel grid. Nothing but the index is held in memory.
+///
+/// A frame that is not there is std::out_of_range. Thread safety: all may be called from several
+/// threads (calls into HDF5 take turns).
+class Recording {
+ public:
+  virtual ~Recording() = default;
+
+  /// For messages: the path as it was opened.
+  virtual const std::string& name() const = 0;
+  virtual ImageSize size() const = 0;
+  virtual std::int64_t frame_count() const = 0;
+
+  /// Time of a frame in seconds, on the events' clock; strictly ascending.
+  virtual double frame_time_s(std::int64_t index) const = 0;
+
+  /// Throws InputError (cause nested) if it cannot be read, or is in colour or of another size.
+  virtual GreyImage frame(std::int64_t index) const = 0;
+
+  /// Events with t(first frame) < t ≤ t(last frame), in time order; none for one frame twice. A
+  /// frame outside the time of the events is no error: there are fewer events then. Throws
+  /// InputError where the data read are malformed: times that fall, pixels outside the picture,
+  /// values that are not finite; std::out_of_range if the last frame is before the first.
+  virtual std::vector<Event> events_between(std::int64_t first_frame,
+                                            std::int64_t last_frame) const = 0;
+
+  /// The true flow from frame `index` to the next one, of recordings that know it (simulated ones);
+  /// its values are finite. Throws InputError (cause nested) if it cannot be read.
+  virtual std::optional<FlowField> flow(std::int64_t index) const = 0;
+};
+
+}  // namespace eventgan

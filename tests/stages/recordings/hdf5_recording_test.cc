@@ -1,0 +1,245 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "manifests/faults.h"
+#include "stages/recordings/hdf5_recording_internal.h"
+#include "stages/recordings/mvsec_writer.h"
+#include "tests/stages/recordings/small_recording.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Each;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+const std::string kEvents = "davis/left/events";
+const std::string kFrames = "davis/left/image_raw";
+const std::string kTimes = "davis/left/image_raw_ts";
+const std::string kIndex = "davis/left/image_raw_event_inds";
+const std::string kFlow = "davis/left/flow_dist";
+
+class Hdf5RecordingTest : public ::testing::Test {
+ protected:
+  Hdf5RecordingTest() : datasets_(testing::small_mvsec()) {}
+
+  Hdf5Recording open() {
+    testing::write_hdf5(path_, datasets_);
+    return Hdf5Recording(path_, mvsec_layout("left"));
+  }
+  /// A cell of the events' table.
+  double& cell(std::size_t event, std::size_t column) {
+    return std::get<std::vector<double>>(datasets_[kEvents].values)[4 * event + column];
+  }
+  /// Opening fails with all of `parts` in the message.
+  void expect_refused(const std::string& expected, const std::string& got) {
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(
+                                     HasSubstr("expected " + expected), HasSubstr("got " + got),
+                                     HasSubstr("in " + path_.string()))));
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "small.hdf5";
+  std::map<std::string, testing::Hdf5Dataset> datasets_;
+};
+
+TEST_F(Hdf5RecordingTest, ReadsFramesTimesAndFlow) {
+  const Hdf5Recording recording = open();
+  EXPECT_EQ(recording.name(), path_.string());
+  EXPECT_EQ(recording.size(), (ImageSize{3, 4}));
+  EXPECT_EQ(recording.frame_count(), 3);
+  EXPECT_EQ(recording.frame_time_s(2), 2.0);
+  EXPECT_EQ(recording.frame(1).size, (ImageSize{3, 4}));
+  EXPECT_THAT(recording.frame(1).pixels, Each(20));
+  const auto flow = recording.flow(1);
+  ASSERT_TRUE(flow.has_value());
+  EXPECT_EQ(flow->size, recording.size());
+  EXPECT_THAT(flow->x_px, Each(2.0f));
+  EXPECT_THAT(flow->y_px, Each(-2.0f));
+}
+
+TEST_F(Hdf5RecordingTest, ReadsEventsAfterAFrameUpToAnother) {
+  const Hdf5Recording recording = open();
+  const std::vector<Event> all = testing::small_events();
+  EXPECT_EQ(recording.events_between(0, 1), (std::vector<Event>{all[2], all[3]}));
+  EXPECT_EQ(recording.events_between(1, 2), (std::vector<Event>{all[4], all[5]}));
+  EXPECT_EQ(recording.events_between(0, 2).size(), 4u);
+  EXPECT_THAT(recording.events_between(2, 2), IsEmpty());
+}
+
+// The index of files of others counts differently, or is not there.
+TEST_F(Hdf5RecordingTest, TrustsTimesMoreThanTheEventIndex) {
+  for (const std::vector<std::int64_t>& index :
+       {std::vector<std::int64_t>{2, 4, 6}, {0, 0, 0}, {-9, 700, std::int64_t{1} << 62}}) {
+    datasets_[kIndex].values = index;
+    EXPECT_EQ(open().events_between(0, 1).size(), 2u);
+  }
+  datasets_.erase(kIndex);
+  EXPECT_EQ(open().events_between(0, 1).size(), 2u);
+}
+
+TEST_F(Hdf5RecordingTest, ReadsFloat32AndPolarityZero) {
+  for (std::size_t i = 0; i < 7; ++i) cell(i, 3) = cell(i, 3) > 0 ? 1 : 0;
+  const auto wide = std::get<std::vector<double>>(datasets_[kEvents].values);
+  datasets_[kEvents].values = std::vector<float>(wide.begin(), wide.end());
+  const std::vector<Event> all = testing::small_events();
+  EXPECT_EQ(open().events_between(0, 2), (std::vector<Event>{all[2], all[3], all[4], all[5]}));
+}
+
+TEST_F(Hdf5RecordingTest, GivesFewerEventsWhereThereAreNone) {
+  datasets_[kEvents] = {{0, 4}, std::vector<double>{}};
+  EXPECT_THAT(open().events_between(0, 2), IsEmpty());
+  datasets_[kEvents] = {{1, 4}, std::vector<double>{0, 0, 1.75, 1}};
+  EXPECT_THAT(open().events_between(0, 1), IsEmpty());
+  EXPECT_EQ(open().events_between(0, 2).size(), 1u);
+}
+
+TEST_F(Hdf5RecordingTest, NeedsOneFrameOnly) {
+  datasets_[kFrames] = {{1, 3, 4}, std::vector<std::uint8_t>(12, 7)};
+  datasets_[kTimes] = {{1}, std::vector<double>{1}};
+  datasets_[kIndex] = {{1}, std::vector<std::int64_t>{1}};
+  datasets_.erase(kFlow);
+  const Hdf5Recording recording = open();
+  EXPECT_EQ(recording.frame_count(), 1);
+  EXPECT_THAT(recording.events_between(0, 0), IsEmpty());
+  EXPECT_THROW(recording.flow(0), std::out_of_range);
+}
+
+TEST_F(Hdf5RecordingTest, RefusesFramesThatAreNotThere) {
+  datasets_.erase(kFlow);
+  const Hdf5Recording recording = open();
+  EXPECT_FALSE(recording.flow(1).has_value());
+  EXPECT_THROW(recording.flow(2), std::out_of_range);
+  EXPECT_THROW(recording.frame(3), std::out_of_range);
+  EXPECT_THROW(recording.frame(-1), std::out_of_range);
+  EXPECT_THROW(recording.frame_time_s(3), std::out_of_range);
+  EXPECT_THROW(recording.events_between(2, 0), std::out_of_range);
+}
+
+TEST_F(Hdf5RecordingTest, NamesTheEventThatIsWrong) {
+  const auto refused = [&](const std::string& what, int event) {
+    const Hdf5Recording recording = open();
+    EXPECT_THAT(
+        [&] { recording.events_between(0, 2); },
+        ThrowsMessage<InputError>(
+            AllOf(HasSubstr(what), HasSubstr("small.hdf5 (event " + std::to_string(event) + ")"))));
+    datasets_ = testing::small_mvsec();
+  };
+  cell(3, 0) = 4;
+  refused("expected a pixel", 3);
+  cell(4, 1) = 0.5;
+  refused("expected a pixel", 4);
+  cell(4, 1) = std::nan("");
+  refused("expected a pixel", 4);
+  cell(3, 2) = 1.125;  // the one before is at 1.25
+  refused("times that never fall", 3);
+  cell(3, 2) = std::nan("");
+  refused("a finite time", 3);
+  cell(2, 3) = 2;
+  refused("expected polarities", 2);
+  cell(4, 3) = 0;  // event 3 has -1
+  refused("expected polarities", 4);
+}
+
+TEST_F(Hdf5RecordingTest, RefusesFlowThatIsNotFinite) {
+  std::get<std::vector<float>>(datasets_[kFlow].values)[13] = std::nanf("");
+  const Hdf5Recording recording = open();
+  EXPECT_THAT([&] { recording.flow(0); },
+              ThrowsMessage<InputError>(HasSubstr("small.hdf5 (flow of frame 0)")));
+}
+
+TEST_F(Hdf5RecordingTest, TellsOfDamagedValuesWithTheCause) {
+  {
+    MvsecWriter writer(path_, {3, 4}, "");
+    writer.add_frame({{3, 4}, std::vector<std::uint8_t>(12)}, 0, nullptr);
+    std::vector<Event> events;
+    for (int i = 0; i < 100'000; ++i) events.push_back({i * 3 % 4, 0, 0.001 * (i + 1), i % 7 < 3});
+    writer.add_events(events);
+    writer.add_frame({{3, 4}, std::vector<std::uint8_t>(12)}, 101, nullptr);
+    writer.commit();
+  }
+  std::string bytes = testing::read_file(path_);
+  bytes[bytes.size() / 2] ^= 1;  // the middle of the file is events
+  testing::write_file(path_, bytes);
+  const Hdf5Recording recording(path_, mvsec_layout("left"));
+  EXPECT_THAT(recording.frame(1).pixels, Each(0));
+  try {
+    recording.events_between(0, 1);
+    FAIL() << "expected InputError";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("got damage, in " + path_.string() + " (events of frames 0..1)"));
+    EXPECT_THROW(std::rethrow_if_nested(error), Hdf5Error);
+  }
+}
+
+TEST_F(Hdf5RecordingTest, NamesTheDatasetThatIsMissing) {
+  for (const std::string& name : {kEvents, kFrames, kTimes}) {
+    datasets_.erase(name);
+    expect_refused("a dataset", "none");
+    datasets_ = testing::small_mvsec();
+  }
+  testing::write_hdf5(path_, datasets_);
+  EXPECT_THAT([&] { Hdf5Recording(path_, mvsec_layout("right")); },
+              ThrowsMessage<InputError>(HasSubstr("(dataset davis/right/events)")));
+  EXPECT_THAT([&] { Hdf5Recording(path_, eventgan_layout()); },
+              ThrowsMessage<InputError>(HasSubstr("(dataset davis/events/data)")));
+}
+
+TEST_F(Hdf5RecordingTest, RefusesColourAndFloatFrames) {
+  datasets_[kFrames] = {{3, 3, 4, 3}, std::vector<std::uint8_t>(108)};
+  expect_refused("grey pictures, uint8 [frames, height, width], and no colour",
+                 "uint8 [3, 3, 4, 3]");
+  datasets_[kFrames] = {{3, 3, 4}, std::vector<float>(36)};
+  expect_refused("grey pictures, uint8", "float32 [3, 3, 4]");
+  datasets_[kFrames] = {{3, 3, 4}, std::vector<std::int64_t>(36)};
+  expect_refused("grey pictures, uint8", "int64 [3, 3, 4]");
+}
+
+TEST_F(Hdf5RecordingTest, RefusesOtherShapesAndTypes) {
+  const auto refused = [&](const std::string& name, testing::Hdf5Dataset dataset,
+                           const std::string& got) {
+    datasets_[name] = std::move(dataset);
+    expect_refused("", got);
+    datasets_ = testing::small_mvsec();
+  };
+  refused(kEvents, {{7, 5}, std::vector<double>(35)}, "float64 [7, 5]");
+  refused(kEvents, {{28}, std::vector<double>(28)}, "float64 [28]");
+  refused(kEvents, {{7, 4}, std::vector<std::int64_t>(28)}, "int64 [7, 4]");
+  refused(kEvents, {{1}, std::vector<std::string>{"x y t p"}}, "text [1]");
+  refused(kFrames, {{36}, std::vector<std::uint8_t>(36)}, "uint8 [36]");
+  refused(kFrames, {{3, 0, 4}, std::vector<std::uint8_t>{}}, "uint8 [3, 0, 4]");
+  refused(kTimes, {{2}, std::vector<double>{1, 2}}, "float64 [2]");
+  refused(kTimes, {{3}, std::vector<std::int64_t>{1, 2, 3}}, "int64 [3]");
+  refused(kTimes, {{3}, std::vector<double>{1, 2, 2}}, "2.000000 s");
+  refused(kIndex, {{2}, std::vector<std::int64_t>{1, 2}}, "int64 [2]");
+  refused(kIndex, {{3}, std::vector<double>{1, 2, 3}}, "float64 [3]");
+  refused(kFlow, {{3, 2, 3, 4}, std::vector<float>(72)}, "float32 [3, 2, 3, 4]");
+  refused(kFlow, {{2, 2, 3, 4}, std::vector<std::uint8_t>(48)}, "uint8 [2, 2, 3, 4]");
+  datasets_[kFrames] = {{0, 3, 4}, std::vector<std::uint8_t>{}};
+  datasets_[kTimes] = {{0}, std::vector<double>{}};
+  datasets_[kIndex] = {{0}, std::vector<std::int64_t>{}};
+  expect_refused("at least one frame", "none");
+}
+
+TEST_F(Hdf5RecordingTest, RefusesWhatIsNoHdf5File) {
+  const auto open_it = [&] { Hdf5Recording recording(path_, mvsec_layout("left")); };
+  EXPECT_THAT(open_it, ThrowsMessage<InputError>(HasSubstr("got none, in " + path_.string())));
+  testing::write_hdf5(path_, datasets_);
+  const std::string whole = testing::read_file(path_);
+  for (const std::string& bytes : {std::string(), std::string("no HDF5"), whole.substr(0, 3000)}) {
+    testing::write_file(path_, bytes);
+    EXPECT_THAT(open_it, ThrowsMessage<InputError>(HasSubstr("one that does not open")));
+  }
+  EXPECT_THAT([&] { Hdf5Recording(folder_.path(), mvsec_layout("left")); },
+              ThrowsMessage<InputError>(HasSubstr("got a folder")));
+}
+
+}  // namespace
+}  // namespace eventgan
