@@ -49,6 +49,7 @@ int main(int argc, char** argv) {
   eventgan::add_preview_command(app, exit_code);
   eventgan::add_make_demo_command(app, exit_code);
   eventgan::add_import_weights_command(app, exit_code);
+  eventgan::add_realism_command(app, exit_code);
   eventgan::add_simulate_command(app, exit_code);
   try {
     app.parse(argc, argv);

@@ -1,0 +1,137 @@
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <map>
+#include <memory>
+
+#include "manifests/faults.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/progress_option.h"
+#include "pipeline/errors/exit_codes.h"
+#include "pipeline/realism/realism.h"
+#include "stages/recordings/open_recording.h"
+
+namespace eventgan {
+namespace {
+
+struct RealismArguments {
+  std::string recording;
+  std::string format;
+  std::string camera = "left";
+  std::string frames;
+  std::string threshold = "fit";
+  std::string out;
+  RealismOptions options;
+  ProgressStyle progress = ProgressStyle::kAuto;
+  bool json = false;
+};
+
+const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::kNetwork},
+                                                    {"difference", RealismMethod::kDifference},
+                                                    {"esim", RealismMethod::kEsim}};
+
+/// As told, else by what is there: a folder is ECD's, a file is MVSEC's.
+RecordingFormat format_of(const RealismArguments& arguments) {
+  for (const RecordingFormat format :
+       {RecordingFormat::kMvsec, RecordingFormat::kEventgan, RecordingFormat::kEcd}) {
+    if (arguments.format == to_string(format)) return format;
+  }
+  return std::filesystem::is_directory(arguments.recording) ? RecordingFormat::kEcd
+                                                            : RecordingFormat::kMvsec;
+}
+
+template <class Number>
+Number number_in(const std::string& text, const std::string& expected) {
+  Number value{};
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end) throw UsageError(expected + ", got \"" + text + "\"");
+  return value;
+}
+
+/// "3:8", "3:" or ":8".
+void read_frame_range(const std::string& text, RealismOptions& options) {
+  const std::string expected = "--frames: expected FIRST:LAST";
+  const std::size_t colon = text.find(':');
+  if (colon == std::string::npos) throw UsageError(expected + ", got \"" + text + "\"");
+  const std::string first = text.substr(0, colon);
+  const std::string last = text.substr(colon + 1);
+  if (!first.empty()) options.first_frame = number_in<std::int64_t>(first, expected);
+  if (!last.empty()) options.last_frame = number_in<std::int64_t>(last, expected);
+}
+
+int run_realism(const RealismArguments& arguments) {
+  RealismOptions options = arguments.options;
+  if (!arguments.frames.empty()) read_frame_range(arguments.frames, options);
+  if (arguments.threshold != "fit") {
+    options.threshold =
+        number_in<double>(arguments.threshold, "--threshold: expected fit or a number");
+  }
+  options.pictures = arguments.out;
+  const auto recording =
+      open_recording(arguments.recording, format_of(arguments), arguments.camera);
+  const RealismReport report = measure_realism(*recording, options, [&](std::int64_t total) {
+    return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
+  });
+  std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
+  return kComplete;
+}
+
+void add_choices(CLI::App& command, RealismArguments& arguments) {
+  command.add_option("RECORDING", arguments.recording, "A recording of events and frames")
+      ->required();
+  command
+      .add_option("--format", arguments.format,
+                  "mvsec, eventgan or ecd; default: a folder is ecd, a file mvsec")
+      ->check(CLI::IsMember({"mvsec", "eventgan", "ecd"}));
+  command.add_option("--camera", arguments.camera, "mvsec: left or right")
+      ->check(CLI::IsMember({"left", "right"}));
+  command.add_option("--frames", arguments.frames, "FIRST:LAST; default: all");
+  command.add_option("--gaps", arguments.options.gaps, "Frames apart, such as 1,2; default: 1")
+      ->delimiter(',');
+}
+
+void add_methods(CLI::App& command, RealismArguments& arguments) {
+  RealismOptions& options = arguments.options;
+  command.add_option("--with", options.methods, "Of network,difference,esim; default: all")
+      ->delimiter(',')
+      ->transform(CLI::CheckedTransformer(kMethods).description(""))
+      ->option_text("METHOD,...");
+  command.add_option("--weights", options.weights,
+                     "The network's: FILE.safetensors, shipped or shipped:WIDTH; default: shipped");
+  command.add_option("--threshold", arguments.threshold,
+                     "Contrast threshold of difference and esim in 0.01..5; default: fit, the one "
+                     "that makes as many events as the camera did");
+  command
+      .add_option("--log-epsilon", options.log_epsilon,
+                  "Their log intensity is ln(u/255 + this), 1e-6..1; default: 0.02")
+      ->check(CLI::Range(1e-6, 1.0));
+  command
+      .add_option("--esim-displacement", options.esim_displacement_px,
+                  "Largest displacement of esim's motions, px a frame; default: 5")
+      ->check(CLI::Range(0.1, 100.0));
+  command.add_option("--esim-draws", options.esim_draws, "Motions of a pair; default: 5")
+      ->check(CLI::Range(1, 1000));
+}
+
+}  // namespace
+
+void add_realism_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "realism",
+      "Compares volumes of the network and of two models with a camera's real events for the same "
+      "frames (manifests/realism.md)");
+  const auto arguments = std::make_shared<RealismArguments>();
+  add_choices(*command, *arguments);
+  add_methods(*command, *arguments);
+  command->add_option("--seed", arguments->options.seed, "Of all random numbers; default: 0");
+  command->add_option("--threads", arguments->options.threads, "Threads to use; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  command->add_flag("--json", arguments->json, "Print JSON, with the scores of each pair");
+  command->add_option("--out", arguments->out, "Folder for a picture of each pair");
+  add_progress_option(*command, arguments->progress);
+  command->callback([arguments, &exit_code] { exit_code = run_realism(*arguments); });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "manifests/grey_image.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// Two frames of a recording, by their indices.
+struct FrameInterval {
+  std::int64_t first = 0;
+  std::int64_t last = 0;
+  int gap() const { return static_cast<int>(last - first); }
+  bool operator==(const FrameInterval&) const = default;
+};
+
+/// The pairs (i, i + gap) with both frames in first..last, by gap, then i. Throws UsageError if
+/// there is none, a gap is below 1 or named twice, or a frame is not in the recording.
+std::vector<FrameInterval> choose_intervals(const Recording& recording, std::int64_t first,
+                                            std::optional<std::int64_t> last,
+                                            const std::vector<int>& gaps);
+
+/// What the methods see of an interval, and the number of events they should make.
+struct IntervalFrames {
+  FrameInterval interval;
+  double duration_s = 0;
+  GreyImage previous;
+  GreyImage next;
+  std::int64_t event_count = 0;
+};
+
+/// An interval with what the camera saw in it.
+struct RealInterval {
+  IntervalFrames frames;
+  std::vector<float> volume;      ///< [2 bins, y, x] float32, normalised by η98, in [0, 1]
+  std::optional<FlowField> flow;  ///< true displacement over the interval, where it is known
+};
+
+/// What the network sees of them: [frame, y, x] float32, previous then next, in [-1, 1], at their
+/// own size.
+std::vector<float> network_input(const IntervalFrames& frames);
+
+/// Both throw InputError as Recording does. Thread safe.
+IntervalFrames read_frames(const Recording& recording, const FrameInterval& interval);
+RealInterval read_interval(const Recording& recording, const FrameInterval& interval, int bins);
+
+}  // namespace eventgan

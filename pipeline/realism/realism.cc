@@ -1,0 +1,136 @@
+#include "pipeline/realism/realism.h"
+
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <string>
+
+#include "manifests/faults.h"
+#include "pipeline/realism/compare_volumes.h"
+#include "pipeline/realism/network_method.h"
+#include "pipeline/realism/simulated_method.h"
+#include "pipeline/threads/thread_count.h"
+
+namespace eventgan {
+namespace {
+
+constexpr int kDefaultBins = 9;
+constexpr std::size_t kMostFitted = 16;
+
+void check_options(const RealismOptions& options) {
+  const std::set<RealismMethod> distinct(options.methods.begin(), options.methods.end());
+  if (distinct.empty() || distinct.size() != options.methods.size()) {
+    throw UsageError("--with: expected different methods, at least one, got " +
+                     std::to_string(options.methods.size()) + ", " +
+                     std::to_string(distinct.size()) + " of them different");
+  }
+  if (options.threshold && !(*options.threshold >= 0.01 && *options.threshold <= 5)) {
+    throw UsageError("--threshold: expected fit or a number in 0.01..5, got " +
+                     std::to_string(*options.threshold));
+  }
+  // Command lines can say "nan", which lies in no range and outside of none.
+  if (!(options.log_epsilon >= 1e-6 && options.log_epsilon <= 1)) {
+    throw UsageError("--log-epsilon: expected a number in 1e-6..1, got " +
+                     std::to_string(options.log_epsilon));
+  }
+  if (!(options.esim_displacement_px >= 0.1 && options.esim_displacement_px <= 100)) {
+    throw UsageError("--esim-displacement: expected a number in 0.1..100, got " +
+                     std::to_string(options.esim_displacement_px));
+  }
+}
+
+std::vector<IntervalFrames> frames_to_fit(const Recording& recording,
+                                          const std::vector<FrameInterval>& intervals) {
+  const std::size_t count = std::min(kMostFitted, intervals.size());
+  std::vector<IntervalFrames> frames;
+  for (std::size_t i = 0; i < count; ++i) {
+    frames.push_back(read_frames(recording, intervals[i * intervals.size() / count]));
+  }
+  return frames;
+}
+
+/// Makes the methods in the order they were asked for; reads the frames for fitting at most once.
+class MethodMaker {
+ public:
+  MethodMaker(const Recording& recording, const std::vector<FrameInterval>& intervals,
+              const RealismOptions& options)
+      : recording_(recording), intervals_(intervals), options_(options) {}
+
+  int bins() const { return bins_; }
+
+  std::vector<std::unique_ptr<VolumeMethod>> make() {
+    const auto& wanted = options_.methods;
+    std::unique_ptr<Generator> generator;
+    if (std::ranges::find(wanted, RealismMethod::kNetwork) != wanted.end()) {
+      generator = open_realism_generator(options_.weights);
+      bins_ = generator->bins();
+    }
+    std::vector<std::unique_ptr<VolumeMethod>> methods;
+    for (const RealismMethod method : wanted) {
+      switch (method) {
+        case RealismMethod::kNetwork:
+          methods.push_back(make_network_method(std::move(generator), options_.weights));
+          break;
+        case RealismMethod::kDifference:
+          methods.push_back(simulated(difference_scene()));
+          break;
+        case RealismMethod::kEsim:
+          methods.push_back(
+              simulated(esim_scene(options_.esim_displacement_px, options_.esim_draws)));
+          break;
+      }
+    }
+    return methods;
+  }
+
+ private:
+  std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {
+    double threshold = options_.threshold.value_or(0);
+    if (!options_.threshold) {
+      if (frames_.empty()) frames_ = frames_to_fit(recording_, intervals_);
+      threshold = fitted_threshold(scene, frames_, options_.log_epsilon, options_.seed);
+    }
+    return make_simulated_method(std::move(scene), realism_sensor(threshold, options_.log_epsilon),
+                                 !options_.threshold, bins_, options_.seed);
+  }
+
+  const Recording& recording_;
+  const std::vector<FrameInterval>& intervals_;
+  const RealismOptions& options_;
+  std::vector<IntervalFrames> frames_;
+  int bins_ = kDefaultBins;
+};
+
+}  // namespace
+
+RealismReport measure_realism(
+    const Recording& recording, const RealismOptions& options,
+    const std::function<std::unique_ptr<Progress>(std::int64_t)>& make_progress) {
+  const auto start = std::chrono::steady_clock::now();
+  check_options(options);
+  const std::vector<FrameInterval> intervals =
+      choose_intervals(recording, options.first_frame, options.last_frame, options.gaps);
+  MethodMaker maker(recording, intervals, options);
+  const int threads = thread_count(options.threads);
+  std::vector<std::unique_ptr<VolumeMethod>> methods;
+  oneapi::tbb::task_arena(threads).execute([&] { methods = maker.make(); });
+  if (!options.pictures.empty()) std::filesystem::create_directories(options.pictures);
+
+  const auto progress =
+      make_progress ? make_progress(static_cast<std::int64_t>(intervals.size())) : nullptr;
+  ComparisonRun run;
+  run.bins = maker.bins();
+  run.threads = threads;
+  run.pictures = options.pictures;
+  if (progress) run.on_interval = [&] { progress->advance(false, 0); };
+  RealismReport report = compare_volumes(recording, intervals, methods, run);
+  if (progress) progress->finish();
+  report.seed = options.seed;
+  report.wall_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,141 @@
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <map>
+
+#include "pipeline/realism/realism_report.h"
+#include "pipeline/realism/score_rows_internal.h"
+
+namespace eventgan {
+namespace {
+
+template <class... Values>
+std::string formatted(const char* pattern, Values... values) {
+  char text[512];
+  std::snprintf(text, sizeof text, pattern, values...);
+  return text;
+}
+
+const char* symbol(BetterScore better) {
+  switch (better) {
+    case BetterScore::kHigher:
+      return "↑";
+    case BetterScore::kLower:
+      return "↓";
+    case BetterScore::kLikeReal:
+      break;
+  }
+  return "≈";
+}
+
+/// How far a value is from the best one could have; NaN if it has no meaning.
+double shortfall(BetterScore better, double value, double real) {
+  if (better == BetterScore::kHigher) return -value;
+  return better == BetterScore::kLower ? value : std::abs(value - real);
+}
+
+/// "label  symbol  real  method  method*": the real volume's own value (none for scores that
+/// compare it with itself), then the methods', the best marked.
+std::string table_row(const std::string& label, BetterScore better, double real, bool show_real,
+                      const std::vector<double>& values) {
+  std::string text = formatted("%-28.28s %s", label.c_str(), symbol(better));
+  const auto cell = [](double value, bool best) {
+    return std::isnan(value) ? formatted("%11s ", "-")
+                             : formatted("%11.4f%c", value, best ? '*' : ' ');
+  };
+  text += show_real ? cell(real, false) : formatted("%11s ", "");
+  double least = std::numeric_limits<double>::infinity();
+  for (const double value : values) {
+    const double distance = shortfall(better, value, real);
+    if (!std::isnan(distance)) least = std::min(least, distance);
+  }
+  for (const double value : values) {
+    text += cell(value, values.size() > 1 && shortfall(better, value, real) == least);
+  }
+  return text + "\n";
+}
+
+std::vector<double> values_of(const RealismReport& report, double RealismScores::*member) {
+  std::vector<double> values;
+  for (const MethodSummary& method : report.methods) values.push_back(method.mean.*member);
+  return values;
+}
+
+std::string bin_rows(const RealismReport& report) {
+  std::string text;
+  for (std::size_t bin = 0; bin < report.real.mean.events_per_bin.size(); ++bin) {
+    std::vector<double> values;
+    for (const MethodSummary& method : report.methods) {
+      values.push_back(method.mean.events_per_bin[bin]);
+    }
+    text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal,
+                      report.real.mean.events_per_bin[bin], true, values);
+  }
+  return text;
+}
+
+double fraction_of(const std::optional<DirectionScore>& direction) {
+  return direction && direction->pixels > 0 ? direction->fraction()
+                                            : std::numeric_limits<double>::quiet_NaN();
+}
+
+std::string direction_rows(const RealismReport& report) {
+  if (!report.real.direction) return {};
+  std::vector<double> values;
+  std::string pixels = formatted("%-28s  %11lld ", "  pixels that tell it",
+                                 static_cast<long long>(report.real.direction->pixels));
+  for (const MethodSummary& method : report.methods) {
+    values.push_back(fraction_of(method.direction));
+    pixels += formatted("%11lld ",
+                        static_cast<long long>(method.direction ? method.direction->pixels : 0));
+  }
+  return table_row("direction within 30 deg", BetterScore::kHigher,
+                   fraction_of(report.real.direction), true, values) +
+         pixels + "\n";
+}
+
+std::string head(const RealismReport& report) {
+  std::map<int, int> by_gap;
+  long long events = 0;
+  for (const IntervalSummary& interval : report.intervals) {
+    ++by_gap[interval.interval.gap()];
+    events += interval.event_count;
+  }
+  std::string text =
+      report.recording + ": " +
+      formatted("%dx%d pixels, %zu pair%s of frames (", report.size.width, report.size.height,
+                report.intervals.size(), report.intervals.size() == 1 ? "" : "s");
+  const char* separator = "";
+  for (const auto& [gap, count] : by_gap) {
+    text += separator + formatted("gap %d: %d", gap, count);
+    separator = ", ";
+  }
+  text += formatted("), %lld real events, %d bins\n", events, report.bins);
+  for (const MethodSummary& method : report.methods) {
+    text += "  " + method.name + ": " + method.settings + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string to_text(const RealismReport& report) {
+  std::string text = head(report) + formatted("%-28s  %11s ", "", "real");
+  for (const MethodSummary& method : report.methods) {
+    text += formatted("%11.11s ", method.name.c_str());
+  }
+  text += "\n";
+  for (const ScoreRow& row : kScoreRows) {
+    text += table_row(row.label, row.better, report.real.mean.*row.member,
+                      row.better == BetterScore::kLikeReal, values_of(report, row.member));
+    if (row.member == &RealismScores::events_per_pixel) text += bin_rows(report);
+  }
+  text += direction_rows(report);
+  text +=
+      "↑ higher is better, ↓ lower, ≈ nearer to the real one; * best. Means over the pairs "
+      "of normalised volumes.\n";
+  return text;
+}
+
+}  // namespace eventgan

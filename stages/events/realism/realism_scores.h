@@ -1,0 +1,47 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "manifests/grey_image.h"
+#include "manifests/volume.h"
+
+namespace eventgan {
+
+/// How one volume compares with the real one of the same frames, both normalised volumes V̂ (DESIGN
+/// section 5). F1 after V2CE (Zhang et al. 2024): a voxel counts as an event where it is above
+/// 0.01. NaN where a score has no meaning (a correlation with a constant), 1 for the F1 of two
+/// empty volumes.
+struct RealismScores {
+  double f1_raw = 0;            ///< voxel by voxel
+  double f1_time = 0;           ///< summed over time, per polarity
+  double f1_time_polarity = 0;  ///< summed over time and polarity
+  double pool_mse_2 = 0;        ///< mean squared difference after 2x2 mean pooling in y and x
+  double pool_mse_4 = 0;  ///< after 4x4; an incomplete border block is the mean of what it has
+  double time_correlation = 0;  ///< Pearson, of the average-timestamp pictures (both polarities
+                                ///< side by side) over all pixels; T is 0 where there is no event,
+                                ///< a sum over time of at most 0.01. (Over the pixels with events
+                                ///< alone an empty or a random volume would do better than one that
+                                ///< has most events right, since the misses correlate negatively.)
+  double polarity_correlation = 0;  ///< Pearson, of (Σ positive - Σ negative) with the change of
+                                    ///< log intensity ln((next + 1)/(previous + 1)), u in 0..255
+  double events_per_pixel = 0;      ///< Σ V̂ / (H W)
+  double positive_share = 0;        ///< Σ positive / Σ both; NaN if empty
+  std::vector<double> events_per_bin;  ///< Σ V̂ per time bin, both polarities, / (H W)
+};
+
+/// volume, real: [2 bins, y, x] float32, C order, ≥ 0, dimensionless; what is above 1 counts as 1.
+/// Counts of events are to be divided by their η98 first; a generator trained on such volumes gives
+/// V̂ itself, and dividing it once more would make the faintest of its volumes full of events.
+/// previous, next: the pair's frames. Throws
+/// std::invalid_argument if sizes differ, there is no pixel or no bin, or a value is NaN, infinite
+/// or below zero. Thread safe.
+RealismScores realism_scores(std::span<const float> volume, std::span<const float> real,
+                             const VolumeShape& shape, const GreyImage& previous,
+                             const GreyImage& next);
+
+/// Means over pairs, field by field; a NaN is left out of its mean (all NaN, or no pairs: NaN).
+/// Throws std::invalid_argument if the numbers of bins differ. Thread safe.
+RealismScores mean_scores(std::span<const RealismScores> scores);
+
+}  // namespace eventgan
