@@ -17,5 +17,6 @@ void add_make_demo_command(CLI::App& app, int& exit_code);
 void add_import_weights_command(CLI::App& app, int& exit_code);
 void add_realism_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
+void add_train_command(CLI::App& app, int& exit_code);
 
 }  // namespace eventgan

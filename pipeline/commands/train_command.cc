@@ -1,0 +1,59 @@
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+
+#include "manifests/training_manifest.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/job_options.h"
+#include "pipeline/errors/exit_codes.h"
+#include "pipeline/training/run_training.h"
+#include "pipeline/training/stop_signal.h"
+
+namespace eventgan {
+namespace {
+
+struct TrainArguments {
+  JobOptions job;
+  std::string device = "cpu";
+};
+
+int run(const TrainArguments& arguments) {
+  const TrainingManifest manifest = read_training_manifest(arguments.job.manifest);
+  const bool json = arguments.job.as_json();
+  const StopSignal signal;
+  TrainingOptions options;
+  options.output = arguments.job.output_folder();
+  options.threads = arguments.job.threads;
+  options.device = arguments.device;
+  options.overwrite = arguments.job.overwrite;
+  options.stop = [&] { return signal.requested(); };
+  options.warn = [&](const std::string& text) {
+    std::cerr << (json ? warning_json(text) : "warning: " + text) << std::endl;
+  };
+  options.make_progress = [&] {
+    return std::make_unique<TrainingProgress>(std::cerr, arguments.job.progress,
+                                              isatty(STDERR_FILENO) != 0);
+  };
+  const TrainingReport report = run_training(manifest, options);
+  std::cout << (json ? to_json(report) : to_text(report)) << std::flush;
+  return report.complete ? kComplete : kStopped;
+}
+
+}  // namespace
+
+void add_train_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "train",
+      "Trains a generator on event recordings with frames (manifests/training.md). Stopped by "
+      "SIGINT or SIGTERM it saves its state; run again, it goes on from there");
+  const auto arguments = std::make_shared<TrainArguments>();
+  add_job_options(*command, arguments->job, "The training (manifests/examples has one)",
+                  "Discard what an earlier run left in the folder");
+  command->add_option("--device", arguments->device, "cpu or cuda; default: cpu")
+      ->check(CLI::IsMember({"cpu", "cuda"}));
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,97 @@
+#include "pipeline/training/records/loss_log.h"
+
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <ranges>
+
+namespace eventgan {
+namespace {
+
+constexpr std::size_t kFirstLoss = 3;  // after phase, step, seconds
+
+CsvTable::Row columns() {
+  CsvTable::Row names{"phase", "step", "seconds"};
+  names.insert(names.end(), kLossNames.begin(), kLossNames.end());
+  names.push_back("learning_rate");
+  return names;
+}
+
+std::optional<TrainingPhase> phase_of(const std::string& word) {
+  for (const auto phase :
+       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
+    if (word == to_string(phase)) return phase;
+  }
+  return std::nullopt;
+}
+
+std::optional<LossRow> parse(const CsvTable::Row& cells) {
+  const auto phase = phase_of(cells[0]);
+  const double step = csv_value(cells[1]);
+  if (!phase || !(step >= 0)) return std::nullopt;
+  LossRow row;
+  row.position = {*phase, static_cast<std::int64_t>(step)};
+  row.seconds = csv_value(cells[2]);
+  for (std::size_t i = 0; i < row.losses.size(); ++i) {
+    row.losses[i] = csv_value(cells[kFirstLoss + i]);
+  }
+  row.rate = csv_value(cells.back());
+  return row;
+}
+
+CsvTable::Row cells_of(const LossRow& row) {
+  CsvTable::Row cells{std::string(to_string(row.position.phase)), std::to_string(row.position.step),
+                      csv_number(row.seconds)};
+  for (const double loss : row.losses) cells.push_back(csv_number(loss));
+  cells.push_back(csv_number(row.rate));
+  return cells;
+}
+
+}  // namespace
+
+LossLog::LossLog(const std::filesystem::path& file, const TrainingPosition& next)
+    : table_(file, columns(), [&](const CsvTable::Row& cells) {
+        const auto row = parse(cells);
+        return row && row->position < next;
+      }) {
+  for (const CsvTable::Row& cells : table_.kept()) rows_.push_back(*parse(cells));
+}
+
+void LossLog::add(const TrainingPosition& position, double seconds,
+                  const std::map<std::string, double>& losses, double rate) {
+  LossRow row;
+  row.position = position;
+  row.seconds = seconds;
+  row.rate = rate;
+  for (std::size_t i = 0; i < kLossNames.size(); ++i) {
+    const auto found = losses.find(std::string(kLossNames[i]));
+    row.losses[i] =
+        found == losses.end() ? std::numeric_limits<double>::quiet_NaN() : found->second;
+  }
+  const CsvTable::Row cells = cells_of(row);
+  table_.add(cells);
+  // As the file has it: then what is drawn and averaged does not depend on when the run was
+  // resumed.
+  rows_.push_back(*parse(cells));
+}
+
+std::map<std::string, double> mean_losses(std::span<const LossRow> rows, TrainingPhase phase,
+                                          std::size_t count) {
+  std::array<double, kLossNames.size()> sums{};
+  std::array<std::size_t, kLossNames.size()> found{};
+  for (const LossRow& row : rows | std::views::reverse) {
+    if (row.position.phase != phase || count-- == 0) break;
+    for (std::size_t i = 0; i < sums.size(); ++i) {
+      if (std::isnan(row.losses[i])) continue;
+      sums[i] += row.losses[i];
+      ++found[i];
+    }
+  }
+  std::map<std::string, double> means;
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    if (found[i] > 0) means[std::string(kLossNames[i])] = sums[i] / static_cast<double>(found[i]);
+  }
+  return means;
+}
+
+}  // namespace eventgan

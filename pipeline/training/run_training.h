@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "manifests/training_manifest.h"
+#include "pipeline/training/training_position.h"
+#include "pipeline/training/training_progress.h"
+
+namespace eventgan {
+
+struct TrainingOptions {
+  std::optional<std::filesystem::path> output;  ///< instead of the manifest's
+  int threads = 0;                              ///< of LibTorch; 0: all cores
+  std::string device = "cpu";                   ///< "cpu" or "cuda"
+  bool overwrite = false;                       ///< discard what an earlier run left in the folder
+  /// Asked before every step; true ends the run with a checkpoint. None: never.
+  std::function<bool()> stop;
+  std::optional<std::int64_t> max_steps;  ///< stop after so many steps of this run; for tests
+  std::function<void(const std::string&)> warn;                      ///< none: silent
+  std::function<std::unique_ptr<TrainingProgress>()> make_progress;  ///< none: silent
+};
+
+/// How a run of a training ended.
+struct TrainingReport {
+  std::string folder;
+  bool complete = false;                 ///< all steps of all phases are done
+  TrainingPosition position;             ///< the next step
+  std::int64_t steps_made = 0;           ///< by this run
+  double run_seconds = 0;                ///< of this run
+  double total_seconds = 0;              ///< of all runs together, as far as it counts
+  std::map<std::string, double> losses;  ///< means over the last steps of the last phase
+  std::string weights;                   ///< the final weights' path; empty if there are none
+  std::string weights_sha256;
+};
+
+/// Trains the phases one after another, or goes on from the output folder's checkpoint, and writes
+///
+/// - checkpoints/{latest,previous}.safetensors: every checkpoint_minutes, after each phase and at
+///   the end of the run; what a later run goes on from;
+/// - weights-latest.safetensors: with each checkpoint of the generator phase;
+/// - weights.safetensors: at the end;
+/// - training.csv, curves.png: the losses;
+/// - validation.csv: realism of the validation pairs, with each checkpoint of the generator phase;
+/// - training.lock: see TrainingLock;
+/// - pictures/generator-STEP.png: every picture_minutes of the generator phase; frames, generated,
+///   real, of four validation pairs, or of the batch where there is no validation.
+///
+/// The weights are the same however often the training was stopped, with one number of threads, one
+/// kind of processor and one set of libraries. Throws UsageError (settings that do not fit the
+/// checkpoint, or recordings that do not fit the manifest), InputError, and std::runtime_error: a
+/// loss that is not finite (phase, step, samples and last good checkpoint in the message), a folder
+/// that another run writes to, or I/O.
+TrainingReport run_training(const TrainingManifest& manifest, const TrainingOptions& options);
+
+std::string to_text(const TrainingReport& report);
+std::string to_json(const TrainingReport& report);
+
+}  // namespace eventgan

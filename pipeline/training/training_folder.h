@@ -1,0 +1,33 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "pipeline/training/training_position.h"
+
+namespace eventgan {
+
+/// Where a training writes what (see run_training).
+struct TrainingFolder {
+  std::filesystem::path root;
+
+  std::filesystem::path checkpoints() const { return root / "checkpoints"; }
+  std::filesystem::path losses() const { return root / "training.csv"; }
+  std::filesystem::path curves() const { return root / "curves.png"; }
+  std::filesystem::path validation() const { return root / "validation.csv"; }
+  std::filesystem::path latest_weights() const { return root / "weights-latest.safetensors"; }
+  std::filesystem::path weights() const { return root / "weights.safetensors"; }
+  std::filesystem::path pictures() const { return root / "pictures"; }
+  std::filesystem::path picture(const TrainingPosition& position) const {
+    return pictures() /
+           (std::string(to_string(position.phase)) + "-" + std::to_string(position.step) + ".png");
+  }
+
+  /// Makes the folders, and clears away what writers left that are no longer alive.
+  void prepare() const;
+
+  /// Deletes all of the above that is there; other files are left alone.
+  void discard() const;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <torch/nn/module.h>
+#include <torch/nn/modules/container/any.h>
+#include <torch/nn/modules/container/modulelist.h>
+#include <torch/nn/pimpl.h>
+
+#include <vector>
+
+#include "manifests/training_manifest.h"
+
+namespace eventgan {
+
+struct UNetSettings {
+  int in_channels = 2;
+  int out_channels = 18;
+  int base_channels = 32;
+  /// Cycle networks: a tanh prediction after each decoder, concatenated to its features.
+  bool multi_scale = false;
+  SpectralNormPlace spectral_norm = SpectralNormPlace::kNone;
+};
+
+/// The U-Net of generator and cycle networks as it is trained (DESIGN section 4): batch norm and
+/// spectral norm are not folded, and parameters and buffers have the published names. kDecoders
+/// puts spectral norm on residual blocks and decoders, as the published code does.
+class UNetImpl : public torch::nn::Module {
+ public:
+  explicit UNetImpl(const UNetSettings& settings);
+
+  /// [B, in, H, W] float32 → one [B, out, H, W] ≥ 0 (ReLU), or, multi-scale, four [B, out, h, w] in
+  /// -1..1 (tanh), coarse to fine: h = H/8, H/4, H/2, H, rounded up. Any H, W. Changes batch norm's
+  /// statistics in training mode and spectral norm's vectors always.
+  std::vector<at::Tensor> forward(const at::Tensor& input);
+
+ private:
+  torch::nn::ModuleList encoders_, resblocks_, decoders_, pred_layers_;
+  torch::nn::AnyModule head_, pred_;
+};
+TORCH_MODULE(UNet);
+
+}  // namespace eventgan

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "manifests/state_dict.h"
+#include "manifests/training_manifest.h"
+#include "stages/training/training_sample.h"
+
+namespace eventgan {
+
+/// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
+/// "volume", "count", "generator" (adversarial), "generator.total", "discriminator",
+/// "discriminator.real_accuracy", "discriminator.fake_accuracy"; only those the step computed. Each
+/// before its weight, "flow" and "generator.total" being weighted sums.
+using StepLosses = std::map<std::string, double>;
+
+/// A loss or a gradient that is not finite. The networks are as before the step.
+class UnsoundLoss : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The networks, losses and optimisers of a training, one step at a time. It draws no random number
+/// of its own: labels to flip come from (seed, step), so state() is all there is to resume from.
+/// Not thread safe; LibTorch's intra-operation threads are the caller's to set, and change the last
+/// bits.
+class Trainer {
+ public:
+  /// `device`: "cpu", or "cuda" where LibTorch has it; throws UsageError for others, and as
+  /// check_trainable.
+  Trainer(const TrainingManifest& manifest, const std::string& device);
+  ~Trainer();
+
+  /// One update. `step` counts from 0 in its phase and decides, in the generator phase, whether it
+  /// is the discriminator's or the generator's turn; samples: manifest.batch of one shape. Throws
+  /// UnsoundLoss, with the samples' origins, before anything is changed; std::invalid_argument if
+  /// the samples do not fit; std::runtime_error if LibTorch fails, likewise.
+  StepLosses step(TrainingPhase phase, std::int64_t step, std::span<const TrainingSample> samples);
+
+  /// Everything needed to go on: parameters, buffers, optimisers' moments.
+  StateDict state() const;
+
+  /// Throws std::runtime_error naming what is missing or has another shape; then nothing is defined
+  /// but another load().
+  void load(const StateDict& state);
+
+  /// The generator's state dict with the published names, as fold_generator takes it.
+  StateDict generator_state() const;
+
+  /// The generator in evaluation mode and float32 on one sample's network frames, of any size:
+  /// [2 bins, y, x]. Changes nothing that training goes on from.
+  std::vector<float> generate(const TrainingSample& sample) const;
+
+ private:
+  struct Learners;
+  std::unique_ptr<Learners> learners_;
+};
+
+}  // namespace eventgan

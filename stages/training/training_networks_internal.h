@@ -1,0 +1,37 @@
+#pragma once
+
+#include <ATen/core/Tensor.h>
+#include <c10/core/Device.h>
+
+#include <vector>
+
+#include "manifests/state_dict.h"
+#include "manifests/training_manifest.h"
+#include "stages/training/networks/patch_discriminator_internal.h"
+#include "stages/training/networks/unet_internal.h"
+
+namespace eventgan {
+
+/// The four networks of a training, and in which precision they run.
+struct TrainingNetworks {
+  /// Starting values from the manifest's seed, each network's its own.
+  TrainingNetworks(const TrainingManifest& manifest, c10::Device device);
+
+  /// The network's outputs in float32, whatever precision it runs in.
+  std::vector<at::Tensor> run(UNet& network, const at::Tensor& input) const;
+  at::Tensor judge(const at::Tensor& volume, const at::Tensor& images);
+
+  /// Under "generator.", "discriminator.", "flow." and "reconstruction.". load() throws as
+  /// load_network.
+  void save(StateDict& state) const;
+  void load(const StateDict& state);
+
+  UNet generator{nullptr};       ///< two frames → volume
+  UNet flow{nullptr};            ///< volume → flow at four scales
+  UNet reconstruction{nullptr};  ///< [sum of the volume, previous frame] → next at four scales
+  PatchDiscriminator discriminator{nullptr};
+  c10::Device device;
+  bool bfloat16;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,246 @@
+#include "stages/training/trainer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "stages/generator/fold.h"
+#include "stages/generator/torch_generator.h"
+#include "tests/stages/training/small_training.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+constexpr TrainingPhase kPhases[] = {TrainingPhase::kFlow, TrainingPhase::kReconstruction,
+                                     TrainingPhase::kGenerator};
+
+/// First parts of the keys ("generator", "optimizer.flow") of what differs between two states.
+std::set<std::string> changed_parts(const StateDict& before, const StateDict& after) {
+  std::set<std::string> parts;
+  for (const auto& [key, tensor] : after) {
+    const bool optimizer = key.starts_with("optimizer.");
+    const auto end = key.find('.', optimizer ? 10 : 0);
+    if (before.at(key).values != tensor.values) parts.insert(key.substr(0, end));
+  }
+  return parts;
+}
+
+TEST(Trainer, AStepChangesOneNetworkAlone) {
+  const TrainingManifest manifest = testing::small_training();
+  Trainer trainer(manifest, "cpu");
+  const auto parts = [&](TrainingPhase phase, std::int64_t step) {
+    const StateDict before = trainer.state();
+    trainer.step(phase, step, testing::edge_batch(manifest, 1));
+    return changed_parts(before, trainer.state());
+  };
+  EXPECT_THAT(parts(TrainingPhase::kFlow, 0), ElementsAre("flow", "optimizer.flow"));
+  EXPECT_THAT(parts(TrainingPhase::kReconstruction, 0),
+              ElementsAre("optimizer.reconstruction", "reconstruction"));
+  EXPECT_THAT(parts(TrainingPhase::kGenerator, 2), ElementsAre("generator", "optimizer.generator"));
+  // The generator's batch norm and spectral norm move with the fakes it makes, nothing else of it.
+  const StateDict before = trainer.state();
+  EXPECT_THAT(parts(TrainingPhase::kGenerator, 0),
+              ElementsAre("discriminator", "generator", "optimizer.discriminator"));
+  const StateDict after = trainer.state();
+  for (const auto& [key, tensor] : after) {
+    if (!key.starts_with("generator.") || key.find("running") != std::string::npos ||
+        key.find("num_batches") != std::string::npos || key.ends_with("_u") ||
+        key.ends_with("_v")) {
+      continue;
+    }
+    EXPECT_EQ(before.at(key).values, tensor.values) << key;
+  }
+}
+
+TEST(Trainer, ALossThatIsNotFiniteNamesItsSamplesAndChangesNothing) {
+  const TrainingManifest manifest = testing::small_training();
+  Trainer trainer(manifest, "cpu");
+  auto batch = testing::edge_batch(manifest, 1);
+  for (const auto phase : kPhases) trainer.step(phase, 0, batch);  // so that moments are there
+  std::fill(batch[3].frames.begin(), batch[3].frames.end(), NAN);
+  batch[3].network_frames = batch[3].frames;
+  std::fill(batch[3].volume.begin(), batch[3].volume.end(), NAN);
+  const StateDict before = trainer.state();
+  for (const auto phase : kPhases) {
+    for (const std::int64_t step : {1, 2}) {
+      try {
+        trainer.step(phase, step, batch);
+        FAIL() << to_string(phase);
+      } catch (const UnsoundLoss& error) {
+        EXPECT_THAT(error.what(), HasSubstr("edge 1.3"));
+        EXPECT_THAT(error.what(), HasSubstr("step " + std::to_string(step)));
+      }
+      EXPECT_THAT(changed_parts(before, trainer.state()), ElementsAre());
+    }
+  }
+}
+
+TEST(Trainer, AnInfiniteLossIsUnsoundToo) {
+  TrainingManifest manifest = testing::small_training();
+  Trainer trainer(manifest, "cpu");
+  auto batch = testing::edge_batch(manifest, 1);
+  batch[0].volume[5] = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(trainer.step(TrainingPhase::kGenerator, 2, batch), UnsoundLoss);
+}
+
+TEST(Trainer, AGradientThatIsNotFiniteIsUnsoundToo) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses = {.adversarial = 0, .flow = 0, .reconstruction = 0, .volume = 1e37};
+  Trainer trainer(manifest, "cpu");
+  // Features of 1e6 that the last layer multiplies by 0, and a volume of 1 from its bias: a loss
+  // near 1e37, but a gradient of the 0 of more than float32's 3e38.
+  StateDict before = trainer.state();
+  const auto set = [&](const std::string& key, float value) {
+    std::fill(before.at(key).values.begin(), before.at(key).values.end(), value);
+  };
+  set("generator.decoders.3.norm_layer.bias", 1e6f);
+  set("generator.pred.conv2d.weight", 0);
+  set("generator.pred.conv2d.bias", 1);
+  trainer.load(before);
+  try {
+    trainer.step(TrainingPhase::kGenerator, 0, testing::edge_batch(manifest, 1));
+    FAIL();
+  } catch (const UnsoundLoss& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("gradients"), HasSubstr("edge 1.3")));
+  }
+  EXPECT_THAT(changed_parts(before, trainer.state()), ElementsAre());
+}
+
+TEST(Trainer, ATermOfWeightZeroIsNotComputed) {
+  const auto names = [](LossWeights weights) {
+    TrainingManifest manifest = testing::small_training();
+    manifest.losses = weights;
+    Trainer trainer(manifest, "cpu");
+    std::vector<std::string> keys;
+    for (const auto& [name, value] :
+         trainer.step(TrainingPhase::kGenerator, 2, testing::edge_batch(manifest, 1))) {
+      keys.push_back(name);
+    }
+    return keys;
+  };
+  EXPECT_THAT(names({1, 1, 1, 1, 1}),
+              ElementsAre("count", "flow", "flow.photometric", "flow.smoothness", "generator",
+                          "generator.total", "reconstruction", "volume"));
+  EXPECT_THAT(names({1, 0, 1, 0}), ElementsAre("generator", "generator.total", "reconstruction"));
+  EXPECT_THAT(names({1, 1, 0, 0}), ElementsAre("flow", "flow.photometric", "flow.smoothness",
+                                               "generator", "generator.total"));
+  EXPECT_THAT(names({0, 0, 1, 0}), ElementsAre("generator.total", "reconstruction"));
+}
+
+TEST(Trainer, WithoutAdversarialLossEveryStepIsTheGenerators) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses.adversarial = 0;
+  manifest.crop = {32, 40};  // too small for the discriminator
+  Trainer trainer(manifest, "cpu");
+  for (int step = 0; step < 3; ++step) {
+    const auto losses =
+        trainer.step(TrainingPhase::kGenerator, step, testing::edge_batch(manifest, 1));
+    EXPECT_TRUE(losses.contains("generator.total"));
+    EXPECT_FALSE(losses.contains("discriminator"));
+  }
+}
+
+TEST(Trainer, FlowIsPhotometricAndWeightedSmoothness) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses.smoothness = 0.25;
+  Trainer trainer(manifest, "cpu");
+  auto losses = trainer.step(TrainingPhase::kFlow, 0, testing::edge_batch(manifest, 1));
+  EXPECT_NEAR(losses["flow"], losses["flow.photometric"] + 0.25 * losses["flow.smoothness"], 1e-6);
+}
+
+TEST(Trainer, TakesSamplesWithoutEvents) {
+  TrainingManifest manifest = testing::small_training();
+  Trainer trainer(manifest, "cpu");
+  auto batch = testing::edge_batch(manifest, 1);
+  for (TrainingSample& sample : batch) std::fill(sample.volume.begin(), sample.volume.end(), 0.0f);
+  for (const auto phase : kPhases) {
+    for (const int step : {0, 2}) EXPECT_NO_THROW(trainer.step(phase, step, batch));
+  }
+}
+
+TEST(Trainer, Bfloat16StaysNearFloat32) {
+  TrainingManifest manifest = testing::small_training();
+  const auto batch = testing::edge_batch(manifest, 1);
+  Trainer exact(manifest, "cpu");
+  manifest.precision = TrainingPrecision::kBfloat16;
+  Trainer coarse(manifest, "cpu");
+  for (const auto phase : kPhases) {
+    for (const int step : {1, 2}) {
+      const StepLosses expected = exact.step(phase, step, batch);
+      StepLosses got = coarse.step(phase, step, batch);
+      for (const auto& [name, value] : expected) {
+        if (name.ends_with("accuracy")) continue;  // a step function of logits near 0
+        EXPECT_NEAR(got.at(name), value, 0.05 * std::abs(value) + 0.05) << name;
+      }
+    }
+  }
+}
+
+TEST(Trainer, RefusesSamplesThatDoNotFit) {
+  const TrainingManifest manifest = testing::small_training();
+  Trainer trainer(manifest, "cpu");
+  EXPECT_THROW(trainer.step(TrainingPhase::kFlow, 0, {}), std::invalid_argument);
+  const auto other_bins = testing::moving_edges(4, {9, {48, 48}}, 1);
+  EXPECT_THROW(trainer.step(TrainingPhase::kFlow, 0, other_bins), std::invalid_argument);
+  auto cut = testing::edge_batch(manifest, 1);
+  cut[2].volume.pop_back();
+  EXPECT_THROW(trainer.step(TrainingPhase::kFlow, 0, cut), std::invalid_argument);
+  auto mixed = testing::edge_batch(manifest, 1);
+  mixed[1] = testing::moving_edges(1, {3, {64, 48}}, 1)[0];
+  EXPECT_THROW(trainer.step(TrainingPhase::kFlow, 0, mixed), std::invalid_argument);
+}
+
+TEST(Trainer, LoadNamesWhatIsMissing) {
+  Trainer trainer(testing::small_training(), "cpu");
+  StateDict state = trainer.state();
+  state.erase("flow.pred_layers.2.conv2d.bias");
+  try {
+    trainer.load(state);
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("flow.pred_layers.2.conv2d.bias"));
+  }
+}
+
+class TrainedGenerator : public ::testing::TestWithParam<SpectralNormPlace> {};
+
+TEST_P(TrainedGenerator, FoldedEqualsItsOwnPictureWhichChangesNothing) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.network.spectral_norm = GetParam();
+  Trainer trainer(manifest, "cpu");
+  for (int step = 0; step < 6; ++step) {
+    trainer.step(TrainingPhase::kGenerator, step, testing::edge_batch(manifest, step));
+  }
+  const StateDict before = trainer.state();
+  // Another size than the crop's, odd.
+  const TrainingSample sample = testing::moving_edges(1, {3, {37, 50}}, 9)[0];
+  const std::vector<float> volume = trainer.generate(sample);
+  EXPECT_EQ(trainer.generate(sample), volume);
+  EXPECT_THAT(changed_parts(before, trainer.state()), ElementsAre());
+
+  const auto engine =
+      make_torch_generator(fold_generator(trainer.generator_state(), "the trained generator"));
+  std::vector<float> folded(volume.size());
+  engine->generate(sample.network_frames, sample.shape.size, folded);
+  const float largest = *std::max_element(volume.begin(), volume.end());
+  ASSERT_GT(largest, 0);
+  for (std::size_t i = 0; i < volume.size(); ++i) {
+    ASSERT_NEAR(folded[i], volume[i], 1e-4f * largest) << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(SpectralNorm, TrainedGenerator,
+                         ::testing::Values(SpectralNormPlace::kDecoders,
+                                           SpectralNormPlace::kEncoders, SpectralNormPlace::kNone),
+                         [](const auto& place) { return std::string(to_string(place.param)); });
+
+}  // namespace
+}  // namespace eventgan
