@@ -31,9 +31,9 @@ std::string demo_manifest(std::uint64_t seed) {
   // Pictures of any size are scaled to fit and laid into the middle of the volume.
   "image": { "width": 346, "height": 260, "fit": "letterbox", "preset": "mpii" },
 
-  // A network that has learnt nothing, to try the program with. Put a weights file here:
-  // eventgan import-weights CHECKPOINT eventgan.safetensors
-  "generator": { "weights": "untrained:8", "precision": "float32" },
+  // The weights that come with the program. A file of your own may stand here, of
+  // eventgan import-weights CHECKPOINT eventgan.safetensors, or of eventgan train.
+  "generator": { "weights": "shipped", "precision": "float32" },
 
   "volume": { "bins": 9, "normalize": "none" },
   "output": { "directory": "events", "samples_per_shard": 8, "dtype": "float16",

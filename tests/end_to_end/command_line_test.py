@@ -1,16 +1,42 @@
 """Exit codes, help and messages of the command line."""
 
+import collections
 import json
+import pathlib
+import struct
+import sys
 import unittest
 
 import program
 from program import run
+from safetensors_rules import read_safetensors
+
+sys.path.append(str(pathlib.Path(__file__).parents[1] / "fuzz"))
+import make_corpus as checkpoint_seeds
+
+
+def folded_network():
+    """A generator of base width 1 and 9 bins that was folded elsewhere: weights 0.5, biases 0.25, no batch norm."""
+    layers = {"head.conv2d": (1, 2, 3), "pred.conv2d": (18, 1, 1)}
+    for level in range(4):
+        layers[f"encoders.{level}.conv2d"] = (2 << level, 1 << level, 3)
+        layers[f"decoders.{level}.conv2d"] = (8 >> level, 24 >> level, 3)
+    for block in range(2):
+        layers[f"resblocks.{block}.conv1"] = layers[f"resblocks.{block}.conv2"] = (16, 16, 3)
+    state = collections.OrderedDict()
+    for name, (out, into, side) in layers.items():
+        for part, shape, value in [("weight", [out, into, side, side], 0.5), ("bias", [out], 0.25)]:
+            count = out * into * side * side if part == "weight" else out
+            storage = checkpoint_seeds.Storage(str(len(state)), "f", [value] * count)
+            state[f"{name}.{part}"] = checkpoint_seeds.Tensor(storage, shape)
+    return state
 
 
 class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
-        for command in ["convert", "plan", "verify", "inspect", "preview", "make-demo", "import-weights"]:
+        for command in ["convert", "plan", "verify", "inspect", "preview", "make-demo", "import-weights", "simulate", "train",
+                        "realism"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -35,12 +61,43 @@ class CommandLine(program.InFolder):
         run("inspect", self.folder / "none.h5", expect=66)
         run("preview", self.folder / "none.h5", "--out", self.folder / "p", expect=66)
         run("import-weights", self.folder / "none.pt", self.folder / "w.safetensors", expect=66)
+        run("simulate", self.folder / "none.json", expect=66)
+        run("train", self.folder / "none.json", expect=66)
+        run("realism", self.folder / "none.hdf5", "--with", "difference", expect=66)
 
     def test_a_bad_manifest_is_64_and_every_fault_is_told_at_once(self):
         bad = program.manifest([{"dataset": "mpii", "root": "x", "pairs": program.pairs([9.7])}], seed="x", colour=1)
         _, err = run("plan", self.write_manifest(bad), expect=64)
         for path in ["$.sources[0].pairs.gaps[0]", "$.seed", "$.colour"]:
             self.assertIn(path, err)
+
+    def test_import_weights_reads_an_old_checkpoint_of_a_folded_network(self):
+        old = self.folder / "old.pt"
+        old.write_bytes(checkpoint_seeds.legacy_checkpoint({"gen": folded_network(), "epoch": 3}))
+        weights = self.folder / "w.safetensors"
+        out, _ = run("import-weights", old, weights)
+        self.assertIn("base width 1, 9 bins", out)
+        tensors, metadata = read_safetensors(weights)
+        self.assertEqual(metadata["base_channels"], "1")
+        self.assertEqual(tensors["pred.bias"], ([18], struct.pack("<18f", *[0.25] * 18)))
+        before = weights.read_bytes()
+        run("import-weights", old, weights)
+        self.assertEqual(weights.read_bytes(), before)
+
+    def test_import_weights_says_what_is_there_instead(self):
+        old = self.folder / "old.pt"
+        weights = self.folder / "w.safetensors"
+        old.write_bytes(checkpoint_seeds.legacy_checkpoint({"flow": {}, "recons": {}, "epoch": 3}))
+        _, err = run("import-weights", old, weights, expect=66)
+        self.assertIn("'gen'", err)
+        self.assertIn("the keys flow, recons, epoch", err)
+        old.write_bytes(old.read_bytes()[:-9])
+        run("import-weights", old, weights, expect=66)
+        old.write_bytes(checkpoint_seeds.legacy_checkpoint({"gen": {}}))
+        _, err = run("import-weights", old, weights, expect=66)
+        self.assertIn("head.conv2d.weight", err)
+        run("import-weights", old, self.folder / "w.pt", expect=64)
+        self.assertFalse(weights.exists())
 
     def test_a_damaged_shard_is_an_error_that_names_it(self):
         (self.folder / "x.h5").write_bytes(b"no HDF5")

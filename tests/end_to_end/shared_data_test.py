@@ -9,6 +9,7 @@ import PIL.Image
 
 import program
 from program import SHARED, manifest, pairs, run, text
+from safetensors_rules import read_safetensors
 
 
 def floats(value):
@@ -24,22 +25,35 @@ class SharedData(program.InFolder):
         return out, [h5py.File(shard) for shard in sorted((self.folder / "out").glob("*.h5"))]
 
     def test_volumes_equal_the_published_network_through_convert(self):
-        weights = self.folder / "w.safetensors"
-        run("import-weights", SHARED / "golden" / "checkpoint_zip.pt", weights)
+        imported = {}
+        for checkpoint in ["zip", "legacy"]:
+            weights = self.folder / f"{checkpoint}.safetensors"
+            run("import-weights", SHARED / "golden" / f"checkpoint_{checkpoint}.pt", weights)
+            imported[checkpoint] = read_safetensors(weights)
+            with self.subTest(checkpoint):
+                self.assert_golden_volumes(weights, checkpoint)
+        tensors, metadata = imported["zip"]
+        self.assertEqual(imported["legacy"][0], tensors)
+        self.assertEqual(metadata["origin"], "PyTorch checkpoint")
+        self.assertEqual(len(tensors), 2 * 14)  # a weight and a bias each
+        self.assertEqual(tensors["head.weight"][0], [8, 2, 3, 3])
+
+    def assert_golden_volumes(self, weights, prefix):
         cases = 0
         with h5py.File(SHARED / "golden" / "golden.h5") as golden:
             for name, case in golden["generator"].items():
                 if name == "state":
                     continue
-                clip = self.folder / f"clip_{name}"
+                clip = self.folder / f"{prefix}_clip_{name}"
                 clip.mkdir()
                 for index, frame in enumerate(case["frames_u8"][:]):
                     PIL.Image.fromarray(frame).save(clip / f"f_{index}.png")
+                output = f"{prefix}_{name}"
                 job = manifest([{"dataset": "frames", "root": str(clip), "pairs": pairs([1])}], name=name,
                                generator={"weights": str(weights), "precision": "float32"},
-                               output={"directory": f"out_{name}", "dtype": "float32"})
+                               output={"directory": output, "dtype": "float32"})
                 run("convert", self.write_manifest(job), "--progress", "none")
-                with h5py.File(next((self.folder / f"out_{name}").glob("*.h5"))) as shard:
+                with h5py.File(next((self.folder / output).glob("*.h5"))) as shard:
                     volume, expected = shard["events/volume"][0], case["volume"][:]
                 self.assertLessEqual(np.abs(volume - expected).max(), 1e-4 * expected.max(), name)
                 cases += 1

@@ -1,0 +1,134 @@
+"""What the weights that come with the program promise, through the program: still pictures, real events, direction of motion.
+
+With EVENTGAN_CANDIDATE_WEIGHTS=FILE.safetensors these weights are judged in place of the shipped ones.
+"""
+
+import hashlib
+import json
+import os
+import unittest
+
+import h5py
+import numpy as np
+
+import program
+from moving_picture import write_pictures
+from program import SHARED, SOURCE, pairs, run, text
+
+CANDIDATE = os.environ.get("EVENTGAN_CANDIDATE_WEIGHTS") and os.path.abspath(os.environ["EVENTGAN_CANDIDATE_WEIGHTS"])
+FOLDER = SOURCE / "manifests" / "weights"
+SHIPPED = sorted(FOLDER.glob("eventgan-*.safetensors"))
+
+# Pictures of a moving texture, and of one that rests.
+HEIGHT, WIDTH = 96, 128
+FRAMES = 7
+SPEED_PX = 1  # a frame
+TEXTURES = [1, 2, 3]
+GAPS = [1, 6]
+# A still pair's events, as a share of those of a pair that moves by a pixel. Not 0, since a network makes no exact nothing;
+# at a fiftieth a still scene costs its reader less than one event in a patch where the slowest motion makes fifty.
+MOST_OF_STILL = 0.02
+# Events per pixel of the farthest pair, so that a network without any events does not pass.
+LEAST_OF_FAR = 0.05
+
+# Real events that the training has not seen: the second interval of the recording.
+REAL = SHARED / "davis" / "slider_depth"
+REAL_FRAMES = "1:2"
+HIGHER = ["f1_time", "time_correlation"]
+LOWER = ["pool_mse_2"]
+
+# The ends of the clips, which the training has not seen either, as the simulated sensor sees them.
+CLIPS = ["01_dog", "03_blocks", "04_coffee"]
+FIRST_FRAME, FRAME_COUNT = 270, 8
+CLIP_SIZE = {"width": 346, "height": 260}
+CLIP_GAP = 1
+SENSOR = {"positive_threshold": 0.2, "negative_threshold": 0.2, "threshold_spread": 0.04}
+LEAST_RIGHT_DIRECTION = 0.5  # of the pixels with events; at random 1/6
+
+
+def needs_shared_data(test):
+    return unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")(test)
+
+
+def realism(recording, *arguments):
+    """Scores of each method: name → score → number."""
+    weights = ["--weights", CANDIDATE] if CANDIDATE else []
+    out, _ = run("realism", recording, *weights, *arguments, "--json", "--progress", "none")
+    return {method["name"]: method["mean"] for method in json.loads(out)["methods"]}
+
+
+class ShippedWeights(program.InFolder):
+    def convert_by_default(self, root):
+        job = {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1,
+               "sources": [{"dataset": "frames", "root": str(root), "pairs": pairs(GAPS, choose="all")}],
+               "image": {"preset": "mpii"}, "output": {"directory": "out", "samples_per_shard": 512, "dtype": "float32"}}
+        if CANDIDATE:
+            job["generator"] = {"weights": CANDIDATE}
+        _, err = run("convert", self.write_manifest(job), "--progress", "none")
+        self.assertNotIn("UNTRAINED", err)
+        shard, = (self.folder / "out").glob("*.h5")
+        return h5py.File(shard)
+
+    def test_events_come_with_motion(self):
+        steps = range(0, FRAMES * SPEED_PX, SPEED_PX)
+        for seed in TEXTURES:
+            write_pictures(self.folder / "pictures" / f"moving_{seed}", steps, HEIGHT, WIDTH, seed)
+            write_pictures(self.folder / "pictures" / f"still_{seed}", [0] * FRAMES, HEIGHT, WIDTH, seed)
+        shard = self.convert_by_default(self.folder / "pictures")
+        events = shard["events/volume"][:].sum(axis=1).mean(axis=(1, 2))  # per pixel
+        still = np.array(["still" in text(path) for path in shard["pairs/prev_path"]])
+        gaps = shard["pairs/gap_frames"][:]
+        self.assertEqual(still.sum(), len(TEXTURES) * sum(FRAMES - gap for gap in GAPS))
+        near, far = (events[~still & (gaps == gap)].mean() for gap in GAPS)
+        print(f"events per pixel: still at most {events[still].max():.6f}, moving {near:.5f} and {far:.5f}, {GAPS} apart")
+        self.assertLess(events[still].max(), MOST_OF_STILL * near)
+        self.assertGreater(far, near)
+        self.assertGreater(far, LEAST_OF_FAR)
+
+    @unittest.skipIf(CANDIDATE, "other weights are judged")
+    def test_the_plan_tells_which_weights(self):
+        write_pictures(self.folder / "pictures", range(FRAMES), HEIGHT, WIDTH, TEXTURES[0])
+        shard = self.convert_by_default(self.folder / "pictures")
+        hashes = {hashlib.sha256(path.read_bytes()).hexdigest() for path in SHIPPED}
+        used = json.loads((self.folder / "out" / "plan.json").read_text())["fingerprint"]["weights"]
+        self.assertIn(used, hashes)
+        self.assertEqual(text(shard.attrs["weights_hash"]), used)
+
+    @needs_shared_data
+    def test_nearer_to_a_camera_than_both_models(self):
+        scores = realism(REAL, "--frames", REAL_FRAMES)
+        for score in HIGHER + LOWER:
+            print(score, ", ".join(f"{name} {mean[score]:.4f}" for name, mean in scores.items()))
+        network = scores.pop("network")
+        self.assertEqual(set(scores), {"difference", "esim"})
+        for name, model in scores.items():
+            for score in HIGHER:
+                with self.subTest(score, better_than=name):
+                    self.assertGreater(network[score], model[score])
+            for score in LOWER:
+                with self.subTest(score, better_than=name):
+                    self.assertLess(network[score], model[score])
+
+    @needs_shared_data
+    def test_keeps_the_direction_of_motion(self):
+        sources = [{"path": str(SHARED / "clips" / f"{clip}.mp4"), "first_frame": FIRST_FRAME, "frame_count": FRAME_COUNT}
+                   for clip in CLIPS]
+        job = {"format": "eventgan-simulation", "version": 1, "name": "job", "seed": 1, "sources": sources, "size": CLIP_SIZE,
+               "sensor": SENSOR, "output": {"directory": "recordings"}}
+        run("simulate", self.write_manifest(job), "--progress", "none")
+        pixels = right = 0
+        for clip in CLIPS:
+            recording = self.folder / "recordings" / f"{clip}.hdf5"
+            direction = realism(recording, "--with", "network", "--gaps", CLIP_GAP)["network"]["direction"]
+            print(f"{clip}: {direction['within_30_deg']} of {direction['pixels']} pixels within 30 degrees")
+            pixels += direction["pixels"]
+            right += direction["within_30_deg"]
+        print(f"together {right / pixels:.3f}")
+        self.assertGreaterEqual(right, LEAST_RIGHT_DIRECTION * pixels)
+
+
+if __name__ == "__main__":
+    if not SHIPPED and not CANDIDATE:
+        print(f"skipped: no eventgan-*.safetensors in {FOLDER}")
+        raise SystemExit(program.SKIPPED)
+    program.main()
