@@ -6,11 +6,11 @@
 #include "manifests/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/checkpoint.h"
 #include "stages/generator/fold.h"
 #include "stages/generator/weights_file.h"
-#include "stages/shards/atomic_file.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

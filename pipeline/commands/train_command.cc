@@ -8,8 +8,8 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/job_options.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/stopping/stop_signal.h"
 #include "pipeline/training/run_training.h"
-#include "pipeline/training/stop_signal.h"
 
 namespace eventgan {
 namespace {

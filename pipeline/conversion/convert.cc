@@ -7,13 +7,13 @@
 
 #include "manifests/faults.h"
 #include "pipeline/conversion/conversion_graph.h"
-#include "pipeline/conversion/output_folder.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/conversion/shard_sink.h"
+#include "pipeline/output/output_folder.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/threads/thread_count.h"
-#include "stages/shards/stale_temporaries.h"
+#include "stages/files/stale_temporaries.h"
 
 namespace eventgan {
 namespace {

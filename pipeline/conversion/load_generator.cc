@@ -5,11 +5,11 @@
 #include "manifests/faults.h"
 #include "manifests/weights_name.h"
 #include "pipeline/conversion/simulated_generator.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/torch_generator.h"
 #include "stages/generator/untrained.h"
 #include "stages/generator/weights_file.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

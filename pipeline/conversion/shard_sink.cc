@@ -3,7 +3,7 @@
 #include <chrono>
 
 #include "manifests/faults.h"
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

@@ -10,7 +10,7 @@
 #include "manifests/grey_image.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
-#include "stages/shards/sha256.h"
+#include "stages/files/sha256.h"
 
 namespace eventgan {
 namespace {

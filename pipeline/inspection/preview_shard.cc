@@ -4,8 +4,8 @@
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
-#include "pipeline/conversion/output_folder.h"
 #include "pipeline/inspection/slot_selection.h"
+#include "pipeline/output/output_folder.h"
 #include "stages/events/pictures/preview_picture.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/placed_picture.h"

@@ -4,8 +4,8 @@
 #include <iterator>
 #include <set>
 
-#include "pipeline/conversion/output_folder.h"
 #include "pipeline/errors/error_text.h"
+#include "pipeline/output/output_folder.h"
 #include "stages/shards/shard_check.h"
 
 namespace eventgan {

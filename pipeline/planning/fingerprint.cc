@@ -10,7 +10,7 @@
 #include <set>
 
 #include "manifests/manifest_fields.h"
-#include "stages/shards/sha256.h"
+#include "stages/files/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -4,10 +4,10 @@
 
 #include "manifests/faults.h"
 #include "pipeline/simulation/sensor_picture.h"
+#include "stages/files/sha256.h"
 #include "stages/frames/sequences/picture_folder.h"
 #include "stages/frames/sequences/video_clip.h"
 #include "stages/frames/sequences/video_dataset.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -1,6 +1,6 @@
 #include "pipeline/training/training_folder.h"
 
-#include "stages/shards/stale_temporaries.h"
+#include "stages/files/stale_temporaries.h"
 
 namespace eventgan {
 

@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/shards/temporary_name.h"
+#include "stages/files/temporary_name.h"
 
 namespace eventgan {
 namespace {

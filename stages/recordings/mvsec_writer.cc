@@ -12,10 +12,10 @@
 #include <system_error>
 #include <vector>
 
+#include "stages/files/atomic_file.h"
 #include "stages/recordings/event_check_internal.h"
 #include "stages/recordings/hdf5_turn_internal.h"
 #include "stages/recordings/mvsec_file_internal.h"
-#include "stages/shards/atomic_file.h"
 
 namespace eventgan {
 namespace {

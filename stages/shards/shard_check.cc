@@ -6,8 +6,8 @@
 #include <system_error>
 #include <type_traits>
 
+#include "stages/files/sha256.h"
 #include "stages/shards/label_check.h"
-#include "stages/shards/sha256.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/volume_check.h"
 

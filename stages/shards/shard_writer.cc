@@ -23,10 +23,10 @@
 #include <system_error>
 #include <vector>
 
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_output_file_internal.h"
-#include "stages/shards/atomic_file.h"
-#include "stages/shards/sha256.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/shard_rows.h"

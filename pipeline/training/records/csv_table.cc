@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

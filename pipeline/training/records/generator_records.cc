@@ -4,10 +4,10 @@
 
 #include "pipeline/training/records/generator_picture.h"
 #include "pipeline/training/records/trained_weights.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/torch_generator.h"
 #include "stages/generator/weights_file.h"
-#include "stages/shards/atomic_file.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/training/records/csv_table.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/fold.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -8,9 +8,9 @@
 #include <string_view>
 #include <utility>
 
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/safetensors.h"
-#include "stages/shards/atomic_file.h"
-#include "stages/shards/sha256.h"
 
 namespace eventgan {
 namespace {

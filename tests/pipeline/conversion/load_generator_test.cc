@@ -4,10 +4,10 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
+#include "stages/files/sha256.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/untrained.h"
 #include "stages/generator/weights_file.h"
-#include "stages/shards/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

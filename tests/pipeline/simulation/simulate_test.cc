@@ -9,8 +9,8 @@
 #include <sstream>
 
 #include "manifests/faults.h"
+#include "stages/files/temporary_name.h"
 #include "stages/recordings/open_recording.h"
-#include "stages/shards/temporary_name.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -7,7 +7,7 @@
 #include <functional>
 #include <limits>
 
-#include "stages/shards/sha256.h"
+#include "stages/files/sha256.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

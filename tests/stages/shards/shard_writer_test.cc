@@ -6,11 +6,11 @@
 
 #include <random>
 
-#include "stages/shards/sha256.h"
+#include "stages/files/sha256.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/volume_codec.h"
 #include "tests/stages/shards/example_shard.h"
-#include "tests/stages/shards/full_disk.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan::testing {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "stages/files/sha256.h"
 #include "stages/generator/torch_generator.h"
-#include "stages/shards/sha256.h"
 #include "stages/training/trainer.h"
 #include "tests/pipeline/training/small_training.h"
 #include "tests/testing/temporary_folder.h"

@@ -1,4 +1,4 @@
-#include "pipeline/training/stop_signal.h"
+#include "pipeline/stopping/stop_signal.h"
 
 #include <atomic>
 

@@ -1,4 +1,4 @@
-#include "pipeline/conversion/output_folder.h"
+#include "pipeline/output/output_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

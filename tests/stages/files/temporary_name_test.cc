@@ -1,4 +1,4 @@
-#include "stages/shards/temporary_name.h"
+#include "stages/files/temporary_name.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stages/shards/temporary_name.h"
+#include "stages/files/temporary_name.h"
 
 namespace eventgan {
 namespace {

@@ -1,12 +1,12 @@
-#include "stages/shards/stale_temporaries.h"
+#include "stages/files/stale_temporaries.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include "stages/shards/temporary_name.h"
-#include "tests/stages/shards/full_disk.h"
+#include "stages/files/temporary_name.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,4 +1,4 @@
-#include "tests/stages/shards/full_disk.h"
+#include "tests/testing/full_disk.h"
 
 #include <signal.h>
 #include <sys/resource.h>

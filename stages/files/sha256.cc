@@ -1,4 +1,4 @@
-#include "stages/shards/sha256.h"
+#include "stages/files/sha256.h"
 
 #include <openssl/evp.h>
 

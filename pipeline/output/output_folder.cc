@@ -1,4 +1,4 @@
-#include "pipeline/conversion/output_folder.h"
+#include "pipeline/output/output_folder.h"
 
 #include <fstream>
 #include <iterator>
@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "manifests/faults.h"
-#include "stages/shards/atomic_file.h"
-#include "stages/shards/sha256.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
 
 namespace eventgan {
 namespace {

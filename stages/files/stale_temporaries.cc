@@ -1,4 +1,4 @@
-#include "stages/shards/stale_temporaries.h"
+#include "stages/files/stale_temporaries.h"
 
 #include <signal.h>
 
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "stages/shards/temporary_name.h"
+#include "stages/files/temporary_name.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,4 @@
-#include "stages/shards/atomic_file.h"
+#include "stages/files/atomic_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "tests/stages/shards/full_disk.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
