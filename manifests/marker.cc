@@ -11,7 +11,8 @@ namespace eventgan {
 namespace {
 
 constexpr char kFormat[] = "eventgan-marker";
-constexpr int kVersion = 1;
+constexpr int kVersion = 2;
+constexpr int kMostGap = 6;
 constexpr double kMostSeconds = 1e12;
 
 bool is_shard_name(std::string_view name) {
@@ -40,6 +41,57 @@ std::vector<QuarantinedSample> read_quarantined(const StrictValue& value, int sa
   return quarantined;
 }
 
+/// Numbers of rows, one for each sample.
+std::vector<std::int32_t> read_row_counts(const StrictValue& value, int samples,
+                                          const FaultList& faults) {
+  std::vector<std::int32_t> counts;
+  for (const StrictValue& element : value.elements())
+    counts.push_back(element.integer<std::int32_t>(0, INT32_MAX));
+  if (faults.empty() && std::ssize(counts) != samples) {
+    value.fault("an array of " + std::to_string(samples) + " (a number for each sample)");
+  }
+  return counts;
+}
+
+std::map<int, std::int64_t> read_gaps(const StrictValue& value, int samples) {
+  std::map<int, std::int64_t> gaps;
+  for (const StrictValue& element : value.elements()) {
+    StrictObject object = element.object();
+    const StrictValue gap = object.at("gap");
+    const auto number = gap.sound_integer(1, kMostGap);
+    if (number && !gaps.empty() && *number <= gaps.rbegin()->first) {
+      gap.fault("gaps in ascending order");
+    }
+    const int count = object.at("samples").integer(1, std::max(samples, 1));
+    if (number) gaps[static_cast<int>(*number)] = count;
+    object.finish();
+  }
+  return gaps;
+}
+
+void require_seconds(double seconds, const std::string& of) {
+  if (seconds >= 0 && seconds <= kMostSeconds) return;  // false for NaN
+  throw std::invalid_argument("expected seconds of 0 or more, got " + std::to_string(seconds) +
+                              ", for " + of);
+}
+
+/// Canonical JSON of a marker: two-space indent, except that an array of numbers stands on one
+/// line, however long it is. A reason may quote a path, and paths need not be UTF-8, but JSON must
+/// be.
+std::string indented(const nlohmann::json& object) {
+  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
+  std::string text = "{";
+  for (const auto& [key, value] : object.items()) {
+    const bool on_one_line = value.is_array() && !value.empty() && value[0].is_number();
+    text += (text.size() == 1 ? "\n  " : ",\n  ") + nlohmann::json(key).dump() + ": ";
+    for (const char c : value.dump(on_one_line ? -1 : 2, ' ', false, kReplace)) {
+      text += c;
+      if (c == '\n') text += "  ";  // within a string it would be written as \n
+    }
+  }
+  return text + "\n}\n";
+}
+
 ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
   constexpr int kMostSamples = 65536;
   ShardMarker marker;
@@ -53,9 +105,19 @@ ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
   const StrictValue valid = object.at("valid");
   marker.valid = valid.integer(0, marker.samples);
   marker.quarantined = read_quarantined(object.at("quarantined"), marker.samples);
+  marker.boxes = read_row_counts(object.at("boxes"), marker.samples, faults);
+  marker.persons = read_row_counts(object.at("persons"), marker.samples, faults);
+  for (const auto& [name, boxes] : object.at("classes").members()) {
+    marker.classes[name] = boxes.integer<std::int64_t>(1, INT64_MAX);
+  }
+  marker.gaps = read_gaps(object.at("gaps"), marker.samples);
+  for (const StrictValue& column : object.at("optional_columns").elements()) {
+    marker.optional_columns.push_back(column.text());
+  }
   for (const auto& [stage, seconds] : object.at("stage_seconds").members()) {
     marker.stage_seconds[stage] = seconds.number(0, kMostSeconds);
   }
+  marker.wall_seconds = object.at("wall_seconds").number(0, kMostSeconds);
   object.finish();
   // A slot is either good or accounted for. Only worth saying if the numbers themselves are sound.
   const auto lost = static_cast<int>(marker.quarantined.size());
@@ -73,19 +135,30 @@ std::string to_json(const ShardMarker& marker) {
     quarantined.push_back(
         {{"slot", sample.slot}, {"sample_id", sample.sample_id}, {"reason", sample.reason}});
   }
-  for (const auto& [stage, seconds] : marker.stage_seconds) {
-    if (seconds >= 0 && seconds <= kMostSeconds) continue;  // false for NaN
-    throw std::invalid_argument("expected seconds of 0 or more, got " + std::to_string(seconds) +
-                                ", for stage " + stage);
+  nlohmann::json gaps = nlohmann::json::array();
+  for (const auto& [gap, samples] : marker.gaps) {
+    gaps.push_back({{"gap", gap}, {"samples", samples}});
   }
-  const nlohmann::json json = {
-      {"format", kFormat},          {"version", kVersion},
-      {"shard", marker.shard},      {"plan_hash", marker.plan_hash},
-      {"sha256", marker.sha256},    {"size_bytes", marker.size_bytes},
-      {"samples", marker.samples},  {"valid", marker.valid},
-      {"quarantined", quarantined}, {"stage_seconds", marker.stage_seconds}};
-  // A reason may quote a path, and paths need not be UTF-8, but JSON must be.
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  for (const auto& [stage, seconds] : marker.stage_seconds) {
+    require_seconds(seconds, "stage " + stage);
+  }
+  require_seconds(marker.wall_seconds, "wall_seconds");
+  return indented({{"format", kFormat},
+                   {"version", kVersion},
+                   {"shard", marker.shard},
+                   {"plan_hash", marker.plan_hash},
+                   {"sha256", marker.sha256},
+                   {"size_bytes", marker.size_bytes},
+                   {"samples", marker.samples},
+                   {"valid", marker.valid},
+                   {"quarantined", quarantined},
+                   {"boxes", marker.boxes},
+                   {"persons", marker.persons},
+                   {"classes", marker.classes},
+                   {"gaps", gaps},
+                   {"optional_columns", marker.optional_columns},
+                   {"stage_seconds", marker.stage_seconds},
+                   {"wall_seconds", marker.wall_seconds}});
 }
 
 ShardMarker parse_marker(std::string_view text, const std::string& name) {

@@ -27,11 +27,20 @@ struct ShardMarker {
   int samples = 0;
   int valid = 0;
   std::vector<QuarantinedSample> quarantined;
+  /// Rows of /labels/boxes and /labels/poses by slot, quarantined samples included: with these the
+  /// whole dataset's offsets follow from the markers alone.
+  std::vector<std::int32_t> boxes;
+  std::vector<std::int32_t> persons;
+  std::map<std::string, std::int64_t> classes;  ///< boxes by class name; only names that occur
+  std::map<int, std::int64_t> gaps;             ///< samples by gap in frames
+  std::vector<std::string> optional_columns;    ///< paths of the optional columns the shard has
   std::map<std::string, double> stage_seconds;  ///< busy time by stage
+  double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
   bool operator==(const ShardMarker&) const = default;
 };
 
-/// Canonical JSON (sorted keys, two-space indent, newline at the end).
+/// Canonical JSON (sorted keys, two-space indent but an array of numbers on one line, newline at
+/// the end). Throws std::invalid_argument for seconds that are negative or no number.
 std::string to_json(const ShardMarker& marker);
 
 /// Throws std::runtime_error listing every fault ("PATH: $.key: expected X, got Y"); strict as

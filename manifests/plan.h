@@ -1,6 +1,8 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <iosfwd>
 #include <map>
 #include <string>
 #include <string_view>
@@ -57,10 +59,17 @@ struct Plan {
 };
 
 /// Canonical JSON: sorted keys, no spaces but a line a sample, newline at the end. Its SHA-256 is
-/// the plan's hash.
+/// the plan's hash. Goes to `sink` in pieces of about 64 KiB, since a plan of a million pairs is
+/// hundreds of megabytes long. Throws std::runtime_error for names that are not UTF-8, after some
+/// pieces perhaps; passes on what `sink` throws.
+void write_plan(const Plan& plan, const std::function<void(std::string_view)>& sink);
 std::string to_json(const Plan& plan);
 
-/// Throws std::runtime_error listing every fault, as parse_marker does.
+/// Reads what write_plan has written, line by line, so that no more than a line stands in memory
+/// beside the plan. Any other layout is damage, even of the same JSON. Throws std::runtime_error
+/// for the first line that is damaged, with all of its faults: "NAME:LINE: $.key: expected X, got
+/// Y".
+Plan read_plan(std::istream& stream, const std::string& name);
 Plan parse_plan(std::string_view text, const std::string& name);
 
 /// Lines "FIELD: expected X, got Y" for each fingerprint field that differs; empty if none does.

@@ -44,6 +44,8 @@ int main(int argc, char** argv) {
   int exit_code = eventgan::kFailed;
   eventgan::add_convert_command(app, exit_code);
   eventgan::add_plan_command(app, exit_code);
+  eventgan::add_status_command(app, exit_code);
+  eventgan::add_finalize_command(app, exit_code);
   eventgan::add_verify_command(app, exit_code);
   eventgan::add_inspect_command(app, exit_code);
   eventgan::add_preview_command(app, exit_code);

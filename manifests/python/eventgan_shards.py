@@ -2,7 +2,7 @@
 
     from eventgan_shards import Shards
 
-    shards = Shards("out")                  # a folder, a shard, or a list of shards
+    shards = Shards("out", split="train")   # a folder (finalized or not), a shard, or a list of shards
     for sample in shards:
         sample["volume"]                    # float32 [2B, H, W], >= 0
         sample["boxes"]["xyxy"]             # float64 [boxes, 4], volume pixels
@@ -22,6 +22,9 @@ import numpy as np
 
 FORMAT = "eventgan-shard"
 FORMAT_VERSION = 1
+DESCRIPTION = "dataset.json"
+DESCRIPTION_FORMAT = "eventgan-dataset"
+DESCRIPTION_VERSION = 1
 _OPEN_FILES = 8
 
 
@@ -30,24 +33,34 @@ class InvalidSample(ValueError):
 
 
 class Shards:
-    """A sequence of the samples of one or more shards, in the order of the shards' names and slots.
+    """A sequence of the samples of one or more shards, in the order of the shards and their slots.
 
-    paths: a folder (all of its shards that are done, so those with a marker), one shard, or a list of shards.
+    paths: a folder, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
+        shards that its dataset.json lists, in the order of the plan: then no shard is opened before it is read,
+        and a shard that is gone or another one by now is a ValueError. Of any other folder all shards that are
+        done, so those with a marker, by name.
+    split: only the shards of this split ("train"...); none is a ValueError. None: of all.
     invalid: what to do about quarantined samples. "skip": they are not part of the sequence. "raise": they
         are, and reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False.
 
     Files are opened when they are needed, anew in every process, so that an object can be handed to the
-    workers of a data loader. One object must not be used by several threads at a time.
+    workers of a data loader; at most eight stay open, however many shards there are. One object must not be
+    used by several threads at a time.
     """
 
-    def __init__(self, paths, invalid="skip"):
+    def __init__(self, paths, invalid="skip", split=None):
         if invalid not in ("skip", "raise", "keep"):
             raise ValueError(f"expected invalid to be skip, raise or keep, got {invalid!r}")
         self._invalid = invalid
         self._files = collections.OrderedDict()
         self._process = os.getpid()
-        self.paths = _shard_paths(paths)
-        self._slots = [self._read_slots(path) for path in self.paths]
+        shards = _find_shards(paths)
+        if split is not None:
+            shards = [shard for shard in shards if (shard.split or self._file(shard.path).attrs["split"]) == split]
+            if not shards:
+                raise ValueError(f"expected shards of split {split!r}, got none, in {paths}")
+        self.paths = [shard.path for shard in shards]
+        self._slots = [self._read_slots(shard) for shard in shards]
         self._ends = np.cumsum([len(slots) for slots in self._slots]).tolist()
 
     def __len__(self):
@@ -81,8 +94,8 @@ class Shards:
     def _path_of(self, index):
         return self.paths[bisect.bisect_right(self._ends, index % len(self))]
 
-    def _read_slots(self, path):
-        valid = self._file(path)["valid"][:]
+    def _read_slots(self, shard):
+        valid = self._file(shard.path)["valid"][:] if shard.valid is None else shard.valid
         return np.flatnonzero(valid) if self._invalid == "skip" else np.arange(len(valid))
 
     def _file(self, path):
@@ -157,13 +170,58 @@ def _reason(path, slot):
     return f"sample {slot} of {path} is {reason}"
 
 
-def _shard_paths(paths):
-    if isinstance(paths, (str, os.PathLike)):
-        paths = pathlib.Path(paths)
-        if not paths.is_dir():
-            return [paths]
-        return sorted(path for path in paths.glob("*.h5") if _is_done(path))
-    return [pathlib.Path(path) for path in paths]
+_Shard = collections.namedtuple("_Shard", "path split valid", defaults=(None, None))  # None: look into the file
+
+
+def _find_shards(paths):
+    if not isinstance(paths, (str, os.PathLike)):
+        return [_Shard(pathlib.Path(path)) for path in paths]
+    paths = pathlib.Path(paths)
+    if not paths.is_dir():
+        return [_Shard(paths)]
+    if (paths / DESCRIPTION).exists():
+        return _described_shards(paths)
+    return [_Shard(path) for path in sorted(paths.glob("*.h5")) if _is_done(path)]
+
+
+def read_description(folder):
+    """dataset.json of a finalized folder, as a dictionary. Raises ValueError if it is of no known version."""
+    path = pathlib.Path(folder, DESCRIPTION)
+    description = json.loads(path.read_text(encoding="utf-8"))
+    found = description.get("format"), description.get("version")
+    if found != (DESCRIPTION_FORMAT, DESCRIPTION_VERSION):
+        raise ValueError(f"expected {DESCRIPTION_FORMAT} {DESCRIPTION_VERSION}, got {found[0]} {found[1]}, in {path}")
+    return description
+
+
+def _described_shards(folder):
+    description = read_description(folder)
+    shards = []
+    for entry in description["shards"]:
+        path = folder / entry["name"]
+        if not _is_same(path, entry):
+            raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
+                             "(eventgan convert and eventgan finalize put it right)")
+        shards.append(_Shard(path, entry["split"], np.ones(entry["samples"], bool)))
+    valid = {shard.path.name: shard.valid for shard in shards}
+    for sample in description["quarantined"]:
+        valid[sample["shard"]][sample["slot"]] = False
+    return shards
+
+
+def _is_same(path, entry):
+    """Whether the shard is the one that was described: by its size, and by its marker if that came along."""
+    try:
+        if path.stat().st_size != entry["size_bytes"]:
+            return False
+    except OSError:
+        return False
+    try:
+        return json.loads(_marker(path).read_text(encoding="utf-8"))["sha256"] == entry["sha256"]
+    except FileNotFoundError:
+        return True
+    except (OSError, ValueError, KeyError):
+        return False
 
 
 def _is_done(path):

@@ -41,6 +41,9 @@ class StrictValue {
   /// The document as a whole; its path is `$`.
   StrictValue(const nlohmann::json& document, FaultList& faults);
 
+  /// A part of a document that was parsed apart, and its path in the document.
+  StrictValue(const nlohmann::json& part, std::string path, FaultList& faults);
+
   /// A whole number in lowest..highest.
   template <std::signed_integral T>
   T integer(T lowest, T highest) const {

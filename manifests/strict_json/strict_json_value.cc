@@ -26,7 +26,10 @@ std::string shortest(double value) {
 }  // namespace
 
 StrictValue::StrictValue(const Json& document, FaultList& faults)
-    : StrictValue(&document, State::kPresent, "$", faults) {}
+    : StrictValue(document, "$", faults) {}
+
+StrictValue::StrictValue(const Json& part, std::string path, FaultList& faults)
+    : StrictValue(&part, State::kPresent, std::move(path), faults) {}
 
 StrictValue::StrictValue(const Json* node, State state, std::string path, FaultList& faults)
     : node_(node), state_(state), path_(std::move(path)), faults_(&faults) {}

@@ -10,6 +10,8 @@ namespace eventgan {
 /// leave it as exceptions (see error_text.h).
 void add_convert_command(CLI::App& app, int& exit_code);
 void add_plan_command(CLI::App& app, int& exit_code);
+void add_status_command(CLI::App& app, int& exit_code);
+void add_finalize_command(CLI::App& app, int& exit_code);
 void add_verify_command(CLI::App& app, int& exit_code);
 void add_inspect_command(CLI::App& app, int& exit_code);
 void add_preview_command(CLI::App& app, int& exit_code);

@@ -1,54 +1,86 @@
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <iostream>
 #include <memory>
 
+#include "manifests/error_limits.h"
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/job_options.h"
 #include "pipeline/commands/progress_option.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/conversion/load_generator.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/generation/load_generator.h"
+#include "pipeline/stopping/stop_signal.h"
 
 namespace eventgan {
 namespace {
 
-int run(const JobOptions& arguments) {
-  const JobManifest manifest = read_job_manifest(arguments.manifest);
-  const LoadedGenerator loaded = load_generator(manifest);
-  if (!loaded.warning.empty()) {
-    std::cerr << (arguments.as_json() ? warning_json(loaded.warning) : "warning: " + loaded.warning)
-              << std::endl;
-  }
+struct ConvertArguments {
+  JobOptions job;
+  std::optional<std::string> shards;
+  double grace_s = ConversionOptions().grace_s;
+};
 
-  ConversionOptions options;
-  options.output = arguments.output_folder();
-  options.threads = arguments.threads;
-  options.overwrite = arguments.overwrite;
-  options.make_progress = [&](std::int64_t total) {
-    return show_progress(arguments.progress, total);
-  };
-  const ConversionReport report =
-      convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  std::cout << (arguments.as_json() ? to_json(report) : to_text(report)) << std::flush;
+void warn(const JobOptions& job, const std::string& text) {
+  std::cerr << (job.as_json() ? warning_json(text) : "warning: " + text) << std::endl;
+}
+
+int judge(const ConversionReport& report, const ErrorSpec& errors) {
   if (report.too_many_faults) {
-    std::cerr << "error: expected at most " << manifest.errors.max_count
-              << " quarantined pairs and " << manifest.errors.max_fraction
-              << " of all (errors in the manifest), got " << report.quarantined.size() << " of "
-              << report.planned << std::endl;
+    std::cerr << "error: expected " << limits_text(errors) << ", got "
+              << report.quarantined_in_plan() << " of " << report.plan_pairs << std::endl;
     return kTooManyFaults;
   }
-  return report.complete() ? kComplete : kFailed;
+  if (report.complete()) return kComplete;
+  return report.stopped ? kStopped : kFailed;
+}
+
+int run(const ConvertArguments& arguments) {
+  const JobOptions& job = arguments.job;
+  const StopSignal signal;
+  const JobManifest manifest = read_job_manifest(job.manifest);
+  ConversionOptions options;
+  options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
+  options.grace_s = arguments.grace_s;
+  options.since_stop_request = [&] { return signal.seconds_since_request(); };
+  options.output = job.output_folder();
+  options.threads = job.threads;
+  options.overwrite = job.overwrite;
+  options.make_progress = [&](std::int64_t total) { return show_progress(job.progress, total); };
+  options.warn = [&](const std::string& text) { warn(job, text); };
+  options.note = [&](const std::string& text) {
+    std::cerr << (job.as_json() ? note_json(text) : text) << std::endl;
+  };
+  const LoadedGenerator loaded = load_generator(manifest);
+  if (!loaded.warning.empty()) warn(job, loaded.warning);
+  const ConversionReport report =
+      convert(manifest, *loaded.generator, loaded.weights_hash, options);
+  std::cout << (job.as_json() ? to_json(report) : to_text(report)) << std::flush;
+  return judge(report, manifest.errors);
 }
 
 }  // namespace
 
 void add_convert_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("convert", "Converts the frame pairs of a manifest into shards");
-  const auto arguments = std::make_shared<JobOptions>();
-  add_job_options(*command, *arguments, "The job (manifests/examples has some)",
+  auto* command = app.add_subcommand(
+      "convert",
+      "Converts the frame pairs of a manifest into shards; run again, it goes on where it was. "
+      "Several workers may share the folder. On SIGTERM, SIGINT or SIGUSR1 it finishes the shard "
+      "under way or drops it, and exits with 75");
+  const auto arguments = std::make_shared<ConvertArguments>();
+  add_job_options(*command, arguments->job, "The job (manifests/examples has some)",
                   "Discard what an earlier run left in the folder");
+  command
+      ->add_option("--shards", arguments->shards,
+                   "This worker's part of the plan: I/N (0 <= I < N) or all; default: what "
+                   "SHARD_INDEX, Slurm, Kubernetes or Open MPI says in the environment, else all")
+      ->option_text("I/N");
+  command
+      ->add_option("--grace", arguments->grace_s,
+                   "Seconds after a signal to finish the shard under way; default: 20")
+      ->check(CLI::Range(0.0, 1e9))
+      ->option_text("SECONDS");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -1,13 +1,18 @@
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
 
+#include "manifests/faults.h"
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/conversion/load_generator.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/generation/load_generator.h"
 #include "pipeline/inspection/plan_summary.h"
 #include "pipeline/inspection/trial.h"
+#include "pipeline/output/output_folder.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/threads/thread_count.h"
 
@@ -18,13 +23,44 @@ struct Arguments {
   std::string manifest;
   int threads = 0;
   bool json = false;
+  bool freeze = false;
+  std::optional<std::string> output;
 };
+
+/// What a script needs to know before it submits a job for each shard.
+void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen, bool as_json) {
+  if (as_json) {
+    const nlohmann::json json = {{"folder", folder.string()},
+                                 {"plan_hash", frozen.hash},
+                                 {"samples", frozen.plan.sample_count()},
+                                 {"shards", frozen.plan.shards.size()}};
+    std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+    return;
+  }
+  std::cout << "Frozen in " << (folder / "plan.json").string() << ": " << frozen.plan.sample_count()
+            << " samples in " << frozen.plan.shards.size() << " shards" << std::endl;
+}
+
+int freeze(const Arguments& arguments, const JobManifest& manifest, Plan plan) {
+  if (arguments.output && arguments.output->empty()) {  // a script's unset variable
+    throw UsageError("--output: expected a folder, got nothing");
+  }
+  const std::filesystem::path folder = arguments.output
+                                           ? std::filesystem::path(*arguments.output)
+                                           : resolve(manifest, manifest.output.directory);
+  std::filesystem::create_directories(folder);
+  const FrozenPlan frozen = freeze_plan(folder, std::move(plan));
+  record_manifest_folder(folder, manifest);
+  print_frozen(folder, frozen, arguments.json);
+  return kComplete;
+}
 
 int run(const Arguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
   if (!loaded.warning.empty()) std::cerr << "warning: " << loaded.warning << std::endl;
-  const PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description());
+  PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description());
+  if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);
   std::cout << (arguments.json ? plan_summary_json : plan_text)(manifest, job.plan, estimate,
@@ -38,7 +74,8 @@ int run(const Arguments& arguments) {
 void add_plan_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "plan",
-      "Tells what convert would do: pairs, what is missing, shards, size and time. Writes nothing");
+      "Tells what convert would do: pairs, what is missing, shards, size and time. Writes nothing, "
+      "except with --freeze");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("MANIFEST", arguments->manifest, "The job")->required();
   command
@@ -46,6 +83,14 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                    "Threads the estimate is for; default: all cores")
       ->check(CLI::Range(1, 4096));
   command->add_flag("--json", arguments->json, "Print JSON");
+  auto* freeze_flag = command->add_flag(
+      "--freeze", arguments->freeze,
+      "Freeze the plan in the output folder, as the first convert does, and tell its number of "
+      "shards; no trial is measured");
+  command
+      ->add_option("--output", arguments->output,
+                   "Folder to freeze the plan in, instead of the manifest's")
+      ->needs(freeze_flag);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -21,14 +21,38 @@ double ratio(const ConversionReport& report) {
   return report.stored_bytes == 0 ? 0.0 : double(report.volume_bytes) / double(report.stored_bytes);
 }
 
-}  // namespace
+/// "part 3 of 7 (--shards): " in front; nothing for the whole plan.
+std::string part_text(const ConversionReport& report) {
+  return report.shards_planned == report.plan_shards ? "" : report.part + ": ";
+}
 
-std::string to_text(const ConversionReport& report) {
+std::string shards_text(const ConversionReport& report) {
   std::string text =
       format("%lld of %lld pairs written, %zu quarantined, in %d of %d shards",
              static_cast<long long>(report.written), static_cast<long long>(report.planned),
              report.quarantined.size(), report.shards_done, report.shards_planned);
-  if (report.shards_done_before > 0) text += format(" (%d done before)", report.shards_done_before);
+  std::string how;
+  const auto add = [&](int count, const char* what) {
+    if (count > 0) how += (how.empty() ? "" : ", ") + std::to_string(count) + " done " + what;
+  };
+  add(report.shards_done_before, "before");
+  add(report.shards_done_by_others, "by others");
+  return how.empty() ? text : text + " (" + how + ")";
+}
+
+}  // namespace
+
+void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionReport& report) {
+  ++report.shards_done;
+  report.written += marker.valid;
+  report.stored_bytes += marker.size_bytes;
+  report.volume_bytes += volume_bytes;
+  report.quarantined.insert(report.quarantined.end(), marker.quarantined.begin(),
+                            marker.quarantined.end());
+}
+
+std::string to_text(const ConversionReport& report) {
+  std::string text = part_text(report) + shards_text(report);
   text += format("\n%.1f MB, volumes compressed %.1fx, %.1f s",
                  double(report.stored_bytes) / kMegabyte, ratio(report), report.wall_seconds);
   if (!report.stage_seconds.empty()) {
@@ -47,6 +71,7 @@ std::string to_text(const ConversionReport& report) {
     text +=
         format("\n... and %zu more (in the shards' markers)", report.quarantined.size() - listed);
   }
+  if (report.stopped) text += "\nstopped on request; the same command goes on from here";
   return text + "\n" + report.folder + "\n";
 }
 
@@ -57,6 +82,7 @@ std::string to_json(const ConversionReport& report) {
   }
   const nlohmann::json json = {{"event", "report"},
                                {"folder", report.folder},
+                               {"part", report.part},
                                {"planned", report.planned},
                                {"written", report.written},
                                {"quarantined", quarantined},
@@ -64,6 +90,14 @@ std::string to_json(const ConversionReport& report) {
                                {"shards_planned", report.shards_planned},
                                {"shards_done", report.shards_done},
                                {"shards_done_before", report.shards_done_before},
+                               {"shards_done_by_others", report.shards_done_by_others},
+                               {"damaged", report.damaged},
+                               {"lost", report.lost},
+                               {"plan_pairs", report.plan_pairs},
+                               {"plan_shards", report.plan_shards},
+                               {"quarantined_elsewhere", report.quarantined_elsewhere},
+                               {"stopped", report.stopped},
+                               {"complete", report.complete()},
                                {"stored_bytes", report.stored_bytes},
                                {"volume_bytes", report.volume_bytes},
                                {"compression_ratio", ratio(report)},

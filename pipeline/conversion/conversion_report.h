@@ -10,24 +10,41 @@
 
 namespace eventgan {
 
-/// What a run did, over all shards of the plan.
+/// What a run did. Pairs and shards are those of its part, unless a field says otherwise.
 struct ConversionReport {
   std::string folder;
+  std::string part = "all shards";  ///< to_text(ShardPart)
   std::int64_t planned = 0;
   std::int64_t written = 0;
   std::vector<QuarantinedSample> quarantined;
-  std::int64_t without_partner = 0;  ///< labelled frames whose sequence ends too early
   int shards_planned = 0;
-  int shards_done = 0;  ///< by this run and before it
-  int shards_done_before = 0;
-  std::int64_t stored_bytes = 0;  ///< size of the shards
-  std::int64_t volume_bytes = 0;  ///< size of their volumes uncompressed, in the stored type
+  int shards_done = 0;               ///< by this run, before it, and by others meanwhile
+  int shards_done_before = 0;        ///< when it started
+  int shards_done_by_others = 0;     ///< by other workers while it ran
+  std::vector<std::string> damaged;  ///< what was found committed and not whole, and made again
+  std::vector<std::string> lost;     ///< committed by this run or before it, and gone at its end
+  std::int64_t stored_bytes = 0;     ///< size of the shards
+  std::int64_t volume_bytes = 0;     ///< size of their volumes uncompressed, in the stored type
   std::map<std::string, double> stage_seconds;  ///< busy time by stage, of this run
   double wall_seconds = 0;
+  bool stopped = false;  ///< a request to stop came before the part was complete
+
+  std::int64_t plan_pairs = 0;  ///< of the whole plan
+  int plan_shards = 0;
+  std::int64_t without_partner = 0;        ///< labelled frames whose sequence ends too early
+  std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed
 
-  bool complete() const { return shards_done == shards_planned; }
+  /// The part is.
+  bool complete() const { return shards_done == shards_planned && lost.empty(); }
+  std::int64_t quarantined_in_plan() const {
+    return static_cast<std::int64_t>(quarantined.size()) + quarantined_elsewhere;
+  }
 };
+
+/// Counts a committed shard: its pairs, what is quarantined of them, its bytes. `volume_bytes` is
+/// the size of its volumes uncompressed.
+void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionReport& report);
 
 /// A few lines for a person; quarantined samples are listed up to a number, then counted.
 std::string to_text(const ConversionReport& report);

@@ -1,29 +1,36 @@
 #include "pipeline/conversion/convert.h"
 
-#include <algorithm>
 #include <chrono>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
+#include <vector>
 
+#include "manifests/error_limits.h"
 #include "manifests/faults.h"
-#include "pipeline/conversion/conversion_graph.h"
-#include "pipeline/conversion/sample_stages.h"
-#include "pipeline/conversion/shard_sink.h"
+#include "manifests/plan_outline.h"
+#include "pipeline/conversion/earlier_shards.h"
+#include "pipeline/conversion/part_of_plan.h"
+#include "pipeline/conversion/shard_maker.h"
 #include "pipeline/output/output_folder.h"
-#include "pipeline/planning/fingerprint.h"
+#include "pipeline/output/shard_backup.h"
+#include "pipeline/output/shard_state.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
-#include "stages/files/stale_temporaries.h"
 
 namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// Memory that samples under way may take together.
-constexpr std::size_t kInFlightBytes = std::size_t{1} << 30;
-/// A sample's volume stands in memory about this often while it is generated, finished and encoded.
-constexpr std::size_t kVolumeCopies = 3;
+void tell(const std::function<void(const std::string&)>& listener, const std::string& text) {
+  if (listener) listener(text);
+}
+
+bool stop_requested(const ConversionOptions& options) {
+  return options.since_stop_request && options.since_stop_request().has_value();
+}
 
 std::int64_t volume_bytes(const JobManifest& manifest, const PlannedShard& shard) {
   const VolumeShape shape{manifest.volume.bins, shard.volume_size};
@@ -31,90 +38,110 @@ std::int64_t volume_bytes(const JobManifest& manifest, const PlannedShard& shard
                                    stored_size(manifest.output.dtype));
 }
 
-ShardHeader make_header(const JobManifest& manifest, const PlannedJob& job,
-                        const PlannedShard& shard, const FrozenPlan& frozen,
-                        const std::string& weights_hash, const std::string& generator) {
-  const auto source = static_cast<std::size_t>(shard.source);
-  ShardHeader header;
-  header.name = shard.name;
-  header.dataset = to_string(manifest.sources[source].dataset);
-  header.split = manifest.sources[source].split;
-  header.sample_count = static_cast<int>(shard.samples.size());
-  header.volume = {manifest.volume.bins, shard.volume_size};
-  header.dtype = manifest.output.dtype;
-  header.deflate_level = manifest.output.deflate_level;
-  header.normalization = manifest.volume.normalize;
-  header.unit = manifest.generator.kind == GeneratorKind::kNetwork ? VolumeUnit::kLearned
-                                                                   : VolumeUnit::kEvents;
-  header.label_schema = job.datasets[source]->label_schema();
-  header.preprocessing = preprocessing_json(manifest.image);
-  header.plan_hash = frozen.hash;
-  header.manifest_text = frozen.plan.manifest_text;
-  header.weights_hash = weights_hash;
-  header.generator = generator;
-  header.program_version = program_version();
-  return header;
+/// A folder in which all is well is not touched.
+void record_place(const fs::path& folder, const JobManifest& manifest,
+                  const ConversionOptions& options) {
+  if (recorded_manifest_folder(folder) == manifest.directory) return;
+  const fs::path record = folder / "run.json";
+  if (fs::exists(record)) {
+    tell(options.note, record.string() + ": the manifest is now in " + manifest.directory.string());
+  }
+  record_manifest_folder(folder, manifest);
 }
 
-/// The report before anything is made, with what earlier runs have done; `left` gets the shards
-/// they have not.
-ConversionReport earlier_runs(const fs::path& folder, const JobManifest& manifest,
-                              const FrozenPlan& frozen, std::vector<const PlannedShard*>& left) {
+/// Makes the folder ready and freezes the plan in it, or takes the one that is there.
+FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, Plan plan,
+                          const ConversionOptions& options) {
+  if (options.overwrite && options.part.count != 1) {
+    throw UsageError("expected --overwrite without parts, got " + options.part.origin +
+                     ": every worker would discard what the others have made");
+  }
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) {
+    throw std::runtime_error("cannot create " + folder.string() + ": " + error.message());
+  }
+  if (options.overwrite) discard_output(folder);
+  FrozenPlan frozen = freeze_plan(folder, std::move(plan));
+  restore_shards(folder, {outline_of(frozen.plan), frozen.hash});
+  record_place(folder, manifest, options);
+  return frozen;
+}
+
+/// Of a run that has not begun.
+ConversionReport empty_report(const fs::path& folder, const Plan& plan, const PartOfPlan& split,
+                              const ShardPart& part) {
   ConversionReport report;
   report.folder = folder.string();
-  report.planned = frozen.plan.sample_count();
-  report.shards_planned = static_cast<int>(frozen.plan.shards.size());
-  for (const SourceSummary& source : frozen.plan.sources) {
-    report.without_partner += source.without_partner;
-  }
-  for (const PlannedShard& shard : frozen.plan.shards) {
-    const auto marker = done_marker(folder, shard, frozen.hash);
-    if (!marker) {
-      left.push_back(&shard);
-      continue;
-    }
-    ++report.shards_done_before;
-    report.written += marker->valid;
-    report.stored_bytes += marker->size_bytes;
-    report.volume_bytes += volume_bytes(manifest, shard);
-    report.quarantined.insert(report.quarantined.end(), marker->quarantined.begin(),
-                              marker->quarantined.end());
-  }
-  report.shards_done = report.shards_done_before;
+  report.plan_pairs = plan.sample_count();
+  report.plan_shards = static_cast<int>(plan.shards.size());
+  report.part = to_text(part, report.plan_shards);
+  report.planned = count_samples(split.part);
+  report.shards_planned = static_cast<int>(split.part.size());
+  for (const SourceSummary& source : plan.sources) report.without_partner += source.without_partner;
   return report;
 }
 
-/// Adds what this run made of `shards`, of which it has committed the first few.
-void add_run(ConversionReport& report, const JobManifest& manifest,
-             const std::vector<const PlannedShard*>& shards, const ShardSink& sink) {
-  report.written += sink.written();
-  for (std::size_t i = 0; i < sink.markers().size(); ++i) {
-    const ShardMarker& marker = sink.markers()[i];
-    ++report.shards_done;
-    report.stored_bytes += marker.size_bytes;
-    report.volume_bytes += volume_bytes(manifest, *shards[i]);
-    for (const auto& [stage, seconds] : marker.stage_seconds)
+void say_part(const ConversionReport& report, const ConversionOptions& options) {
+  if (report.shards_planned == report.plan_shards) return;
+  const std::string plan = " of the plan's " + std::to_string(report.plan_shards) + " shards";
+  tell(options.note, report.shards_planned == 0
+                         ? report.part + ": nothing to do, it has none" + plan
+                         : report.part + ": " + std::to_string(report.shards_planned) + plan +
+                               ", " + std::to_string(report.planned) + " pairs");
+}
+
+/// Checks what earlier runs left, and reports it.
+EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
+                        ConversionReport& report) {
+  const EarlierCheck check{job.threads, [&] { return stop_requested(job.options); },
+                           job.options.note};
+  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, split.part, check);
+  for (const std::string& fault : earlier.faults) {
+    tell(job.options.warn, fault + "; it is made again");
+  }
+  report.damaged = earlier.faults;
+  for (const CommittedShard& done : earlier.done) {
+    add_shard(done.marker, volume_bytes(job.manifest, *done.shard), report);
+  }
+  report.shards_done_before = report.shards_done;
+  // Where not even a plan of quarantined samples passes the limits, nobody needs to count.
+  if (beyond_limits(job.manifest.errors, report.plan_pairs, report.plan_pairs)) {
+    report.quarantined_elsewhere =
+        count_quarantined(job.folder, job.frozen, split.elsewhere, check);
+  }
+  return earlier;
+}
+
+void add_made(const ConversionJob& job, const ShardMaker& maker, ConversionReport& report) {
+  for (const CommittedShard& made : maker.made()) {
+    add_shard(made.marker, volume_bytes(job.manifest, *made.shard), report);
+    for (const auto& [stage, seconds] : made.marker.stage_seconds) {
       report.stage_seconds[stage] += seconds;
+    }
   }
-  report.quarantined.insert(report.quarantined.end(), sink.quarantined().begin(),
-                            sink.quarantined().end());
-  report.too_many_faults =
-      beyond_limits(manifest.errors, std::ssize(report.quarantined), report.planned);
+  for (const PlannedShard* shard : maker.done_by_others()) {
+    const ShardState state = shard_state(job.folder, outline_of(*shard), job.frozen.hash);
+    if (!state.done()) continue;  // the last look tells of it
+    ++report.shards_done_by_others;
+    add_shard(*state.marker, volume_bytes(job.manifest, *shard), report);
+  }
 }
 
-std::int64_t count_samples(const std::vector<const PlannedShard*>& shards) {
-  std::int64_t count = 0;
-  for (const PlannedShard* shard : shards) count += std::ssize(shard->samples);
-  return count;
-}
-
-std::size_t largest_sample_bytes(const Plan& plan, int bins) {
-  std::size_t largest = 1;
-  for (const PlannedShard& shard : plan.shards) {
-    const VolumeShape shape{bins, shard.volume_size};
-    largest = std::max(largest, kVolumeCopies * shape.value_count() * sizeof(float));
+/// A last look at the part, so that "complete" is what stands in the folder: beside this run
+/// another may have overwritten, or a person deleted, what was committed.
+void look_again(const ConversionJob& job, const PartOfPlan& split, ConversionReport& report) {
+  std::vector<ShardCondition> conditions(split.part.size());
+  for_each_index(split.part.size(), job.threads, [&](std::size_t i) {
+    conditions[i] = shard_state(job.folder, outline_of(*split.part[i]), job.frozen.hash).condition;
+  });
+  for (std::size_t i = 0; i < conditions.size(); ++i) {
+    if (conditions[i] == ShardCondition::kDone) continue;
+    report.lost.push_back((job.folder / split.part[i]->name).string() +
+                          ": expected the shard that was committed, got it " +
+                          to_string(conditions[i]));
+    tell(job.options.warn, report.lost.back() + "; run again");
   }
-  return largest;
 }
 
 }  // namespace
@@ -123,48 +150,23 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
-  const PlannedJob job = make_plan(manifest, weights_hash, generator.description());
-  fs::create_directories(folder);
-  remove_stale_temporaries(folder);
-  if (options.overwrite) discard_output(folder);
-  const FrozenPlan frozen = freeze_plan(folder, job.plan);
-  record_manifest_folder(folder, manifest);
+  PlannedJob planned = make_plan(manifest, weights_hash, generator.description(),
+                                 [&] { return stop_requested(options); });
+  const FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
+  const ConversionJob job{manifest,         options,   folder,       frozen,
+                          planned.datasets, generator, weights_hash, thread_count(options.threads)};
 
-  std::vector<const PlannedShard*> shards;
-  ConversionReport report = earlier_runs(folder, manifest, frozen, shards);
-  ShardSink sink(folder, frozen.hash, manifest.errors, report.planned,
-                 std::ssize(report.quarantined), [&](const PlannedShard& shard) {
-                   return make_header(manifest, job, shard, frozen, weights_hash,
-                                      generator.description());
-                 });
-  if (sink.stopped()) shards.clear();  // an earlier run has passed the limits
-
-  const int threads = thread_count(options.threads);
-  const GraphLimits limits{
-      threads, samples_in_flight(threads, largest_sample_bytes(frozen.plan, manifest.volume.bins),
-                                 kInFlightBytes)};
-  const SampleStages stages(manifest, job.datasets, generator, static_cast<int>(limits.in_flight));
-  const std::int64_t to_do = count_samples(shards);
-  const std::unique_ptr<Progress> progress =
-      options.make_progress && to_do > 0 ? options.make_progress(to_do) : nullptr;
-  const std::size_t arrived =
-      run_conversion_graph(shards,
-                           {[&](SampleMessage& message) { stages.read(message); },
-                            [&](SampleMessage& message) { stages.generate(message); },
-                            [&](SampleMessage& message) { stages.finish(message); },
-                            [&](SampleMessage& message) {
-                              sink.accept(message);
-                              if (progress)
-                                progress->advance(message.failed(), std::ssize(message.chunk));
-                              return !sink.stopped();
-                            }},
-                           limits);
-  if (!sink.stopped() && std::cmp_not_equal(arrived, to_do)) {
-    throw std::logic_error("expected " + std::to_string(to_do) + " samples at the writer, got " +
-                           std::to_string(arrived));
-  }
-  if (progress) progress->finish();
-  add_run(report, manifest, shards, sink);
+  const PartOfPlan split = split_plan(frozen.plan, options.part);
+  ConversionReport report = empty_report(folder, frozen.plan, split, options.part);
+  say_part(report, options);
+  EarlierShards earlier = look_back(job, split, report);
+  ShardMaker maker(job, std::move(earlier), report.quarantined_in_plan());
+  maker.make();
+  add_made(job, maker, report);
+  report.too_many_faults =
+      beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);
+  report.stopped = stop_requested(options) && !report.complete();
+  if (!report.stopped && !report.too_many_faults) look_again(job, split, report);
   report.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;

@@ -1,7 +1,8 @@
 #include "pipeline/conversion/shard_sink.h"
 
-#include <chrono>
+#include <utility>
 
+#include "manifests/error_limits.h"
 #include "manifests/faults.h"
 #include "stages/files/atomic_file.h"
 
@@ -12,65 +13,91 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-}  // namespace
-
-bool beyond_limits(const ErrorSpec& errors, std::int64_t quarantined, std::int64_t planned) {
-  if (errors.policy == ErrorPolicy::kFail) return quarantined > 0;
-  return quarantined > errors.max_count ||
-         static_cast<double>(quarantined) > errors.max_fraction * static_cast<double>(planned);
+double& write_seconds(ShardMarker& marker) {
+  return marker.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]];
 }
 
-ShardSink::ShardSink(std::filesystem::path folder, std::string plan_hash, const ErrorSpec& errors,
-                     std::int64_t planned, std::int64_t quarantined_before,
-                     std::function<ShardHeader(const PlannedShard&)> header_of)
-    : folder_(std::move(folder)),
-      plan_hash_(std::move(plan_hash)),
-      errors_(errors),
-      planned_(planned),
-      quarantined_before_(quarantined_before),
-      header_of_(std::move(header_of)),
-      stopped_(beyond_limits(errors, quarantined_before, planned)) {}
+}  // namespace
 
-void ShardSink::accept(SampleMessage& message) {
-  if (stopped_) return;
+ShardSink::ShardSink(SinkSetup setup, ShardPace& pace)
+    : setup_(std::move(setup)),
+      pace_(pace),
+      committed_at_(std::chrono::steady_clock::now()),
+      quarantined_(setup_.quarantined_before),
+      closed_(beyond_limits(setup_.errors, quarantined_, setup_.planned)) {}
+
+bool ShardSink::accept(SampleMessage& message) {
+  if (!obey()) return false;
   const auto start = std::chrono::steady_clock::now();
   const PlannedShard& shard = *message.shard;
-  if (message.failed() && errors_.policy == ErrorPolicy::kFail) {
+  if (message.failed() && setup_.errors.policy == ErrorPolicy::kFail) {
     throw TooManyFaults("errors.policy is \"fail\": " + message.sample.fault);
   }
-  if (!writer_) {
-    writer_ = std::make_unique<ShardWriter>(folder_, header_of_(shard));
-    marker_ = {shard.name, plan_hash_, "", 0, 0, 0, {}, {}};
-  }
+  if (!writer_) open(shard);
   writer_->append(message.sample, message.chunk);
   ++marker_.samples;
   if (message.failed()) {
     marker_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
-    quarantined_.push_back(marker_.quarantined.back());
   } else {
     ++marker_.valid;
-    ++written_;
   }
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
-  const bool last = marker_.samples == static_cast<int>(shard.samples.size());
-  marker_.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]] +=
-      seconds_since(start);
-  if (last) commit(shard);
+  write_seconds(marker_) += seconds_since(start);
+  pace_.take(std::ssize(message.chunk));
+  if (marker_.samples == static_cast<int>(shard.samples.size())) commit(shard);
+  return true;
+}
+
+void ShardSink::abandon() {
+  writer_.reset();
+  pace_.close();
+}
+
+bool ShardSink::obey() {
+  if (closed_) return false;
+  const StopOrder order = setup_.order();
+  if (order == StopOrder::kAbort || (order == StopOrder::kFinishShard && !writer_)) {
+    abandon();
+    closed_ = true;
+  }
+  return !closed_;
+}
+
+void ShardSink::open(const PlannedShard& shard) {
+  writer_ = std::make_unique<ShardWriter>(setup_.folder, setup_.header_of(shard));
+  if (setup_.opened) setup_.opened(shard);
+  marker_ = {};
+  marker_.shard = shard.name;
+  marker_.plan_hash = setup_.plan_hash;
+  pace_.open(static_cast<int>(shard.samples.size()));
 }
 
 void ShardSink::commit(const PlannedShard& shard) {
   const auto start = std::chrono::steady_clock::now();
-  const ShardReceipt receipt = writer_->commit();
+  pace_.begin_commit();
+  ShardReceipt receipt;
+  try {
+    receipt = writer_->commit();
+  } catch (const UnfinishedShardLost&) {
+    if (!setup_.is_done || !setup_.is_done(shard)) throw;
+    abandon();
+    done_by_others_.push_back(&shard);
+    return;
+  }
   writer_.reset();
   marker_.sha256 = receipt.sha256;
   marker_.size_bytes = receipt.size_bytes;
-  marker_.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]] +=
-      seconds_since(start);
-  write_file_atomically(folder_ / marker_name(shard.name), to_json(marker_));
-  markers_.push_back(marker_);
-  stopped_ = beyond_limits(errors_, quarantined_before_ + std::ssize(quarantined_), planned_);
+  enter(std::move(receipt.contents), marker_);
+  write_seconds(marker_) += seconds_since(start);
+  marker_.wall_seconds = seconds_since(committed_at_);
+  write_file_atomically(setup_.folder / marker_name(shard.name), to_json(marker_));
+  pace_.close();
+  committed_at_ = std::chrono::steady_clock::now();
+  quarantined_ += std::ssize(marker_.quarantined);
+  committed_.push_back({&shard, std::move(marker_)});
+  closed_ = beyond_limits(setup_.errors, quarantined_, setup_.planned);
 }
 
 }  // namespace eventgan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -11,50 +12,64 @@
 #include "manifests/marker.h"
 #include "manifests/plan.h"
 #include "manifests/shard.h"
-#include "pipeline/conversion/sample_message.h"
+#include "pipeline/conversion/earlier_shards.h"
+#include "pipeline/samples/sample_message.h"
+#include "pipeline/stopping/shard_pace.h"
+#include "pipeline/stopping/stop_order.h"
 #include "stages/shards/shard_writer.h"
 
 namespace eventgan {
 
-/// True if so many of a plan's samples are quarantined that its error policy calls the run failed.
-bool beyond_limits(const ErrorSpec& errors, std::int64_t quarantined, std::int64_t planned);
+/// Where a sink writes, and whom it asks.
+struct SinkSetup {
+  std::filesystem::path folder;
+  std::string plan_hash;
+  ErrorSpec errors;
+  std::int64_t planned = 0;             ///< the whole plan's number of samples
+  std::int64_t quarantined_before = 0;  ///< in all shards of the plan that are done already
+  std::function<ShardHeader(const PlannedShard&)> header_of;
+  std::function<StopOrder()> order;                   ///< asked for every sample
+  std::function<void(const PlannedShard&)> opened{};  ///< told of each shard whose file is there
+  /// Whether another worker has committed the shard; asked if the file under way was lost.
+  std::function<bool(const PlannedShard&)> is_done{};
+};
 
 /// Takes finished samples in plan order, writes them into shards and commits each shard with its
 /// marker. Enforces the manifest's error policy: with "fail" the first fault throws TooManyFaults;
-/// with "quarantine" the shard in which the limits are passed is still committed, then `stopped()`
-/// turns true and what follows is ignored. Thread safety: one thread at a time.
+/// with "quarantine" the shard in which the limits are passed is still committed, then the sink is
+/// closed. It obeys the order: kFinishShard closes it when no shard is open, kAbort at once, and
+/// the file under way is deleted. A closed sink drops every sample. Thread safety: one thread at a
+/// time.
 class ShardSink {
  public:
-  /// `planned` is the whole plan's number of samples, `quarantined_before` those that shards done
-  /// earlier hold; `header_of` gives the header of a planned shard.
-  ShardSink(std::filesystem::path folder, std::string plan_hash, const ErrorSpec& errors,
-            std::int64_t planned, std::int64_t quarantined_before,
-            std::function<ShardHeader(const PlannedShard&)> header_of);
+  /// `pace` is told how it gets on; must outlive the sink.
+  ShardSink(SinkSetup setup, ShardPace& pace);
 
-  /// The next sample. Throws std::runtime_error if the disk fails.
-  void accept(SampleMessage& message);
+  /// The next sample; false if it was dropped. Throws std::runtime_error if the disk fails.
+  bool accept(SampleMessage& message);
 
-  bool stopped() const { return stopped_; }
-  std::int64_t written() const { return written_; }
-  const std::vector<QuarantinedSample>& quarantined() const { return quarantined_; }
-  const std::vector<ShardMarker>& markers() const { return markers_; }
+  /// Deletes the file under way, if any.
+  void abandon();
+
+  bool closed() const { return closed_; }
+  const std::vector<CommittedShard>& committed() const { return committed_; }
+  /// Shards whose file under way was lost, but which another worker has committed.
+  const std::vector<const PlannedShard*>& done_by_others() const { return done_by_others_; }
 
  private:
+  bool obey();
+  void open(const PlannedShard& shard);
   void commit(const PlannedShard& shard);
 
-  std::filesystem::path folder_;
-  std::string plan_hash_;
-  ErrorSpec errors_;
-  std::int64_t planned_;
-  std::int64_t quarantined_before_;
-  std::function<ShardHeader(const PlannedShard&)> header_of_;
-
+  SinkSetup setup_;
+  ShardPace& pace_;
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
   ShardMarker marker_;                   // of the shard under way
-  std::int64_t written_ = 0;
-  std::vector<QuarantinedSample> quarantined_;
-  std::vector<ShardMarker> markers_;
-  bool stopped_;
+  std::chrono::steady_clock::time_point committed_at_;
+  std::int64_t quarantined_;
+  std::vector<CommittedShard> committed_;
+  std::vector<const PlannedShard*> done_by_others_;
+  bool closed_;
 };
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include "manifests/faults.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/stopping/stopped.h"
 
 namespace eventgan {
 
@@ -19,6 +20,7 @@ int exit_code_of(const std::exception& error) {
   if (dynamic_cast<const UsageError*>(&error) != nullptr) return kUsage;
   if (dynamic_cast<const TooManyFaults*>(&error) != nullptr) return kTooManyFaults;
   if (dynamic_cast<const InputError*>(&error) != nullptr) return kInputMissing;
+  if (dynamic_cast<const Stopped*>(&error) != nullptr) return kStopped;
   return kFailed;
 }
 

@@ -10,7 +10,7 @@ namespace eventgan {
 std::string error_text(const std::exception& error);
 
 /// The exit code that stands for an exception: UsageError 64, TooManyFaults 65, InputError 66,
-/// else 1.
+/// Stopped 75, else 1.
 int exit_code_of(const std::exception& error);
 
 }  // namespace eventgan

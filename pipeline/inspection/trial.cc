@@ -4,7 +4,7 @@
 #include <numeric>
 #include <utility>
 
-#include "pipeline/conversion/sample_stages.h"
+#include "pipeline/samples/sample_stages.h"
 
 namespace eventgan {
 namespace {

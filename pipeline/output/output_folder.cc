@@ -1,13 +1,17 @@
 #include "pipeline/output/output_folder.h"
 
-#include <fstream>
-#include <iterator>
+#include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <system_error>
 
 #include "manifests/faults.h"
+#include "manifests/marker.h"
+#include "pipeline/output/amendments.h"
+#include "pipeline/output/hashed_file.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -17,84 +21,120 @@ namespace fs = std::filesystem;
 constexpr char kPlanName[] = "plan.json";
 constexpr char kRunName[] = "run.json";
 
-std::optional<std::string> read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) return std::nullopt;
-  return std::string{std::istreambuf_iterator<char>(stream), {}};
-}
-
-}  // namespace
-
-FrozenPlan read_frozen_plan(const fs::path& folder) {
+/// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
+template <class Frozen, class Read>
+Frozen read_plan_file(const fs::path& folder, const Read& read) {
   const fs::path file = folder / kPlanName;
-  const std::optional<std::string> text = read_text(file);
-  if (!text) {
+  HashedFile hashed(file);
+  if (!hashed.is_open()) {
     throw InputError("expected a folder that eventgan convert has written, got no " +
                      file.string());
   }
   try {
-    return {parse_plan(*text, file.string()), sha256_hex(*text)};
+    std::istream stream(&hashed);
+    stream.exceptions(std::ios::badbit);  // else an error of reading would pass for the end
+    auto plan = read(stream, file.string());
+    return {std::move(plan), hashed.hash_of_read()};
+  } catch (const std::system_error&) {
+    throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
   } catch (const std::runtime_error&) {
     std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
                                               file.string() + " (--overwrite starts again)"));
   }
 }
 
-FrozenPlan freeze_plan(const fs::path& folder, const Plan& plan) {
-  const std::string text = to_json(plan);
-  if (create_file_atomically(folder / kPlanName, text) || read_text(folder / kPlanName) == text) {
-    return {plan, sha256_hex(text)};
+std::string hash_of(const Plan& plan) {
+  Sha256 hash;
+  write_plan(plan, [&](std::string_view piece) { hash.update(piece); });
+  return hash.hex();
+}
+
+/// What to do about a fingerprint that differs: inputs that were mended ask for no new start, which
+/// would throw away what all other shards took.
+const char* way_out(const std::map<std::string, std::string>& frozen,
+                    std::map<std::string, std::string> now) {
+  for (const auto& [field, value] : frozen) {
+    if (is_amendable(field)) now[field] = value;
   }
-  FrozenPlan frozen = read_frozen_plan(folder);
-  const auto differences = fingerprint_differences(frozen.plan.fingerprint, plan.fingerprint);
-  if (differences.empty()) {
-    // The manifest may differ in what does not change bytes; nothing else may.
-    Plan same = plan;
-    same.manifest_text = frozen.plan.manifest_text;
-    if (sha256_hex(to_json(same)) == frozen.hash) return frozen;
-    throw UsageError(
-        "expected the plan that this manifest and these inputs give, got an altered one, in " +
-        (folder / kPlanName).string() + " (--overwrite starts again)");
-  }
-  std::string message =
-      (folder / kPlanName).string() +
-      " was frozen by a run that would have written other bytes (--overwrite starts again):";
+  return frozen == now ? " (if inputs were mended, `eventgan retry` takes them and keeps what is "
+                         "done; --overwrite starts again):"
+                       : " (--overwrite starts again):";
+}
+
+/// Throws UsageError with a line for each field that differs.
+void require_same_fingerprint(const fs::path& plan_file,
+                              const std::map<std::string, std::string>& frozen,
+                              const std::map<std::string, std::string>& now) {
+  const auto differences = fingerprint_differences(frozen, now);
+  if (differences.empty()) return;
+  std::string message = plan_file.string() +
+                        " was frozen by a run that would have written other bytes" +
+                        way_out(frozen, now);
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
 }
 
+}  // namespace
+
+FrozenPlan read_frozen_plan(const fs::path& folder) {
+  return read_plan_file<FrozenPlan>(folder, &read_plan);
+}
+
+FrozenOutline read_frozen_outline(const fs::path& folder) {
+  return read_plan_file<FrozenOutline>(folder, &read_plan_outline);
+}
+
+FrozenPlan freeze_plan(const fs::path& folder, Plan plan) {
+  const fs::path file = folder / kPlanName;
+  std::string hash;
+  const bool is_first = create_file_atomically(file, [&](const TextSink& sink) {
+    Sha256 hashed;
+    write_plan(plan, [&](std::string_view piece) {
+      hashed.update(piece);
+      sink(piece);
+    });
+    hash = hashed.hex();
+  });
+  if (is_first) return {std::move(plan), hash};
+  if (hash.empty()) hash = hash_of(plan);  // there was a plan from the start
+
+  const std::string frozen_hash = sha256_of_file(file);
+  const std::vector<Amendment> amendments = read_amendments(folder, frozen_hash);
+  if (amendments.empty() && hash == frozen_hash) return {std::move(plan), hash};
+
+  FrozenOutline frozen = read_frozen_outline(folder);
+  require_same_fingerprint(file, amended(frozen.plan.fingerprint, amendments), plan.fingerprint);
+  // Inputs that were mended since then may give other samples now (a hole that was filled): those
+  // that were frozen stay.
+  if (!amendments.empty()) {
+    plan = {};  // a large plan need not stand in memory twice
+    return read_frozen_plan(folder);
+  }
+  // The manifest may differ in what does not change bytes; nothing else may.
+  plan.manifest_text = std::move(frozen.plan.manifest_text);
+  if (hash_of(plan) == frozen.hash) return {std::move(plan), frozen.hash};
+  throw UsageError(
+      "expected the plan that this manifest and these inputs give, got an altered one, in " +
+      file.string() + " (--overwrite starts again)");
+}
+
 void discard_output(const fs::path& folder) {
-  const std::optional<std::string> text = read_text(folder / kPlanName);
-  if (!text) return;
-  std::vector<PlannedShard> shards;
+  if (!fs::exists(folder / kPlanName)) return;
+  std::vector<ShardOutline> shards;
   try {
-    shards = parse_plan(*text, kPlanName).shards;
+    shards = read_frozen_outline(folder).plan.shards;
   } catch (const std::runtime_error&) {
     // A damaged plan names no shards; those that are left are made anew, or reported by `verify`.
   }
-  for (const PlannedShard& shard : shards) {
-    // The marker first: without it the shard counts for nothing.
+  // What says that something is whole goes before what it says it of; the plan last, so that after
+  // an interruption the next run finds the rest.
+  for (const char* name : {"dataset.json", "dataset.h5"}) fs::remove(folder / name);
+  for (const ShardOutline& shard : shards) {
     fs::remove(folder / marker_name(shard.name));
     fs::remove(folder / shard.name);
   }
+  fs::remove(folder / "amendments.json");
   fs::remove(folder / kPlanName);
-}
-
-std::optional<ShardMarker> done_marker(const fs::path& folder, const PlannedShard& shard,
-                                       const std::string& plan_hash) {
-  const fs::path file = folder / marker_name(shard.name);
-  const std::optional<std::string> text = read_text(file);
-  if (!text) return std::nullopt;
-  try {
-    ShardMarker marker = parse_marker(*text, file.string());
-    std::error_code absent;
-    const auto size = fs::file_size(folder / shard.name, absent);
-    const bool done = !absent && marker.shard == shard.name && marker.plan_hash == plan_hash &&
-                      size == static_cast<std::uintmax_t>(marker.size_bytes);
-    return done ? std::optional(std::move(marker)) : std::nullopt;
-  } catch (const std::runtime_error&) {
-    return std::nullopt;  // a torn marker: the shard is made again
-  }
 }
 
 void record_manifest_folder(const fs::path& folder, const JobManifest& manifest) {
@@ -103,9 +143,13 @@ void record_manifest_folder(const fs::path& folder, const JobManifest& manifest)
 }
 
 std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
-  const std::optional<std::string> text = read_text(folder / kRunName);
-  if (!text) return std::nullopt;
-  const auto json = nlohmann::json::parse(*text, nullptr, /*allow_exceptions=*/false);
+  std::string text;
+  try {
+    text = read_text_file(folder / kRunName);
+  } catch (const std::runtime_error&) {  // there is none, as a rule
+    return std::nullopt;
+  }
+  const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
   if (!json.is_object() || !json.contains("manifest_folder")) return std::nullopt;
   const auto& value = json["manifest_folder"];
   return value.is_string() ? std::optional<fs::path>(value.get<std::string>()) : std::nullopt;

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "manifests/job_manifest.h"
-#include "manifests/marker.h"
 #include "manifests/plan.h"
+#include "manifests/plan_outline.h"
 
 namespace eventgan {
 
@@ -16,23 +16,28 @@ struct FrozenPlan {
   std::string hash;  ///< SHA-256 of plan.json, hex
 };
 
-/// Freezes `plan` as FOLDER/plan.json, created whole and only if absent. If a plan is there already
-/// (from an earlier run, or a process that was faster) it is taken, provided its fingerprint is the
-/// same. Throws UsageError listing the fields that differ otherwise.
-FrozenPlan freeze_plan(const std::filesystem::path& folder, const Plan& plan);
+/// The same without its samples: small and quick to read for any number of pairs.
+struct FrozenOutline {
+  PlanOutline plan;
+  std::string hash;  ///< SHA-256 of plan.json, hex
+};
+
+/// Freezes `plan` as FOLDER/plan.json, created whole and only if absent; written piece by piece, so
+/// that its text never stands in memory. If a plan is there already (from an earlier run, or a
+/// process that was faster) it is taken, provided its fingerprint, with the folder's amendments, is
+/// the same. Throws UsageError listing the fields that differ otherwise, or if the same fingerprint
+/// has another plan; std::runtime_error if the one that is there is damaged, or on an error of
+/// writing, after which there is no plan.json. Safe in several processes and threads at once.
+FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan);
 
 /// The plan of an output folder. Throws InputError if there is none, std::runtime_error if it is
 /// damaged.
 FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
+FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
 
-/// Deletes plan.json and every shard and marker it names; other files are left alone. Nothing
-/// happens without plan.json.
+/// Deletes plan.json, every shard and marker it names, and what was made from these (dataset.json,
+/// dataset.h5, amendments.json); other files are left alone. Nothing happens without plan.json.
 void discard_output(const std::filesystem::path& folder);
-
-/// The marker of a shard that is done: the marker parses, names the plan, and the file has its
-/// size. None if the shard is still to be made.
-std::optional<ShardMarker> done_marker(const std::filesystem::path& folder,
-                                       const PlannedShard& shard, const std::string& plan_hash);
 
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a
 /// convenience, not part of the plan.

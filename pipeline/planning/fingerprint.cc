@@ -5,9 +5,10 @@
 #include <libdeflate.h>
 #include <png.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
-#include <set>
+#include <string_view>
 
 #include "manifests/manifest_fields.h"
 #include "stages/files/sha256.h"
@@ -15,31 +16,46 @@
 namespace eventgan {
 namespace {
 
-std::string annotations_hash(const JobManifest& manifest, const std::vector<std::string>& files) {
-  std::string listing;
-  for (const std::string& path : std::set<std::string>(files.begin(), files.end())) {
-    const auto file = resolve(manifest, path);
-    const bool there = std::filesystem::is_regular_file(file);
-    listing += path + '\t' + (there ? sha256_of_file(file) : "absent") + '\n';
+/// SHA-256 of a listing "PATH\tSTATE\n", sorted, each path once. A million pairs name two million
+/// frames: neither copies of their paths nor the listing stand in memory.
+template <class State>
+std::string listing_hash(std::vector<std::string_view> paths, const State& state) {
+  std::ranges::sort(paths);
+  Sha256 hash;
+  std::string line;
+  for (std::size_t i = 0; i < paths.size(); ++i) {
+    if (i > 0 && paths[i] == paths[i - 1]) continue;
+    line.assign(paths[i]).append("\t").append(state(std::string(paths[i]))).append("\n");
+    hash.update(line);
   }
-  return sha256_hex(listing);
+  return hash.hex();
 }
 
-std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedShard>& shards) {
-  std::set<std::string> paths;
+std::string annotations_hash(const JobManifest& manifest, const std::vector<std::string>& files,
+                             const std::function<void()>& before_file) {
+  return listing_hash({files.begin(), files.end()}, [&](const std::string& path) {
+    before_file();
+    const auto file = resolve(manifest, path);
+    const bool there = std::filesystem::is_regular_file(file);
+    return there ? sha256_of_file(file) : "absent";
+  });
+}
+
+std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedShard>& shards,
+                        const std::function<void()>& before_file) {
+  std::vector<std::string_view> paths;
   for (const PlannedShard& shard : shards) {
     for (const PlannedSample& sample : shard.samples) {
-      paths.insert(sample.pair.previous.path);
-      paths.insert(sample.pair.next.path);
+      paths.push_back(sample.pair.previous.path);
+      paths.push_back(sample.pair.next.path);
     }
   }
-  std::string listing;
-  for (const std::string& path : paths) {
+  return listing_hash(std::move(paths), [&](const std::string& path) {
+    before_file();
     std::error_code absent;
     const auto size = std::filesystem::file_size(resolve(manifest, path), absent);
-    listing += path + '\t' + (absent ? "absent" : std::to_string(size)) + '\n';
-  }
-  return sha256_hex(listing);
+    return absent ? "absent" : std::to_string(size);
+  });
 }
 
 }  // namespace
@@ -72,12 +88,12 @@ std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSI
 std::map<std::string, std::string> make_fingerprint(
     const JobManifest& manifest, const std::vector<PlannedShard>& shards,
     const std::vector<std::string>& annotation_files, const std::string& weights_hash,
-    const std::string& engine) {
+    const std::string& engine, const std::function<void()>& before_file) {
   unsigned major = 0, minor = 0, release = 0;
   H5get_libversion(&major, &minor, &release);
   std::map<std::string, std::string> fingerprint = {
-      {"annotations", annotations_hash(manifest, annotation_files)},
-      {"frames", frames_hash(manifest, shards)},
+      {"annotations", annotations_hash(manifest, annotation_files, before_file)},
+      {"frames", frames_hash(manifest, shards, before_file)},
       {"weights", weights_hash},
       {"engine", engine},
       {"preprocessing", preprocessing_json(manifest.image)},

@@ -1,12 +1,13 @@
 #include "pipeline/planning/make_plan.h"
 
-#include <map>
+#include <unordered_map>
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/pair_choice.h"
 #include "pipeline/planning/shard_layout.h"
+#include "pipeline/stopping/stopped.h"
 #include "stages/frames/decoding/image_size_probe.h"
 #include "stages/frames/open_dataset.h"
 
@@ -36,60 +37,66 @@ class SizeProbe {
   }
 
   const JobManifest& manifest_;
-  std::map<std::string, ImageSize> sizes_;
+  std::unordered_map<std::string, ImageSize> sizes_;
 };
 
-SizedSamples plan_source(const JobManifest& manifest, int index, const Dataset& dataset,
-                         SourceSummary& summary) {
+SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset& dataset,
+                          SizeProbe& probe, ShardLayout& layout,
+                          const std::function<void()>& before_frame) {
   const SourceSpec& spec = manifest.sources[index];
-  SizedSamples planned{index, spec.split, {}, {}};
-  SizeProbe probe(manifest);
+  SourceSummary summary;
+  std::int64_t pairs = 0;
+  layout.begin_source(index, spec.split);
   for (const LabelledFrame& frame : dataset.labelled_frames()) {
+    before_frame();
     PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
     summary.without_partner += chosen.samples.empty() && spec.pairs.choose == PairChoice::kOne
                                    ? 1
                                    : static_cast<std::int64_t>(chosen.without_partner.size());
     if (!chosen.without_partner.empty()) summary.without_partner_ids.push_back(frame.sample_id);
     for (PlannedSample& sample : chosen.samples) {
+      ++pairs;
       ++summary.pairs_by_gap[sample.pair.gap_frames];
       summary.faults += !sample.fault.empty();
-      planned.volume_sizes.push_back(probe.volume_size(sample));
-      planned.samples.push_back(std::move(sample));
+      const ImageSize size = probe.volume_size(sample);
+      layout.add(std::move(sample), size);
     }
   }
   summary.labelled_frames = static_cast<std::int64_t>(dataset.labelled_frames().size());
   summary.notes = dataset.notes();
-  const auto pairs = static_cast<std::int64_t>(planned.samples.size());
   if (pairs < spec.pairs.min_pairs) {
     throw InputError("expected at least " + std::to_string(spec.pairs.min_pairs) +
                      " pairs (pairs.min_pairs), got " + std::to_string(pairs) + " of " +
                      std::to_string(summary.labelled_frames) + " labelled frames, in " + spec.root +
                      " ($.sources[" + std::to_string(index) + "])");
   }
-  return planned;
+  return summary;
 }
 
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine) {
+                     const std::string& engine, const std::function<bool()>& stop) {
+  const auto stop_if_asked = [&] {
+    if (stop && stop()) throw Stopped("stopped while planning; nothing was written: run again");
+  };
   PlannedJob job;
   job.plan.name = manifest.name;
   job.plan.manifest_text = manifest.text;
-  std::vector<SizedSamples> samples;
+  SizeProbe probe(manifest);
+  ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
   std::vector<std::string> annotation_files;
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
     const auto& dataset =
         job.datasets.emplace_back(open_dataset(manifest.sources[i], manifest.directory));
-    SourceSummary& summary = job.plan.sources.emplace_back();
-    samples.push_back(plan_source(manifest, static_cast<int>(i), *dataset, summary));
+    job.plan.sources.push_back(
+        plan_source(manifest, static_cast<int>(i), *dataset, probe, layout, stop_if_asked));
     const auto files = dataset->annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
   }
-  job.plan.shards =
-      lay_out_shards(manifest.name, std::move(samples), manifest.output.samples_per_shard);
-  job.plan.fingerprint =
-      make_fingerprint(manifest, job.plan.shards, annotation_files, weights_hash, engine);
+  job.plan.shards = layout.finish();
+  job.plan.fingerprint = make_fingerprint(manifest, job.plan.shards, annotation_files, weights_hash,
+                                          engine, stop_if_asked);
   return job;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
@@ -19,7 +20,10 @@ struct PlannedJob {
 /// Opens every source and decides everything that is random or depends on what is on disk. Freezes
 /// and writes nothing. Throws InputError if a source is missing or yields fewer pairs than its
 /// min_pairs.
+///
+/// A million frames on a network file system take minutes to look at: `stop` is asked for each, and
+/// if it says yes, Stopped is thrown. None: nobody asks.
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine);
+                     const std::string& engine, const std::function<bool()>& stop = {});
 
 }  // namespace eventgan

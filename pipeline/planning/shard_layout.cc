@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -14,62 +15,80 @@ std::string numbered(const std::string& prefix, std::size_t index, std::size_t c
   return prefix + text;
 }
 
-/// Samples of one size, by their place in the source.
-struct SizeGroup {
-  ImageSize size;
-  std::vector<std::size_t> samples;
-};
-
-/// Groups in the order of their first sample; samples of unknown size join the largest group.
-std::vector<SizeGroup> group_by_size(const std::vector<ImageSize>& sizes) {
-  std::vector<SizeGroup> groups;
-  std::map<std::pair<int, int>, std::size_t> index;
-  std::vector<std::size_t> unknown;
-  for (std::size_t i = 0; i < sizes.size(); ++i) {
-    if (sizes[i] == ImageSize{}) {
-      unknown.push_back(i);
-      continue;
-    }
-    const auto [entry, is_new] =
-        index.try_emplace({sizes[i].height, sizes[i].width}, groups.size());
-    if (is_new) groups.push_back({sizes[i], {}});
-    groups[entry->second].samples.push_back(i);
-  }
-  if (unknown.empty()) return groups;
-  if (groups.empty()) groups.push_back({ImageSize{1, 1}, {}});
-  auto& largest = std::max_element(groups.begin(), groups.end(), [](const auto& a, const auto& b) {
-                    return a.samples.size() < b.samples.size();
-                  })->samples;
-  const auto middle = static_cast<std::ptrdiff_t>(largest.size());
-  largest.insert(largest.end(), unknown.begin(), unknown.end());
-  std::inplace_merge(largest.begin(), largest.begin() + middle, largest.end());
-  return groups;
-}
-
 }  // namespace
 
-std::vector<PlannedShard> lay_out_shards(const std::string& name, std::vector<SizedSamples> sources,
-                                         int samples_per_shard) {
-  std::vector<PlannedShard> shards;
-  std::vector<std::string> splits;  // of each shard
-  for (SizedSamples& source : sources) {
-    for (const SizeGroup& group : group_by_size(source.volume_sizes)) {
-      for (std::size_t i = 0; i < group.samples.size(); ++i) {
-        if (i % static_cast<std::size_t>(samples_per_shard) == 0) {
-          shards.push_back({"", source.source, group.size, {}});
-          splits.push_back(source.split);
-        }
-        shards.back().samples.push_back(std::move(source.samples[group.samples[i]]));
-      }
-    }
-  }
+ShardLayout::ShardLayout(std::string name, int samples_per_shard)
+    : name_(std::move(name)), samples_per_shard_(static_cast<std::size_t>(samples_per_shard)) {}
+
+void ShardLayout::begin_source(int source, const std::string& split) {
+  end_source();
+  source_ = source;
+  split_ = split;
+}
+
+void ShardLayout::add(PlannedSample sample, ImageSize volume_size) {
+  append(volume_size == ImageSize{} ? unknown_ : group(volume_size), next_place_++,
+         std::move(sample));
+}
+
+std::vector<PlannedShard> ShardLayout::finish() {
+  end_source();
   std::map<std::string, std::size_t> totals;
-  for (const std::string& split : splits) ++totals[split];
+  for (const std::string& split : splits_) ++totals[split];
   std::map<std::string, std::size_t> next;
-  for (std::size_t i = 0; i < shards.size(); ++i) {
-    shards[i].name = numbered(name + "-" + splits[i], next[splits[i]]++, totals[splits[i]]);
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    shards_[i].name = numbered(name_ + "-" + splits_[i], next[splits_[i]]++, totals[splits_[i]]);
   }
-  return shards;
+  splits_.clear();
+  return std::exchange(shards_, {});
+}
+
+ShardLayout::Group& ShardLayout::group(ImageSize size) {
+  const auto [entry, is_new] = group_index_.try_emplace({size.height, size.width}, groups_.size());
+  if (is_new) groups_.push_back({size, {}, {}});
+  return groups_[entry->second];
+}
+
+void ShardLayout::append(Group& group, std::size_t place, PlannedSample sample) {
+  if (group.shards.empty() || group.shards.back().samples.size() == samples_per_shard_) {
+    group.shards.push_back({"", source_, group.size, {}});
+  }
+  group.shards.back().samples.push_back(std::move(sample));
+  group.places.push_back(place);
+}
+
+void ShardLayout::place_unknown() {
+  if (unknown_.places.empty()) return;
+  if (groups_.empty()) group({1, 1});
+  const auto count = [](const Group& group) { return group.places.size(); };
+  Group& largest = *std::ranges::max_element(groups_, {}, count);
+
+  using Placed = std::pair<std::size_t, PlannedSample>;
+  std::vector<Placed> merged;
+  const auto take = [&merged](Group& group) {
+    std::size_t taken = 0;
+    for (PlannedShard& shard : group.shards) {
+      for (PlannedSample& sample : shard.samples)
+        merged.emplace_back(group.places[taken++], std::move(sample));
+    }
+    group.shards.clear();
+    group.places.clear();
+  };
+  take(largest);
+  take(unknown_);
+  std::ranges::sort(merged, {}, &Placed::first);
+  for (Placed& placed : merged) append(largest, placed.first, std::move(placed.second));
+}
+
+void ShardLayout::end_source() {
+  place_unknown();
+  for (Group& group : groups_) {
+    std::ranges::move(group.shards, std::back_inserter(shards_));
+    splits_.resize(shards_.size(), split_);
+  }
+  groups_.clear();
+  group_index_.clear();
+  next_place_ = 0;
 }
 
 }  // namespace eventgan

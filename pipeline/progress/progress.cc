@@ -31,6 +31,11 @@ std::chrono::milliseconds interval(ProgressStyle style) {
   }
 }
 
+std::string event_json(const char* event, const std::string& text) {
+  const nlohmann::json json = {{"event", event}, {"text", text}};
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+
 }  // namespace
 
 std::string progress_line(const ProgressState& state) {
@@ -70,10 +75,9 @@ std::string progress_json(const ProgressState& state) {
   return json.dump();
 }
 
-std::string warning_json(const std::string& text) {
-  const nlohmann::json json = {{"event", "warning"}, {"text", text}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+std::string warning_json(const std::string& text) { return event_json("warning", text); }
+
+std::string note_json(const std::string& text) { return event_json("note", text); }
 
 Progress::Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
                    Clock clock, ProgressUnit unit)

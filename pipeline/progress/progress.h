@@ -46,6 +46,9 @@ std::string progress_json(const ProgressState& state);
 /// A warning as JSON: {"event": "warning", "text": ...}.
 std::string warning_json(const std::string& text);
 
+/// Something that is no warning, as JSON: {"event": "note", "text": ...}.
+std::string note_json(const std::string& text);
+
 /// Shows progress on a stream: a bar redrawn ten times a second, a plain line every 10 s, or a JSON
 /// line a second; each also at the end. Thread safety: one thread at a time.
 class Progress {
@@ -63,6 +66,9 @@ class Progress {
 
   /// One more is done.
   void advance(bool quarantined, std::int64_t bytes);
+
+  /// There is more or less to do than was thought.
+  void set_total(std::int64_t total) { state_.total = total; }
 
   /// Shows the last state and ends the line.
   void finish();

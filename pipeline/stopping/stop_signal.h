@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
 #include <csignal>
+#include <optional>
 
 namespace eventgan {
 
-/// While it lives, SIGINT and SIGTERM ask to stop instead of ending the process; a second one of
-/// the same kind ends it as usual. At most one at a time.
+/// While it lives, SIGINT, SIGTERM and SIGUSR1 (what schedulers send ahead of a time limit) ask to
+/// stop instead of ending the process. A second SIGINT ends it at once; further SIGTERM and SIGUSR1
+/// change nothing, since schedulers repeat them. At most one at a time.
 class StopSignal {
  public:
   StopSignal();
@@ -16,9 +19,11 @@ class StopSignal {
   /// Whether a signal has come. Thread safe.
   bool requested() const;
 
+  /// Seconds since the first one; none if none has come. Thread safe.
+  std::optional<double> seconds_since_request() const;
+
  private:
-  struct sigaction interrupt_before_ {};
-  struct sigaction terminate_before_ {};
+  std::array<struct sigaction, 3> before_{};
 };
 
 }  // namespace eventgan

@@ -44,7 +44,6 @@ class TemporaryFile {
 
   const fs::path& path() const { return path_; }
 
-  /// Writes, fsyncs and closes: network file systems report some errors only at the last step.
   void write(std::string_view text) {
     while (!text.empty()) {
       const ssize_t written = ::write(descriptor_, text.data(), text.size());
@@ -52,6 +51,10 @@ class TemporaryFile {
       if (written < 0) fail("cannot write " + path_.string());
       text.remove_prefix(static_cast<std::size_t>(written));
     }
+  }
+
+  /// Fsyncs and closes: network file systems report some errors of writing only here.
+  void finish() {
     if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) {
       fail("cannot write " + path_.string());
     }
@@ -112,13 +115,20 @@ void publish(const fs::path& temporary, const fs::path& target) {
 void write_file_atomically(const fs::path& target, std::string_view text) {
   TemporaryFile temporary(target);
   temporary.write(text);
+  temporary.finish();
   publish(temporary.path(), target);
 }
 
 bool create_file_atomically(const fs::path& target, std::string_view text) {
+  return create_file_atomically(target, [&](const TextSink& sink) { sink(text); });
+}
+
+bool create_file_atomically(const fs::path& target,
+                            const std::function<void(const TextSink&)>& write) {
   if (fs::exists(fs::symlink_status(target))) return false;
   TemporaryFile temporary(target);
-  temporary.write(text);
+  write([&](std::string_view text) { temporary.write(text); });
+  temporary.finish();
   if (!link_exclusively(temporary.path(), target)) return false;
   sync_to_disk(folder_of(target));
   return true;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -24,5 +25,13 @@ void write_file_atomically(const std::filesystem::path& target, std::string_view
 /// The same, but only if `target` does not exist; false (and nothing changed) if it does. Of two
 /// processes that race, one wins.
 bool create_file_atomically(const std::filesystem::path& target, std::string_view text);
+
+/// Takes a file's text piece by piece; pieces should be large.
+using TextSink = std::function<void(std::string_view)>;
+
+/// The same for a text that need not stand in memory: `write` is called with the sink to give it
+/// to, unless `target` exists already. What `write` throws is passed on, and nothing has changed.
+bool create_file_atomically(const std::filesystem::path& target,
+                            const std::function<void(const TextSink&)>& write);
 
 }  // namespace eventgan

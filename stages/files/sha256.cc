@@ -7,47 +7,65 @@
 #include <cstring>
 #include <fstream>
 #include <memory>
+#include <new>
 #include <stdexcept>
 #include <vector>
 
 namespace eventgan {
 namespace {
 
-class Digest {
- public:
-  Digest() {
-    if (!context_ || EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1) fail();
-  }
+using Context = std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)>;
 
-  void update(const void* bytes, std::size_t size) {
-    if (EVP_DigestUpdate(context_.get(), bytes, size) != 1) fail();
-  }
+Context new_context() {
+  Context context(EVP_MD_CTX_new(), &EVP_MD_CTX_free);
+  if (!context) throw std::bad_alloc();
+  return context;
+}
 
-  std::string hex() {
-    std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
-    unsigned size = 0;
-    if (EVP_DigestFinal_ex(context_.get(), digest.data(), &size) != 1) fail();
-    std::string text;
-    for (unsigned i = 0; i < size; ++i) {
-      text += "0123456789abcdef"[digest[i] >> 4];
-      text += "0123456789abcdef"[digest[i] & 15];
-    }
-    return text;
-  }
-
- private:
-  [[noreturn]] static void fail() { throw std::runtime_error("OpenSSL cannot compute SHA-256"); }
-
-  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_{EVP_MD_CTX_new(),
-                                                                   &EVP_MD_CTX_free};
-};
+/// What every call of OpenSSL answers if it worked.
+void require(int answer) {
+  if (answer != 1) throw std::runtime_error("OpenSSL cannot compute SHA-256");
+}
 
 }  // namespace
 
+struct Sha256::State {
+  Context context = new_context();
+};
+
+Sha256::Sha256() : state_(std::make_unique<State>()) {
+  require(EVP_DigestInit_ex(state_->context.get(), EVP_sha256(), nullptr));
+}
+Sha256::~Sha256() = default;
+Sha256::Sha256(Sha256&&) noexcept = default;
+Sha256& Sha256::operator=(Sha256&&) noexcept = default;
+
+void Sha256::update(std::span<const std::byte> bytes) {
+  require(EVP_DigestUpdate(state_->context.get(), bytes.data(), bytes.size()));
+}
+
+void Sha256::update(std::string_view text) {
+  update(std::as_bytes(std::span(text.data(), text.size())));
+}
+
+std::string Sha256::hex() const {
+  const Context copy = new_context();  // finishing it is the end of it
+  require(EVP_MD_CTX_copy_ex(copy.get(), state_->context.get()));
+  std::array<unsigned char, EVP_MAX_MD_SIZE> digest;
+  unsigned size = 0;
+  require(EVP_DigestFinal_ex(copy.get(), digest.data(), &size));
+  std::string text;
+  for (unsigned i = 0; i < size; ++i) {
+    text += "0123456789abcdef"[digest[i] >> 4];
+    text += "0123456789abcdef"[digest[i] & 15];
+  }
+  return text;
+}
+
 std::string sha256_hex(std::span<const std::byte> bytes) {
-  Digest digest;
-  digest.update(bytes.data(), bytes.size());
-  return digest.hex();
+  Sha256 hash;
+  hash.update(bytes);
+  return hash.hex();
 }
 
 std::string sha256_hex(std::string_view text) {
@@ -57,15 +75,15 @@ std::string sha256_hex(std::string_view text) {
 std::string sha256_of_file(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::vector<char> block(std::size_t{1} << 20);
-  Digest digest;
+  Sha256 hash;
   while (stream) {
     stream.read(block.data(), static_cast<std::streamsize>(block.size()));
-    digest.update(block.data(), static_cast<std::size_t>(stream.gcount()));
+    hash.update(std::string_view(block.data(), static_cast<std::size_t>(stream.gcount())));
   }
   if (!stream.eof()) {
     throw std::runtime_error("cannot read " + file.string() + ": " + std::strerror(errno));
   }
-  return digest.hex();
+  return hash.hex();
 }
 
 }  // namespace eventgan

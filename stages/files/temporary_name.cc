@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
 
@@ -31,25 +32,30 @@ std::string to_string(const TemporaryName& name) {
          std::to_string(name.attempt) + std::string(kEnding);
 }
 
-std::optional<TemporaryName> parse_temporary_name(std::string_view name, std::string_view host) {
+std::optional<TemporaryName> parse_temporary_name(std::string_view name) {
   if (!name.starts_with('.') || !name.ends_with(kEnding)) return std::nullopt;
   name = name.substr(1, name.size() - 1 - kEnding.size());
   TemporaryName parsed;
   if (!take_number(name, parsed.attempt) || !take_number(name, parsed.pid)) return std::nullopt;
-  // Only now the host: it can hold dots and digits itself.
-  if (!name.ends_with(host)) return std::nullopt;
-  name.remove_suffix(host.size());
-  if (name.size() < 2 || !name.ends_with('.')) return std::nullopt;
-  name.remove_suffix(1);
-  parsed.target = name;
-  parsed.host = host;
-  return parsed.pid > 0 ? std::optional(parsed) : std::nullopt;
+  // Unlike the target, the host has no dots.
+  const std::size_t dot = name.rfind('.');
+  if (dot == std::string_view::npos) return std::nullopt;
+  parsed.target = name.substr(0, dot);
+  parsed.host = name.substr(dot + 1);
+  const bool whole = parsed.pid > 0 && !parsed.target.empty() && !parsed.host.empty();
+  return whole ? std::optional(parsed) : std::nullopt;
+}
+
+std::string without_dots(std::string machine) {
+  std::replace_if(
+      machine.begin(), machine.end(), [](char c) { return c == '.' || c == '/'; }, '_');
+  return machine;
 }
 
 std::string host_name() {
   std::array<char, HOST_NAME_MAX + 1> name{};
   const bool named = ::gethostname(name.data(), name.size() - 1) == 0 && name[0] != '\0';
-  std::string host = named ? name.data() : "localhost";
+  std::string host = without_dots(named ? name.data() : "localhost");
   struct stat space {};
   if (::stat("/proc/self/ns/pid", &space) == 0) host += "-" + std::to_string(space.st_ino);
   return host;

@@ -15,8 +15,8 @@ namespace {
 
 constexpr char kVolumePath[] = "/events/volume";
 
-Hdf5Handle open_object(hid_t file, const char* path) {
-  return {H5Oopen(file, path, H5P_DEFAULT), H5Oclose, "open", path};
+Hdf5Handle open_object(hid_t location, const char* path) {
+  return {H5Oopen(location, path, H5P_DEFAULT), H5Oclose, "open", path};
 }
 
 void write_root_attributes(hid_t file, const ShardHeader& header) {
@@ -25,29 +25,7 @@ void write_root_attributes(hid_t file, const ShardHeader& header) {
   write_attribute(file, "name", header.name);
   write_attribute(file, "dataset", header.dataset);
   write_attribute(file, "split", header.split);
-  write_attribute(file, "plan_hash", header.plan_hash);
-  write_attribute(file, "manifest", header.manifest_text);
-  write_attribute(file, "weights_hash", header.weights_hash);
-  write_attribute(file, "generator", header.generator);
-  write_attribute(file, "program_version", header.program_version);
-  write_attribute(file, "preprocessing", header.preprocessing);
-}
-
-void describe_volume(hid_t volume, const ShardHeader& header) {
-  const int bins = header.volume.bins;
-  write_attribute(volume, "axes", std::string("sample, channel, y, x"));
-  write_attribute(volume, "bins", std::int32_t{bins});
-  write_attribute(volume, "channel_order",
-                  "channels 0.." + std::to_string(bins - 1) + ": positive polarity, channels " +
-                      std::to_string(bins) + ".." + std::to_string(2 * bins - 1) +
-                      ": negative; each in time order");
-  write_attribute(volume, "time_axis", time_axis_text(header.unit));
-  write_attribute(volume, "normalization", std::string(to_string(header.normalization)));
-  write_attribute(volume, "unit", unit_text(header.unit, header.normalization));
-  write_attribute(volume, "scale",
-                  header.dtype == StoredType::kUint8
-                      ? std::string("value = stored number x /events/scale[sample]")
-                      : std::string("value = stored number"));
+  describe_origin(file, header);
 }
 
 Hdf5Handle create_volume(hid_t file, const ShardHeader& header) {
@@ -83,28 +61,59 @@ std::size_t stored_volume_size(const ShardHeader& header) {
   return size;
 }
 
-Hdf5Handle create_objects(hid_t file, const ShardHeader& header) {
-  write_root_attributes(file, header);
+void describe_origin(hid_t object, const ShardHeader& header) {
+  write_attribute(object, "plan_hash", header.plan_hash);
+  write_attribute(object, "manifest", header.manifest_text);
+  write_attribute(object, "weights_hash", header.weights_hash);
+  write_attribute(object, "generator", header.generator);
+  write_attribute(object, "program_version", header.program_version);
+  write_attribute(object, "preprocessing", header.preprocessing);
+}
+
+void create_groups(hid_t location) {
   const Hdf5Handle creation = creation_properties(H5P_GROUP_CREATE);
   for (const char* path :
-       {"/events", "/events/statistics", "/pairs", "/labels", "/labels/boxes", "/labels/poses"}) {
-    Hdf5Handle group(H5Gcreate2(file, path, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose, "create",
-                     path);
+       {"events", "events/statistics", "pairs", "labels", "labels/boxes", "labels/poses"}) {
+    Hdf5Handle group(H5Gcreate2(location, path, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose,
+                     "create", path);
     group.close(path);
   }
+}
+
+void describe_volume(hid_t volume, const ShardHeader& header) {
+  const int bins = header.volume.bins;
+  write_attribute(volume, "axes", std::string("sample, channel, y, x"));
+  write_attribute(volume, "bins", std::int32_t{bins});
+  write_attribute(volume, "channel_order",
+                  "channels 0.." + std::to_string(bins - 1) + ": positive polarity, channels " +
+                      std::to_string(bins) + ".." + std::to_string(2 * bins - 1) +
+                      ": negative; each in time order");
+  write_attribute(volume, "time_axis", time_axis_text(header.unit));
+  write_attribute(volume, "normalization", std::string(to_string(header.normalization)));
+  write_attribute(volume, "unit", unit_text(header.unit, header.normalization));
+  write_attribute(volume, "scale",
+                  header.dtype == StoredType::kUint8
+                      ? std::string("value = stored number x /events/scale[sample]")
+                      : std::string("value = stored number"));
+}
+
+Hdf5Handle create_objects(hid_t file, const ShardHeader& header) {
+  write_root_attributes(file, header);
+  create_groups(file);
   Hdf5Handle volume = create_volume(file, header);
   describe_volume(volume, header);
   return volume;
 }
 
-void describe_columns(hid_t file, const ShardHeader& header) {
+void describe_columns(hid_t location, const ShardHeader& header) {
   const LabelSchema& schema = header.label_schema;
-  write_attribute(open_object(file, "/labels/boxes/class_id"), "class_names", schema.class_names);
-  write_attribute(open_object(file, "/labels/poses"), "joint_names", schema.joint_names);
-  write_attribute(open_object(file, "/labels/poses/joints"), "joint_names", schema.joint_names);
-  write_attribute(open_object(file, "/events/statistics/flags"), "bits",
+  write_attribute(open_object(location, "labels/boxes/class_id"), "class_names",
+                  schema.class_names);
+  write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
+  write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
+  write_attribute(open_object(location, "events/statistics/flags"), "bits",
                   std::vector<std::string>{"empty", "extrapolated", "saturated"});
-  write_attribute(open_object(file, "/pairs/source_to_volume"), "meaning",
+  write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
                   std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
                               "picture to one in the volume; pixel centres are whole numbers"));
 }

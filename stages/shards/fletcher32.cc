@@ -37,4 +37,19 @@ std::uint32_t fletcher32(std::span<const std::byte> bytes) {
   return fold(second) << 16 | fold(first);
 }
 
+void append_fletcher32(std::vector<std::byte>& bytes) {
+  const std::uint32_t sum = fletcher32(bytes);
+  for (int shift = 0; shift < 32; shift += 8) bytes.push_back(static_cast<std::byte>(sum >> shift));
+}
+
+bool ends_in_fletcher32(std::span<const std::byte> bytes) {
+  if (bytes.size() < sizeof(std::uint32_t)) return false;
+  const std::size_t size = bytes.size() - sizeof(std::uint32_t);
+  std::uint32_t sum = 0;
+  for (std::size_t i = 0; i < sizeof sum; ++i) {
+    sum |= std::to_integer<std::uint32_t>(bytes[size + i]) << (8 * i);
+  }
+  return sum == fletcher32(bytes.first(size));
+}
+
 }  // namespace eventgan

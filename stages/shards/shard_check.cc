@@ -7,6 +7,7 @@
 #include <type_traits>
 
 #include "stages/files/sha256.h"
+#include "stages/shards/contents_check.h"
 #include "stages/shards/label_check.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/volume_check.h"
@@ -31,6 +32,9 @@ class Check {
       check_sample(reader, slot, sample);
     }
     check_quarantined(invalid);
+    for (const std::string& found : contents_faults(contents_of(marker_), reader.contents())) {
+      fault(found);
+    }
     return faults_;
   }
 

@@ -11,8 +11,8 @@ namespace eventgan {
 /// Every fault of a shard, one line each, "FILE: what is wrong"; empty if it is sound. Checks that
 /// the marker's size and SHA-256 are the file's; that every dataset of the format is there with its
 /// type and shape; that ragged offsets ascend to the number of rows; that all chunks decode
-/// (fletcher32), hold finite values ≥ 0, and agree with the stored statistics; that counts agree
-/// with the marker. Never throws for a bad file.
+/// (fletcher32), hold finite values ≥ 0, and agree with the stored statistics; that all the marker
+/// says of the rows (see shard_contents.h) is so. Never throws for a bad file.
 std::vector<std::string> check_shard(const std::filesystem::path& shard, const ShardMarker& marker);
 
 }  // namespace eventgan

@@ -10,6 +10,7 @@
 #include "manifests/faults.h"
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_types_internal.h"
+#include "stages/shards/fletcher32.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_file_internal.h"
 #include "stages/shards/shard_objects_internal.h"
@@ -129,6 +130,29 @@ std::vector<std::byte> read_stored_volume(const ShardFile& shard, int slot) {
       H5Dread(shard.volume, volume_type(shard.header.dtype), to, from, H5P_DEFAULT, bytes.data()),
       "read", std::string(kVolumePath) + "[" + std::to_string(slot) + "]");
   return bytes;
+}
+
+std::vector<std::byte> read_stored_chunk(const ShardFile& shard, int slot) {
+  const std::string where = std::string(kVolumePath) + "[" + std::to_string(slot) + "]";
+  const hsize_t offset[4] = {static_cast<hsize_t>(slot), 0, 0, 0};
+  unsigned skipped_filters = 0;
+  haddr_t address = HADDR_UNDEF;
+  hsize_t size_bytes = 0;
+  // H5Dget_chunk_storage_size fails on a chunk that was not written if others were.
+  checked(H5Dget_chunk_info_by_coord(shard.volume, offset, &skipped_filters, &address, &size_bytes),
+          "find", where);
+  if (address == HADDR_UNDEF) return {};
+  std::vector<std::byte> chunk(size_bytes);
+  checked(H5Dread_chunk(shard.volume, H5P_DEFAULT, offset, &skipped_filters, chunk.data()), "read",
+          where);
+  if (skipped_filters != 0) {
+    throw Hdf5Error("expected a chunk with all filters, got one without some, in " + where);
+  }
+  // A copy of damaged bytes would get a SHA-256 of its own, and count as sound from then on.
+  if (!ends_in_fletcher32(chunk)) {
+    throw Hdf5Error("expected a chunk that ends in its checksum, got another, in " + where);
+  }
+  return chunk;
 }
 
 }  // namespace eventgan

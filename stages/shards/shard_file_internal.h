@@ -28,4 +28,8 @@ ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>
 /// Hdf5Error, also if a checksum is wrong.
 std::vector<std::byte> read_stored_volume(const ShardFile& shard, int slot);
 
+/// The chunk of `slot` after all filters, as it lies in the file; empty if none was written. Throws
+/// Hdf5Error, also if a filter was left out of it, or its checksum is wrong.
+std::vector<std::byte> read_stored_chunk(const ShardFile& shard, int slot);
+
 }  // namespace eventgan

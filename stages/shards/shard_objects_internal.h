@@ -15,8 +15,20 @@ std::size_t stored_volume_size(const ShardHeader& header);
 /// Everything that is known before the first sample. Returns the open dataset `/events/volume`.
 Hdf5Handle create_objects(hid_t file, const ShardHeader& header);
 
-/// Attributes of the columns, once these are written.
-void describe_columns(hid_t file, const ShardHeader& header);
+/// Attributes of the columns below `location` (a shard, or a group built like one), once these are
+/// written.
+void describe_columns(hid_t location, const ShardHeader& header);
+
+// Parts of create_objects that a view of many shards shares with a shard.
+
+/// Attributes that are the same for all shards of a plan.
+void describe_origin(hid_t object, const ShardHeader& header);
+
+/// The groups that hold the columns, below `location`.
+void create_groups(hid_t location);
+
+/// Attributes of the open dataset `events/volume`.
+void describe_volume(hid_t volume, const ShardHeader& header);
 
 /// The header again. `name` stays empty if the file does not have it. Throws also if the format or
 /// its version is not ours.

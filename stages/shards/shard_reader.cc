@@ -36,6 +36,10 @@ ShardReader::ShardReader(ShardReader&&) noexcept = default;
 
 const ShardHeader& ShardReader::header() const { return state_->shard.header; }
 
+ShardContents ShardReader::contents() const {
+  return contents_of(state_->shard.tables, header().label_schema);
+}
+
 ShardSample ShardReader::sample(int slot) const {
   state_->check_slot(slot);
   return extract_row(state_->shard.header, state_->shard.tables, slot);
@@ -48,6 +52,16 @@ std::vector<float> ShardReader::volume(int slot) const {
   try {
     return dequantize(read_stored_volume(shard, slot), shard.header.dtype,
                       shard.tables.events.scale[static_cast<std::size_t>(slot)]);
+  } catch (const Hdf5Error& error) {
+    throw std::runtime_error(state_->path + ": " + error.what());
+  }
+}
+
+std::vector<std::byte> ShardReader::stored_chunk(int slot) const {
+  quiet_hdf5_errors();
+  state_->check_slot(slot);
+  try {
+    return read_stored_chunk(state_->shard, slot);
   } catch (const Hdf5Error& error) {
     throw std::runtime_error(state_->path + ": " + error.what());
   }

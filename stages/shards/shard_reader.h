@@ -1,10 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <vector>
 
 #include "manifests/shard.h"
+#include "stages/shards/shard_contents.h"
 
 namespace eventgan {
 
@@ -21,12 +23,19 @@ class ShardReader {
 
   const ShardHeader& header() const;
 
+  /// The rows of the shard, counted.
+  ShardContents contents() const;
+
   /// Everything about slot `slot` but its volume. `fault` is empty, since it stands in the marker;
   /// frame times are relative to the previous frame. Throws std::out_of_range.
   ShardSample sample(int slot) const;
 
   /// The volume of slot `slot`, decoded to float32 [2 bins, H, W], C order.
   std::vector<float> volume(int slot) const;
+
+  /// The volume's chunk as it lies in the file, for ShardWriter::append: what it was given once;
+  /// empty where no volume was written (a quarantined sample).
+  std::vector<std::byte> stored_chunk(int slot) const;
 
  private:
   struct State;

@@ -60,6 +60,7 @@ struct ShardWriter::State {
 
   void write_chunk(std::span<const std::byte> chunk);
   void write_columns();
+  ShardReceipt flush();
 };
 
 ShardWriter::State::~State() {
@@ -104,6 +105,23 @@ void ShardWriter::State::write_columns() {
   });
 }
 
+/// Step 3.
+ShardReceipt ShardWriter::State::flush() {
+  try {
+    sync_to_disk(temporary);
+    return {sha256_of_file(temporary),
+            static_cast<std::int64_t>(std::filesystem::file_size(temporary)),
+            contents_of(tables, header.label_schema)};
+  } catch (const std::runtime_error&) {
+    std::error_code unknown;
+    if (std::filesystem::exists(temporary, unknown) || unknown) throw;
+    std::throw_with_nested(UnfinishedShardLost(
+        "expected the file that was being written, got nothing: it was silent for so long that "
+        "another process deleted it, in " +
+        target.string()));
+  }
+}
+
 ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header)
     : state_(std::make_unique<State>()) {
   quiet_hdf5_errors();
@@ -112,8 +130,8 @@ ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader&
   state.header = header;
   state.target = folder / header.name;
   state.temporary = temporary_beside(state.target);
+  state.created = true;  // whatever fails from here on, nothing stays of it
   state.file.emplace(state.temporary, creation_properties(H5P_FILE_CREATE));
-  state.created = true;
   state.write([&] { state.volume = create_objects(state.file->id(), header); });
 }
 
@@ -149,9 +167,7 @@ ShardReceipt ShardWriter::commit() {
     state.volume.close("/events/volume");
     state.file->close();
   });
-  sync_to_disk(state.temporary);
-  ShardReceipt receipt{sha256_of_file(state.temporary),
-                       static_cast<std::int64_t>(std::filesystem::file_size(state.temporary))};
+  ShardReceipt receipt = state.flush();
   publish(state.temporary, state.target);
   state.committed = true;
   return receipt;

@@ -5,9 +5,11 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <stdexcept>
 #include <string>
 
 #include "manifests/shard.h"
+#include "stages/shards/shard_contents.h"
 
 namespace eventgan {
 
@@ -15,6 +17,14 @@ namespace eventgan {
 struct ShardReceipt {
   std::string sha256;  ///< hex
   std::int64_t size_bytes = 0;
+  ShardContents contents;
+};
+
+/// The temporary file has gone before it could be renamed. Nobody deletes that of a writer that
+/// seems alive, so the writer must have been silent for long: suspended, or cut off from its disk.
+class UnfinishedShardLost : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
 };
 
 /// Writes one shard so that it is under its final name whole or not at all. The protocol (DESIGN
@@ -45,7 +55,8 @@ class ShardWriter {
   /// schema; after any other error the writer can only be destroyed.
   void append(const ShardSample& sample, std::span<const std::byte> chunk);
 
-  /// Steps 2-5. Throws std::logic_error if slots are missing. Once.
+  /// Steps 2-5. Throws std::logic_error if slots are missing, UnfinishedShardLost if the temporary
+  /// file is gone. Once.
   ShardReceipt commit();
 
  private:

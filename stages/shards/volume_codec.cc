@@ -41,11 +41,6 @@ std::vector<std::byte> deflate(const std::vector<std::byte>& bytes, int level) {
   return out;
 }
 
-void append_little_endian(std::vector<std::byte>& bytes, std::uint32_t number) {
-  for (int shift = 0; shift < 32; shift += 8)
-    bytes.push_back(static_cast<std::byte>(number >> shift));
-}
-
 }  // namespace
 
 VolumeCodec::VolumeCodec(StoredType type, int deflate_level)
@@ -63,7 +58,7 @@ EncodedVolume VolumeCodec::encode(std::span<const float> volume) const {
   result.saturated = quantized.saturated;
   result.chunk = shuffle(std::move(quantized.bytes), stored_size(type_));
   if (deflate_level_ > 0) result.chunk = deflate(result.chunk, deflate_level_);
-  append_little_endian(result.chunk, fletcher32(result.chunk));
+  append_fletcher32(result.chunk);
   return result;
 }
 

@@ -3,40 +3,25 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <string>
+#include <vector>
+
+#include "tests/manifests/small_plan.h"
 
 namespace eventgan {
 namespace {
 
-Plan small_plan() {
-  Plan plan;
-  plan.name = "job";
-  plan.manifest_text = "{ // a \"job\"\n}";
-  plan.fingerprint = {{"weights", "aa"}, {"manifest", "bb"}};
-  SourceSummary source;
-  source.labelled_frames = 3;
-  source.pairs_by_gap = {{1, 1}, {6, 1}};
-  source.without_partner = 1;
-  source.without_partner_ids = {"b"};
-  source.faults = 1;
-  source.notes = {"a \"note\""};
-  plan.sources = {source};
-  FrameRef previous{"root/a \xc3\xa9.png", 4, -1, 0.1};
-  FrameRef next{"clip.mp4", 5, 17, std::nan("")};
-  plan.shards = {
-      {"job-train-00000-of-00001.h5",
-       0,
-       {3, 4},
-       {{"s1", "seq", "label#1", {previous, next, 1, 5, 0.5}, ""},
-        {"s2", "", "", {next, previous, 6, -1, 1}, "expected a frame, got no file, in x"}}}};
-  return plan;
-}
+using ::testing::HasSubstr;
+using testing::small_plan;
+using ::testing::ThrowsMessage;
 
 TEST(PlanJson, RoundTripsByteForByte) {
   const std::string text = to_json(small_plan());
   const Plan back = parse_plan(text, "plan.json");
   EXPECT_EQ(to_json(back), text);
-  EXPECT_EQ(back.sample_count(), 2);
+  EXPECT_EQ(back.sample_count(), 3);
   EXPECT_EQ(back.manifest_text, small_plan().manifest_text);
   const PlannedSample& sample = back.shards[0].samples[0];
   EXPECT_EQ(sample.pair.previous.path, "root/a \xc3\xa9.png");
@@ -53,19 +38,105 @@ TEST(PlanJson, OfNoShardsRoundTrips) {
   EXPECT_EQ(to_json(parse_plan(text, "plan.json")), text);
 }
 
-TEST(PlanJson, NamesEveryFaultOfADamagedPlan) {
+TEST(PlanJson, BytesAreAsTheyEverWere) {
+  // Changing them would orphan every folder that was frozen before.
+  EXPECT_EQ(to_json(small_plan()), R"({"fingerprint":{"manifest":"bb","weights":"aa"},
+"format":"eventgan-plan",
+"manifest":"{ // a \"job\"\n}",
+"name":"job",
+"shards":[
+{"height":3,"name":"job-train-00000-of-00002.h5","samples":[
+{"gap":1,"id":"s1","label":"label#1","label_index":5,"label_position":0.5,"next":{"index":5,"path":"clip.mp4","video_frame":17},"previous":{"index":4,"path":"root/a é.png","time_s":0.1},"sequence":"seq"},
+{"fault":"expected a frame, got no file, in x","gap":6,"id":"s2","label":"","label_index":-1,"label_position":1.0,"next":{"index":4,"path":"root/a é.png","time_s":0.1},"previous":{"index":5,"path":"clip.mp4","video_frame":17},"sequence":""}
+],"source":0,"width":4},
+{"height":5,"name":"job-train-00001-of-00002.h5","samples":[
+{"gap":2,"id":"s3","label":"","label_index":7,"label_position":1.0,"next":{"index":7,"path":"b"},"previous":{"index":5,"path":"a"},"sequence":""}
+],"source":1,"width":6}
+],
+"sources":[{"faults":1,"labelled_frames":3,"notes":["a \"note\""],"pairs_by_gap":[{"gap":1,"pairs":1},{"gap":6,"pairs":1}],"without_partner":1,"without_partner_ids":["b"]},{"faults":0,"labelled_frames":1,"notes":[],"pairs_by_gap":[{"gap":2,"pairs":1}],"without_partner":0,"without_partner_ids":[]}],
+"version":1}
+)");
+}
+
+TEST(PlanJson, IsWrittenInPieces) {
+  Plan plan = small_plan();
+  plan.shards[1].samples.assign(5000, plan.shards[0].samples[0]);
+  std::string text;
+  std::size_t longest = 0;
+  int pieces = 0;
+  write_plan(plan, [&](std::string_view piece) {
+    text += piece;
+    longest = std::max(longest, piece.size());
+    ++pieces;
+  });
+  EXPECT_EQ(text, to_json(plan));
+  EXPECT_GT(pieces, 3);
+  EXPECT_LT(longest, std::size_t{70000});
+  EXPECT_EQ(parse_plan(text, "p").shards[1].samples.size(), 5000U);
+}
+
+TEST(PlanJson, NamesTheDamagedLineAndEveryFaultInIt) {
   std::string text = to_json(small_plan());
   text.replace(text.find("\"gap\":1"), 7, "\"gap\":9");
-  text.replace(text.find("\"height\":3"), 10, "\"height\":0");
-  try {
-    parse_plan(text, "plan.json");
-    FAIL();
-  } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("$.shards[0].samples[0].gap"));
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("$.shards[0].height"));
+  text.replace(text.find("\"index\":5"), 9, "\"index\":x");
+  EXPECT_THAT([&] { parse_plan(text, "plan.json"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("plan.json:7:")));
+  text = to_json(small_plan());
+  text.replace(text.find("\"gap\":6"), 7, "\"gap\":9");
+  text.replace(text.find("\"id\":\"s2\""), 9, "\"id\":null");
+  EXPECT_THAT([&] { parse_plan(text, "plan.json"); },
+              ThrowsMessage<std::runtime_error>(
+                  "plan.json:8: $.shards[0].samples[1].id: expected text, got null\n"
+                  "plan.json:8: $.shards[0].samples[1].gap: expected an integer 1..6, got 9"));
+}
+
+struct Damage {
+  std::string what;
+  std::string with;
+  std::string fault;
+};
+
+TEST(PlanJson, EveryRuleIsChecked) {
+  const std::vector<Damage> table = {
+      {"\"eventgan-plan\"", "\"eventgan-marker\"",
+       "p:2: expected the line \"format\":\"eventgan-plan\",, got \"\\\"format"},
+      {"\"version\":1", "\"version\":2", ": expected the line \"version\":1}, got"},
+      {"\"name\":\"job\"", "\"name\":7", "p:4: $.name: expected text, got 7"},
+      {"\"bb\"", "2", "p:1: $.fingerprint.manifest: expected text, got 2"},
+      {"{\"manifest\":\"bb\"", "{\"weights\":\"bb\"", "p:1: $.weights: expected the key once"},
+      {"\"height\":3", "\"height\":0", "p:9: $.shards[0].height: expected an integer"},
+      {"\"height\":3", "\"depth\":3,\"height\":3", "p:9: $.shards[0].depth: expected"},
+      {"\"source\":1", "\"source\":2", "p: expected a source 0..1, got 2"},
+      {"00001-of-00002.h5", "00001-of-00002.h6", "$.shards[1].name: expected a file name"},
+      {"\"gap\":2,", "\"gap\":2,\"gap\":2,", "p:11: $.gap: expected the key"},
+      {"\"gap\":2,", "\"gap\":2,\"Gap\":2,", "p:11: $.shards[1].samples[0].Gap: expected"},
+      {"\"label\":\"label#1\",", "", "p:7: $.shards[0].samples[0].label: expected text"},
+      {"\"faults\":1", "\"faults\":-1", "$.sources[0].faults: expected an integer"},
+      // Another layout of the same values, or half of it.
+      {",\n\"name\"", ", \n\"name\"", "p:3: expected a line \"manifest\":...,, got"},
+      {"\n\"sources\"", "\"sources\"", "expected the line ],, got"},
+      {"{\"gap\":2", " {\"gap\":2", "p:11: expected a sample, got \" {"},
+      {"},\n{\"fault\"", "}\n{\"fault\"", "p:8: expected a line ],...}, got"},
+      {"\n],\"source\":0", ",\n],\"source\":0", "p:9: expected a sample, got \"],"},
+      {"]}],\n\"version\"", "]}]\n\"version\"", "expected a line \"sources\":...,, got"},
+      {"\"version\":1}\n", "\"version\":1}\n\n", "p:16: expected the end of the file, got \"\""},
+  };
+  for (const Damage& damage : table) {
+    std::string text = to_json(small_plan());
+    const std::size_t at = text.find(damage.what);
+    ASSERT_NE(at, std::string::npos) << damage.what;
+    text.replace(at, damage.what.size(), damage.with);
+    EXPECT_THAT([&] { parse_plan(text, "p"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr(damage.fault)))
+        << damage.with;
   }
-  EXPECT_THROW(parse_plan(text.substr(0, text.size() / 2), "plan.json"), std::runtime_error);
-  EXPECT_THROW(parse_plan("", "plan.json"), std::runtime_error);
+}
+
+TEST(PlanJson, NoPartOfAPlanIsAPlan) {
+  const std::string text = to_json(small_plan());
+  for (std::size_t size = 0; size < text.size(); ++size) {
+    EXPECT_THROW(parse_plan(text.substr(0, size), "p"), std::runtime_error) << size;
+  }
 }
 
 TEST(PlanJson, RefusesNamesThatAreNotUtf8) {

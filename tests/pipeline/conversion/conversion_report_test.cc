@@ -13,7 +13,7 @@ ConversionReport report() {
   result.written = 9;
   result.quarantined = {{3, "id", "expected a picture, got rubbish, in a.png (id)"}};
   result.without_partner = 2;
-  result.shards_planned = result.shards_done = 2;
+  result.shards_planned = result.shards_done = result.plan_shards = 2;
   result.stored_bytes = 2'000'000;
   result.volume_bytes = 9'000'000;
   result.stage_seconds = {{"read", 1.25}, {"write", 0.5}};
@@ -32,6 +32,34 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
               ::testing::HasSubstr("quarantined: expected a picture, got rubbish, in a.png (id)"));
 }
 
+TEST(ReportText, SaysWhichPartAndWhoseWork) {
+  ConversionReport part = report();
+  part.part = "part 1 of 4 (--shards)";
+  part.plan_shards = 8;
+  part.shards_done_before = 1;
+  part.shards_done_by_others = 1;
+  EXPECT_THAT(to_text(part),
+              ::testing::StartsWith("part 1 of 4 (--shards): 9 of 10 pairs written, 1 quarantined, "
+                                    "in 2 of 2 shards (1 done before, 1 done by others)\n"));
+  EXPECT_THAT(to_text(part), ::testing::Not(::testing::HasSubstr("stopped")));
+  part.stopped = true;
+  EXPECT_THAT(to_text(part), ::testing::HasSubstr("\nstopped on request"));
+}
+
+TEST(AddShard, CountsItsMarker) {
+  ConversionReport sum = report();
+  ShardMarker marker;
+  marker.size_bytes = 5;
+  marker.valid = 3;
+  marker.quarantined = {{0, "other", "reason"}};
+  add_shard(marker, 70, sum);
+  EXPECT_EQ(sum.shards_done, 3);
+  EXPECT_EQ(sum.written, 12);
+  EXPECT_EQ(sum.quarantined.size(), 2u);
+  EXPECT_EQ(sum.stored_bytes, 2'000'005);
+  EXPECT_EQ(sum.volume_bytes, 9'000'070);
+}
+
 TEST(ReportText, CountsWhatItDoesNotList) {
   ConversionReport many = report();
   many.quarantined.assign(25, many.quarantined[0]);
@@ -47,6 +75,8 @@ TEST(ReportJson, IsOneLine) {
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1);
   EXPECT_THAT(text, ::testing::HasSubstr("\"compression_ratio\":4.5"));
   EXPECT_THAT(text, ::testing::HasSubstr("\"sample_id\":\"id\""));
+  EXPECT_THAT(text, ::testing::HasSubstr("\"stopped\":false"));
+  EXPECT_THAT(text, ::testing::HasSubstr("\"part\":\"all shards\""));
 }
 
 }  // namespace

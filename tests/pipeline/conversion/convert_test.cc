@@ -8,66 +8,20 @@
 #include <set>
 
 #include "manifests/faults.h"
-#include "pipeline/conversion/load_generator.h"
-#include "pipeline/inspection/verify_folder.h"
+#include "pipeline/generation/load_generator.h"
+#include "pipeline/output/output_folder.h"
+#include "pipeline/verification/verify_folder.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
-#include "tests/testing/fake_generator.h"
+#include "tests/pipeline/conversion/small_conversion.h"
 #include "tests/testing/picture_file.h"
-#include "tests/testing/small_job.h"
-#include "tests/testing/temporary_folder.h"
-#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// 12 frames: 11 pairs in 3 shards.
-class Convert : public ::testing::Test {
- protected:
-  Convert() : manifest_(testing::make_small_job(folder_, 12)) {}
-
-  fs::path picture(int frame) const {
-    return folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png");
-  }
-
-  ConversionReport run(const std::string& output = "out", int threads = 2, bool overwrite = false) {
-    ConversionOptions options;
-    options.output = folder_ / output;
-    options.threads = threads;
-    options.overwrite = overwrite;
-    return convert(manifest_, generator_, "weights", options);
-  }
-
-  /// Changes the manifest as a user would.
-  void change(const std::string& from, const std::string& to) {
-    std::string text = manifest_.text;
-    text.replace(text.find(from), from.size(), to);
-    manifest_ = parse_job_manifest(text, folder_.path(), "manifest.json");
-  }
-
-  std::map<std::string, std::string> shards(const std::string& output) const {
-    std::map<std::string, std::string> bytes;
-    for (const auto& entry : fs::directory_iterator(folder_ / output)) {
-      if (entry.path().extension() == ".h5")
-        bytes[entry.path().filename()] = testing::read_file(entry.path());
-    }
-    return bytes;
-  }
-
-  std::vector<std::string> names(const std::string& output) const {
-    std::vector<std::string> result;
-    for (const auto& entry : fs::directory_iterator(folder_ / output))
-      result.push_back(entry.path().filename());
-    std::sort(result.begin(), result.end());
-    return result;
-  }
-
-  testing::TemporaryFolder folder_;
-  JobManifest manifest_;
-  testing::FakeGenerator generator_;
-};
+using Convert = testing::SmallConversion;
 
 TEST_F(Convert, WritesShardsMarkersAndPlan) {
   const ConversionReport report = run();
@@ -125,6 +79,27 @@ TEST_F(Convert, AgainDoesOnlyWhatIsMissing) {
   EXPECT_EQ(report.written, 11);
   EXPECT_EQ(generator_.calls(), calls + 4);
   EXPECT_EQ(shards("out"), whole);
+}
+
+TEST_F(Convert, LeavesAWholeFolderUntouched) {
+  run();
+  const auto written = [&] {
+    std::map<std::string, fs::file_time_type> times;
+    for (const std::string& name : names()) times[name] = fs::last_write_time(out(name));
+    return times;
+  };
+  const auto before = written();
+  std::vector<std::string> told;
+  ConversionOptions listening = options();
+  listening.note = listening.warn = [&](const std::string& text) { told.push_back(text); };
+  run(listening);
+  EXPECT_EQ(written(), before);
+  EXPECT_THAT(told, ::testing::IsEmpty());
+
+  testing::write_file(out("run.json"), "{}");
+  run(listening);
+  EXPECT_THAT(told, ::testing::ElementsAre(::testing::HasSubstr("run.json: the manifest is now")));
+  EXPECT_EQ(recorded_manifest_folder(folder_ / "out"), manifest_.directory);
 }
 
 TEST_F(Convert, RefusesAFolderOfAnotherPlanUnlessToldToOverwrite) {
@@ -223,19 +198,18 @@ TEST_F(Convert, AVolumeThatIsNotFiniteIsQuarantined) {
 
 TEST_F(Convert, AFolderThatCannotBeWrittenIsAnErrorThatNamesIt) {
   testing::write_file(folder_ / "file", "");
-  EXPECT_THROW(run("file/out"), std::exception);
+  EXPECT_THAT([&] { run("file/out"); }, ::testing::ThrowsMessage<std::runtime_error>(
+                                            ::testing::HasSubstr((folder_ / "file/out").string())));
 }
 
 TEST_F(Convert, ShowsProgressOfEveryPair) {
   std::ostringstream shown;
-  ConversionOptions options;
-  options.output = folder_ / "out";
-  options.threads = 2;
-  options.make_progress = [&](std::int64_t total) {
+  ConversionOptions shows = options();
+  shows.make_progress = [&](std::int64_t total) {
     EXPECT_EQ(total, 11);
     return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
   };
-  convert(manifest_, generator_, "weights", options);
+  run(shows);
   EXPECT_THAT(shown.str(), ::testing::HasSubstr("11/11 pairs"));
 }
 
@@ -251,10 +225,8 @@ TEST_F(Convert, TheSameManifestGoesWithEveryKindOfGenerator) {
     text.replace(text.find(before), before.size(), settings);
     const JobManifest manifest = parse_job_manifest(text, folder_.path(), "manifest.json");
     const LoadedGenerator loaded = load_generator(manifest);
-    ConversionOptions options;
-    options.output = folder_ / kind;
     const ConversionReport report =
-        convert(manifest, *loaded.generator, loaded.weights_hash, options);
+        convert(manifest, *loaded.generator, loaded.weights_hash, options(kind));
     EXPECT_EQ(report.written, 11) << kind;
     EXPECT_EQ(verify_folder(folder_ / kind).faults.size(), 0u) << kind;
 

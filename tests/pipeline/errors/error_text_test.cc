@@ -4,6 +4,7 @@
 
 #include "manifests/faults.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/stopping/stopped.h"
 
 namespace eventgan {
 namespace {
@@ -28,6 +29,7 @@ TEST(ExitCodeOf, KnowsTheKindsOfErrors) {
   EXPECT_EQ(exit_code_of(UsageError("")), kUsage);
   EXPECT_EQ(exit_code_of(TooManyFaults("")), kTooManyFaults);
   EXPECT_EQ(exit_code_of(InputError("")), kInputMissing);
+  EXPECT_EQ(exit_code_of(Stopped("")), kStopped);
   EXPECT_EQ(exit_code_of(std::runtime_error("")), kFailed);
 }
 

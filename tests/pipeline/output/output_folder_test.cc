@@ -3,95 +3,203 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <system_error>
+#include <thread>
+
 #include "manifests/faults.h"
+#include "manifests/marker.h"
+#include "pipeline/output/amendments.h"
+#include "stages/files/sha256.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-Plan plan(const std::string& weights) {
+namespace fs = std::filesystem;
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::names_in;
+using ::testing::Not;
+using testing::read_file;
+using testing::TemporaryFolder;
+using ::testing::ThrowsMessage;
+using testing::write_file;
+
+constexpr char kShard[] = "job-train-00000-of-00001.h5";
+
+Plan plan(const std::string& weights, const std::string& frames = "f") {
   Plan result;
   result.name = "job";
-  result.fingerprint = {{"weights", weights}};
+  result.manifest_text = "{}";
+  result.fingerprint = {{"weights", weights}, {"frames", frames}};
   result.sources.resize(1);
-  result.shards = {
-      {"job-train-00000-of-00001.h5", 0, {2, 2}, {{"a", "", "", {{"p"}, {"n"}, 1, 0, 1}, ""}}}};
+  result.shards = {{kShard, 0, {2, 2}, {{"a", "", "", {{"p"}, {"n"}, 1, 0, 1}, ""}}}};
   return result;
 }
 
-const std::string kHash(64, 'a');
-
-ShardMarker marker(const std::string& plan_hash, std::int64_t size) {
-  return {"job-train-00000-of-00001.h5", plan_hash, kHash, size, 1, 1, {}, {}};
+TEST(FreezePlan, WritesTheTextWhoseHashItGives) {
+  const TemporaryFolder folder;
+  const FrozenPlan frozen = freeze_plan(folder.path(), plan("w"));
+  EXPECT_EQ(read_file(folder / "plan.json"), to_json(plan("w")));
+  EXPECT_EQ(frozen.hash, sha256_hex(to_json(plan("w"))));
+  EXPECT_EQ(to_json(frozen.plan), to_json(plan("w")));
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("plan.json"));
 }
 
 TEST(FreezePlan, TheFirstWinsAndALaterRunTakesIt) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   const FrozenPlan first = freeze_plan(folder.path(), plan("w"));
   const FrozenPlan second = freeze_plan(folder.path(), plan("w"));
   EXPECT_EQ(first.hash, second.hash);
   EXPECT_EQ(read_frozen_plan(folder.path()).hash, first.hash);
+  EXPECT_EQ(read_frozen_outline(folder.path()).hash, first.hash);
+}
+
+TEST(FreezePlan, OfManyWorkersThatRaceAllTakeTheSame) {
+  const TemporaryFolder folder;
+  std::vector<std::string> hashes(8);
+  std::vector<std::jthread> workers;
+  for (std::size_t i = 0; i < hashes.size(); ++i) {
+    workers.emplace_back([&, i] {
+      Plan mine = plan("w");
+      mine.manifest_text = "{ /* " + std::to_string(i) + " */ }";
+      hashes[i] = freeze_plan(folder.path(), std::move(mine)).hash;
+    });
+  }
+  workers.clear();
+  EXPECT_THAT(hashes, ::testing::Each(sha256_of_file(folder / "plan.json")));
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("plan.json"));
+}
+
+TEST(FreezePlan, TakesTheFrozenManifestWhereOnlyItsTextDiffers) {
+  const TemporaryFolder folder;
+  const FrozenPlan first = freeze_plan(folder.path(), plan("w"));
+  Plan other = plan("w");
+  other.manifest_text = "{ /* a remark */ }";
+  const FrozenPlan second = freeze_plan(folder.path(), std::move(other));
+  EXPECT_EQ(second.hash, first.hash);
+  EXPECT_EQ(second.plan.manifest_text, "{}");
 }
 
 TEST(FreezePlan, RefusesAnotherFingerprintFieldByField) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   freeze_plan(folder.path(), plan("w"));
-  EXPECT_THAT(
-      [&] { freeze_plan(folder.path(), plan("v")); },
-      ::testing::ThrowsMessage<UsageError>(::testing::HasSubstr("weights: expected w, got v")));
+  EXPECT_THAT([&] { freeze_plan(folder.path(), plan("v")); },
+              ThrowsMessage<UsageError>(
+                  AllOf(HasSubstr("weights: expected w, got v"), Not(HasSubstr("frames")))));
+}
+
+TEST(FreezePlan, SendsToRetryWhereOnlyInputsDiffer) {
+  const TemporaryFolder folder;
+  freeze_plan(folder.path(), plan("w", "holed"));
+  EXPECT_THAT([&] { freeze_plan(folder.path(), plan("w", "whole")); },
+              ThrowsMessage<UsageError>(AllOf(HasSubstr("eventgan retry"),
+                                              HasSubstr("frames: expected holed, got whole"))));
+  EXPECT_THAT([&] { freeze_plan(folder.path(), plan("v", "whole")); },
+              ThrowsMessage<UsageError>(Not(HasSubstr("eventgan retry"))));
+}
+
+TEST(FreezePlan, RefusesAnAlteredPlan) {
+  const TemporaryFolder folder;
+  Plan altered = plan("w");
+  altered.shards[0].samples[0].pair.gap_frames = 2;
+  freeze_plan(folder.path(), altered);
+  EXPECT_THAT([&] { freeze_plan(folder.path(), plan("w")); },
+              ThrowsMessage<UsageError>(
+                  HasSubstr("got an altered one, in " + (folder / "plan.json").string())));
+}
+
+TEST(FreezePlan, SaysThatTheFrozenOneIsDamagedAndLeavesIt) {
+  const TemporaryFolder folder;
+  const std::string half = to_json(plan("w")).substr(0, 200);
+  write_file(folder / "plan.json", half);
+  EXPECT_THAT([&] { freeze_plan(folder.path(), plan("w")); },
+              ThrowsMessage<std::runtime_error>(
+                  HasSubstr("got a damaged one, in " + (folder / "plan.json").string())));
+  EXPECT_EQ(read_file(folder / "plan.json"), half);
+}
+
+TEST(FreezePlan, LeavesNothingOnAFullDisk) {
+  const TemporaryFolder folder;
+  Plan large = plan("w");
+  large.shards[0].samples.assign(1000, large.shards[0].samples[0]);
+  const std::string error =
+      testing::error_on_full_disk(5000, [&] { freeze_plan(folder.path(), large); });
+  EXPECT_THAT(error, HasSubstr((folder / ".plan.json.").string()));
+  EXPECT_THAT(names_in(folder.path()), ElementsAre());
+}
+
+TEST(FreezePlan, AfterARetryTheMendedInputsAreTheRightOnes) {
+  const TemporaryFolder folder;
+  Plan holed = plan("w", "with a hole");
+  holed.shards[0].samples[0].fault = "expected a frame, got no file, in p";
+  const std::string hash = freeze_plan(folder.path(), holed).hash;
+  EXPECT_THROW(freeze_plan(folder.path(), plan("w", "whole")), UsageError);
+
+  record_amendment(folder.path(), hash, {{{"frames", "whole"}}, {"a"}});
+  const FrozenPlan frozen = freeze_plan(folder.path(), plan("w", "whole"));
+  EXPECT_EQ(frozen.hash, hash);
+  EXPECT_EQ(to_json(frozen.plan), to_json(holed)) << "the samples stay as they were frozen";
+  EXPECT_THROW(freeze_plan(folder.path(), plan("v", "whole")), UsageError);
+  // The inputs as they were would make other bytes than the retry has.
+  EXPECT_THAT([&] { freeze_plan(folder.path(), holed); },
+              ThrowsMessage<UsageError>(HasSubstr("frames: expected whole, got with a hole")));
 }
 
 TEST(ReadFrozenPlan, SaysWhenThereIsNoneOrADamagedOne) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   EXPECT_THROW(read_frozen_plan(folder.path()), InputError);
-  testing::write_file(folder / "plan.json", "{");
+  EXPECT_THROW(read_frozen_outline(folder.path()), InputError);
+  fs::create_directory(folder / "plan.json");
+  EXPECT_THAT([&] { read_frozen_plan(folder.path()); },
+              ThrowsMessage<std::system_error>(
+                  AllOf(HasSubstr("cannot read"), Not(HasSubstr("--overwrite")))));
+  EXPECT_THROW(read_frozen_outline(folder.path()), std::system_error);
+  fs::remove(folder / "plan.json");
+  write_file(folder / "plan.json", "{");
   EXPECT_THROW(read_frozen_plan(folder.path()), std::runtime_error);
+  EXPECT_THROW(read_frozen_outline(folder.path()), std::runtime_error);
 }
 
-TEST(DoneMarker, NeedsMarkerPlanAndSizeToAgree) {
-  const testing::TemporaryFolder folder;
-  const PlannedShard shard = plan("w").shards[0];
-  const auto marker_file = folder / "job-train-00000-of-00001.json";
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash));
-  testing::write_file(folder / shard.name, "12345");
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash)) << "a shard without marker";
-  testing::write_file(marker_file, to_json(marker(kHash, 5)));
-  EXPECT_TRUE(done_marker(folder.path(), shard, kHash));
-  testing::write_file(marker_file, to_json(marker(kHash, 6)));
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash)) << "another size";
-  testing::write_file(marker_file, to_json(marker(std::string(64, 'b'), 5)));
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash)) << "another plan";
-  testing::write_file(marker_file, to_json(marker(kHash, 5)).substr(0, 40));
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash)) << "a torn marker";
-  testing::write_file(marker_file, to_json(marker(kHash, 5)));
-  std::filesystem::remove(folder / shard.name);
-  EXPECT_FALSE(done_marker(folder.path(), shard, kHash)) << "a marker without shard";
+TEST(ReadFrozenOutline, IsThePlanWithoutItsSamples) {
+  const TemporaryFolder folder;
+  freeze_plan(folder.path(), plan("w"));
+  const FrozenOutline frozen = read_frozen_outline(folder.path());
+  EXPECT_EQ(frozen.plan.fingerprint, plan("w").fingerprint);
+  EXPECT_THAT(frozen.plan.shards, ElementsAre(outline_of(plan("w").shards[0])));
 }
 
 TEST(DiscardOutput, RemovesWhatThePlanNamesAndNothingElse) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   discard_output(folder.path());  // nothing there
   freeze_plan(folder.path(), plan("w"));
-  for (const char* name :
-       {"job-train-00000-of-00001.h5", "job-train-00000-of-00001.json", "mine.h5"}) {
-    testing::write_file(folder / name, "x");
+  for (const char* name : {kShard, "job-train-00000-of-00001.json", "mine.h5", "dataset.json",
+                           "dataset.h5", "amendments.json"}) {
+    write_file(folder / name, "x");
   }
   discard_output(folder.path());
-  EXPECT_FALSE(std::filesystem::exists(folder / "plan.json"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "job-train-00000-of-00001.h5"));
-  EXPECT_FALSE(std::filesystem::exists(folder / "job-train-00000-of-00001.json"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "mine.h5"));
+  EXPECT_THAT(names_in(folder.path()), ElementsAre("mine.h5"));
+}
+
+TEST(DiscardOutput, OfADamagedPlanLeavesTheShardsItCannotName) {
+  const TemporaryFolder folder;
+  for (const char* name : {"plan.json", kShard, "dataset.json"}) write_file(folder / name, "x");
+  discard_output(folder.path());
+  EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard));
 }
 
 TEST(RecordedManifestFolder, IsWhatWasRecorded) {
-  const testing::TemporaryFolder folder;
+  const TemporaryFolder folder;
   EXPECT_FALSE(recorded_manifest_folder(folder.path()));
   JobManifest manifest;
   manifest.directory = "/data/here";
   record_manifest_folder(folder.path(), manifest);
   EXPECT_EQ(recorded_manifest_folder(folder.path()), "/data/here");
-  testing::write_file(folder / "run.json", "[1, 2");
+  write_file(folder / "run.json", "[1, 2");
   EXPECT_FALSE(recorded_manifest_folder(folder.path()));
 }
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "stages/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -28,6 +29,19 @@ class Fingerprint : public ::testing::Test {
 };
 
 TEST_F(Fingerprint, IsTheSameForTheSameInputs) { EXPECT_EQ(make(), make()); }
+
+TEST_F(Fingerprint, ListsEachPathOnceSortedWithItsSizeOrHash) {
+  // Folders that were frozen by an earlier version must stay valid: these values never change.
+  const PlannedSample sample = shards_[0].samples[0];
+  shards_.push_back({"t.h5", 0, {1, 1}, {sample, sample}});
+  shards_[1].samples[0].pair.next.path = "B.png";
+  const auto fields =
+      make_fingerprint(manifest_, shards_, {"z.txt", "labels.txt", "z.txt"}, "weights", "engine");
+  EXPECT_EQ(fields.at("frames"), sha256_hex("B.png\tabsent\na.png\t5\nb.png\tabsent\n"));
+  EXPECT_EQ(fields.at("annotations"),
+            sha256_hex("labels.txt\t" + sha256_hex("Car 1") + "\nz.txt\tabsent\n"));
+  EXPECT_EQ(make_fingerprint(manifest_, {}, {}, "", "").at("frames"), sha256_hex(""));
+}
 
 TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
   const auto before = make();

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
+#include "pipeline/stopping/stopped.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -53,6 +54,20 @@ TEST_F(MakePlan, GroupsPicturesBySize) {
   const Plan plan = make_plan(manifest_, "w", "e").plan;
   ASSERT_EQ(plan.shards.size(), 2u);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 6}));
+}
+
+TEST_F(MakePlan, StopsAtAnyFrameOrFile) {
+  int asked = 0;
+  make_plan(manifest_, "w", "e", [&] {
+    ++asked;
+    return false;
+  });
+  EXPECT_EQ(asked, 4 + 4);
+  for (int last = 1; last <= 8; ++last) {
+    asked = 0;
+    EXPECT_THROW(make_plan(manifest_, "w", "e", [&] { return ++asked == last; }), Stopped);
+    EXPECT_EQ(asked, last);
+  }
 }
 
 TEST_F(MakePlan, TooFewPairsAreAnError) {

@@ -92,6 +92,20 @@ TEST(Progress, AnErrorDoesNotWriteIntoTheBarsLine) {
   EXPECT_TRUE(out.str().ends_with("\n"));
 }
 
+TEST(Progress, TheTotalMayTurnOutSmaller) {
+  HandClock clock;
+  std::ostringstream out;
+  Progress progress(out, ProgressStyle::kLines, false, 10, clock.get());
+  progress.advance(false, 10);
+  progress.set_total(1);
+  progress.finish();
+  EXPECT_THAT(out.str(), ::testing::StartsWith("1/1 pairs"));
+}
+
+TEST(NoteJson, IsOneLine) {
+  EXPECT_EQ(note_json("part 1 of 2"), R"({"event":"note","text":"part 1 of 2"})");
+}
+
 TEST(WarningJson, IsOneLine) {
   EXPECT_EQ(warning_json("no \"weights\""), R"({"event":"warning","text":"no \"weights\""})");
 }

@@ -2,28 +2,58 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+
 namespace eventgan {
 namespace {
 
-TEST(StopSignal, CatchesTheFirstOfEachKind) {
-  for (const int number : {SIGINT, SIGTERM}) {
+constexpr std::array kSignals{SIGINT, SIGTERM, SIGUSR1};
+
+struct sigaction action_of(int number) {
+  struct sigaction action {};
+  sigaction(number, nullptr, &action);
+  return action;
+}
+
+TEST(StopSignal, EachKindIsARequest) {
+  for (const int number : kSignals) {
     const StopSignal signal;
     EXPECT_FALSE(signal.requested());
+    EXPECT_FALSE(signal.seconds_since_request());
     std::raise(number);
     EXPECT_TRUE(signal.requested());
-    struct sigaction now {};
-    sigaction(number, nullptr, &now);
-    EXPECT_EQ(now.sa_handler, SIG_DFL);  // a second one ends the process
+    EXPECT_GE(signal.seconds_since_request(), 0);
   }
 }
 
+TEST(StopSignal, CountsFromTheFirst) {
+  const StopSignal signal;
+  std::raise(SIGUSR1);
+  const double first_s = signal.seconds_since_request().value();
+  for (int i = 0; i < 3; ++i) {  // schedulers repeat them
+    std::raise(SIGTERM);
+    std::raise(SIGUSR1);
+  }
+  EXPECT_GE(signal.seconds_since_request(), first_s);
+}
+
+TEST(StopSignal, ASecondInterruptEndsTheProcess) {
+  const auto interrupt_twice = [] {
+    const StopSignal signal;
+    std::raise(SIGTERM);  // does not count as the first
+    std::raise(SIGINT);
+    if (signal.requested()) std::raise(SIGINT);
+  };
+  EXPECT_EXIT(interrupt_twice(), ::testing::KilledBySignal(SIGINT), "");
+}
+
 TEST(StopSignal, LeavesSignalsAsTheyWere) {
-  struct sigaction before {};
-  sigaction(SIGTERM, nullptr, &before);
+  std::array<struct sigaction, 3> before{};
+  for (std::size_t i = 0; i < kSignals.size(); ++i) before[i] = action_of(kSignals[i]);
   { const StopSignal signal; }
-  struct sigaction after {};
-  sigaction(SIGTERM, nullptr, &after);
-  EXPECT_EQ(before.sa_handler, after.sa_handler);
+  for (std::size_t i = 0; i < kSignals.size(); ++i) {
+    EXPECT_EQ(action_of(kSignals[i]).sa_handler, before[i].sa_handler);
+  }
 }
 
 }  // namespace

@@ -48,6 +48,27 @@ TEST(AtomicFile, CreatesOnlyWhatIsNotThere) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre("plan.json"));
 }
 
+TEST(AtomicFile, CreatesInPieces) {
+  const TemporaryFolder folder;
+  const auto write = [](const TextSink& sink) {
+    for (const char* piece : {"one ", "", "two"}) sink(piece);
+  };
+  EXPECT_TRUE(create_file_atomically(folder / "plan.json", write));
+  EXPECT_FALSE(create_file_atomically(folder / "plan.json", [](const TextSink&) { FAIL(); }));
+  EXPECT_EQ(read_file(folder / "plan.json"), "one two");
+}
+
+TEST(AtomicFile, AWriterThatFailsLeavesNothing) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(create_file_atomically(folder / "plan.json",
+                                      [](const TextSink& sink) {
+                                        sink("half");
+                                        throw std::logic_error("the other half");
+                                      }),
+               std::logic_error);
+  EXPECT_THAT(names_in(folder.path()), ElementsAre());
+}
+
 TEST(AtomicFile, OfManyCreatorsOneWins) {
   const TemporaryFolder folder;
   std::atomic<int> winner{-1};

@@ -18,6 +18,17 @@ TEST(Sha256, GivesPublishedDigests) {
   EXPECT_EQ(sha256_hex("abc"), kOfAbc);
 }
 
+TEST(Sha256, OfPiecesIsThatOfTheWhole) {
+  Sha256 hash;
+  EXPECT_EQ(hash.hex(), kOfNothing);
+  hash.update("a");
+  EXPECT_EQ(hash.hex(), sha256_hex("a"));
+  hash.update("");
+  hash.update("bc");
+  EXPECT_EQ(hash.hex(), kOfAbc);
+  EXPECT_EQ(hash.hex(), kOfAbc);
+}
+
 TEST(Sha256, OfAFileIsThatOfItsBytes) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "empty", "");

@@ -5,6 +5,8 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include "stages/files/temporary_name.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
@@ -21,18 +23,23 @@ pid_t dead_pid() {
   return child;
 }
 
-TEST(StaleTemporaries, OnlyThoseOfDeadProcessesOfThisHostGo) {
+TEST(StaleTemporaries, OnlyThoseOfDeadWritersGo) {
   const testing::TemporaryFolder folder;
   const pid_t dead = dead_pid();
+  const std::string other_host = host_name() + "-2";
   const std::string stale = to_string(TemporaryName{"a.h5", host_name(), dead, 0});
+  const std::string silent = to_string(TemporaryName{"b.h5", other_host, dead, 0});
   const std::string stale_too = to_string(TemporaryName{"plan.json", host_name(), dead, 17});
   const std::string alive = to_string(TemporaryName{"a.h5", host_name(), ::getpid(), 0});
-  const std::string foreign = to_string(TemporaryName{"a.h5", host_name() + "-2", dead, 0});
-  for (const auto& name : {stale, stale_too, alive, foreign, std::string("a.h5")}) {
+  const std::string foreign = to_string(TemporaryName{"a.h5", other_host, dead, 0});
+  for (const auto& name : {stale, silent, stale_too, alive, foreign, std::string("a.h5")}) {
     testing::write_file(folder / name, "x");
   }
+  using std::chrono::hours;
+  std::filesystem::last_write_time(folder / silent,
+                                   std::filesystem::file_time_type::clock::now() - hours(2));
   EXPECT_THAT(remove_stale_temporaries(folder.path()),
-              ::testing::ElementsAre(folder / stale, folder / stale_too));
+              ::testing::ElementsAre(folder / stale, folder / silent, folder / stale_too));
   EXPECT_THAT(testing::names_in(folder.path()),
               ::testing::UnorderedElementsAre(alive, foreign, "a.h5"));
   EXPECT_TRUE(remove_stale_temporaries(folder.path()).empty());

@@ -195,9 +195,10 @@ ShardMarker write_shard(const std::filesystem::path& folder, const ExampleShard&
     }
     writer.append(sample, encoded.chunk);
   }
-  const ShardReceipt receipt = writer.commit();
+  ShardReceipt receipt = writer.commit();
   marker.sha256 = receipt.sha256;
   marker.size_bytes = receipt.size_bytes;
+  enter(std::move(receipt.contents), marker);
   return marker;
 }
 

@@ -139,6 +139,18 @@ TEST_F(ShardCheck, CountsThatDifferAreFound) {
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the marker lists")));
 }
 
+TEST_F(ShardCheck, RowsOtherThanTheMarkerSaysAreFound) {
+  write(testing::example_shard());
+  marker_.boxes[0] = 1;
+  marker_.persons[4] = 2;
+  marker_.classes["Car"] = 1;
+  marker_.gaps = {{1, 5}};
+  marker_.optional_columns.clear();
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("boxes in slot 0"), HasSubstr("persons in slot 4"),
+                                    HasSubstr("boxes by class"), HasSubstr("samples by gap 1: 5"),
+                                    HasSubstr("optional columns none")));
+}
+
 TEST_F(ShardCheck, MissingDatasetsAreFoundAllAtOnce) {
   write(testing::example_shard());
   change([](hid_t file) {

@@ -8,12 +8,14 @@ import h5py
 from example_shards import SOURCE, ExampleShards
 
 PAGE = SOURCE / "manifests" / "shard_format.md"
+# What a shard is; the parts after that are on the files beside it.
+TEXT = PAGE.read_text(encoding="utf-8").split("## The marker")[0]
 
 
 def tables():
     """Rows of the page's two tables, as lists of cells without backquotes, without headings."""
     rows = [[cell.strip().strip("`") for cell in line.strip("|").split("|")]
-            for line in PAGE.read_text(encoding="utf-8").splitlines() if line.startswith("| `/")]
+            for line in TEXT.splitlines() if line.startswith("| `/")]
     datasets = [row for row in rows if row[1].startswith("[")]
     attributes = [row for row in rows if not row[1].startswith("[")]
     return datasets, attributes
@@ -69,7 +71,7 @@ class ShardFormatPage(unittest.TestCase):
 
     def test_the_lines_of_python_on_the_page_run(self):
         code = "\n".join(line[4:] for line in re.findall(
-            r"(?m)^    (?:import h5py|with h5py|    ).*$", PAGE.read_text(encoding="utf-8")))
+            r"(?m)^    (?:import h5py|with h5py|    ).*$", TEXT))
         code = code.replace("kitti-events-train-00000-of-00117.h5",
                             str(self.example.path("uint8-1")))
         names = {}

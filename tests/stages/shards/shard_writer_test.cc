@@ -57,6 +57,17 @@ TEST(ShardWriter, WithoutCommitNothingStays) {
   EXPECT_THAT(names_in(folder.path()), IsEmpty());
 }
 
+TEST(ShardWriter, AFileThatSomeoneDeletedUnderWayIsNamed) {
+  const TemporaryFolder folder;
+  const ExampleShard example = unlabelled_shard();
+  ShardWriter writer(folder.path(), example.header);
+  writer.append(example.samples[0], chunk_of(example, 0));
+  std::filesystem::remove(folder / names_in(folder.path()).at(0));
+  EXPECT_THAT([&] { writer.commit(); }, ::testing::ThrowsMessage<UnfinishedShardLost>(
+                                            HasSubstr((folder / example.header.name).string())));
+  EXPECT_THAT(names_in(folder.path()), IsEmpty());
+}
+
 TEST(ShardWriter, ReplacesAnOlderShard) {
   const TemporaryFolder folder;
   const ExampleShard example = unlabelled_shard();

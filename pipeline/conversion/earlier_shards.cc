@@ -1,0 +1,78 @@
+#include "pipeline/conversion/earlier_shards.h"
+
+#include <atomic>
+#include <cstddef>
+#include <cstdio>
+#include <utility>
+
+#include "manifests/plan_outline.h"
+#include "pipeline/output/shard_state.h"
+#include "pipeline/threads/for_each_index.h"
+
+namespace eventgan {
+namespace {
+
+/// Some ten seconds of hashing.
+constexpr std::int64_t kNotedBytes = 4'000'000'000;
+
+bool is_stopped(const EarlierCheck& check) { return check.stop && check.stop(); }
+
+void tell_if_long(const std::vector<ShardState>& states, const EarlierCheck& check) {
+  int done = 0;
+  std::int64_t bytes = 0;
+  for (const ShardState& state : states) {
+    if (!state.done()) continue;
+    ++done;
+    bytes += state.marker->size_bytes;
+  }
+  if (!check.note || bytes < kNotedBytes) return;
+  char text[80];
+  std::snprintf(text, sizeof text, "checking %d committed shards (%.1f GB)", done,
+                1e-9 * static_cast<double>(bytes));
+  check.note(text);
+}
+
+}  // namespace
+
+EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
+                                   const std::vector<const PlannedShard*>& shards,
+                                   const EarlierCheck& check) {
+  std::vector<ShardState> states(shards.size());
+  for_each_index(shards.size(), check.threads, [&](std::size_t i) {
+    if (!is_stopped(check)) states[i] = shard_state(folder, outline_of(*shards[i]), frozen.hash);
+  });
+  tell_if_long(states, check);
+  for_each_index(shards.size(), check.threads, [&](std::size_t i) {
+    if (!states[i].done()) return;
+    states[i] = is_stopped(check) ? ShardState{}
+                                  : hashed_shard_state(folder, outline_of(*shards[i]), frozen.hash);
+  });
+
+  EarlierShards earlier;
+  for (std::size_t i = 0; i < shards.size(); ++i) {
+    if (states[i].done()) {
+      earlier.done.push_back({shards[i], *std::move(states[i].marker)});
+      continue;
+    }
+    earlier.left.push_back(shards[i]);
+    if (!states[i].fault.empty()) earlier.faults.push_back(states[i].fault);
+    if (states[i].condition == ShardCondition::kOtherBytes) {
+      earlier.distrusted.insert(shards[i]->name);
+    }
+  }
+  return earlier;
+}
+
+std::int64_t count_quarantined(const std::filesystem::path& folder, const FrozenPlan& frozen,
+                               const std::vector<const PlannedShard*>& shards,
+                               const EarlierCheck& check) {
+  std::atomic<std::int64_t> count = 0;
+  for_each_index(shards.size(), check.threads, [&](std::size_t i) {
+    if (is_stopped(check)) return;
+    const ShardState state = shard_state(folder, outline_of(*shards[i]), frozen.hash);
+    if (state.done()) count += std::ssize(state.marker->quarantined);
+  });
+  return count;
+}
+
+}  // namespace eventgan

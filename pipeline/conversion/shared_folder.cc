@@ -1,0 +1,88 @@
+#include "pipeline/conversion/shared_folder.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "manifests/marker.h"
+#include "manifests/plan_outline.h"
+#include "pipeline/output/shard_state.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/unfinished_files.h"
+
+namespace eventgan {
+namespace {
+
+/// A listing stands so many times as long as it took: folders of thousands of shards on network
+/// file systems are slow to list.
+constexpr int kListingStands = 20;
+
+bool is_ours(const TemporaryName& name) {
+  return name.pid == ::getpid() && name.host == host_name();
+}
+
+}  // namespace
+
+SharedFolder::SharedFolder(std::filesystem::path folder, std::string plan_hash,
+                           std::set<std::string> distrusted)
+    : folder_(std::move(folder)),
+      plan_hash_(std::move(plan_hash)),
+      distrusted_(std::move(distrusted)),
+      next_listing_(std::chrono::steady_clock::now()) {}
+
+SharedFolder::~SharedFolder() {
+  std::error_code ignored;  // the next run cleans up what stays
+  for (const auto& [shard, file] : claims_) std::filesystem::remove(file, ignored);
+}
+
+ShardActivity SharedFolder::look_at(const PlannedShard& shard) {
+  const std::lock_guard lock(mutex_);
+  if (is_done(shard)) return ShardActivity::kDone;
+  if (is_busy(shard)) return ShardActivity::kBusy;
+  claim(shard);
+  return ShardActivity::kFree;
+}
+
+void SharedFolder::opened(const PlannedShard& shard) {
+  const std::lock_guard lock(mutex_);
+  const auto claim = claims_.find(shard.name);
+  if (claim == claims_.end()) return;
+  std::error_code ignored;
+  std::filesystem::remove(claim->second, ignored);
+  claims_.erase(claim);
+}
+
+bool SharedFolder::is_done(const PlannedShard& shard) const {
+  const auto state = distrusted_.contains(shard.name) ? hashed_shard_state : shard_state;
+  return state(folder_, outline_of(shard), plan_hash_).done();
+}
+
+bool SharedFolder::is_busy(const PlannedShard& shard) {
+  const auto start = std::chrono::steady_clock::now();
+  if (start >= next_listing_) {
+    busy_.clear();
+    for (const UnfinishedFile& file : unfinished_files(folder_)) {
+      if (!is_ours(file.name) && !is_stale(file)) busy_.insert(file.name.target);
+    }
+    const auto end = std::chrono::steady_clock::now();
+    next_listing_ = end + kListingStands * (end - start);
+  }
+  return busy_.contains(shard.name) || busy_.contains(marker_name(shard.name));
+}
+
+void SharedFolder::claim(const PlannedShard& shard) {
+  const std::filesystem::path file = temporary_beside(folder_ / shard.name);
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor < 0) {
+    throw std::runtime_error("cannot create " + file.string() + ": " + std::strerror(errno));
+  }
+  ::close(descriptor);
+  claims_[shard.name] = file;
+}
+
+}  // namespace eventgan

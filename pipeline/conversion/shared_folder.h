@@ -1,0 +1,52 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "pipeline/workers/shard_queue.h"
+
+namespace eventgan {
+
+/// The output folder as several workers share it, who know of each other by files alone. A shard
+/// that this worker takes is claimed at once by an empty temporary file, since the samples of the
+/// shard before may keep its writer from opening it for long; else two workers side by side would
+/// make the same shards for ever. Thread safe.
+class SharedFolder {
+ public:
+  /// The shards named in `distrusted` count as done only after their bytes were hashed.
+  SharedFolder(std::filesystem::path folder, std::string plan_hash,
+               std::set<std::string> distrusted);
+
+  /// Takes its claims back.
+  ~SharedFolder();
+  SharedFolder(const SharedFolder&) = delete;
+  SharedFolder& operator=(const SharedFolder&) = delete;
+
+  /// What others do with a shard; kFree claims it. Lists the folder so seldom that it costs little.
+  /// Throws std::runtime_error naming the path if the folder cannot be listed or written to.
+  ShardActivity look_at(const PlannedShard& shard);
+
+  /// Whether the shard is committed.
+  bool is_done(const PlannedShard& shard) const;
+
+  /// The shard's own temporary is there: the claim is not needed any more.
+  void opened(const PlannedShard& shard);
+
+ private:
+  bool is_busy(const PlannedShard& shard);
+  void claim(const PlannedShard& shard);
+
+  std::filesystem::path folder_;
+  std::string plan_hash_;
+  std::set<std::string> distrusted_;
+  std::mutex mutex_;
+  std::map<std::string, std::filesystem::path> claims_;  // by shard
+  std::set<std::string> busy_;                           // what others write, when last listed
+  std::chrono::steady_clock::time_point next_listing_;
+};
+
+}  // namespace eventgan

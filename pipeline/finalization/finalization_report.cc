@@ -1,0 +1,63 @@
+#include "pipeline/finalization/finalization_report.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/finalization/dataset_description.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::size_t kListedShards = 100;
+
+/// What is wrong with a shard names its file.
+std::string line_of(const MissingShard& shard) {
+  return shard.why.find(": ") == std::string::npos ? shard.name + ": " + shard.why : shard.why;
+}
+
+}  // namespace
+
+std::string to_text(const FinalizationReport& report) {
+  std::string text;
+  const std::size_t listed = std::min(report.missing.size(), kListedShards);
+  for (std::size_t i = 0; i < listed; ++i) {
+    text += line_of(report.missing[i]) + "\n";
+  }
+  if (listed < report.missing.size()) {
+    text += "... and " + std::to_string(report.missing.size() - listed) + " more (all: --json)\n";
+  }
+  const DatasetCounts& counts = report.counts;
+  text += std::to_string(counts.shards) + " of " + std::to_string(report.shards_planned) +
+          " shards: " + std::to_string(counts.samples) + " samples, " +
+          std::to_string(counts.quarantined()) + " of them quarantined, " +
+          std::to_string(counts.boxes) + " boxes, " + std::to_string(counts.persons) + " persons\n";
+  if (!report.written) {
+    return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
+                                      : "not finalized: incomplete (--partial to allow it)\n");
+  }
+  if (!report.complete()) text += "PARTIAL: finalize again when the rest is done\n";
+  return text + report.folder + ": " + kDescriptionName + ", " + kViewName + "\n";
+}
+
+std::string to_json(const FinalizationReport& report) {
+  nlohmann::json missing = nlohmann::json::array();
+  for (const MissingShard& shard : report.missing) {
+    missing.push_back({{"shard", shard.name}, {"why", shard.why}});
+  }
+  const nlohmann::json json = {{"folder", report.folder},
+                               {"complete", report.complete()},
+                               {"written", report.written},
+                               {"shards_planned", report.shards_planned},
+                               {"shards_done", report.counts.shards},
+                               {"missing", missing},
+                               {"samples", report.counts.samples},
+                               {"valid", report.counts.valid},
+                               {"quarantined", report.counts.quarantined()},
+                               {"boxes", report.counts.boxes},
+                               {"persons", report.counts.persons},
+                               {"views", report.views},
+                               {"too_many_faults", report.too_many_faults}};
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace eventgan

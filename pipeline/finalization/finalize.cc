@@ -1,0 +1,34 @@
+#include "pipeline/finalization/finalize.h"
+
+#include "manifests/error_limits.h"
+#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/finalization/dataset_parts.h"
+#include "pipeline/finalization/dataset_views.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/stale_temporaries.h"
+
+namespace eventgan {
+
+FinalizationReport finalize(const std::filesystem::path& folder,
+                            const FinalizationOptions& options) {
+  const DatasetParts parts = read_dataset_parts(folder);
+  FinalizationReport report;
+  report.folder = folder.string();
+  report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
+  report.missing = parts.missing;
+  for (const FinishedShard& shard : parts.shards) add(shard.marker, report.counts);
+  report.too_many_faults =
+      beyond_limits(options.errors.value_or(parts.manifest.errors), report.counts.quarantined(),
+                    parts.frozen.plan.sample_count());
+  if (parts.shards.empty() || (!report.complete() && !options.partial)) return report;
+
+  remove_stale_temporaries(folder);  // of a finalize that was killed, for one
+  const std::vector<DatasetView> views = views_of(parts);
+  const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);
+  write_file_atomically(folder / kDescriptionName, describe_dataset(parts, views, receipt));
+  report.views = static_cast<int>(views.size());
+  report.written = true;
+  return report;
+}
+
+}  // namespace eventgan

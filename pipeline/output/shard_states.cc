@@ -1,0 +1,16 @@
+#include "pipeline/output/shard_states.h"
+
+#include "pipeline/threads/for_each_index.h"
+
+namespace eventgan {
+
+std::vector<ShardState> shard_states(const std::filesystem::path& folder,
+                                     const FrozenOutline& frozen) {
+  std::vector<ShardState> states(frozen.plan.shards.size());
+  for_each_index(states.size(), kLooksAtOnce, [&](std::size_t i) {
+    states[i] = shard_state(folder, frozen.plan.shards[i], frozen.hash);
+  });
+  return states;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,158 @@
+#include "pipeline/samples/sample_stages.h"
+
+#include <algorithm>
+#include <ctime>
+#include <limits>
+
+#include "stages/events/normalization.h"
+#include "stages/labels/label_mapping.h"
+
+namespace eventgan {
+namespace {
+
+/// Gap that the published generator never saw in training (DESIGN section 4).
+constexpr int kFirstExtrapolatedGap = 6;
+
+/// Adds the processor time that the calling thread spends in its scope to one stage of a message:
+/// waiting for another thread is not work.
+class Stopwatch {
+ public:
+  Stopwatch(SampleMessage& message, Stage stage)
+      : seconds_(message.seconds[static_cast<std::size_t>(stage)]) {}
+  ~Stopwatch() { seconds_ += thread_seconds() - start_; }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  static double thread_seconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+
+  double& seconds_;
+  double start_ = thread_seconds();
+};
+
+std::string frame_names(const FramePair& pair) {
+  return pair.previous.path + " and " + pair.next.path;
+}
+
+std::string size_text(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// The content's volume laid into the whole volume's frame; zeros (no events) around it.
+std::vector<float> framed(std::vector<float> content, const PreparedPair& prepared, int channels) {
+  const ImageSize whole = prepared.placement.volume;
+  const ImageSize part = prepared.content;
+  if (part == whole) return content;
+  std::vector<float> volume(channels * whole.pixel_count(), 0.0f);
+  for (int row = 0; row < channels * part.height; ++row) {
+    const int channel = row / part.height;
+    const std::size_t y = prepared.content_y + row % part.height;
+    std::copy_n(
+        content.begin() + static_cast<std::ptrdiff_t>(row) * part.width, part.width,
+        volume.begin() + static_cast<std::ptrdiff_t>((channel * whole.height + y) * whole.width +
+                                                     prepared.content_x));
+  }
+  return volume;
+}
+
+}  // namespace
+
+SampleStages::SampleStages(const JobManifest& manifest,
+                           const std::vector<std::unique_ptr<Dataset>>& datasets,
+                           const Generator& generator, int in_flight)
+    : manifest_(manifest),
+      datasets_(datasets),
+      generator_(generator),
+      reader_(manifest.directory, manifest.image, in_flight),
+      codec_(manifest.output.dtype, manifest.output.deflate_level) {}
+
+void SampleStages::read(SampleMessage& message) const {
+  const Stopwatch stopwatch(message, Stage::kRead);
+  const PlannedSample& planned = message.planned();
+  message.sample.sample_id = planned.sample_id;
+  message.sample.sequence = planned.sequence;
+  message.sample.pair = planned.pair;
+  message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
+  if (!planned.fault.empty()) {
+    message.fail(planned.fault);
+  } else {
+    Outcome<PreparedPair> prepared = reader_.read(planned.pair);
+    if (is_fault(prepared)) {
+      message.fail(std::get<SampleFault>(prepared).reason);
+    } else {
+      message.prepared = std::move(std::get<PreparedPair>(prepared));
+      const Placement& placement = message.prepared.placement;
+      message.sample.source_size = placement.source;
+      message.sample.source_to_volume = placement.source_to_volume();
+      if (placement.volume != message.shard->volume_size) {
+        message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
+                     size_text(placement.volume) + ", in " + frame_names(planned.pair));
+      }
+    }
+  }
+  read_labels(message, *datasets_[static_cast<std::size_t>(message.shard->source)]);
+}
+
+void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {
+  const PlannedSample& planned = message.planned();
+  Outcome<Annotation> annotation = dataset.annotation(planned.label_key);
+  if (is_fault(annotation)) {
+    if (!message.failed()) message.fail(std::get<SampleFault>(annotation).reason);
+    return;
+  }
+  message.sample.annotation = std::move(std::get<Annotation>(annotation));
+  if (!message.failed()) {
+    Outcome<VolumeLabels> labels = map_labels(message.sample.annotation, message.prepared.placement,
+                                              dataset.label_place(planned.label_key));
+    if (!is_fault(labels)) {
+      message.sample.labels = std::move(std::get<VolumeLabels>(labels));
+      return;
+    }
+    message.fail(std::get<SampleFault>(labels).reason);
+  }
+  // Without a usable picture or label there is no place in the volume; the original text is kept.
+  message.sample.annotation.boxes.clear();
+  message.sample.annotation.persons.clear();
+}
+
+void SampleStages::generate(SampleMessage& message) const {
+  if (message.failed()) return;
+  const Stopwatch stopwatch(message, Stage::kGenerate);
+  const PreparedPair& prepared = message.prepared;
+  message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
+  generator_.generate(prepared.input, prepared.content, message.volume);
+  message.prepared.input = {};
+}
+
+void SampleStages::finish(SampleMessage& message) const {
+  if (message.failed()) return;
+  const Stopwatch stopwatch(message, Stage::kFinish);
+  if (const std::size_t bad = first_unsound_value(message.volume); bad != message.volume.size()) {
+    const std::size_t plane = message.prepared.content.pixel_count();
+    message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
+                 " in channel " + std::to_string(bad / plane) + " of the generated volume, from " +
+                 frame_names(message.planned().pair));
+    return;
+  }
+  const VolumeShape shape{generator_.bins(), message.prepared.placement.volume};
+  std::vector<float> volume = framed(std::move(message.volume), message.prepared, shape.channels());
+  VolumeStatistics& statistics = message.sample.statistics;
+  statistics = volume_statistics(volume, shape);
+  if (manifest_.generator.kind == GeneratorKind::kNetwork &&
+      message.planned().pair.gap_frames >= kFirstExtrapolatedGap) {
+    statistics.flags |= kFlagExtrapolated;
+  }
+  if (manifest_.volume.normalize == Normalization::kEta98) normalize(volume, statistics.eta98);
+  EncodedVolume encoded = codec_.encode(volume);
+  if (encoded.saturated) statistics.flags |= kFlagSaturated;
+  message.sample.scale = encoded.scale;
+  message.chunk = std::move(encoded.chunk);
+  message.volume = {};
+  message.prepared = {};
+}
+
+}  // namespace eventgan

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+
+struct VerifyOptions {
+  bool deep = false;  ///< compare labels with the sources, too
+  /// deep: the job's manifest, if its folder is not the recorded one.
+  std::optional<std::filesystem::path> manifest;
+};
+
+/// What `eventgan verify` found.
+struct FolderCheck {
+  std::vector<std::string> faults;  ///< one line each, "PATH: expected X, got Y"
+  std::vector<std::string> notes;   ///< what is no fault, but a person should know
+  int shards = 0;                   ///< shards of the plan that were looked at
+  long long samples = 0;
+  long long valid = 0;
+  long long compared = 0;  ///< deep: valid samples whose labels were compared with their source
+};
+
+/// Checks a whole output folder: the plan, a marker for every shard of it, each shard's bytes,
+/// structure, counts, checksums and values; that nothing else looks like a part of it; that
+/// dataset.json and dataset.h5, if there, are what the markers give. Temporaries of other processes
+/// are noted. With `deep`, labels are compared with the sources, where these are there (see
+/// SourceComparison). Changes nothing. Throws InputError if the folder has no plan,
+/// std::runtime_error if that is damaged.
+FolderCheck verify_folder(const std::filesystem::path& folder, const VerifyOptions& options = {});
+
+}  // namespace eventgan

@@ -1,0 +1,114 @@
+#include "pipeline/finalization/dataset_description.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/finalization/dataset_views.h"
+#include "tests/pipeline/finalization/converted_folder.h"
+
+namespace eventgan {
+namespace {
+
+using nlohmann::json;
+using testing::ConvertedFolder;
+
+json description_of(const ConvertedFolder& folder) {
+  const DatasetParts parts = read_dataset_parts(folder.path());
+  return json::parse(describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
+}
+
+TEST(DatasetDescription, SaysWhatTheDatasetIs) {
+  const ConvertedFolder folder;
+  const json text = description_of(folder);
+  EXPECT_EQ(text["format"], "eventgan-dataset");
+  EXPECT_EQ(text["version"], 1);
+  EXPECT_EQ(text["name"], "demo");
+  EXPECT_EQ(text["complete"], true);
+  EXPECT_EQ(text["missing"], json::array());
+  EXPECT_EQ(text["plan_hash"], folder.plan_hash());
+  EXPECT_EQ(text["weights_hash"], std::string(64, 'b'));
+  EXPECT_EQ(text["generator"], "a fake generator");
+  EXPECT_EQ(text["program_version"], "0.1.0");
+  EXPECT_EQ(text["fingerprint"]["cpu"], "x86-64 avx2 fma");
+  EXPECT_FALSE(text["fingerprint"].contains("manifest $.seed"));  // stands in the settings
+  EXPECT_EQ(text["settings"]["seed"], 7);
+  EXPECT_FALSE(text.contains("amendments"));
+}
+
+TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
+  const ConvertedFolder folder;
+  const json text = description_of(folder);
+  // The example: 5 samples, one in quarantine, 3 boxes (Car, DontCare, Car), 3 persons, gap 2.
+  const json& total = text["counts"]["total"];
+  EXPECT_EQ(total["shards"], 4);
+  EXPECT_EQ(total["samples"], 16);
+  EXPECT_EQ(total["valid"], 13);
+  EXPECT_EQ(total["quarantined"], 3);
+  EXPECT_EQ(total["boxes"], 9);
+  EXPECT_EQ(total["boxes_by_class"], (json{{"Car", 6}, {"DontCare", 3}}));
+  EXPECT_EQ(total["persons"], 9);
+  EXPECT_EQ(total["samples_by_gap"], (json{{"2", 16}}));
+  EXPECT_EQ(text["counts"]["by_dataset"], (json{{"kitti_object", total}}));
+  EXPECT_EQ(text["counts"]["by_split"]["val"]["samples"], 5);
+  EXPECT_EQ(text["counts"]["by_split"]["train"]["samples"], 11);
+  const ShardMarker marker = folder.marker(1);
+  EXPECT_EQ(text["shards"][1], (json{{"name", "demo-val-00000-of-00001.h5"},
+                                     {"split", "val"},
+                                     {"dataset", "kitti_object"},
+                                     {"samples", 5},
+                                     {"valid", 4},
+                                     {"boxes", 3},
+                                     {"persons", 3},
+                                     {"size_bytes", marker.size_bytes},
+                                     {"sha256", marker.sha256}}));
+}
+
+TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
+  const json text = description_of(ConvertedFolder());
+  ASSERT_EQ(text["quarantined"].size(), 3u);
+  EXPECT_EQ(text["quarantined"][1],
+            (json{{"sample_id", "000002"},
+                  {"shard", "demo-val-00000-of-00001.h5"},
+                  {"slot", 2},
+                  {"reason", "cannot decode kitti/image_2/000002.png (000002)"}}));
+}
+
+TEST(DatasetDescription, TellsOfTheViewAndItsSplits) {
+  const json view = description_of(ConvertedFolder())["view"];
+  EXPECT_EQ(view["name"], "dataset.h5");
+  EXPECT_EQ(view["sha256"], std::string(64, 'c'));
+  EXPECT_EQ(view["size_bytes"], 77);
+  EXPECT_EQ(view["views"][0]["group"], "/");
+  EXPECT_EQ(view["views"][0]["volume_shape"], (json{4, 6, 8}));
+  EXPECT_EQ(view["views"][0]["splits"][1], (json{{"name", "val"}, {"first", 11}, {"rows", 5}}));
+}
+
+TEST(DatasetDescription, OfASourceWithoutShardsTheNamesAreUnknown) {
+  const json text = description_of(ConvertedFolder(1));
+  EXPECT_EQ(text["complete"], false);
+  EXPECT_EQ(text["missing"].size(), 3u);
+  EXPECT_EQ(text["sources"][0]["class_names"], (json{"Car", "DontCare"}));
+  EXPECT_EQ(text["sources"][0]["labelled_frames"], 6);
+  EXPECT_EQ(text["sources"][1]["class_names"], json());
+}
+
+TEST(DatasetDescription, AmendmentsAreTold) {
+  const ConvertedFolder folder;
+  record_amendment(folder.path(), folder.plan_hash(), {{{"annotations", "4567"}}, {"000002"}});
+  const json text = description_of(folder);
+  EXPECT_EQ(text["fingerprint"]["annotations"], "4567");
+  EXPECT_EQ(text["amendments"],
+            json::array({{{"fields", {{"annotations", "4567"}}}, {"samples", {"000002"}}}}));
+}
+
+TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {
+  const ConvertedFolder folder;
+  DatasetParts parts = read_dataset_parts(folder.path());
+  parts.shards[0].marker.quarantined[0].reason = "cannot read \xff.png";
+  EXPECT_NO_THROW(describe_dataset(parts, views_of(parts), {}));
+}
+
+}  // namespace
+}  // namespace eventgan

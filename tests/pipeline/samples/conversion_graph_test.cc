@@ -1,0 +1,233 @@
+#include "pipeline/samples/conversion_graph.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <deque>
+#include <stdexcept>
+
+namespace eventgan {
+namespace {
+
+PlannedShard shard(const std::string& name, int samples) {
+  PlannedShard result{name, 0, {1, 1}, {}};
+  result.samples.resize(static_cast<std::size_t>(samples));
+  return result;
+}
+
+/// Bodies that do nothing but record what the writer got.
+struct Recorder {
+  std::vector<std::string> written;
+  std::vector<bool> failed;
+
+  ConversionBodies bodies() {
+    return {[](SampleMessage&) {}, [](SampleMessage&) {}, [](SampleMessage&) {},
+            [this](SampleMessage& message) {
+              written.push_back(message.shard->name + std::to_string(message.slot));
+              failed.push_back(message.failed());
+              return true;
+            }};
+  }
+};
+
+/// Gives the shards one after the other, then nullptr for ever.
+std::function<const PlannedShard*()> one_by_one(std::deque<const PlannedShard*> shards) {
+  return [shards]() mutable -> const PlannedShard* {
+    if (shards.empty()) return nullptr;
+    const PlannedShard* const next = shards.front();
+    shards.pop_front();
+    return next;
+  };
+}
+
+StopOrder go_on() { return StopOrder::kGoOn; }
+
+class ConversionGraph : public ::testing::TestWithParam<int> {
+ protected:
+  GraphLimits limits() const { return {GetParam(), static_cast<std::size_t>(GetParam()) + 1}; }
+
+  /// Of the shards a, e and b. The same number of samples must leave the source and arrive.
+  std::size_t run(const ConversionBodies& bodies,
+                  const std::function<StopOrder()>& order = go_on) const {
+    const GraphCounts counts =
+        run_conversion_graph(one_by_one({&a_, &empty_, &b_}), bodies, limits(), order);
+    EXPECT_EQ(counts.handed_out, counts.arrived);
+    return counts.arrived;
+  }
+
+  const PlannedShard a_ = shard("a", 3), empty_ = shard("e", 0), b_ = shard("b", 40);
+};
+
+TEST_P(ConversionGraph, WritesEverySampleInPlanOrderWhateverOrderTheyFinishIn) {
+  Recorder recorder;
+  ConversionBodies bodies = recorder.bodies();
+  std::atomic<unsigned> work = 0;
+  bodies.generate = [&](SampleMessage& message) {
+    // Early samples take longest, so that with several threads they finish out of order.
+    for (unsigned i = 0; i < 20000u / (message.number % 7 + 1); ++i) work += i;
+  };
+  EXPECT_EQ(run(bodies), 43u);
+  std::vector<std::string> expected;
+  for (int slot = 0; slot < 3; ++slot) expected.push_back("a" + std::to_string(slot));
+  for (int slot = 0; slot < 40; ++slot) expected.push_back("b" + std::to_string(slot));
+  EXPECT_EQ(recorder.written, expected);
+}
+
+TEST_P(ConversionGraph, NeverHasMoreSamplesUnderWayThanTheLimit) {
+  Recorder recorder;
+  ConversionBodies bodies = recorder.bodies();
+  std::atomic<int> under_way = 0, most = 0;
+  bodies.read = [&](SampleMessage&) {
+    const int now = ++under_way;
+    int seen = most;
+    while (seen < now && !most.compare_exchange_weak(seen, now)) {
+    }
+  };
+  const auto write = bodies.write;
+  bodies.write = [&](SampleMessage& message) {
+    --under_way;
+    return write(message);
+  };
+  run_conversion_graph(one_by_one({&a_, &b_}), bodies, {GetParam(), 3}, go_on);
+  EXPECT_LE(most, 3);
+  EXPECT_GE(most, 1);
+}
+
+TEST_P(ConversionGraph, AFailedSampleReachesItsSlot) {
+  Recorder recorder;
+  ConversionBodies bodies = recorder.bodies();
+  bodies.read = [](SampleMessage& message) {
+    if (message.number % 5 == 2) message.fail("expected a frame, got none");
+  };
+  EXPECT_EQ(run(bodies), 43u);
+  for (std::size_t i = 0; i < recorder.failed.size(); ++i)
+    EXPECT_EQ(recorder.failed[i], i % 5 == 2);
+}
+
+TEST_P(ConversionGraph, AnExceptionOfABodyEndsTheRun) {
+  for (int stage = 0; stage < 4; ++stage) {
+    Recorder recorder;
+    ConversionBodies bodies = recorder.bodies();
+    const auto fail = [](SampleMessage& message) {
+      if (message.number == 10) throw std::runtime_error("disk full");
+    };
+    if (stage == 0) bodies.read = fail;
+    if (stage == 1) bodies.generate = fail;
+    if (stage == 2) bodies.finish = fail;
+    if (stage == 3) bodies.write = [&](SampleMessage& message) { return fail(message), true; };
+    EXPECT_THROW(run(bodies), std::runtime_error) << stage;
+  }
+}
+
+TEST_P(ConversionGraph, StopsWhenTheWriterSaysSo) {
+  std::size_t written = 0;
+  ConversionBodies bodies = Recorder().bodies();
+  bodies.write = [&](SampleMessage&) { return ++written < 5; };
+  const std::size_t arrived = run(bodies);
+  EXPECT_GE(arrived, 5u);
+  EXPECT_LE(arrived, 5 + 2 * limits().in_flight);  // what was under way still comes
+}
+
+TEST_P(ConversionGraph, OfNothingEndsAtOnce) {
+  Recorder recorder;
+  for (const auto& shards : {std::deque<const PlannedShard*>{}, {&empty_}}) {
+    const GraphCounts counts =
+        run_conversion_graph(one_by_one(shards), recorder.bodies(), limits(), go_on);
+    EXPECT_EQ(counts.handed_out, 0u);
+    EXPECT_EQ(counts.arrived, 0u);
+  }
+}
+
+TEST_P(ConversionGraph, AnExceptionOfTheSourceEndsTheRun) {
+  Recorder recorder;
+  int calls = 0;
+  const auto fail = [&]() -> const PlannedShard* {
+    if (++calls == 2) throw std::runtime_error("cannot list");
+    return &a_;
+  };
+  EXPECT_THROW(run_conversion_graph(fail, recorder.bodies(), limits(), go_on), std::runtime_error);
+}
+
+TEST_P(ConversionGraph, AsksForAShardOnlyWhenTheOneBeforeIsUnderWay) {
+  Recorder recorder;
+  std::atomic<int> read = 0;
+  std::vector<int> seen;
+  const PlannedShard long_shard = shard("l", 100);
+  std::deque<const PlannedShard*> shards = {&long_shard, &a_};
+  ConversionBodies bodies = recorder.bodies();
+  bodies.read = [&](SampleMessage&) { ++read; };
+  const auto next = [&]() -> const PlannedShard* {
+    seen.push_back(read);
+    if (shards.empty()) return nullptr;
+    const PlannedShard* const front = shards.front();
+    shards.pop_front();
+    return front;
+  };
+  run_conversion_graph(next, bodies, limits(), go_on);
+  ASSERT_EQ(seen.size(), 3u);
+  EXPECT_EQ(seen[0], 0);
+  EXPECT_GE(seen[1] + static_cast<int>(limits().in_flight), 100);
+}
+
+TEST_P(ConversionGraph, FinishingAShardGivesItWholeAndNoOther) {
+  Recorder recorder;
+  std::atomic<StopOrder> order = StopOrder::kGoOn;
+  ConversionBodies bodies = recorder.bodies();
+  const auto write = bodies.write;
+  bodies.write = [&](SampleMessage& message) {
+    if (message.shard == &b_) order = StopOrder::kFinishShard;
+    return write(message);
+  };
+  const PlannedShard more = shard("m", 1000);
+  const GraphCounts counts = run_conversion_graph(one_by_one({&a_, &b_, &more}), bodies, limits(),
+                                                  [&] { return order.load(); });
+  EXPECT_EQ(counts.handed_out, counts.arrived);
+  EXPECT_EQ(counts.arrived, 43u);
+}
+
+TEST_P(ConversionGraph, FinishingAShardLeavesAlmostNothingOfTheNext) {
+  Recorder recorder;
+  std::atomic<StopOrder> order = StopOrder::kGoOn;
+  ConversionBodies bodies = recorder.bodies();
+  const auto write = bodies.write;
+  bodies.write = [&](SampleMessage& message) {
+    if (message.shard == &a_) order = StopOrder::kFinishShard;
+    return write(message) && message.shard == &a_;  // as a sink that drops the others
+  };
+  EXPECT_LE(run(bodies, [&] { return order.load(); }), 3 + 2 * limits().in_flight);
+  EXPECT_EQ(std::count(recorder.written.begin(), recorder.written.end(), "a2"), 1);
+}
+
+TEST_P(ConversionGraph, AnAbortLetsMessagesPassWithoutWork) {
+  Recorder recorder;
+  std::atomic<StopOrder> order = StopOrder::kGoOn;
+  std::atomic<std::size_t> late = 0;
+  ConversionBodies bodies = recorder.bodies();
+  bodies.generate = [&](SampleMessage& message) {
+    if (message.number == 10) order = StopOrder::kAbort;
+  };
+  bodies.finish = [&](SampleMessage& message) { late += message.number >= 10; };
+  const std::size_t arrived = run(bodies, [&] { return order.load(); });
+  EXPECT_GE(arrived, 11u);  // in order, so all before it too
+  EXPECT_LE(arrived, 10 + 2 * limits().in_flight);
+  EXPECT_LE(late, limits().in_flight);  // those that had overtaken it
+}
+
+TEST_P(ConversionGraph, AnAbortBeforeTheStartDoesNothing) {
+  Recorder recorder;
+  EXPECT_EQ(run(recorder.bodies(), [] { return StopOrder::kAbort; }), 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Threads, ConversionGraph, ::testing::Values(1, 2, 5));
+
+TEST(SamplesInFlight, KeepsThreadsBusyWithinTheBudget) {
+  EXPECT_EQ(samples_in_flight(2, 10, 1000), 12u);   // plenty: 4 x 2 + 4
+  EXPECT_EQ(samples_in_flight(2, 100, 1000), 10u);  // the budget
+  EXPECT_EQ(samples_in_flight(2, 5000, 1000), 3u);  // never fewer than threads + 1
+  EXPECT_EQ(samples_in_flight(1, 0, 1000), 8u);
+}
+
+}  // namespace
+}  // namespace eventgan
