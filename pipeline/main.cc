@@ -45,6 +45,7 @@ int main(int argc, char** argv) {
   eventgan::add_convert_command(app, exit_code);
   eventgan::add_plan_command(app, exit_code);
   eventgan::add_status_command(app, exit_code);
+  eventgan::add_retry_command(app, exit_code);
   eventgan::add_finalize_command(app, exit_code);
   eventgan::add_verify_command(app, exit_code);
   eventgan::add_inspect_command(app, exit_code);

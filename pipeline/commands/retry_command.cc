@@ -1,0 +1,84 @@
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "manifests/error_limits.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/progress_option.h"
+#include "pipeline/errors/exit_codes.h"
+#include "pipeline/generation/load_generator.h"
+#include "pipeline/output/recorded_manifest.h"
+#include "pipeline/retry/retry.h"
+#include "pipeline/stopping/stop_signal.h"
+
+namespace eventgan {
+namespace {
+
+struct RetryArguments {
+  std::string folder;
+  std::optional<std::string> manifest;
+  int threads = 0;
+  double grace_s = RetryOptions().grace_s;
+  ProgressStyle progress = ProgressStyle::kAuto;
+
+  bool as_json() const { return progress == ProgressStyle::kJson; }
+};
+
+int finish(const RetryArguments& arguments, const RetryReport& report, const ErrorSpec& errors) {
+  std::cout << (arguments.as_json() ? to_json(report) : to_text(report)) << std::flush;
+  if (report.stopped) return kStopped;
+  if (report.too_many_faults) {
+    std::cerr << "error: expected " << limits_text(errors) << ", got " << report.quarantined
+              << " of " << report.planned << std::endl;
+    return kTooManyFaults;
+  }
+  return report.damaged_shards.empty() ? kComplete : kFailed;
+}
+
+int run(const RetryArguments& arguments) {
+  const StopSignal signal;
+  const FrozenOutline frozen = read_frozen_outline(arguments.folder);
+  if (const auto report = nothing_to_retry(arguments.folder, frozen)) {
+    return finish(arguments, *report, {});
+  }
+  const JobManifest manifest = recorded_manifest(arguments.folder, frozen.plan, arguments.manifest);
+  const LoadedGenerator loaded = load_generator(manifest);
+  RetryOptions options;
+  options.threads = arguments.threads;
+  options.grace_s = arguments.grace_s;
+  options.since_stop_request = [&] { return signal.seconds_since_request(); };
+  options.make_progress = [&](std::int64_t total) {
+    return show_progress(arguments.progress, total);
+  };
+  const RetryReport report =
+      retry(arguments.folder, manifest, *loaded.generator, loaded.weights_hash, options);
+  return finish(arguments, report, manifest.errors);
+}
+
+}  // namespace
+
+void add_retry_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "retry",
+      "Redoes the quarantined samples of a folder after its inputs were mended; every "
+      "other byte of its shards stays");
+  const auto arguments = std::make_shared<RetryArguments>();
+  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
+  command
+      ->add_option("--manifest", arguments->manifest,
+                   "The job, where its folder has moved; default: as recorded in DIR")
+      ->option_text("FILE");
+  command->add_option("--threads", arguments->threads, "Threads to use; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  command
+      ->add_option("--grace", arguments->grace_s,
+                   "Seconds after a signal to finish the shard under way; default: 20")
+      ->check(CLI::Range(0.0, 1e9))
+      ->option_text("SECONDS");
+  add_progress_option(*command, arguments->progress);
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

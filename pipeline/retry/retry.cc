@@ -1,0 +1,163 @@
+#include "pipeline/retry/retry.h"
+
+#include <chrono>
+#include <map>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "manifests/error_limits.h"
+#include "manifests/faults.h"
+#include "manifests/plan_outline.h"
+#include "pipeline/output/amendments.h"
+#include "pipeline/output/shard_backup.h"
+#include "pipeline/planning/make_plan.h"
+#include "pipeline/retry/retry_sink.h"
+#include "pipeline/retry/retry_work.h"
+#include "pipeline/samples/conversion_graph.h"
+#include "pipeline/samples/graph_limits.h"
+#include "pipeline/samples/sample_stages.h"
+#include "pipeline/stopping/shard_pace.h"
+#include "pipeline/stopping/stop_monitor.h"
+#include "pipeline/threads/thread_count.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+using Fingerprint = std::map<std::string, std::string>;
+
+RetryReport new_report(const fs::path& folder, const QuarantinedSamples& found,
+                       std::int64_t planned) {
+  RetryReport report;
+  report.folder = folder.string();
+  report.planned = planned;
+  report.quarantined = found.count;
+  report.damaged_shards = found.damaged;
+  report.shards_missing = found.shards_missing;
+  return report;
+}
+
+/// The amendable fields in which the inputs differ now. Throws UsageError if other fields do.
+Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const Fingerprint& now) {
+  Fingerprint changed;
+  for (const auto& [field, value] : now) {
+    if (!is_amendable(field) || accepted[field] == value) continue;
+    changed[field] = accepted[field] = value;
+  }
+  const auto differences = fingerprint_differences(accepted, now);
+  if (differences.empty()) return changed;
+  std::string message = "expected the job that " + (folder / "plan.json").string() +
+                        " was frozen by, its inputs mended, got another one:";
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
+bool stop_requested(const RetryOptions& options) {
+  return options.since_stop_request && options.since_stop_request().has_value();
+}
+
+/// The shards with quarantined samples that prove whole; the others are reported. After a request
+/// to stop there may be fewer.
+std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenPlan& frozen,
+                                           const QuarantinedSamples& found,
+                                           const RetryOptions& options, RetryReport& report) {
+  std::vector<const PlannedShard*> shards;
+  for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
+  EarlierShards earlier = check_earlier_shards(
+      folder, frozen, shards,
+      {thread_count(options.threads), [&] { return stop_requested(options); }, {}});
+  for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
+  if (!stop_requested(options)) {
+    report.quarantined = 0;  // what a damaged shard held does not count
+    for (const CommittedShard& shard : earlier.done) {
+      report.quarantined += std::ssize(shard.marker.quarantined);
+    }
+  }
+  return std::move(earlier.done);
+}
+
+/// Runs the samples through the stages and into their shards.
+void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob& job,
+          const Generator& generator, const std::vector<RetriedShard>& shards,
+          const RetryOptions& options, RetryReport& report) {
+  std::vector<const PlannedShard*> samples;
+  std::int64_t to_do = 0;
+  for (const RetriedShard& shard : shards) {
+    samples.push_back(&shard.samples);
+    to_do += std::ssize(shard.slots);
+  }
+  const GraphLimits limits =
+      graph_limits(samples, manifest.volume.bins, thread_count(options.threads));
+  const SampleStages stages(manifest, job.datasets, generator, static_cast<int>(limits.in_flight));
+  const std::unique_ptr<Progress> progress =
+      options.make_progress && to_do > 0 ? options.make_progress(to_do) : nullptr;
+  ShardPace pace(limits.threads);
+  const StopMonitor monitor(options.since_stop_request, options.grace_s,
+                            [&] { return pace.open_shard(); });
+  RetrySink sink(folder, shards, pace, report);
+  auto next = samples.begin();
+  const GraphCounts counts =
+      run_conversion_graph([&] { return next == samples.end() ? nullptr : *next++; },
+                           {[&](SampleMessage& message) { stages.read(message); },
+                            [&](SampleMessage& message) { stages.generate(message); },
+                            [&](SampleMessage& message) { stages.finish(message); },
+                            [&](SampleMessage& message) {
+                              const StopOrder order = monitor.order();
+                              if (order == StopOrder::kAbort) return false;
+                              if (order == StopOrder::kFinishShard && !sink.is_open()) return false;
+                              sink.accept(message);
+                              if (progress)
+                                progress->advance(message.failed(), std::ssize(message.chunk));
+                              return true;
+                            }},
+                           limits, [&] { return monitor.order(); });
+  if (counts.arrived != counts.handed_out) {
+    throw std::logic_error("expected " + std::to_string(counts.handed_out) +
+                           " samples at the writer, got " + std::to_string(counts.arrived));
+  }
+  sink.abandon();
+  if (progress) progress->finish();
+}
+
+}  // namespace
+
+std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen) {
+  restore_shards(folder, frozen);
+  const QuarantinedSamples found = find_quarantined(folder, frozen);
+  if (found.count > 0) return std::nullopt;
+  return new_report(folder, found, frozen.plan.sample_count());
+}
+
+RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Generator& generator,
+                  const std::string& weights_hash, const RetryOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  const FrozenPlan frozen = read_frozen_plan(folder);
+  const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
+  restore_shards(folder, outline);
+  const QuarantinedSamples found = find_quarantined(folder, outline);
+  RetryReport report = new_report(folder, found, frozen.plan.sample_count());
+  if (found.count == 0) return report;
+
+  const PlannedJob job = make_plan(manifest, weights_hash, generator.description(),
+                                   [&] { return stop_requested(options); });
+  const Fingerprint changed =
+      changed_inputs(folder, amended(frozen.plan.fingerprint, read_amendments(folder, frozen.hash)),
+                     job.plan.fingerprint);
+  const std::vector<RetriedShard> shards =
+      plan_retry(trusted_shards(folder, frozen, found, options, report), job.plan);
+  const std::int64_t to_do = report.quarantined;
+  if (!changed.empty()) record_amendment(folder, frozen.hash, {changed, found.ids});
+  if (recorded_manifest_folder(folder) != manifest.directory) {
+    record_manifest_folder(folder, manifest);
+  }
+  redo(folder, manifest, job, generator, shards, options, report);
+  report.stopped = stop_requested(options) && report.tried < to_do;
+  report.dataset_outdated = report.shards_rewritten > 0 && fs::exists(folder / "dataset.json");
+  report.too_many_faults = beyond_limits(manifest.errors, report.quarantined, report.planned);
+  report.wall_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "manifests/job_manifest.h"
+#include "pipeline/output/output_folder.h"
+#include "pipeline/progress/progress.h"
+#include "pipeline/retry/retry_report.h"
+#include "stages/generator/generator.h"
+
+namespace eventgan {
+
+struct RetryOptions {
+  int threads = 0;      ///< 0: all cores
+  double grace_s = 20;  ///< time after a request to stop, ≥ 0
+  /// Seconds since the request to stop, if one has come (see StopSignal); called from several
+  /// threads. None: nobody asks.
+  std::function<std::optional<double>()> since_stop_request;
+  /// Called with the number of samples to redo; shows progress. None: silent.
+  std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
+};
+
+/// The report where no committed shard of the folder has a quarantined sample; none if one has.
+/// First cleans up what a retry that was killed has left (see restore_shards).
+std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
+                                            const FrozenOutline& frozen);
+
+/// Redoes the quarantined samples of an output folder's committed shards, after its inputs were
+/// mended; every other byte of the shards stays, and plan.json does. A shard is written again only
+/// if a sample of it is mended now or fails for another reason. Shards that are damaged, or not
+/// made yet, are left to `convert`.
+///
+/// The job must be the frozen one in all but its inputs: where the fingerprint differs in fields
+/// that may change, that is recorded first (amendments.json), so that later runs accept the folder.
+/// Throws UsageError listing the other fields that differ, InputError, Stopped on a request to stop
+/// while it plans, or std::runtime_error when the disk or the generator fails; whole shards stay.
+RetryReport retry(const std::filesystem::path& folder, const JobManifest& manifest,
+                  const Generator& generator, const std::string& weights_hash,
+                  const RetryOptions& options);
+
+}  // namespace eventgan

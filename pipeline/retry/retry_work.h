@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "manifests/marker.h"
+#include "manifests/plan.h"
+#include "pipeline/conversion/earlier_shards.h"
+#include "pipeline/output/output_folder.h"
+
+namespace eventgan {
+
+/// Where an output folder has quarantined samples, by its markers alone.
+struct QuarantinedSamples {
+  std::vector<std::size_t> shards;   ///< committed shards with any, by their place in the plan
+  std::int64_t count = 0;            ///< in all of them
+  std::vector<std::string> ids;      ///< of these samples, in plan order
+  std::vector<std::string> damaged;  ///< "PATH: expected X, got Y" of shards that are not whole
+  int shards_missing = 0;            ///< not made yet
+};
+
+QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
+                                    const FrozenOutline& frozen);
+
+/// The quarantined samples of one committed shard.
+struct RetriedShard {
+  ShardMarker marker;      ///< the shard's
+  PlannedShard samples;    ///< the planned shard with these samples alone, in slot order
+  std::vector<int> slots;  ///< of each of them in the shard
+};
+
+/// What to redo of each shard: samples as they were planned; but one that was planned with a fault
+/// (a hole in its sequence) as `today`'s plan has it, if that knows of it: its frames, too, are
+/// only known now.
+std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards, const Plan& today);
+
+}  // namespace eventgan
