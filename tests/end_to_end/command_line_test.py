@@ -1,11 +1,9 @@
 """Exit codes, help and messages of the command line."""
 
 import collections
-import json
 import pathlib
 import struct
 import sys
-import unittest
 
 import program
 from program import run
@@ -35,8 +33,8 @@ def folded_network():
 class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
-        for command in ["convert", "plan", "verify", "inspect", "preview", "make-demo", "import-weights", "simulate", "train",
-                        "realism"]:
+        for command in ["convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
+                        "import-weights", "simulate", "train", "realism"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -49,12 +47,17 @@ class CommandLine(program.InFolder):
         run("convert", expect=64)
         run("convert", "a.json", "--threads", "0", expect=64)
         run("convert", "a.json", "--progress", "loud", expect=64)
+        run("convert", "a.json", "--grace", "-1", expect=64)
+        for command in ["status", "retry", "finalize", "verify"]:
+            run(command, expect=64)
         run("make-demo", self.folder / "demo")
         run("convert", self.folder / "demo" / "manifest.json", "--output", "", expect=64)
 
     def test_missing_inputs_are_66(self):
         run("convert", self.folder / "none.json", expect=66)
-        run("verify", self.folder, expect=66)
+        for command in ["verify", "status", "retry", "finalize"]:
+            _, err = run(command, self.folder, expect=66)
+            self.assertIn(str(self.folder), err)
         path = self.write_manifest(program.manifest([{"dataset": "mpii", "root": "nowhere", "pairs": program.pairs([2])}]))
         _, err = run("convert", path, expect=66)
         self.assertIn("nowhere", err)

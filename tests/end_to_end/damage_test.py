@@ -1,0 +1,230 @@
+"""Damage in an output folder is found and named by `verify` and mended by the next `convert`, never trusted, never deleted."""
+
+import pathlib
+import shutil
+import tempfile
+
+import program
+from folders import content, markers, same_content, shards
+from program import run
+from small_job import small_job
+
+
+def setUpModule():
+    global job, whole
+    job = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-damage-"))
+    small_job(job)
+    run("convert", job / "manifest.json", "--progress", "none")
+    whole = job / "out"
+
+
+def tearDownModule():
+    shutil.rmtree(job)
+
+
+class Damage(program.InFolder):
+    def setUp(self):
+        super().setUp()
+        self.out = self.folder / "out"
+        shutil.copytree(whole, self.out)
+        self.shards = shards(self.out)
+        self.shard = self.out / self.shards[2]
+        self.marker = self.shard.with_suffix(".json")
+
+    def convert(self, expect=0, *more):
+        return run("convert", job / "manifest.json", "--output", self.out, "--progress", "none", *more, expect=expect)
+
+    def verify(self):
+        """The faults that it tells."""
+        return "".join(run("verify", self.out, expect=1))
+
+    def found_and_mended(self, *named):
+        """`verify` and `convert` name the files; afterwards all is as it was before the damage."""
+        faults = self.verify()
+        for path in named:
+            self.assertIn(str(path), faults)
+        untouched = [path for path in self.out.glob("*-of-*") if path.stem != self.shard.stem]
+        before = {path: stamp(path) for path in untouched}
+        self.assertEqual(len(before), 8)
+        out, err = self.convert()
+        for path in named:
+            self.assertIn(str(path), err)
+        self.assertEqual({path: stamp(path) for path in untouched}, before)
+        self.assertIn("5 of 5 shards (4 done before)", out)
+        self.same_as_whole()
+
+    def same_as_whole(self):
+        same_content(content(self.out), content(whole), self.out)
+
+    def test_nothing_is_said_or_touched_when_all_is_well(self):
+        before = {path: stamp(path) for path in self.out.iterdir()}
+        out, err = self.convert()
+        self.assertEqual(err, "")
+        self.assertIn("5 of 5 shards (5 done before)", out)
+        self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
+
+    def test_truncated_shard(self):
+        self.shard.write_bytes(self.shard.read_bytes()[:-1])
+        self.found_and_mended(self.shard)
+
+    def test_emptied_shard(self):
+        self.shard.write_bytes(b"")
+        self.found_and_mended(self.shard)
+
+    def test_one_bit_flipped_anywhere_in_a_shard(self):
+        original = self.shard.read_bytes()
+        for place in (0, len(original) // 3, len(original) // 2, len(original) - 1):
+            with self.subTest(place=place):
+                damaged = bytearray(original)
+                damaged[place] ^= 0x10
+                self.shard.write_bytes(damaged)
+                self.found_and_mended(self.shard)
+
+    def test_shard_of_the_same_size_from_elsewhere(self):
+        self.shard.write_bytes(bytes(self.shard.stat().st_size))
+        self.found_and_mended(self.shard)
+
+    def test_shard_that_is_a_folder(self):
+        self.shard.unlink()
+        self.shard.mkdir()
+        err = self.verify()
+        self.assertIn(str(self.shard), err)
+        _, err = self.convert(1)
+        self.assertIn(str(self.shard), err)
+        self.shard.rmdir()
+        self.convert()
+        self.same_as_whole()
+
+    def test_torn_marker(self):
+        for kept in (1, 200, -2):
+            with self.subTest(kept=kept):
+                self.marker.write_bytes(self.marker.read_bytes()[:kept])
+                self.found_and_mended(self.marker)
+
+    def test_emptied_marker(self):
+        self.marker.write_bytes(b"")
+        self.found_and_mended(self.marker)
+
+    def test_marker_of_another_plan(self):
+        own = markers(self.out)[self.shard.name]["plan_hash"]
+        self.marker.write_text(self.marker.read_text().replace(own, own[::-1]))
+        self.found_and_mended(self.marker)
+
+    def test_marker_of_another_shard(self):
+        shutil.copy(self.marker.with_name(self.shards[1]).with_suffix(".json"), self.marker)
+        self.found_and_mended(self.marker)
+
+    def test_marker_without_shard(self):
+        self.shard.unlink()
+        self.found_and_mended(self.shard)
+
+    def test_shard_without_marker(self):
+        self.marker.unlink()
+        self.found_and_mended(self.marker.name)
+
+    def test_neither_shard_nor_marker(self):
+        self.marker.unlink()
+        self.shard.unlink()
+        err = self.verify()
+        self.assertIn(str(self.shard.with_suffix("")), err)
+        self.convert()
+        self.same_as_whole()
+
+    def test_everything_damaged_at_once(self):
+        for number, name in enumerate(self.shards):
+            path = self.out / name if number % 2 else (self.out / name).with_suffix(".json")
+            path.write_bytes(path.read_bytes()[:100])
+        err = self.verify()
+        told = self.convert()[1]
+        for name in self.shards:
+            self.assertIn(name.removesuffix(".h5"), err)
+            self.assertIn(name.removesuffix(".h5"), told)
+        self.same_as_whole()
+        run("verify", self.out, "--deep")
+
+    def test_plan_of_another_manifest_is_refused_field_by_field(self):
+        manifest = small_job(self.folder / "other", seed=8, volume={"bins": 5})
+        before = {path: stamp(path) for path in self.out.iterdir()}
+        _, err = run("convert", manifest, "--output", self.out, "--progress", "none", expect=64)
+        self.assertIn("manifest", err)
+        for differs in ("seed", "bins"):
+            self.assertRegex(err, differs)
+        self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
+        self.same_as_whole()
+        run("convert", manifest, "--output", self.out, "--progress", "none", "--overwrite")
+        run("verify", self.out, "--deep")
+
+    def test_plan_put_in_place_of_another(self):
+        """The shards are of one plan, plan.json of another: no shard is trusted."""
+        manifest = small_job(self.folder / "other", seed=8)
+        other = self.folder / "other" / "out"
+        run("convert", manifest, "--progress", "none")
+        shutil.copy(other / "plan.json", self.out)
+        err = self.verify()
+        for name in self.shards:
+            self.assertIn(name.removesuffix(".h5"), err)
+        before = {path: stamp(path) for path in self.out.iterdir()}
+        _, err = self.convert(64)
+        self.assertIn("seed", err)
+        self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
+        _, err = run("convert", manifest, "--output", self.out, "--progress", "none")
+        for name in self.shards:
+            self.assertIn(name.removesuffix(".h5"), err)
+        run("verify", self.out, "--deep")
+        same_content(content(self.out), content(other), self.out)
+
+    def test_damaged_plan_is_named_and_replaced_only_when_told(self):
+        plan = self.out / "plan.json"
+        original = plan.read_bytes()
+        for damaged in (b"", original[:-1], original[:len(original) // 2], original.replace(b'"', b"'", 1)):
+            with self.subTest(size=len(damaged)):
+                plan.write_bytes(damaged)
+                for command in (("verify", self.out), ("status", self.out), ("finalize", self.out),
+                                ("convert", job / "manifest.json", "--output", self.out)):
+                    _, err = run(*command, expect=1)
+                    self.assertIn(str(plan), err)
+                self.assertEqual(plan.read_bytes(), damaged)
+                self.convert(0, "--overwrite")
+                self.same_as_whole()
+
+    def test_altered_plan_is_refused(self):
+        """It parses, and its fingerprint is the manifest's; still it is not the plan that was frozen."""
+        plan = self.out / "plan.json"
+        original = plan.read_bytes()
+        for was, altered in [(b"prev_2/000004_03.png", b"prev_2/000004_02.png"), (b"small-train-00003", b"small-train-00007"),
+                             (b'"gap":2', b'"gap":3')]:
+            with self.subTest(altered=altered):
+                altered = original.replace(was, altered, 1)
+                self.assertTrue(altered != original)
+                plan.write_bytes(altered)
+                self.verify()
+                before = {path: stamp(path) for path in self.out.iterdir()}
+                _, err = self.convert(64)
+                self.assertIn(str(plan), err)
+                self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
+
+    def test_stray_shards_are_named_and_left_alone(self):
+        stray = self.out / "small-train-00000-of-00099.h5"
+        shutil.copy(self.shard, stray)
+        err = self.verify()
+        self.assertIn(str(stray), err)
+        self.convert()
+        self.assertEqual(stray.read_bytes(), self.shard.read_bytes())
+        stray.unlink()
+        self.same_as_whole()
+
+    def test_a_persons_own_files_are_left_alone(self):
+        notes = self.out / "notes.txt"
+        notes.write_text("mine")
+        run("verify", self.out)
+        self.convert()
+        self.assertEqual(notes.read_text(), "mine")
+
+
+def stamp(path):
+    status = path.stat()
+    return status.st_ino, status.st_mtime_ns, status.st_size
+
+
+if __name__ == "__main__":
+    program.main()

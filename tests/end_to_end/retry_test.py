@@ -1,0 +1,187 @@
+"""`retry` redoes quarantined samples after their inputs were mended, and nothing else changes."""
+
+import json
+import shutil
+
+import h5py
+import numpy as np
+
+import program
+from folders import content, markers, same_content, temporaries
+from program import run
+from small_job import small_job
+
+BROKEN_CAR, MALFORMED_CAR, HOLE = "000001", "000002", "000000002"
+
+
+class Retry(program.InFolder):
+    def setUp(self):
+        super().setUp()
+        self.manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})
+        self.out = self.folder / "out"
+        self.picture = self.folder / "cars" / "image_2" / f"{BROKEN_CAR}.png"
+        self.label = self.folder / "cars" / "label_2" / f"{MALFORMED_CAR}.txt"
+        frames = self.folder / "people" / "sequences" / HOLE
+        # Pairs of gap 2 and 4 around frame 5 both lose one of their frames.
+        self.spoiled = {self.picture: self.picture.read_bytes(), self.label: self.label.read_bytes()}
+        for name in ("00000004.jpg", "00000003.jpg"):
+            self.spoiled[frames / name] = (frames / name).read_bytes()
+            (frames / name).unlink()
+        self.picture.write_bytes(self.picture.read_bytes()[:200])
+        self.label.write_bytes(self.label.read_bytes().replace(b"12.50", b"twelve", 1))
+        self.convert()
+
+    def convert(self, output="out", expect=0):
+        return run("convert", self.manifest, "--output", self.folder / output, "--progress", "json", expect=expect)
+
+    def retry(self, *more, expect=0):
+        out, _ = run("retry", self.out, "--progress", "json", *more, expect=expect)
+        return json.loads(out.splitlines()[-1])
+
+    def mend(self):
+        for path, content_before in self.spoiled.items():
+            path.write_bytes(content_before)
+
+    def quarantined(self):
+        """Sample ids by shard."""
+        return {shard: {sample["sample_id"] for sample in marker["quarantined"]}
+                for shard, marker in markers(self.out).items() if marker["quarantined"]}
+
+    def test_mended_samples_are_those_of_a_fresh_conversion(self):
+        ids = set().union(*self.quarantined().values())
+        self.assertEqual(len(ids), 3)
+        self.assertTrue({BROKEN_CAR, MALFORMED_CAR} < ids)
+        self.assertTrue(any(HOLE in sample for sample in ids))
+        touched = set(self.quarantined())
+        before = {name: shard(self.out / name) for name in markers(self.out)}
+        untouched = {name: (self.out / name).read_bytes() for name in before.keys() - touched}
+        plan = (self.out / "plan.json").read_bytes()
+        run("verify", self.out, "--deep")
+
+        self.mend()
+        report = self.retry()
+        self.assertEqual((report["tried"], report["mended"], report["quarantined"]), (3, 3, 0))
+        self.assertEqual(report["shards_rewritten"], len(touched))
+
+        self.convert("fresh")
+        for name, old in before.items():
+            new = shard(self.out / name)
+            self.assertEqual(new["attributes"], old["attributes"])
+            if name in untouched:
+                self.assertEqual((self.out / name).read_bytes(), untouched[name])
+                continue
+            for slot, sample in enumerate(old["ids"]):
+                if sample not in ids:
+                    self.assertEqual(new["chunks"][slot], old["chunks"][slot])
+                self.assertTrue(new["chunks"][slot])
+            fresh = shard(self.folder / "fresh" / name)
+            self.assertEqual(new["chunks"], fresh["chunks"])
+            self.assertEqual(new["columns"].keys(), fresh["columns"].keys())
+            for column, rows in fresh["columns"].items():
+                np.testing.assert_array_equal(new["columns"][column], rows, err_msg=f"{name}: {column}")
+        self.assertEqual((self.out / "plan.json").read_bytes(), plan)
+        self.assertEqual(temporaries(self.out), [])
+
+        out, _ = run("verify", self.out, "--deep")
+        self.assertIn("sound: 5 shards, 9 samples, 0 of them quarantined", out)
+        self.assertIn("labels of 9 samples compared", out)
+        mended = content(self.out)
+        out, _ = self.convert()
+        report = json.loads(out.splitlines()[-1])
+        self.assertEqual((report["shards_done_before"], report["written"]), (5, 9))
+        same_content(content(self.out), mended, self.out)
+
+    def test_finalize_after_a_retry_gives_the_new_counts(self):
+        run("finalize", self.out)
+        before = json.loads((self.out / "dataset.json").read_text())
+        self.mend()
+        self.assertTrue(self.retry()["dataset_outdated"])
+        faults, _ = run("verify", self.out, expect=1)
+        self.assertIn(str(self.out / "dataset.json"), faults)
+        self.assertIn("1 faults", faults)
+        run("finalize", self.out)
+        run("verify", self.out, "--deep")
+        after = json.loads((self.out / "dataset.json").read_text())
+        self.assertEqual(before["counts"]["total"]["quarantined"], 3)
+        self.assertEqual(after["counts"]["total"]["quarantined"], 0)
+        with h5py.File(self.out / "dataset.h5") as file:
+            valid = [group["valid"][:] for group in file.values() if "valid" in group] or [file["valid"][:]]
+        self.assertTrue(np.concatenate(valid).all())
+
+    def test_what_still_fails_stays_and_only_the_limits_decide(self):
+        before = content(self.out)
+        report = self.retry()
+        self.assertEqual((report["tried"], report["mended"], report["quarantined"]), (3, 0, 3))
+        self.assertEqual(report["shards_rewritten"], 0)
+        same_content(content(self.out), before, self.out)
+
+        self.label.write_bytes(self.spoiled[self.label])
+        strict = self.folder / "strict.json"
+        strict.write_text(self.manifest.read_text().replace('"max_count": 9', '"max_count": 1'))
+        report = self.retry("--manifest", strict, expect=65)
+        self.assertEqual((report["mended"], report["quarantined"]), (1, 2))
+        self.assertTrue(report["too_many_faults"])
+        self.assertEqual({row["sample_id"] for row in report["failed"]},
+                         set().union(*self.quarantined().values()))
+        run("verify", self.out, "--deep")
+
+        self.mend()
+        self.assertEqual(self.retry("--manifest", strict)["quarantined"], 0)
+        out, _ = run("retry", self.out)
+        self.assertIn("nothing to retry", out)
+        run("verify", self.out, "--deep")
+
+    def test_inputs_that_have_moved(self):
+        self.mend()
+        moved = self.folder / "moved"
+        moved.mkdir()
+        for name in ("cars", "people", "manifest.json"):
+            shutil.move(self.folder / name, moved / name)
+        run("retry", self.out, expect=66)
+        report = self.retry("--manifest", moved / "manifest.json")
+        self.assertEqual(report["mended"], 3)
+        run("verify", self.out, "--deep")
+
+    def test_another_job_is_refused(self):
+        self.mend()
+        before = content(self.out)
+        other = self.folder / "other.json"
+        other.write_text(self.manifest.read_text().replace('"seed": 7', '"seed": 8'))
+        _, err = run("retry", self.out, "--manifest", other, expect=64)
+        self.assertIn("seed: expected 7, got 8", err)
+        run("retry", self.folder, expect=66)
+        same_content(content(self.out), before, self.out)
+
+    def test_a_label_that_changed_beside_the_mended_one_is_found(self):
+        """Retry accepts changed inputs; samples that were good before are not made again, and `verify --deep` tells."""
+        self.mend()
+        other = self.folder / "cars" / "label_2" / "000004.txt"
+        other.write_bytes(other.read_bytes().replace(b"12.50", b"13.50", 1))
+        self.assertEqual(self.retry()["mended"], 3)
+        run("verify", self.out)
+        faults, _ = run("verify", self.out, "--deep", expect=1)
+        self.assertIn("cars/label_2/000004.txt", faults)
+        self.assertIn("000004)", faults)
+        self.assertIn("1 faults", faults)
+
+
+def shard(path):
+    """What a shard holds, without decoding volumes."""
+    with h5py.File(path) as file:
+        volume = file["events/volume"]
+        columns = {}
+
+        def collect(name, item):
+            if isinstance(item, h5py.Dataset) and name != "events/volume":
+                rows = item[:]
+                columns[name] = [bytes(row) for row in rows] if rows.dtype == object else rows
+        file.visititems(collect)
+        stored = {volume.id.get_chunk_info(i).chunk_offset[0] for i in range(volume.id.get_num_chunks())}
+        chunks = [volume.id.read_direct_chunk((slot, 0, 0, 0))[1] if slot in stored else b""
+                  for slot in range(volume.shape[0])]
+        return {"ids": [program.text(value) for value in columns["pairs/sample_id"]], "columns": columns,
+                "chunks": chunks, "attributes": {name: str(value) for name, value in file.attrs.items()}}
+
+
+if __name__ == "__main__":
+    program.main()
