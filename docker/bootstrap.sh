@@ -2,7 +2,8 @@
 # Sets up a Debian 12 machine, builds eventgan and runs it:
 #   docker/bootstrap.sh demo [DIR]   a small demo dataset in DIR (default: ./demo), converted, checked and drawn
 #   docker/bootstrap.sh test         the whole test suite
-#   docker/bootstrap.sh packages     only installs what is missing
+#   docker/bootstrap.sh build        only the program, build/release/eventgan
+#   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -40,11 +41,15 @@ build() {
   cmake --build --preset "$preset" -j "$jobs" ${1:+--target "$@"}
 }
 
-demo() {
-  local folder=${1:-demo} program=build/release/eventgan
+build_program() {
   install_packages docker/packages/build.txt
   options=(-DEVENTGAN_TESTS=OFF)
   build release eventgan
+}
+
+demo() {
+  local folder=${1:-demo} program=build/release/eventgan
+  build_program
   if [ ! -e "$folder/manifest.json" ]; then
     say "making a small dataset in $folder"
     "$program" make-demo "$folder"
@@ -70,9 +75,20 @@ run_tests() {
   ctest --preset dev -j "$jobs"
 }
 
+packages() {
+  [ $# -gt 0 ] || set -- build test
+  local name lists=()
+  for name in "$@"; do
+    [ -f "docker/packages/$name.txt" ] || { echo "expected one of docker/packages, got $name" >&2; exit 64; }
+    lists+=("docker/packages/$name.txt")
+  done
+  install_packages "${lists[@]}"
+}
+
 case "${1:-}" in
   demo) demo "${@:2}" ;;
   test) run_tests ;;
-  packages) install_packages docker/packages/build.txt docker/packages/test.txt ;;
-  *) sed -n '2,7s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
+  build) build_program ;;
+  packages) packages "${@:2}" ;;
+  *) sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
 esac
