@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <atomic>
 #include <memory>
+#include <stdexcept>
+#include <string>
 
 namespace eventgan {
 namespace {
@@ -46,7 +48,7 @@ class Cursor {
   std::size_t number_ = 0;
 };
 
-GraphCounts run(const std::function<const PlannedShard*()>& next_shard,
+std::size_t run(const std::function<const PlannedShard*()>& next_shard,
                 const ConversionBodies& bodies, const GraphLimits& limits,
                 const std::function<StopOrder()>& order) {
   flow::graph graph;
@@ -89,7 +91,11 @@ GraphCounts run(const std::function<const PlannedShard*()>& next_shard,
   flow::make_edge(write, limiter.decrementer());
   source.activate();
   graph.wait_for_all();
-  return {cursor.handed_out(), arrived};
+  if (arrived != cursor.handed_out()) {
+    throw std::logic_error("expected " + std::to_string(cursor.handed_out()) +
+                           " samples at the writer, got " + std::to_string(arrived));
+  }
+  return arrived;
 }
 
 }  // namespace
@@ -100,7 +106,7 @@ std::size_t samples_in_flight(int threads, std::size_t sample_bytes, std::size_t
   return std::clamp(budget_bytes / std::max<std::size_t>(sample_bytes, 1), least, enough);
 }
 
-GraphCounts run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
+std::size_t run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
                                  const ConversionBodies& bodies, const GraphLimits& limits,
                                  const std::function<StopOrder()>& order) {
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,

@@ -27,12 +27,6 @@ struct GraphLimits {
 /// a shard, and not more than `budget_bytes` of them by their largest size; at least threads + 1.
 std::size_t samples_in_flight(int threads, std::size_t sample_bytes, std::size_t budget_bytes);
 
-/// What went through the graph; the two differ only after an exception.
-struct GraphCounts {
-  std::size_t handed_out = 0;  ///< samples that left the source
-  std::size_t arrived = 0;     ///< samples that reached the writer
-};
-
 /// Runs every sample of the shards that `next_shard` gives, until it gives nullptr, through the
 /// flow graph of DESIGN section 3,
 ///   source → limiter → read → generate → finish → sequencer → write → limiter's decrement.
@@ -47,7 +41,9 @@ struct GraphCounts {
 ///                 which has to drop them;
 ///   kAbort        the source gives nothing more; messages pass the parallel bodies untouched and
 ///                 come to `write`, which has to drop them.
-GraphCounts run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
+/// Returns the number of samples that left the source. Throws std::logic_error if fewer reached
+/// `write`: a sample lost on the way would otherwise go unnoticed.
+std::size_t run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
                                  const ConversionBodies& bodies, const GraphLimits& limits,
                                  const std::function<StopOrder()>& order);
 
