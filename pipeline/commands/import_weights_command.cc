@@ -8,9 +8,9 @@
 #include "pipeline/errors/exit_codes.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/checkpoint.h"
-#include "stages/generator/fold.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "stages/generator/checkpoints/fold.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 namespace eventgan {
 namespace {

@@ -6,10 +6,10 @@
 #include "manifests/weights_name.h"
 #include "pipeline/generation/simulated_generator.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/shipped_weights.h"
-#include "stages/generator/torch_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/untrained.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/shipped_weights.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 namespace eventgan {
 namespace {

@@ -6,9 +6,9 @@
 #include "manifests/faults.h"
 #include "manifests/volume.h"
 #include "manifests/weights_name.h"
-#include "stages/generator/shipped_weights.h"
-#include "stages/generator/torch_generator.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/weights_files/shipped_weights.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 namespace eventgan {
 namespace {

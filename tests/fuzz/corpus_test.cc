@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <span>
 
-#include "stages/generator/checkpoint.h"
-#include "stages/generator/safetensors.h"
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "stages/generator/weights_files/safetensors.h"
 #include "tests/fuzz/readers.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -4,10 +4,10 @@
 #include <fstream>
 
 #include "manifests/faults.h"
-#include "stages/generator/checkpoint.h"
-#include "stages/generator/fold.h"
-#include "stages/generator/safetensors.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "stages/generator/checkpoints/fold.h"
+#include "stages/generator/weights_files/safetensors.h"
+#include "stages/generator/weights_files/weights_file.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan::testing {

@@ -6,8 +6,8 @@
 #include "pipeline/training/records/trained_weights.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/torch_generator.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 namespace eventgan {
 namespace {

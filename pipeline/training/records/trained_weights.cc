@@ -6,7 +6,7 @@
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/training/records/csv_table.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/fold.h"
+#include "stages/generator/checkpoints/fold.h"
 
 namespace eventgan {
 namespace {

@@ -10,7 +10,7 @@
 
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/safetensors.h"
+#include "stages/generator/weights_files/safetensors.h"
 
 namespace eventgan {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "manifests/faults.h"
 #include "stages/files/sha256.h"
-#include "stages/generator/shipped_weights.h"
 #include "stages/generator/untrained.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/shipped_weights.h"
+#include "stages/generator/weights_files/weights_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -8,8 +8,8 @@
 #include <limits>
 #include <set>
 
-#include "stages/generator/fold.h"
-#include "stages/generator/torch_generator.h"
+#include "stages/generator/checkpoints/fold.h"
+#include "stages/generator/torch/torch_generator.h"
 #include "tests/stages/training/small_training.h"
 
 namespace eventgan {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "stages/files/sha256.h"
-#include "stages/generator/torch_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 #include "stages/training/trainer.h"
 #include "tests/pipeline/training/small_training.h"
 #include "tests/testing/temporary_folder.h"

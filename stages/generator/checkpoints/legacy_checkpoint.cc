@@ -1,4 +1,4 @@
-#include "stages/generator/legacy_checkpoint.h"
+#include "stages/generator/checkpoints/legacy_checkpoint.h"
 
 #include <cstring>
 #include <map>
@@ -6,8 +6,8 @@
 #include <stdexcept>
 
 #include "stages/archives/file_bytes.h"
-#include "stages/generator/checkpoint_limits.h"
-#include "stages/generator/checkpoint_storages.h"
+#include "stages/generator/checkpoints/checkpoint_limits.h"
+#include "stages/generator/checkpoints/checkpoint_storages.h"
 
 namespace eventgan {
 namespace {

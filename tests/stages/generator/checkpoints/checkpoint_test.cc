@@ -1,4 +1,4 @@
-#include "stages/generator/checkpoint.h"
+#include "stages/generator/checkpoints/checkpoint.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 
 #include "manifests/faults.h"
 #include "pipeline/errors/error_text.h"
-#include "tests/stages/generator/checkpoint_bytes.h"
+#include "tests/stages/generator/checkpoints/checkpoint_bytes.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "stages/generator/checkpoint_archive.h"
+#include "stages/generator/checkpoints/checkpoint_archive.h"
 
 namespace eventgan {
 

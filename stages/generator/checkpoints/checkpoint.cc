@@ -1,4 +1,4 @@
-#include "stages/generator/checkpoint.h"
+#include "stages/generator/checkpoints/checkpoint.h"
 
 #include <algorithm>
 #include <exception>
@@ -9,11 +9,11 @@
 
 #include "manifests/faults.h"
 #include "stages/archives/file_bytes.h"
-#include "stages/generator/checkpoint_archive.h"
-#include "stages/generator/checkpoint_limits.h"
-#include "stages/generator/legacy_checkpoint.h"
-#include "stages/generator/stored_tensor.h"
-#include "stages/generator/zip_checkpoint.h"
+#include "stages/generator/checkpoints/checkpoint_archive.h"
+#include "stages/generator/checkpoints/checkpoint_limits.h"
+#include "stages/generator/checkpoints/legacy_checkpoint.h"
+#include "stages/generator/checkpoints/stored_tensor.h"
+#include "stages/generator/checkpoints/zip_checkpoint.h"
 
 namespace eventgan {
 namespace {

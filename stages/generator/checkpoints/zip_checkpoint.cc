@@ -1,10 +1,10 @@
-#include "stages/generator/zip_checkpoint.h"
+#include "stages/generator/checkpoints/zip_checkpoint.h"
 
 #include <stdexcept>
 
 #include "stages/archives/file_bytes.h"
 #include "stages/archives/zip_archive.h"
-#include "stages/generator/checkpoint_limits.h"
+#include "stages/generator/checkpoints/checkpoint_limits.h"
 
 namespace eventgan {
 namespace {

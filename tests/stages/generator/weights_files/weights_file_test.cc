@@ -1,4 +1,4 @@
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "manifests/faults.h"
-#include "stages/generator/safetensors.h"
 #include "stages/generator/untrained.h"
+#include "stages/generator/weights_files/safetensors.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

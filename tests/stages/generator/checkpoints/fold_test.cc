@@ -1,4 +1,4 @@
-#include "stages/generator/fold.h"
+#include "stages/generator/checkpoints/fold.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "stages/generator/stored_tensor.h"
+#include "stages/generator/checkpoints/stored_tensor.h"
 
 #include <stdexcept>
 

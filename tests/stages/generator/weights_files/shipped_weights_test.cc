@@ -1,4 +1,4 @@
-#include "stages/generator/shipped_weights.h"
+#include "stages/generator/weights_files/shipped_weights.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <filesystem>
 
 #include "manifests/faults.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/weights_file.h"
 #include "tests/testing/text_file.h"
 
 namespace eventgan {

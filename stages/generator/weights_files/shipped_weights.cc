@@ -1,11 +1,11 @@
-#include "stages/generator/shipped_weights.h"
+#include "stages/generator/weights_files/shipped_weights.h"
 
 #include <algorithm>
 #include <cstdint>
 #include <string>
 
 #include "manifests/faults.h"
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 namespace eventgan {
 

@@ -1,12 +1,12 @@
-#include "stages/generator/legacy_checkpoint.h"
+#include "stages/generator/checkpoints/legacy_checkpoint.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
 #include "pipeline/errors/error_text.h"
-#include "stages/generator/checkpoint.h"
-#include "tests/stages/generator/checkpoint_bytes.h"
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "tests/stages/generator/checkpoints/checkpoint_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

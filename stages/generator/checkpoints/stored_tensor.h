@@ -7,7 +7,7 @@
 
 #include "manifests/state_dict.h"
 #include "stages/archives/pickle/pickle.h"
-#include "stages/generator/checkpoint_storages.h"
+#include "stages/generator/checkpoints/checkpoint_storages.h"
 
 namespace eventgan {
 

@@ -1,4 +1,4 @@
-#include "stages/generator/safetensors.h"
+#include "stages/generator/weights_files/safetensors.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "stages/generator/checkpoint_storages.h"
+#include "stages/generator/checkpoints/checkpoint_storages.h"
 
 #include <algorithm>
 #include <bit>
@@ -8,7 +8,7 @@
 #include <stdexcept>
 
 #include "stages/archives/pickled_array.h"
-#include "stages/generator/checkpoint_archive.h"
+#include "stages/generator/checkpoints/checkpoint_archive.h"
 
 namespace eventgan {
 namespace {

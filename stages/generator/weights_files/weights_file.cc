@@ -1,11 +1,11 @@
-#include "stages/generator/weights_file.h"
+#include "stages/generator/weights_files/weights_file.h"
 
 #include <charconv>
 #include <exception>
 #include <stdexcept>
 
 #include "manifests/faults.h"
-#include "stages/generator/safetensors.h"
+#include "stages/generator/weights_files/safetensors.h"
 
 namespace eventgan {
 namespace {

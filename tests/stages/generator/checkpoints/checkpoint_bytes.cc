@@ -1,4 +1,4 @@
-#include "tests/stages/generator/checkpoint_bytes.h"
+#include "tests/stages/generator/checkpoints/checkpoint_bytes.h"
 
 #include <cstring>
 #include <utility>

@@ -1,4 +1,4 @@
-#include "stages/generator/torch_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 
 #include <ATen/Functions.h>
 #include <ATen/Parallel.h>

@@ -1,4 +1,4 @@
-#include "stages/generator/torch_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "manifests/counter_random.h"
-#include "stages/generator/checkpoint.h"
-#include "stages/generator/fold.h"
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/untrained.h"
 #include "tests/stages/generator/plain_network.h"
 #include "tests/testing/golden_numbers.h"
