@@ -13,4 +13,10 @@ struct ColourFrame {
   std::vector<std::uint8_t> bgr;
 };
 
+/// The same, owned by somebody else.
+struct ColourView {
+  ImageSize size;
+  const std::uint8_t* bgr = nullptr;
+};
+
 }  // namespace eventgan

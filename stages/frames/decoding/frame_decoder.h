@@ -1,12 +1,12 @@
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <memory>
 
 #include "manifests/faults.h"
 #include "manifests/pairs.h"
 #include "stages/frames/decoding/colour_frame.h"
+#include "stages/frames/decoding/open_videos.h"
 
 namespace eventgan {
 
@@ -25,21 +25,14 @@ class FrameDecoder {
   /// Relative frame paths start at `base`. Of each of the two videos used last, the latest
   /// `kept_frames` are kept, whatever their size.
   explicit FrameDecoder(std::filesystem::path base, int kept_frames = kDefaultKeptFrames);
-  ~FrameDecoder();
 
   /// A fault if the file is missing, empty, truncated, not a picture, or larger than
   /// kMaxPicturePixels, or if a video ends before the frame; it names the frame's path.
   Outcome<ColourFrame> decode(const FrameRef& frame) const;
 
-  /// Both frames; the first fault, if any. Two frames of one video are decoded without other
-  /// threads' frames in between, so that these cannot push the first one's neighbours out.
-  Outcome<std::array<ColourFrame, 2>> decode_both(const FrameRef& first,
-                                                  const FrameRef& second) const;
-
  private:
-  class OpenVideos;
   std::filesystem::path base_;
-  std::unique_ptr<OpenVideos> videos_;
+  std::unique_ptr<OpenVideos<ColourFrame>> videos_;
 };
 
 }  // namespace eventgan

@@ -4,13 +4,15 @@
 #include <string>
 
 #include "stages/frames/decoding/picture_file.h"
-#include "stages/frames/decoding/video_file.h"
+#include "stages/frames/decoding/video_window.h"
 
 namespace eventgan {
 
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file) {
   try {
-    return is_picture_file(file) ? picture_file_size(file) : VideoFile(file, 1).frame(0).size;
+    if (is_picture_file(file)) return picture_file_size(file);
+    const auto size_of = [](const ColourView& frame) { return frame.size; };
+    return VideoWindow<ImageSize>(file, 1, size_of).frame(0);
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + file.string()};
   }

@@ -1,17 +1,17 @@
 #include "stages/frames/decoding/pair_reader.h"
 
-#include <array>
-#include <cstdint>
-#include <opencv2/imgproc.hpp>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "stages/frames/decoding/picture_file.h"
 #include "stages/frames/decoding/visible_part.h"
 
 namespace eventgan {
 namespace {
 
-// Frames of a video kept besides one for each pair under way.
+// Frames kept besides those of the pairs under way.
 constexpr int kLongestGap = 6;
 constexpr int kMargin = 2;
 
@@ -19,64 +19,84 @@ std::string text_of(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-cv::Mat as_grey(const cv::Mat& colour) {
-  cv::Mat grey;
-  cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
-  return grey;
-}
-
-/// Grey, resized and blurred, uncut.
-cv::Mat prepare(ColourFrame& frame, const Placement& placement, const ImageSpec& spec) {
-  cv::Mat picture(frame.size.height, frame.size.width, CV_8UC3, frame.bgr.data());
-  if (spec.grey == GreyOrder::kBeforeResize) picture = as_grey(picture);
-  cv::Mat resized;
-  cv::resize(picture, resized, cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
-             cv::INTER_LINEAR);
-  if (spec.grey == GreyOrder::kAfterResize) resized = as_grey(resized);
-  if (spec.blur == 0) return resized;
-  cv::Mat blurred;
-  cv::GaussianBlur(resized, blurred, cv::Size(spec.blur, spec.blur), 0);
-  return blurred;
-}
-
-void append_input(const cv::Mat& grey, const VisiblePart& part, std::vector<float>& input) {
-  for (int y = 0; y < part.size.height; ++y) {
-    const std::uint8_t* row = grey.ptr<std::uint8_t>(part.scaled_y + y) + part.scaled_x;
-    for (int x = 0; x < part.size.width; ++x) {
-      input.push_back((static_cast<float>(row[x]) / 255.0f - 0.5f) * 2.0f);
-    }
+/// What `prepare` returns or, if it throws a std::runtime_error, why not.
+template <class Prepare>
+SharedFrame frame_or_fault(Prepare prepare) {
+  try {
+    return std::make_shared<Outcome<PreparedFrame>>(prepare());
+  } catch (const std::runtime_error& error) {
+    return std::make_shared<Outcome<PreparedFrame>>(SampleFault{error.what()});
   }
+}
+
+SampleFault fault_in(const FrameRef& frame, const std::string& reason) {
+  return {reason + ", in " + frame.path};
 }
 
 }  // namespace
 
 PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way)
-    : decoder_(std::move(base), pairs_under_way + kLongestGap + kMargin), spec_(std::move(spec)) {}
+    : base_(std::move(base)),
+      spec_(std::move(spec)),
+      pictures_(std::make_unique<SharedPictures>(2 * pairs_under_way + kLongestGap + kMargin)),
+      videos_(std::make_unique<OpenVideos<SharedFrame>>(
+          pairs_under_way + kLongestGap + kMargin, [spec = spec_](const ColourView& view) {
+            return frame_or_fault([&] { return prepare_frame(view, spec); });
+          })) {}
+
+SharedFrame PairReader::frame(const FrameRef& ref) const {
+  if (ref.video_frame >= 0) return videos_->frames<1>(base_ / ref.path, {ref.video_frame})[0];
+  return pictures_->get(ref.path, [&] {
+    return frame_or_fault([&] {
+      const ColourFrame picture = decode_picture_file(base_ / ref.path);
+      return prepare_frame({picture.size, picture.bgr.data()}, spec_);
+    });
+  });
+}
+
+Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair) const {
+  const FrameRef& previous = pair.previous;
+  const FrameRef& next = pair.next;
+  std::array<SharedFrame, 2> both;
+  const FrameRef* current = &previous;
+  try {
+    if (previous.video_frame >= 0 && next.video_frame >= 0 && previous.path == next.path) {
+      return videos_->frames<2>(base_ / previous.path, {previous.video_frame, next.video_frame});
+    }
+    both[0] = frame(previous);
+    current = &next;
+    both[1] = frame(next);
+  } catch (const std::runtime_error& error) {
+    return fault_in(*current, error.what());
+  }
+  return both;
+}
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair) const {
-  auto outcome = decoder_.decode_both(pair.previous, pair.next);
-  if (is_fault(outcome)) return std::get<SampleFault>(std::move(outcome));
-  auto& [before, after] = std::get<std::array<ColourFrame, 2>>(outcome);
-  if (before.size != after.size) {
-    return SampleFault{"expected two frames of one size, got " + text_of(before.size) + " in " +
-                       pair.previous.path + " and " + text_of(after.size) + ", in " +
-                       pair.next.path};
+  const auto outcome = frames(pair);
+  if (is_fault(outcome)) return std::get<SampleFault>(outcome);
+  const auto& [previous, next] = std::get<0>(outcome);
+  for (const auto& [frame, ref] : {std::pair{&previous, &pair.previous}, {&next, &pair.next}}) {
+    if (is_fault(**frame)) return fault_in(*ref, std::get<SampleFault>(**frame).reason);
+  }
+  const auto& before = std::get<PreparedFrame>(*previous);
+  const auto& after = std::get<PreparedFrame>(*next);
+  if (before.placement.source != after.placement.source) {
+    return SampleFault{"expected two frames of one size, got " + text_of(before.placement.source) +
+                       " in " + pair.previous.path + " and " + text_of(after.placement.source) +
+                       ", in " + pair.next.path};
   }
 
   PreparedPair prepared;
-  prepared.placement = place(before.size, spec_);
+  prepared.placement = before.placement;
   const VisiblePart part = visible_part(prepared.placement);
   prepared.content = part.size;
   prepared.content_x = part.volume_x;
   prepared.content_y = part.volume_y;
-  prepared.input.reserve(2 * part.size.pixel_count());
-  try {
-    append_input(prepare(before, prepared.placement, spec_), part, prepared.input);
-    append_input(prepare(after, prepared.placement, spec_), part, prepared.input);
-  } catch (const cv::Exception& exception) {
-    return SampleFault{"expected frames that can be resized, got " + exception.err + ", in " +
-                       pair.next.path};
-  }
+  prepared.input.resize(2 * part.size.pixel_count());
+  const std::span<float> input = prepared.input;
+  to_input(before.grey, input.first(before.grey.size()));
+  to_input(after.grey, input.last(after.grey.size()));
   return prepared;
 }
 

@@ -1,13 +1,17 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <memory>
 #include <vector>
 
 #include "manifests/faults.h"
 #include "manifests/job_manifest.h"
 #include "manifests/pairs.h"
 #include "manifests/placement.h"
-#include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/open_videos.h"
+#include "stages/frames/decoding/prepared_frame.h"
+#include "stages/frames/decoding/shared_pictures.h"
 
 namespace eventgan {
 
@@ -23,26 +27,33 @@ struct PreparedPair {
   Placement placement;
 };
 
-/// Decodes frame pairs from pictures and videos and prepares them as `spec` says: grey (ITU-R
-/// BT.601, 8 bit), bilinear resizing, Gaussian blur (OpenCV's 8-bit filters, sigma from the
-/// kernel's side), cut, [-1, 1].
+/// Decodes frame pairs from pictures and videos, as FrameDecoder does, and prepares them as `spec`
+/// says (prepare_frame). Pairs near each other in the plan share frames: the prepared frames used
+/// last are kept, so that each is decoded once. A file that changes meanwhile may be seen as it
+/// was.
 ///
-/// The two frames must have one size. Thread safety: `read` may be called from several threads; for
-/// videos see FrameDecoder.
+/// The two frames must have one size. Thread safety: `read` may be called from several threads;
+/// pictures are decoded in parallel, videos one frame after another under a lock.
 class PairReader {
  public:
   /// Relative frame paths start at `base`. `pairs_under_way`: how many pairs, of those in the
   /// plan's order, may be read out of order at once. A pair reaches 6 frames back, so
-  /// pairs_under_way + 6 frames and a margin are kept of each video (of two videos at most),
-  /// whatever the frames' size: with that no video is decoded twice.
+  /// pairs_under_way + 6 prepared frames and a margin are kept of each video (of two videos at
+  /// most): with that no video is decoded twice. Of pictures, whose pairs may skip frames, two for
+  /// each pair under way are kept, besides those 6 and the margin.
   PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way = 16);
 
   /// A fault if a file is missing, empty, truncated, not a picture, or the sizes differ.
   Outcome<PreparedPair> read(const FramePair& pair) const;
 
  private:
-  FrameDecoder decoder_;
+  Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair) const;
+  SharedFrame frame(const FrameRef& ref) const;
+
+  std::filesystem::path base_;
   ImageSpec spec_;
+  std::unique_ptr<SharedPictures> pictures_;
+  std::unique_ptr<OpenVideos<SharedFrame>> videos_;
 };
 
 }  // namespace eventgan

@@ -3,10 +3,15 @@
 #include <png.h>
 
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include "stages/frames/decoding/escape_internal.h"
 #include "stages/frames/decoding/picture_limits.h"
+#include "stages/frames/decoding/stored_png.h"
 
 namespace eventgan {
 namespace {
@@ -17,9 +22,18 @@ namespace {
 
 void ignore_warning(png_structp, png_const_charp) {}
 
+void read_from_memory(png_structp png, png_bytep to, std::size_t count) {
+  auto& left = *static_cast<std::span<const std::uint8_t>*>(png_get_io_ptr(png));
+  if (count > left.size()) png_error(png, "Read Error");
+  std::memcpy(to, left.data(), count);
+  left = left.subspan(count);
+}
+
 class PngFile {
  public:
-  explicit PngFile(std::FILE* file) {
+  /// Reads `file`, or `stored` unless that is empty: the same file with its pixel data inflated.
+  explicit PngFile(std::FILE* file, std::vector<std::uint8_t> stored = {})
+      : stored_(std::move(stored)), left_(stored_) {
     run_guarded(escape_, [&] {
       png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape_, leave_with_message,
                                     ignore_warning);
@@ -27,6 +41,10 @@ class PngFile {
       info_ = png_create_info_struct(png_);
       if (info_ == nullptr) escape_.leave("cannot start libpng");
       png_init_io(png_, file);
+      if (!stored_.empty()) {
+        png_set_read_fn(png_, &left_, read_from_memory);
+        png_set_option(png_, PNG_IGNORE_ADLER32, PNG_OPTION_ON);  // compared when inflated
+      }
       // What is said beside the pixels (colour profiles, text) may be damaged, the pixels may not.
       png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
       png_set_benign_errors(png_, 0);
@@ -49,6 +67,7 @@ class PngFile {
     frame.bgr.resize(3 * frame.size.pixel_count());
     const std::size_t row_bytes = 3 * static_cast<std::size_t>(frame.size.width);
     std::vector<png_bytep> rows;
+    rows.reserve(static_cast<std::size_t>(frame.size.height));
     for (int y = 0; y < frame.size.height; ++y) rows.push_back(frame.bgr.data() + y * row_bytes);
     run_guarded(escape_, [&] {
       set_conversions();
@@ -76,6 +95,8 @@ class PngFile {
     png_set_interlace_handling(png_);
   }
 
+  std::vector<std::uint8_t> stored_;
+  std::span<const std::uint8_t> left_;  ///< of it
   Escape escape_;
   png_structp png_ = nullptr;
   png_infop info_ = nullptr;
@@ -83,7 +104,11 @@ class PngFile {
 
 }  // namespace
 
-ColourFrame decode_png(std::FILE* file) { return PngFile(file).read(); }
+ColourFrame decode_png(std::FILE* file) {
+  std::vector<std::uint8_t> stored = stored_png(file);
+  std::rewind(file);
+  return PngFile(file, std::move(stored)).read();
+}
 
 ImageSize png_size(std::FILE* file) { return PngFile(file).read_header(); }
 

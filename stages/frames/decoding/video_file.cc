@@ -6,7 +6,6 @@
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "stages/frames/decoding/picture_limits.h"
 
@@ -26,34 +25,42 @@ bool is_text(const std::filesystem::path& path) {
 
 struct VideoFile::Capture {
   cv::VideoCapture video;
+  cv::Mat picture;  ///< the latest frame
 };
 
-VideoFile::VideoFile(std::filesystem::path path, int kept_frames)
-    : path_(std::move(path)),
-      kept_frames_(static_cast<std::size_t>(std::max(kept_frames, 1))),
-      capture_(std::make_unique<Capture>()) {
-  open();
-}
-
-VideoFile::~VideoFile() = default;
-
-void VideoFile::open() {
-  latest_.clear();
-  decoded_ = 0;
-  if (!std::filesystem::exists(path_)) throw std::runtime_error("expected a file, got none");
+VideoFile::VideoFile(const std::filesystem::path& path) : capture_(std::make_unique<Capture>()) {
+  if (!std::filesystem::exists(path)) throw std::runtime_error("expected a file, got none");
   bool opened = false;
   try {
-    opened = !is_text(path_) && capture_->video.open(path_.string(), cv::CAP_FFMPEG);
+    opened = !is_text(path) && capture_->video.open(path.string(), cv::CAP_FFMPEG);
   } catch (const cv::Exception&) {
     opened = false;
   }
   if (!opened) throw std::runtime_error("expected a video, got a file that cannot be read as one");
 }
 
-bool VideoFile::decode_next() {
-  cv::Mat picture;
+VideoFile::~VideoFile() = default;
+VideoFile::VideoFile(VideoFile&&) noexcept = default;
+VideoFile& VideoFile::operator=(VideoFile&&) noexcept = default;
+
+bool VideoFile::skip() {
   try {
-    if (!capture_->video.read(picture)) return false;
+    if (!capture_->video.grab()) return false;
+  } catch (const cv::Exception& exception) {
+    throw std::runtime_error("expected a whole video, got " + exception.err);
+  }
+  ++position_;
+  return true;
+}
+
+std::optional<ColourView> VideoFile::next() {
+  if (!skip()) return std::nullopt;
+  cv::Mat& picture = capture_->picture;
+  try {
+    if (!capture_->video.retrieve(picture)) {
+      throw std::runtime_error("expected a whole video, got one whose frame " +
+                               std::to_string(position_ - 1) + " cannot be read");
+    }
   } catch (const cv::Exception& exception) {
     throw std::runtime_error("expected a whole video, got " + exception.err);
   }
@@ -62,22 +69,7 @@ bool VideoFile::decode_next() {
   }
   const ImageSize size{picture.rows, picture.cols};
   check_picture_size(size);
-  latest_.push_back({size, {picture.data, picture.data + picture.total() * picture.elemSize()}});
-  if (latest_.size() > kept_frames_) latest_.pop_front();
-  ++decoded_;
-  return true;
-}
-
-const ColourFrame& VideoFile::frame(std::int64_t position) {
-  const auto first_kept = decoded_ - static_cast<std::int64_t>(latest_.size());
-  if (position < first_kept) open();
-  while (decoded_ <= position) {
-    if (!decode_next()) {
-      throw std::runtime_error("expected a frame at position " + std::to_string(position) +
-                               ", got a video whose frames end after " + std::to_string(decoded_));
-    }
-  }
-  return latest_[latest_.size() - static_cast<std::size_t>(decoded_ - position)];
+  return ColourView{size, picture.data};
 }
 
 }  // namespace eventgan

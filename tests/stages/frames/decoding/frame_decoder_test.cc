@@ -104,30 +104,6 @@ TEST(FrameDecoder, KeepsAsManyFramesAsToldAndOpensAnewForEarlierOnes) {
             "expected a file, got none, in clip.avi");
 }
 
-TEST(FrameDecoder, DecodesBothFramesOfPicturesAndVideos) {
-  const TemporaryFolder folder;
-  testing::write_counting_video(folder / "clip.avi", 20);
-  cv::imwrite((folder / "a.png").string(), gradient_picture({12, 20}));
-  const FrameDecoder decoder(folder.path());
-  const auto frame_12 = testing::video_ref("clip.avi", 12);
-  const auto frame_9 = testing::video_ref("clip.avi", 9);
-  const auto video = decoder.decode_both(frame_12, frame_9);
-  const auto& [first, second] = std::get<0>(video);
-  EXPECT_EQ(testing::counted(first), 12);
-  EXPECT_EQ(testing::counted(second), 9);
-  const auto mixed = decoder.decode_both(picture_ref("a.png"), frame_9);
-  EXPECT_TRUE(same_pixels(std::get<0>(mixed)[0], opencv_read(folder / "a.png")));
-  EXPECT_EQ(testing::counted(std::get<0>(mixed)[1]), 9);
-
-  const auto reason = [&](const FrameRef& one, const FrameRef& other) {
-    return std::get<SampleFault>(decoder.decode_both(one, other)).reason;
-  };
-  EXPECT_EQ(reason(frame_9, testing::video_ref("clip.avi", 20)),
-            "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
-  EXPECT_EQ(reason(picture_ref("none.png"), frame_9), "expected a file, got none, in none.png");
-  EXPECT_EQ(reason(frame_9, picture_ref("none.png")), "expected a file, got none, in none.png");
-}
-
 TEST(FrameDecoder, SeveralVideosByTurns) {
   const TemporaryFolder folder;
   const FrameDecoder decoder(folder.path());

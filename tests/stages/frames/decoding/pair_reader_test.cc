@@ -5,6 +5,7 @@
 #include <hdf5.h>
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "tests/stages/frames/decoding/test_pictures.h"
@@ -175,6 +176,30 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
       std::filesystem::remove(folder / "clip.avi");
     }
   }
+}
+
+std::string reason(const Outcome<PreparedPair>& outcome) {
+  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+}
+
+TEST(PairReader, FramesOfAVideoAndOfAFolderPair) {
+  const TemporaryFolder folder;
+  testing::write_counting_video(folder / "clip.avi", 20);
+  cv::imwrite((folder / "a.png").string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(77)));
+  const PairReader reader(folder.path(), {});
+  FramePair pair = pair_of("a.png", "");
+  pair.next = testing::video_ref("clip.avi", 9);
+  const std::vector<float> input = std::get<PreparedPair>(reader.read(pair)).input;
+  EXPECT_EQ(level(input.front()), 77);
+  EXPECT_NEAR(level(input.back()), 18, 1);
+  std::swap(pair.previous, pair.next);
+  EXPECT_EQ(level(std::get<PreparedPair>(reader.read(pair)).input.back()), 77);
+  pair.previous.video_frame = 20;
+  EXPECT_EQ(reason(reader.read(pair)),
+            "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
+  pair.next = testing::video_ref("clip.avi", 9);
+  EXPECT_EQ(reason(reader.read(pair)),
+            "expected a frame at position 20, got a video whose frames end after 20, in clip.avi");
 }
 
 template <class T>
