@@ -1,10 +1,11 @@
 #include "pipeline/samples/sample_stages.h"
 
-#include <algorithm>
 #include <ctime>
 #include <limits>
+#include <optional>
 
 #include "stages/events/normalization.h"
+#include "stages/events/volume_statistics.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {
@@ -40,23 +41,6 @@ std::string frame_names(const FramePair& pair) {
 
 std::string size_text(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
-/// The content's volume laid into the whole volume's frame; zeros (no events) around it.
-std::vector<float> framed(std::vector<float> content, const PreparedPair& prepared, int channels) {
-  const ImageSize whole = prepared.placement.volume;
-  const ImageSize part = prepared.content;
-  if (part == whole) return content;
-  std::vector<float> volume(channels * whole.pixel_count(), 0.0f);
-  for (int row = 0; row < channels * part.height; ++row) {
-    const int channel = row / part.height;
-    const std::size_t y = prepared.content_y + row % part.height;
-    std::copy_n(
-        content.begin() + static_cast<std::ptrdiff_t>(row) * part.width, part.width,
-        volume.begin() + static_cast<std::ptrdiff_t>((channel * whole.height + y) * whole.width +
-                                                     prepared.content_x));
-  }
-  return volume;
 }
 
 }  // namespace
@@ -131,23 +115,28 @@ void SampleStages::generate(SampleMessage& message) const {
 void SampleStages::finish(SampleMessage& message) const {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kFinish);
-  if (const std::size_t bad = first_unsound_value(message.volume); bad != message.volume.size()) {
-    const std::size_t plane = message.prepared.content.pixel_count();
+  const PreparedPair& prepared = message.prepared;
+  const VolumeShape shape{generator_.bins(), prepared.placement.volume};
+  const std::optional<VolumeStatistics> found = volume_statistics(message.volume, shape);
+  if (!found) {
+    const std::size_t bad = first_unsound_value(message.volume);
     message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
-                 " in channel " + std::to_string(bad / plane) + " of the generated volume, from " +
-                 frame_names(message.planned().pair));
+                 " in channel " + std::to_string(bad / prepared.content.pixel_count()) +
+                 " of the generated volume, from " + frame_names(message.planned().pair));
     return;
   }
-  const VolumeShape shape{generator_.bins(), message.prepared.placement.volume};
-  std::vector<float> volume = framed(std::move(message.volume), message.prepared, shape.channels());
-  VolumeStatistics& statistics = message.sample.statistics;
-  statistics = volume_statistics(volume, shape);
+  VolumeStatistics& statistics = message.sample.statistics = *found;
   if (manifest_.generator.kind == GeneratorKind::kNetwork &&
       message.planned().pair.gap_frames >= kFirstExtrapolatedGap) {
     statistics.flags |= kFlagExtrapolated;
   }
-  if (manifest_.volume.normalize == Normalization::kEta98) normalize(volume, statistics.eta98);
-  EncodedVolume encoded = codec_.encode(volume);
+  float largest = statistics.max;
+  if (manifest_.volume.normalize == Normalization::kEta98) {
+    normalize(message.volume, statistics.eta98);
+    if (largest > 0) largest = 1;
+  }
+  EncodedVolume encoded = codec_.encode(
+      message.volume, {shape, prepared.content, prepared.content_x, prepared.content_y}, largest);
   if (encoded.saturated) statistics.flags |= kFlagSaturated;
   message.sample.scale = encoded.scale;
   message.chunk = std::move(encoded.chunk);

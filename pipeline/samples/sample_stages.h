@@ -8,7 +8,7 @@
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/generator/generator.h"
-#include "stages/shards/volume_codec.h"
+#include "stages/shards/codec/volume_codec.h"
 
 namespace eventgan {
 
@@ -28,8 +28,8 @@ class SampleStages {
   /// Runs the generator on the prepared frames.
   void generate(SampleMessage& message) const;
 
-  /// Checks the volume, lays it into the volume's frame, takes statistics, normalises if asked,
-  /// encodes.
+  /// Checks the volume and takes its statistics, normalises if asked, encodes it into the volume's
+  /// frame.
   void finish(SampleMessage& message) const;
 
  private:

@@ -6,7 +6,7 @@
 #include "stages/hdf5/hdf5_attribute_internal.h"
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_types_internal.h"
-#include "stages/shards/quantization.h"
+#include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/volume_words_internal.h"
 

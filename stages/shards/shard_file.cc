@@ -10,7 +10,7 @@
 #include "manifests/faults.h"
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_types_internal.h"
-#include "stages/shards/fletcher32.h"
+#include "stages/shards/codec/fletcher32.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_file_internal.h"
 #include "stages/shards/shard_objects_internal.h"

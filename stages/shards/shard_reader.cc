@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/shards/quantization.h"
+#include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_file_internal.h"
 #include "stages/shards/shard_rows.h"
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <sstream>
 
-#include "stages/shards/half_float.h"
+#include "stages/shards/codec/half_float.h"
 
 namespace eventgan {
 namespace {

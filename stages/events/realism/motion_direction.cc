@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "stages/events/normalization.h"
 #include "stages/events/realism/time_slope_internal.h"
+#include "stages/events/volume_statistics.h"
 
 namespace eventgan {
 namespace {

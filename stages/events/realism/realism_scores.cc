@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/events/normalization.h"
 #include "stages/events/realism/agreement_internal.h"
 #include "stages/events/time_image.h"
+#include "stages/events/volume_statistics.h"
 
 namespace eventgan {
 namespace {

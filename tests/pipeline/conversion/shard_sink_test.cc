@@ -7,7 +7,7 @@
 
 #include "manifests/faults.h"
 #include "stages/files/sha256.h"
-#include "stages/shards/volume_codec.h"
+#include "stages/shards/codec/volume_codec.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "stages/shards/shard_check.h"
-#include "stages/shards/volume_codec.h"
+#include "stages/shards/codec/volume_codec.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "stages/events/normalization.h"
+#include "stages/shards/codec/volume_codec.h"
 #include "tests/testing/fake_dataset.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/picture_file.h"
@@ -78,6 +80,36 @@ TEST_F(SampleStagesTest, LetterboxBordersHoldNoEvents) {
   EXPECT_NEAR(message.sample.statistics.nonzero_fraction, 0.5 * 2 / 3, 1e-6);
   EXPECT_NEAR(message.sample.statistics.sum_positive, 0.4 * 96 * 5, 1e-3);
   EXPECT_EQ(message.sample.labels.boxes[0].clipped, (Rectangle{2, 4, 6, 6}));
+}
+
+TEST_F(SampleStagesTest, StoresWhatWasGeneratedInItsFrameAndNormalisedIfAsked) {
+  manifest_.image.size = shard_.volume_size = {12, 12};
+  manifest_.image.fit = ImageFit::kLetterbox;
+  for (const Normalization normalization : {Normalization::kNone, Normalization::kEta98}) {
+    for (const StoredType type : {StoredType::kUint8, StoredType::kFloat16, StoredType::kFloat32}) {
+      manifest_.volume.normalize = normalization;
+      manifest_.output.dtype = type;
+      const SampleStages stages(manifest_, datasets_, generator_, 1);
+      SampleMessage message;
+      message.shard = &shard_;
+      stages.read(message);
+      stages.generate(message);
+      std::vector<float> content = message.volume;
+      stages.finish(message);
+      if (normalization == Normalization::kEta98) content = normalized(std::move(content));
+      // 8 rows of 12 pixels a channel, below 2 of 12.
+      std::vector<float> expected;
+      for (auto row = content.begin(); row != content.end(); row += 8 * 12) {
+        expected.resize(expected.size() + 2 * 12);
+        expected.insert(expected.end(), row, row + 8 * 12);
+        expected.resize(expected.size() + 2 * 12);
+      }
+      const VolumeCodec codec(type, manifest_.output.deflate_level);
+      const EncodedVolume encoded = codec.encode(expected);
+      EXPECT_EQ(message.chunk, encoded.chunk);
+      EXPECT_EQ(message.sample.scale, encoded.scale);
+    }
+  }
 }
 
 TEST_F(SampleStagesTest, SixFramesApartIsMarkedAsExtrapolated) {

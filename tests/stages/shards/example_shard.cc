@@ -6,8 +6,8 @@
 #include <string>
 #include <utility>
 
+#include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_writer.h"
-#include "stages/shards/volume_codec.h"
 
 namespace eventgan::testing {
 namespace {

@@ -6,9 +6,9 @@
 
 #include <filesystem>
 
+#include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_writer.h"
-#include "stages/shards/volume_codec.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

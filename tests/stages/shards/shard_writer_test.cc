@@ -7,8 +7,8 @@
 #include <random>
 
 #include "stages/files/sha256.h"
+#include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_reader.h"
-#include "stages/shards/volume_codec.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"

@@ -1,9 +1,13 @@
-#include "stages/shards/half_float.h"
+#include "stages/shards/codec/half_float.h"
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
+#include <random>
+#include <vector>
 
 namespace eventgan {
 namespace {
@@ -44,6 +48,40 @@ TEST(HalfFloat, SmallestNumbersBecomeZero) {
   EXPECT_EQ(to_half(std::numeric_limits<float>::denorm_min()), 0);
   EXPECT_EQ(to_half(0x1p-25f), 0);  // tie
   EXPECT_EQ(to_half(-0.0f), 0);
+}
+
+/// Whatever the processor converts with must round as to_half does: every half, the middles between
+/// them, their neighbours, and numbers of all magnitudes.
+TEST(HalfFloat, ManyAtOnceAreTheSameBits) {
+  std::vector<float> values;
+  for (std::uint16_t half = 0; half < 0x7bff; ++half) {
+    const float low = from_half(half);
+    const float middle = low + (from_half(half + 1) - low) / 2;
+    for (const float value :
+         {low, middle, std::nextafter(middle, 0.0f), std::nextafter(middle, 1e9f)}) {
+      values.push_back(value);
+    }
+  }
+  std::mt19937 random(8);
+  for (int i = 0; i < 100000; ++i) {
+    values.push_back(std::bit_cast<float>(static_cast<std::uint32_t>(random() % 0x7f800000u)));
+  }
+  values.insert(values.end(), {-0.0f, std::numeric_limits<float>::max(), kLargestHalf, 65520.0f});
+  std::vector<std::uint16_t> halves(values.size());
+  to_halves(values, halves.data());
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    ASSERT_EQ(halves[i], to_half(std::min(values[i], kLargestHalf))) << values[i];
+  }
+}
+
+TEST(HalfFloat, AnyNumberAtOnceAndNothingBehindThem) {
+  for (std::size_t count = 0; count < 40; ++count) {
+    const std::vector<float> values(count, 2.0f);
+    std::vector<std::uint16_t> halves(count + 1, 7);
+    to_halves(values, halves.data());
+    for (std::size_t i = 0; i < count; ++i) ASSERT_EQ(halves[i], 0x4000);
+    ASSERT_EQ(halves[count], 7);
+  }
 }
 
 }  // namespace

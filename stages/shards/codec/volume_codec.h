@@ -1,11 +1,12 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "manifests/job_manifest.h"
-#include "manifests/volume.h"
+#include "stages/shards/codec/volume_window.h"
 
 namespace eventgan {
 
@@ -24,18 +25,37 @@ struct EncodedVolume {
 ///
 /// uint8: scale = largest value / 255 (1 for an empty volume), code = round(value / scale), so
 /// nothing above zero is lost but what is below half a step; never a scale below the smallest
-/// normal float. Throws std::invalid_argument for values that are not finite or below zero.
-/// Deterministic. Thread safety: `encode` may be called from several threads.
+/// normal float. Deterministic. Thread safety: `encode` may be called from several threads; the
+/// codec keeps working memory for as many calls as ran at once, twice a volume's codes each.
 class VolumeCodec {
  public:
   /// `deflate_level` 0..9; 0 stores without the deflate filter.
   VolumeCodec(StoredType type, int deflate_level);
+  ~VolumeCodec();
+  VolumeCodec(const VolumeCodec&) = delete;
+  VolumeCodec& operator=(const VolumeCodec&) = delete;
 
+  /// A whole volume of any shape. Throws std::invalid_argument for values that are not finite or
+  /// are below zero.
   EncodedVolume encode(std::span<const float> volume) const;
 
+  /// The values in their window, zeros around them. They must be known to be finite and >= 0, with
+  /// `largest` the largest (VolumeStatistics::max; 0 if there is none). Throws
+  /// std::invalid_argument if there are not as many values as the window says, or it leaves the
+  /// volume.
+  EncodedVolume encode(std::span<const float> values, const VolumeWindow& window,
+                       float largest) const;
+
  private:
+  class Workspaces;
+
+  /// The chunk of `count` numbers that `write_planes` puts in HDF5's shuffled order into a buffer.
+  template <class WritePlanes>
+  std::vector<std::byte> chunk(std::size_t count, WritePlanes write_planes) const;
+
   StoredType type_;
   int deflate_level_;
+  std::unique_ptr<Workspaces> workspaces_;
 };
 
 }  // namespace eventgan

@@ -1,12 +1,17 @@
-#include "stages/shards/volume_codec.h"
+#include "stages/shards/codec/volume_codec.h"
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <algorithm>
+#include <atomic>
+#include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <random>
 #include <string>
+#include <thread>
 
 #include "tests/testing/temporary_folder.h"
 
@@ -104,6 +109,89 @@ TEST(VolumeCodec, SameVolumeSameBytes) {
 TEST(VolumeCodec, PassesOnScaleAndSaturation) {
   EXPECT_EQ(VolumeCodec(StoredType::kUint8, 1).encode(std::vector<float>{510}).scale, 2);
   EXPECT_TRUE(VolumeCodec(StoredType::kFloat16, 1).encode(std::vector<float>{1e6}).saturated);
+}
+
+TEST(VolumeCodec, RefusesWhatNoVolumeMayHold) {
+  for (const float bad : {-0.1f, std::nanf(""), std::numeric_limits<float>::infinity(),
+                          -std::numeric_limits<float>::infinity()}) {
+    for (const auto type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+      const VolumeCodec codec(type, 1);
+      EXPECT_THROW(codec.encode(std::vector<float>{0, bad, 1}), std::invalid_argument) << bad;
+      EXPECT_THROW(codec.encode(std::vector<float>{0, 1, bad}), std::invalid_argument) << bad;
+    }
+  }
+}
+
+/// The window's values copied into a volume of zeros.
+std::vector<float> framed(const std::vector<float>& values, const VolumeWindow& window) {
+  const ImageSize whole = window.whole.size;
+  const ImageSize content = window.content;
+  std::vector<float> volume(window.whole.value_count());
+  std::size_t next = 0;
+  for (int channel = 0; channel < window.whole.channels(); ++channel) {
+    for (int y = 0; y < content.height; ++y) {
+      for (int x = 0; x < content.width; ++x) {
+        const int row = channel * whole.height + window.y + y;
+        volume[static_cast<std::size_t>(row) * whole.width + window.x + x] = values[next++];
+      }
+    }
+  }
+  return volume;
+}
+
+TEST(VolumeCodec, AWindowIsWhatItWouldBeWithZerosAroundIt) {
+  const VolumeShape shape{2, {7, 9}};
+  const VolumeWindow windows[] = {{shape, {7, 9}, 0, 0},  // all of it
+                                  {shape, {3, 9}, 0, 2},  // borders above and below
+                                  {shape, {7, 4}, 3, 0},  // left and right
+                                  {shape, {5, 1}, 8, 1},  // a column of pixels
+                                  {shape, {1, 1}, 0, 6}, {shape, {0, 0}, 0, 0},
+                                  {shape, {0, 9}, 0, 3}, {shape, {7, 0}, 4, 0}};
+  for (const auto type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    for (const int level : {0, 1, 6}) {
+      const VolumeCodec codec(type, level);
+      for (const VolumeWindow& window : windows) {
+        // Working memory that other volumes went through must not show.
+        codec.encode(std::vector<float>(shape.value_count(), 1.0f));
+        const std::vector<float> values = some_volume(window.value_count());
+        const float largest =
+            values.empty() ? 0.0f : *std::max_element(values.begin(), values.end());
+        const EncodedVolume got = codec.encode(values, window, largest);
+        const EncodedVolume expected = codec.encode(framed(values, window));
+        ASSERT_EQ(got.chunk, expected.chunk)
+            << window.content.height << " " << window.content.width;
+        EXPECT_EQ(got.scale, expected.scale);
+      }
+    }
+  }
+}
+
+TEST(VolumeCodec, RefusesAWindowThatDoesNotFit) {
+  const VolumeCodec codec(StoredType::kUint8, 1);
+  const VolumeShape shape{1, {2, 2}};
+  const std::vector<float> four(4);
+  EXPECT_THROW(codec.encode(four, {shape, {1, 2}, 1, 0}, 0), std::invalid_argument);
+  EXPECT_THROW(codec.encode(four, {shape, {2, 1}, 0, 1}, 0), std::invalid_argument);
+  EXPECT_THROW(codec.encode(four, {shape, {1, 2}, 0, -1}, 0), std::invalid_argument);
+  EXPECT_THROW(codec.encode(four, {shape, {1, 1}, 0, 0}, 0), std::invalid_argument);
+}
+
+TEST(VolumeCodec, ManyThreadsGetTheBytesOfOne) {
+  const VolumeCodec codec(StoredType::kFloat16, 1);
+  std::vector<std::vector<std::byte>> expected;
+  for (std::size_t i = 0; i < 6; ++i) expected.push_back(codec.encode(some_volume(500 * i)).chunk);
+  std::vector<std::thread> threads;
+  std::atomic<int> wrong = 0;
+  for (std::size_t thread = 0; thread < 4; ++thread) {
+    threads.emplace_back([&, thread] {
+      for (std::size_t i = 0; i < 24; ++i) {
+        const std::size_t which = (i + thread) % expected.size();
+        if (codec.encode(some_volume(500 * which)).chunk != expected[which]) ++wrong;
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
 }
 
 TEST(VolumeCodec, RefusesLevelsThatDoNotExist) {

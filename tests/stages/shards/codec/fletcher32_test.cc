@@ -1,9 +1,12 @@
-#include "stages/shards/fletcher32.h"
+#include "stages/shards/codec/fletcher32.h"
 
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -52,14 +55,57 @@ std::uint32_t checksum_by_hdf5(const std::vector<std::byte>& bytes) {
 
 TEST(Fletcher32, IsWhatHdf5Writes) {
   std::mt19937 random(1);
-  // Around the 720 bytes after which sums are folded, odd and even; all ones make the sums as large
-  // as they get, and multiples of 65535, which must not become 0.
-  for (const std::size_t size : {1, 2, 3, 719, 720, 721, 722, 1440, 1441, 100003}) {
+  // Around a row of 32 bytes, the 720 bytes after which HDF5 folds and the 11520 after which we
+  // reduce, odd and even; all ones make the sums as large as they get, and multiples of 65535,
+  // which must not become 0; zeros, of which the sums are.
+  for (const std::size_t size :
+       {1, 2, 3, 31, 32, 33, 719, 720, 721, 722, 11519, 11520, 11521, 11552, 100003}) {
     std::vector<std::byte> bytes(size);
     for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
     EXPECT_EQ(fletcher32(bytes), checksum_by_hdf5(bytes)) << size;
     std::fill(bytes.begin(), bytes.end(), std::byte{0xff});
     EXPECT_EQ(fletcher32(bytes), checksum_by_hdf5(bytes)) << size << " of 0xff";
+    std::fill(bytes.begin(), bytes.end(), std::byte{0});
+    EXPECT_EQ(fletcher32(bytes), checksum_by_hdf5(bytes)) << size << " of 0";
+    bytes.back() = std::byte{0xff};
+    EXPECT_EQ(fletcher32(bytes), checksum_by_hdf5(bytes)) << size << " of 0 but the last";
+  }
+}
+
+/// As HDF5 computes it, word by word.
+std::uint32_t plain_fletcher32(std::span<const std::byte> bytes) {
+  std::uint32_t first = 0;
+  std::uint32_t second = 0;
+  for (std::size_t i = 0; i < bytes.size(); i += 2) {
+    first += std::to_integer<std::uint32_t>(bytes[i]) << 8;
+    if (i + 1 < bytes.size()) first += std::to_integer<std::uint32_t>(bytes[i + 1]);
+    first = (first & 0xffff) + (first >> 16);
+    second += first;
+    second = (second & 0xffff) + (second >> 16);
+  }
+  first = (first & 0xffff) + (first >> 16);
+  second = (second & 0xffff) + (second >> 16);
+  return second << 16 | first;
+}
+
+TEST(Fletcher32, OfEverySizeEqualsItsDefinition) {
+  std::mt19937 random(2);
+  std::vector<std::byte> bytes(3000);
+  for (std::byte& byte : bytes) byte = static_cast<std::byte>(random());
+  for (std::size_t size = 0; size < bytes.size(); ++size) {
+    const auto part = std::span<const std::byte>(bytes).first(size);
+    ASSERT_EQ(fletcher32(part), plain_fletcher32(part)) << size;
+  }
+}
+
+TEST(Fletcher32, OfTheLargestSumsEqualsItsDefinition) {
+  for (const int word : {0xffff, 0xfffe, 0x0001, 0x0100}) {
+    std::vector<std::byte> bytes(1u << 20);
+    for (std::size_t i = 0; i < bytes.size(); i += 2) {
+      bytes[i] = static_cast<std::byte>(word >> 8);
+      bytes[i + 1] = static_cast<std::byte>(word);
+    }
+    EXPECT_EQ(fletcher32(bytes), plain_fletcher32(bytes)) << word;
   }
 }
 

@@ -1,0 +1,149 @@
+#include "stages/shards/codec/volume_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "stages/shards/codec/deflater.h"
+#include "stages/shards/codec/fletcher32.h"
+#include "stages/shards/codec/quantization.h"
+
+namespace eventgan {
+namespace {
+
+float largest_sound_value(std::span<const float> values) {
+  float largest = 0;
+  bool sound = true;
+  for (const float value : values) {
+    sound &= value >= 0;  // false for NaN
+    largest = std::max(largest, value);
+  }
+  if (!sound || !std::isfinite(largest)) {
+    throw std::invalid_argument("expected finite values >= 0 in a volume to store, got others");
+  }
+  return largest;
+}
+
+void check(const VolumeWindow& window, std::size_t value_count) {
+  const ImageSize whole = window.whole.size;
+  if (window.x < 0 || window.y < 0 || window.x + window.content.width > whole.width ||
+      window.y + window.content.height > whole.height) {
+    throw std::invalid_argument("expected a window inside of the volume, got one across its edge");
+  }
+  if (value_count != window.value_count()) {
+    throw std::invalid_argument("expected " + std::to_string(window.value_count()) +
+                                " values, got " + std::to_string(value_count));
+  }
+}
+
+/// Calls run(first value, its place in the whole volume, count) for the longest stretches of values
+/// that lie next to each other in the whole volume too.
+template <class Run>
+void for_each_run(const VolumeWindow& window, Run run) {
+  const ImageSize whole = window.whole.size;
+  const ImageSize content = window.content;
+  const bool whole_rows = content.width == whole.width;
+  const int runs = whole_rows ? 1 : content.height;  // in each channel
+  const std::size_t count = content.pixel_count() / static_cast<std::size_t>(std::max(runs, 1));
+  std::size_t value = 0;
+  for (int channel = 0; channel < window.whole.channels(); ++channel) {
+    const std::size_t corner = static_cast<std::size_t>(channel) * whole.pixel_count() +
+                               static_cast<std::size_t>(window.y) * whole.width + window.x;
+    for (int row = 0; row < runs; ++row, value += count) {
+      run(value, corner + static_cast<std::size_t>(row) * whole.width, count);
+    }
+  }
+}
+
+}  // namespace
+
+/// What one call works with, kept for the next.
+class VolumeCodec::Workspaces {
+ public:
+  struct Workspace {
+    explicit Workspace(int level) : deflater(level) {}
+    std::vector<std::byte> planes;
+    Deflater deflater;
+  };
+
+  std::unique_ptr<Workspace> take(int level) {
+    {
+      const std::lock_guard lock(mutex_);
+      if (!idle_.empty()) {
+        std::unique_ptr<Workspace> workspace = std::move(idle_.back());
+        idle_.pop_back();
+        return workspace;
+      }
+    }
+    return std::make_unique<Workspace>(level);
+  }
+
+  void give_back(std::unique_ptr<Workspace> workspace) {
+    const std::lock_guard lock(mutex_);
+    idle_.push_back(std::move(workspace));
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<Workspace>> idle_;
+};
+
+VolumeCodec::VolumeCodec(StoredType type, int deflate_level)
+    : type_(type), deflate_level_(deflate_level), workspaces_(std::make_unique<Workspaces>()) {
+  if (deflate_level < 0 || deflate_level > 9) {
+    throw std::invalid_argument("expected a deflate level 0..9, got " +
+                                std::to_string(deflate_level));
+  }
+}
+
+VolumeCodec::~VolumeCodec() = default;
+
+template <class WritePlanes>
+std::vector<std::byte> VolumeCodec::chunk(std::size_t count, WritePlanes write_planes) const {
+  constexpr std::size_t kChecksumBytes = 4;
+  const std::size_t size = count * stored_size(type_);
+  std::vector<std::byte> chunk;
+  if (deflate_level_ == 0) {
+    chunk.reserve(size + kChecksumBytes);
+    chunk.resize(size);
+    write_planes(std::span(chunk));
+  } else {
+    auto workspace = workspaces_->take(deflate_level_);
+    workspace->planes.resize(size);
+    write_planes(std::span(workspace->planes));
+    const std::span<const std::byte> deflated = workspace->deflater.deflate(workspace->planes);
+    chunk.reserve(deflated.size() + kChecksumBytes);
+    chunk.assign(deflated.begin(), deflated.end());
+    workspaces_->give_back(std::move(workspace));
+  }
+  append_fletcher32(chunk);
+  return chunk;
+}
+
+EncodedVolume VolumeCodec::encode(std::span<const float> volume) const {
+  const Quantization how = quantization(type_, largest_sound_value(volume));
+  const auto write_planes = [&](std::span<std::byte> planes) {
+    quantize(volume, how, planes.data(), volume.size());
+  };
+  return {chunk(volume.size(), write_planes), how.scale, how.saturated};
+}
+
+EncodedVolume VolumeCodec::encode(std::span<const float> values, const VolumeWindow& window,
+                                  float largest) const {
+  check(window, values.size());
+  const std::size_t count = window.whole.value_count();
+  const Quantization how = quantization(type_, largest);
+  const auto write_planes = [&](std::span<std::byte> planes) {
+    // Zero is the code of no events in every type.
+    if (values.size() != count) std::fill(planes.begin(), planes.end(), std::byte{0});
+    for_each_run(window, [&](std::size_t value, std::size_t place, std::size_t run) {
+      quantize(values.subspan(value, run), how, planes.data() + place, count);
+    });
+  };
+  return {chunk(count, write_planes), how.scale, how.saturated};
+}
+
+}  // namespace eventgan
