@@ -1,7 +1,9 @@
 #pragma once
 
 #include <array>
+#include <optional>
 
+#include "manifests/engine.h"
 #include "manifests/job_manifest.h"
 #include "manifests/strict_json/word_internal.h"
 
@@ -40,6 +42,14 @@ inline constexpr std::array kGeneratorWords{
     Word<GeneratorKind>{"network", GeneratorKind::kNetwork},
     Word<GeneratorKind>{"esim", GeneratorKind::kEsim},
     Word<GeneratorKind>{"difference", GeneratorKind::kDifference}};
+
+inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std::nullopt},
+                                         Word<std::optional<Engine>>{"torch", Engine::kTorch},
+                                         Word<std::optional<Engine>>{"onednn", Engine::kOnednn}};
+
+inline constexpr std::array kPrecisionWords{Word<Precision>{"float32", Precision::kFloat32},
+                                            Word<Precision>{"bfloat16", Precision::kBfloat16},
+                                            Word<Precision>{"int8", Precision::kInt8}};
 
 inline constexpr std::array kNormalizationWords{
     Word<Normalization>{"none", Normalization::kNone},

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <span>
 #include <string>
 
@@ -26,6 +27,10 @@ class Generator {
   /// engine fails. Values that are not finite are left for the caller to find.
   virtual void generate(std::span<const float> frames, ImageSize size,
                         std::span<float> volume) const = 0;
+
+  /// Memory that one call needs beyond its spans, about; calls at the same time need it each. 0:
+  /// hardly any.
+  virtual std::size_t working_bytes(ImageSize) const { return 0; }
 
   /// Engine, precision and the libraries that change bytes, for the plan's fingerprint.
   virtual std::string description() const = 0;

@@ -8,7 +8,7 @@
 namespace eventgan {
 
 Weights untrained_weights(int base_channels, int bins, std::uint64_t seed) {
-  Weights weights{base_channels, bins, network_layout(base_channels, bins), {}};
+  Weights weights{base_channels, bins, network_layout(base_channels, bins), {}, nullptr};
   weights.metadata["origin"] = "untrained, seed " + std::to_string(seed);
   for (Convolution& layer : weights.convolutions) {
     const CounterRandom random = CounterRandom(seed).keyed(layer.name);

@@ -4,11 +4,10 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "stages/generator/network_shape.h"
+
 namespace eventgan {
 namespace {
-
-constexpr int kLevels = 4;  // encoders and decoders
-constexpr int kResidualBlocks = 2;
 
 std::string shape_text(const Convolution& convolution) {
   return convolution.name + " [" + std::to_string(convolution.out_channels) + ", " +
@@ -30,20 +29,29 @@ std::vector<Convolution> network_layout(int base_channels, int bins) {
     layout.push_back({std::move(name), out, in, kernel, stride, {}, {}});
   };
   add("head", b, 2, 3, 1);
-  for (int level = 0; level < kLevels; ++level) {
+  for (int level = 0; level < kNetworkLevels; ++level) {
     add("encoders." + std::to_string(level), b << (level + 1), b << level, 3, 2);
   }
   for (int block = 0; block < kResidualBlocks; ++block) {
     for (const char* part : {".conv1", ".conv2"}) {
-      add("resblocks." + std::to_string(block) + part, b << kLevels, b << kLevels, 3, 1);
+      add("resblocks." + std::to_string(block) + part, b << kNetworkLevels, b << kNetworkLevels, 3,
+          1);
     }
   }
-  for (int level = 0; level < kLevels; ++level) {
-    const int in = b << (kLevels - level);
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    const int in = b << (kNetworkLevels - level);
     add("decoders." + std::to_string(level), in / 2, in + in / 2, 3, 1);
   }
   add("pred", 2 * bins, b, 1, 1);
   return layout;
+}
+
+std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes) {
+  // What the encoders read and the decoders but the last write: levels of half the side and twice
+  // the channels, the topmost once, the others twice; and two tensors at the bottom.
+  const std::size_t top = size.pixel_count() * base_channels * value_bytes;
+  return top + 2 * (top / 2 + top / 4 + top / 8) + 2 * (top / 16) +
+         2 * size.pixel_count() * sizeof(float);
 }
 
 void check_weights(const Weights& weights, const std::string& name) {

@@ -1,8 +1,12 @@
 #pragma once
 
+#include <cstddef>
 #include <map>
+#include <memory>
 #include <string>
 #include <vector>
+
+#include "manifests/image_size.h"
 
 namespace eventgan {
 
@@ -20,6 +24,8 @@ struct Convolution {
 constexpr int kMostBaseChannels = 1024;  ///< of Weights::base_channels
 constexpr int kMostWeightBins = 64;      ///< of Weights::bins
 
+struct Calibration;  // stages/generator/calibration
+
 /// The generator's network (DESIGN section 4), spectral and batch norm folded into the
 /// convolutions.
 struct Weights {
@@ -27,11 +33,17 @@ struct Weights {
   int bins = 0;                                 ///< per polarity; the last layer has 2 bins outputs
   std::vector<Convolution> convolutions;        ///< in the order of network_layout()
   std::map<std::string, std::string> metadata;  ///< origin: where the numbers come from
+  std::shared_ptr<const Calibration> calibration;  ///< what int8 needs; null: none
 };
 
 /// Names and shapes of the network's convolutions for a base width, without numbers: head,
 /// encoders.0-3, resblocks.0-1.conv1-2, decoders.0-3, pred.
 std::vector<Convolution> network_layout(int base_channels, int bins);
+
+/// Bytes of the activations between the network's layers for one picture, each held once, with
+/// `value_bytes` a value, and of its input and output: what an engine that reuses nothing needs,
+/// but for what it works on at the moment.
+std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes);
 
 /// Throws std::runtime_error "expected X, got Y, in NAME" unless the convolutions have exactly the
 /// layout's names and shapes and all numbers are finite.

@@ -1,10 +1,11 @@
 #include "stages/generator/weights_files/weights_file.h"
 
-#include <charconv>
 #include <exception>
 #include <stdexcept>
 
 #include "manifests/faults.h"
+#include "stages/generator/weights_files/calibration_fields.h"
+#include "stages/generator/weights_files/content_fields.h"
 #include "stages/generator/weights_files/safetensors.h"
 
 namespace eventgan {
@@ -13,29 +14,7 @@ namespace {
 constexpr char kFormat[] = "eventgan-generator";
 constexpr char kVersion[] = "1";
 
-int take_number(std::map<std::string, std::string>& metadata, const std::string& key, int largest) {
-  const std::string text = metadata[key];
-  int number = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size() || number < 1 || number > largest) {
-    throw std::runtime_error("expected metadata " + key + " in 1.." + std::to_string(largest) +
-                             ", got \"" + text + "\"");
-  }
-  metadata.erase(key);
-  return number;
-}
-
-NamedTensor take_tensor(StateDict& tensors, const std::string& name,
-                        const std::vector<std::int64_t>& shape) {
-  auto node = tensors.extract(name);
-  if (node.empty()) throw std::runtime_error("expected tensor " + name + ", got none");
-  if (node.mapped().shape != shape) {
-    throw std::runtime_error("expected another shape of tensor " + name);
-  }
-  return std::move(node.mapped());
-}
-
-Weights from_content(SafetensorsFile content) {
+Weights from_content(SafetensorsFile content, const std::string& name) {
   if (content.metadata["format"] != kFormat || content.metadata["format_version"] != kVersion) {
     throw std::runtime_error("expected metadata format " + std::string(kFormat) + " version " +
                              kVersion + ", got \"" + content.metadata["format"] + "\" version \"" +
@@ -45,17 +24,17 @@ Weights from_content(SafetensorsFile content) {
   content.metadata.erase("format");
   content.metadata.erase("format_version");
   Weights weights;
-  weights.base_channels = take_number(content.metadata, "base_channels", kMostBaseChannels);
-  weights.bins = take_number(content.metadata, "bins", kMostWeightBins);
+  weights.base_channels = take_number(content, "base_channels", kMostBaseChannels);
+  weights.bins = take_number(content, "bins", kMostWeightBins);
   weights.convolutions = network_layout(weights.base_channels, weights.bins);
   for (Convolution& convolution : weights.convolutions) {
     const std::int64_t out = convolution.out_channels;
     const std::int64_t side = convolution.kernel;
-    convolution.weight = take_tensor(content.tensors, convolution.name + ".weight",
-                                     {out, convolution.in_channels, side, side})
-                             .values;
-    convolution.bias = take_tensor(content.tensors, convolution.name + ".bias", {out}).values;
+    convolution.weight = take_tensor(content, convolution.name + ".weight",
+                                     {out, convolution.in_channels, side, side});
+    convolution.bias = take_tensor(content, convolution.name + ".bias", {out});
   }
+  weights.calibration = take_calibration(content, weights.base_channels, name);
   if (!content.tensors.empty()) {
     throw std::runtime_error("expected no other tensors, got " + content.tensors.begin()->first);
   }
@@ -64,7 +43,7 @@ Weights from_content(SafetensorsFile content) {
 }
 
 Weights checked_weights(SafetensorsFile content, const std::string& name) {
-  Weights weights = from_content(std::move(content));
+  Weights weights = from_content(std::move(content), name);
   check_weights(weights, name);
   return weights;
 }
@@ -85,6 +64,7 @@ std::string serialize_weights(const Weights& weights) {
                                              convolution.weight};
     tensors[convolution.name + ".bias"] = {{out}, convolution.bias};
   }
+  if (weights.calibration) add_calibration(*weights.calibration, tensors, metadata);
   return serialize_safetensors(tensors, metadata);
 }
 

@@ -9,13 +9,13 @@
 namespace eventgan {
 
 /// The weights as a safetensors file: tensors NAME.weight and NAME.bias for each convolution;
-/// metadata `format`
-/// ("eventgan-generator"), `format_version`, `base_channels`, `bins` and Weights::metadata.
+/// metadata `format` ("eventgan-generator"), `format_version`, `base_channels`, `bins` and
+/// Weights::metadata; the calibration, if there is one, as calibration_fields.h says.
 /// Deterministic.
 std::string serialize_weights(const Weights& weights);
 
 /// Reads and checks such a file. Throws InputError (with the cause nested) if it is absent,
-/// malformed, not a generator, or has numbers that are not finite.
+/// malformed, not a generator, has half a calibration, or numbers that are not finite.
 Weights read_weights(const std::filesystem::path& file);
 
 /// The same from bytes; `name` stands for the file in messages.

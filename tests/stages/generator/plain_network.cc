@@ -65,11 +65,18 @@ Planes activated(Planes planes, double slope) {
   return planes;
 }
 
-Planes residual(const Weights& weights, const std::string& block, const Planes& in) {
-  Planes out =
-      convolve(weights, block + ".conv2", activated(convolve(weights, block + ".conv1", in), 0.0));
+Planes changed(const std::string& name, Planes planes, const TensorChange& change) {
+  if (change) change(name, planes.values);
+  return planes;
+}
+
+Planes residual(const Weights& weights, const std::string& block, const Planes& in,
+                const TensorChange& change) {
+  const std::string first = block + ".conv1";
+  const Planes middle = changed(first, activated(convolve(weights, first, in), 0.0), change);
+  Planes out = convolve(weights, block + ".conv2", middle);
   for (std::size_t i = 0; i < out.values.size(); ++i) out.values[i] += in.values[i];
-  return activated(std::move(out), 0.0);
+  return changed(block, activated(std::move(out), 0.0), change);
 }
 
 /// Nearest upsampling to the skip's size, then [x, skip].
@@ -90,20 +97,21 @@ Planes joined(const Planes& x, const Planes& skip) {
 }  // namespace
 
 std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
-                                 ImageSize size) {
+                                 ImageSize size, const TensorChange& change) {
   constexpr double kSlope = 0.01;
+  const auto leaky = [&](const std::string& name, const Planes& in) {
+    return changed(name, activated(convolve(weights, name, in), kSlope), change);
+  };
   Planes x{2, size, {frames.begin(), frames.end()}};
-  x = activated(convolve(weights, "head", x), kSlope);
+  x = leaky("head", x);
   std::vector<Planes> skips;
   for (int level = 0; level < 4; ++level) {
     skips.push_back(x);
-    x = activated(convolve(weights, "encoders." + std::to_string(level), x), kSlope);
+    x = leaky("encoders." + std::to_string(level), x);
   }
-  for (const char* block : {"resblocks.0", "resblocks.1"}) x = residual(weights, block, x);
+  for (const char* block : {"resblocks.0", "resblocks.1"}) x = residual(weights, block, x, change);
   for (int level = 0; level < 4; ++level) {
-    x = activated(
-        convolve(weights, "decoders." + std::to_string(level), joined(x, skips[3 - level])),
-        kSlope);
+    x = leaky("decoders." + std::to_string(level), joined(x, skips[3 - level]));
   }
   x = activated(convolve(weights, "pred", x), 0.0);
   return {x.values.begin(), x.values.end()};

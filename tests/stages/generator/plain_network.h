@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+#include <string>
 #include <vector>
 
 #include "manifests/image_size.h"
@@ -9,7 +11,10 @@ namespace eventgan::testing {
 
 /// The generator written from DESIGN section 4 as plain loops in double precision: slow, and with
 /// nothing in common with the engines it judges. frames [2, H, W] → volume [2 bins, H, W].
+/// `change` sees, and may change, the tensors [channel, y, x] of quantized_tensors(), and
+/// decoders.3, behind their activations.
+using TensorChange = std::function<void(const std::string& name, std::vector<double>& values)>;
 std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
-                                 ImageSize size);
+                                 ImageSize size, const TensorChange& change = {});
 
 }  // namespace eventgan::testing

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "stages/generator/network_shape.h"
 #include "stages/generator/untrained.h"
 
 namespace eventgan {
@@ -31,6 +32,11 @@ TEST(NetworkLayout, ScalesWithTheBaseWidth) {
   EXPECT_EQ(layout.back().out_channels, 18);
 }
 
+TEST(HalfSize, RoundsUp) {
+  EXPECT_EQ(half_size({260, 861}), (ImageSize{130, 431}));
+  EXPECT_EQ(half_size({1, 2}), (ImageSize{1, 1}));
+}
+
 TEST(CheckWeights, FindsAMissingLayerAndNan) {
   Weights weights = untrained_weights(1, 9, 1);
   weights.convolutions[2].weight[0] = NAN;
@@ -41,6 +47,14 @@ TEST(CheckWeights, FindsAMissingLayerAndNan) {
   weights = untrained_weights(1, 9, 1);
   std::swap(weights.convolutions[2], weights.convolutions[3]);
   EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+}
+
+TEST(ActivationBytes, AddUpTheTensorsBetweenTheLayers) {
+  // Base width 2 at 32x48: 2 channels of 32x48, 4 of 16x24, 8 of 8x12, 16 of 4x6, the last three
+  // twice, two of 32 channels of 2x3; the frames in float32.
+  const std::size_t values = 2 * 1536 + 2 * (4 * 384 + 8 * 96 + 16 * 24) + 2 * 32 * 6;
+  EXPECT_EQ(activation_bytes({32, 48}, 2, 4), values * 4 + 2 * 1536 * 4);
+  EXPECT_EQ(activation_bytes({32, 48}, 2, 1), values + 2 * 1536 * 4);
 }
 
 }  // namespace

@@ -1,0 +1,120 @@
+#include "stages/generator/onednn/activation_rows.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "stages/generator/network_shape.h"
+
+// Compiled for several processors, chosen when the program starts. A sanitizer is not set up yet
+// when that choice is made.
+#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#define EVENTGAN_CLONES \
+  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
+#else
+#define EVENTGAN_CLONES
+#endif
+
+namespace eventgan {
+namespace {
+
+[[gnu::always_inline]] inline void store(float value, float& stored) { stored = value; }
+
+[[gnu::always_inline]] inline void store(float value, Bfloat16& stored) {
+  const auto bits = std::bit_cast<std::uint32_t>(value);
+  const std::uint32_t rounded = bits + 0x7fff + ((bits >> 16) & 1);
+  const bool is_nan = (bits & 0x7fffffff) > 0x7f800000;
+  stored.bits = static_cast<std::uint16_t>((is_nan ? bits | 0x400000 : rounded) >> 16);
+}
+
+[[gnu::always_inline]] inline void store(float value, std::uint8_t& stored) {
+  const float clipped = value > 0 ? std::min(value, 255.0f) : 0.0f;
+  stored = static_cast<std::uint8_t>(static_cast<std::int32_t>(clipped + 0.5f));
+}
+
+template <class T>
+[[gnu::always_inline]] inline void store_each(const float* values, std::size_t count, T* stored) {
+  for (std::size_t i = 0; i < count; ++i) store(values[i], stored[i]);
+}
+
+[[gnu::always_inline]] inline void combine(const float* skip, const float* phase, std::size_t count,
+                                           float* combined) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const float sum = skip[i] + phase[i];
+    combined[i] = sum > 0 ? sum : sum * kLeakySlope;
+  }
+}
+
+/// The values of a row's pixel behind the phases' kernel.
+[[gnu::always_inline]] inline const float* phase_of(const DecoderRow& row, std::ptrdiff_t x) {
+  const std::ptrdiff_t phase = 2 * row.row_phase + x % 2;
+  return row.phases + ((x + 1) / 2 * 4 + phase) * row.channels;
+}
+
+[[gnu::always_inline]] inline void combine_row(const DecoderRow& row, float* combined) {
+  const std::size_t channels = row.channels;
+  if (row.whole_row) {
+    combine(row.skip, row.whole_row, row.width * channels, combined);
+    return;
+  }
+  const std::ptrdiff_t from_phases = row.last_pixel ? row.width - 1 : row.width;
+  for (std::ptrdiff_t x = 0; x < from_phases; ++x) {
+    combine(row.skip + x * channels, phase_of(row, x), channels, combined + x * channels);
+  }
+  if (row.last_pixel) {
+    const std::size_t last = from_phases * channels;
+    combine(row.skip + last, row.last_pixel, channels, combined + last);
+  }
+}
+
+/// Narrow types are stored from a whole row of float32: the few channels of a pixel fill no
+/// register.
+template <class T>
+[[gnu::always_inline]] inline void combine_and_store(const DecoderRow& row, T* stored) {
+  combine_row(row, row.skip);
+  store_each(row.skip, static_cast<std::size_t>(row.width) * row.channels, stored);
+}
+
+}  // namespace
+
+EVENTGAN_CLONES
+void store_activations(const float* values, std::size_t count, float* stored) {
+  store_each(values, count, stored);
+}
+
+EVENTGAN_CLONES
+void store_activations(const float* values, std::size_t count, Bfloat16* stored) {
+  store_each(values, count, stored);
+}
+
+EVENTGAN_CLONES
+void store_activations(const float* values, std::size_t count, std::uint8_t* stored) {
+  store_each(values, count, stored);
+}
+
+EVENTGAN_CLONES
+void combine_phases(const DecoderRow& row, float* stored) { combine_row(row, stored); }
+
+EVENTGAN_CLONES
+void combine_phases(const DecoderRow& row, Bfloat16* stored) { combine_and_store(row, stored); }
+
+EVENTGAN_CLONES
+void combine_phases(const DecoderRow& row, std::uint8_t* stored) { combine_and_store(row, stored); }
+
+EVENTGAN_CLONES
+void rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
+                         std::size_t plane_stride) {
+  // In blocks that stay in the first-level cache, since pixels and planes are far apart.
+  constexpr std::size_t kBlock = 64;
+  for (std::size_t begin = 0; begin < pixel_count; begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, pixel_count);
+    for (int c = 0; c < channels; ++c) {
+      float* plane = planes + c * plane_stride;
+      for (std::size_t i = begin; i < end; ++i) {
+        const float value = pixels[i * channels + c];
+        plane[i] = value <= 0 ? 0.0f : value;
+      }
+    }
+  }
+}
+
+}  // namespace eventgan

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace eventgan {
+
+/// Upper half of a float32, as bfloat16 is.
+struct Bfloat16 {
+  std::uint16_t bits = 0;
+};
+
+// The engine's own loops over activations, [y, x, channel] with channels contiguous. Stored as
+// float32, as bfloat16 (nearest, ties to even; NaN stays NaN), or as uint8 (nearest, halves up,
+// clipped to 0..255; the value has been divided by the tensor's scale; NaN becomes 0). No
+// multiplication is followed by an addition, so that the result is the same with and without fused
+// instructions. Thread safe.
+
+void store_activations(const float* values, std::size_t count, float* stored);
+void store_activations(const float* values, std::size_t count, Bfloat16* stored);
+void store_activations(const float* values, std::size_t count, std::uint8_t* stored);
+
+/// Where one row of a decoder's output comes from.
+struct DecoderRow {
+  int width = 0;      ///< of the output row, pixels
+  int channels = 0;   ///< of the output
+  int row_phase = 0;  ///< 0: even row, 1: odd row
+  /// [x, channel]: what the skip connection adds, bias included; may be overwritten.
+  float* skip = nullptr;
+  /// [(x + 1) / 2, phase, channel]: the row of phase_kernel's output that holds this one.
+  const float* phases = nullptr;
+  /// Not null: [x, channel], in place of `phases`.
+  const float* whole_row = nullptr;
+  /// Not null: [channel], in place of the phase of the last pixel.
+  const float* last_pixel = nullptr;
+};
+
+/// LeakyReLU of skip + phase, stored: [x, channel].
+void combine_phases(const DecoderRow& row, float* stored);
+void combine_phases(const DecoderRow& row, Bfloat16* stored);
+void combine_phases(const DecoderRow& row, std::uint8_t* stored);
+
+/// ReLU of pixels [pixel, channel] into planes: planes[c * plane_stride + pixel]. NaN stays NaN.
+void rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
+                         std::size_t plane_stride);
+
+}  // namespace eventgan

@@ -1,0 +1,228 @@
+#include <algorithm>
+#include <stdexcept>
+#include <type_traits>
+
+#include "stages/generator/onednn/network_plan_internal.h"
+
+namespace eventgan {
+namespace {
+
+using Type = dnnl::memory::data_type;
+
+/// Rows of the head's float32 output that are held until they are stored.
+constexpr std::size_t kHeadStripBytes = std::size_t{1} << 19;
+
+std::string numbered(const char* name, int number) {
+  return std::string(name) + "." + std::to_string(number);
+}
+
+}  // namespace
+
+NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
+    : engine_(layers.engine()),
+      size_(size),
+      base_channels_(layers.base_channels()),
+      bins_(layers.bins()),
+      stored_type_(layers.stored_type()) {
+  plan_head(layers);
+  plan_encoders(layers);
+  plan_residual_blocks(layers);
+  plan_decoders(layers);
+  plan_prediction(layers);
+
+  std::size_t scratch_bytes = std::max(head_->scratch_bytes(), prediction_->scratch_bytes());
+  for (const auto* list : {&encoders_, &residuals_}) {
+    for (const FusedConvolution& convolution : *list) {
+      scratch_bytes = std::max(scratch_bytes, convolution.scratch_bytes());
+    }
+  }
+  for (const DecoderLevel& decoder : decoders_) {
+    scratch_bytes = std::max(scratch_bytes, decoder.scratch_bytes());
+  }
+  scratch_ = layout_.add(scratch_bytes);
+}
+
+NetworkPlan::Buffer NetworkPlan::add_activations(ImageSize size, int channels) {
+  const std::size_t bytes =
+      size.pixel_count() * channels * dnnl::memory::data_type_size(stored_type_);
+  return {layout_.add(bytes), bytes};
+}
+
+void NetworkPlan::plan_head(NetworkLayers& layers) {
+  RowConvolutionSetup setup;
+  setup.input = setup.output = size_;
+  setup.padding = 1;
+  setup.activation = Activation::kLeakyRelu;
+  RowConvolution& head = head_.emplace(setup, layers.at("head"), engine_);
+  input_ = layout_.add(2 * size_.pixel_count() * sizeof(float));
+  skips_[0] = add_activations(size_, base_channels_);
+  // Float32 activations are written where they stay.
+  head_rows_ = stored_type_ == Type::f32
+                   ? size_.height
+                   : static_cast<int>(std::clamp<std::size_t>(
+                         kHeadStripBytes / head.output_row_bytes(), 1, size_.height));
+  for (int row = 0; row < size_.height; row += head_rows_) {
+    head.prepare(row, std::min(head_rows_, size_.height - row));
+  }
+  if (stored_type_ != Type::f32) {
+    head_rows_buffer_ = layout_.add(head_rows_ * head.output_row_bytes());
+  }
+}
+
+void NetworkPlan::plan_encoders(NetworkLayers& layers) {
+  ImageSize size = size_;
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    sizes_[level] = size;
+    if (level > 0) skips_[level] = add_activations(size, base_channels_ << level);
+    ConvolutionSetup setup;
+    setup.input = size;
+    setup.padding = {1, 1, 1, 1};
+    setup.stride = 2;
+    setup.source_type = setup.target_type = stored_type_;
+    setup.activation = Activation::kLeakyRelu;
+    // oneDNN takes the padding after the last pixel as given, also where no stride reaches it.
+    encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
+    size = half_size(size);
+  }
+  bottom_ = add_activations(size, base_channels_ << kNetworkLevels);
+  between_ = add_activations(size, base_channels_ << kNetworkLevels);
+}
+
+void NetworkPlan::plan_residual_blocks(NetworkLayers& layers) {
+  for (int block = 0; block < kResidualBlocks; ++block) {
+    ConvolutionSetup setup;
+    setup.input = half_size(sizes_.back());
+    setup.padding = {1, 1, 1, 1};
+    setup.source_type = setup.target_type = stored_type_;
+    setup.activation = Activation::kRelu;
+    const std::string name = numbered("resblocks", block);
+    residuals_.emplace_back(setup, layers.at(name + ".conv1"), engine_);
+    setup.add_target = layers.residual_factor(block);
+    residuals_.emplace_back(setup, layers.at(name + ".conv2"), engine_);
+  }
+}
+
+void NetworkPlan::plan_decoders(NetworkLayers& layers) {
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    const ImageSize large = sizes_[kNetworkLevels - 1 - level];
+    decoders_.emplace_back(layers, level, large, layout_);
+    if (level < kNetworkLevels - 1) {
+      decoded_[level] = add_activations(large, decoders_[level].channels());
+    }
+  }
+}
+
+void NetworkPlan::plan_prediction(NetworkLayers& layers) {
+  const DecoderLevel& last = decoders_.back();
+  RowConvolutionSetup setup;
+  setup.input = setup.output = {last.most_rows(), size_.width};
+  RowConvolution& prediction = prediction_.emplace(setup, layers.at("pred"), engine_);
+  for (const DecoderStrip& strip : last.strips()) prediction.prepare(0, strip.row_count);
+  decoded_rows_ = layout_.add(sizeof(float) * last.most_rows() * size_.width * last.channels());
+  predicted_rows_ = layout_.add(last.most_rows() * prediction.output_row_bytes());
+}
+
+template <class Stored>
+void NetworkPlan::run_head(const EngineRun& run, const float* frames) const {
+  auto* input = reinterpret_cast<float*>(run.block + input_);
+  const std::size_t pixels = size_.pixel_count();
+  for (std::size_t i = 0; i < pixels; ++i) {
+    input[2 * i] = frames[i];
+    input[2 * i + 1] = frames[pixels + i];
+  }
+  auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
+  if constexpr (std::is_same_v<Stored, float>) {
+    head_->run(run.stream, 0, size_.height, input, stored, run.scratch);
+    return;
+  }
+  auto* rows = reinterpret_cast<float*>(run.block + head_rows_buffer_);
+  const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
+  for (int row = 0; row < size_.height; row += head_rows_) {
+    const int count = std::min(head_rows_, size_.height - row);
+    head_->run(run.stream, row, count, input, rows, run.scratch);
+    store_activations(rows, count * row_values, stored + row * row_values);
+  }
+}
+
+template <class Stored>
+void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* small) const {
+  const DecoderLevel& decoder = decoders_[level];
+  const std::byte* skip = run.block + skips_[kNetworkLevels - 1 - level].offset;
+  auto* stored = reinterpret_cast<Stored*>(run.block + decoded_[level].offset);
+  decoder.compute_edges(run, small);
+  for (const DecoderStrip& strip : decoder.strips()) {
+    decoder.compute(run, strip, small, skip);
+    for (int y = strip.first_row; y < strip.first_row + strip.row_count; ++y) {
+      const DecoderRow row = decoder.row(run, strip, y);
+      combine_phases(row, stored + static_cast<std::ptrdiff_t>(y) * row.width * row.channels);
+    }
+  }
+}
+
+void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
+                                   float* volume) const {
+  const DecoderLevel& decoder = decoders_.back();
+  const std::byte* skip = run.block + skips_[0].offset;
+  auto* decoded = reinterpret_cast<float*>(run.block + decoded_rows_);
+  auto* predicted = reinterpret_cast<float*>(run.block + predicted_rows_);
+  const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(size_.width) * decoder.channels();
+  decoder.compute_edges(run, small);
+  for (const DecoderStrip& strip : decoder.strips()) {
+    decoder.compute(run, strip, small, skip);
+    for (int y = 0; y < strip.row_count; ++y) {
+      combine_phases(decoder.row(run, strip, strip.first_row + y), decoded + y * row_values);
+    }
+    prediction_->run(run.stream, 0, strip.row_count, decoded, predicted, run.scratch);
+    rectify_into_planes(
+        predicted, static_cast<std::size_t>(strip.row_count) * size_.width, 2 * bins_,
+        volume + static_cast<std::ptrdiff_t>(strip.first_row) * size_.width, size_.pixel_count());
+  }
+}
+
+template <class Stored>
+void NetworkPlan::run_stored(const EngineRun& run, const float* frames, float* volume) const {
+  const auto at = [&](const Buffer& buffer) { return run.block + buffer.offset; };
+  run_head<Stored>(run, frames);
+  for (int level = 0; level < kNetworkLevels; ++level) {
+    const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottom_;
+    encoders_[level].run(run.stream, at(skips_[level]), at(target), run.scratch);
+  }
+  for (int block = 0; block < kResidualBlocks; ++block) {
+    residuals_[2 * block].run(run.stream, at(bottom_), at(between_), run.scratch);
+    residuals_[2 * block + 1].run(run.stream, at(between_), at(bottom_), run.scratch);
+  }
+  const std::byte* small = at(bottom_);
+  for (int level = 0; level < kNetworkLevels - 1; ++level) {
+    run_decoder<Stored>(run, level, small);
+    small = at(decoded_[level]);
+  }
+  run_last_decoder(run, small, volume);
+}
+
+void NetworkPlan::run(const float* frames, float* volume, std::byte* block) const {
+  dnnl::stream stream(engine_);
+  const EngineRun run{stream, block, block + scratch_};
+  switch (stored_type_) {
+    case Type::f32:
+      return run_stored<float>(run, frames, volume);
+    case Type::bf16:
+      return run_stored<Bfloat16>(run, frames, volume);
+    case Type::u8:
+      return run_stored<std::uint8_t>(run, frames, volume);
+    default:
+      throw std::logic_error("unknown type of activations");
+  }
+}
+
+std::vector<std::string> NetworkPlan::implementations() const {
+  std::vector<std::string> names;
+  head_->list_implementations(names);
+  for (const auto* list : {&encoders_, &residuals_}) {
+    for (const FusedConvolution& convolution : *list) names.push_back(convolution.implementation());
+  }
+  for (const DecoderLevel& decoder : decoders_) decoder.list_implementations(names);
+  prediction_->list_implementations(names);
+  return names;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <dnnl.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/image_size.h"
+#include "stages/generator/onednn/buffer_layout.h"
+#include "stages/generator/onednn/decoder_level_internal.h"
+#include "stages/generator/onednn/fused_convolution_internal.h"
+#include "stages/generator/onednn/network_layers_internal.h"
+
+namespace eventgan {
+
+/// The network for one picture size: which convolutions run in which order, and where in one block
+/// of memory their buffers lie. Holds no buffers itself; thread safe.
+class NetworkPlan {
+ public:
+  /// `layers` must outlive it. Throws dnnl::error.
+  NetworkPlan(NetworkLayers& layers, ImageSize size);
+
+  /// Bytes that a run needs.
+  std::size_t block_bytes() const { return layout_.total_bytes(); }
+
+  /// frames [2, y, x], volume [2 bins, y, x] as Generator::generate has them. `block`:
+  /// block_bytes(), whatever stands in it.
+  void run(const float* frames, float* volume, std::byte* block) const;
+
+  /// oneDNN's names of all kernels.
+  std::vector<std::string> implementations() const;
+
+ private:
+  struct Buffer {
+    std::size_t offset = 0;
+    std::size_t size_bytes = 0;
+  };
+
+  Buffer add_activations(ImageSize size, int channels);
+  void plan_head(NetworkLayers& layers);
+  void plan_encoders(NetworkLayers& layers);
+  void plan_residual_blocks(NetworkLayers& layers);
+  void plan_decoders(NetworkLayers& layers);
+  void plan_prediction(NetworkLayers& layers);
+
+  template <class Stored>
+  void run_stored(const EngineRun& run, const float* frames, float* volume) const;
+  template <class Stored>
+  void run_head(const EngineRun& run, const float* frames) const;
+  template <class Stored>
+  void run_decoder(const EngineRun& run, int level, const std::byte* small) const;
+  void run_last_decoder(const EngineRun& run, const std::byte* small, float* volume) const;
+
+  dnnl::engine engine_;
+  ImageSize size_;
+  int base_channels_;
+  int bins_;
+  dnnl::memory::data_type stored_type_;
+  BufferLayout layout_;
+
+  std::size_t input_ = 0;             ///< [y, x, frame] float32
+  std::size_t head_rows_buffer_ = 0;  ///< float32
+  int head_rows_ = 0;                 ///< of a strip
+  std::optional<RowConvolution> head_;
+  std::array<Buffer, kNetworkLevels>
+      skips_;  ///< what each encoder reads, and the decoder beside it
+  std::array<ImageSize, kNetworkLevels> sizes_;
+  std::vector<FusedConvolution> encoders_;
+  std::vector<FusedConvolution> residuals_;  ///< two a block
+  Buffer bottom_;                            ///< the last encoder's output, the blocks' too
+  Buffer between_;                           ///< within a residual block
+  std::vector<DecoderLevel> decoders_;
+  std::array<Buffer, kNetworkLevels - 1> decoded_;
+  std::optional<RowConvolution> prediction_;
+  std::size_t decoded_rows_ = 0;    ///< float32, a strip of the last decoder
+  std::size_t predicted_rows_ = 0;  ///< [pixel, channel] float32
+  std::size_t scratch_ = 0;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,117 @@
+#include "stages/generator/onednn/onednn_generator.h"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <dnnl.hpp>
+#include <limits>
+#include <new>
+#include <stdexcept>
+#include <string>
+
+#include "stages/generator/generator_spans.h"
+#include "stages/generator/onednn/block_pool.h"
+#include "stages/generator/onednn/plan_cache_internal.h"
+
+namespace eventgan {
+namespace {
+
+/// oneDNN takes as many threads as OpenMP gives the calling thread; how it splits the work must not
+/// depend on the machine.
+void use_one_thread() {
+  thread_local const bool done = [] {
+    omp_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(done);
+}
+
+bool all_finite(std::span<const float> values) {
+  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
+}
+
+std::string version_text() {
+  const dnnl_version_t* version = dnnl_version();
+  return std::to_string(version->major) + "." + std::to_string(version->minor) + "." +
+         std::to_string(version->patch);
+}
+
+std::size_t stored_bytes(Precision precision) {
+  switch (precision) {
+    case Precision::kFloat32:
+      return 4;
+    case Precision::kBfloat16:
+      return 2;
+    case Precision::kInt8:
+      return 1;
+  }
+  throw std::logic_error("unknown precision");
+}
+
+class OnednnGenerator final : public Generator {
+ public:
+  OnednnGenerator(const Weights& weights, Precision precision)
+      : bins_(weights.bins),
+        precision_(precision),
+        description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
+                     version_text() + ", " + onednn_support(precision).instruction_set),
+        layers_(weights, precision, dnnl::engine(dnnl::engine::kind::cpu, 0)),
+        plans_(layers_) {}
+
+  int bins() const override { return bins_; }
+  std::string description() const override { return description_; }
+  std::size_t working_bytes(ImageSize size) const override {
+    return activation_bytes(size, layers_.base_channels(), stored_bytes(precision_));
+  }
+
+  void generate(std::span<const float> frames, ImageSize size,
+                std::span<float> volume) const override {
+    check_generator_spans(frames, size, volume, bins_);
+    // Whole numbers cannot hold what is not a number: it would come out as a plausible volume.
+    if (precision_ == Precision::kInt8 && !all_finite(frames)) {
+      std::ranges::fill(volume, std::numeric_limits<float>::quiet_NaN());
+      return;
+    }
+    use_one_thread();
+    try {
+      const auto plan = plans_.plan(size);
+      const BlockPool::Lease block = blocks_.take(plan->block_bytes());
+      plan->run(frames.data(), volume.data(), block.data());
+    } catch (const dnnl::error&) {
+      std::throw_with_nested(std::runtime_error("the generator failed in oneDNN"));
+    } catch (const std::bad_alloc&) {
+      std::throw_with_nested(
+          std::runtime_error("expected memory for a picture of " + std::to_string(size.width) +
+                             "x" + std::to_string(size.height) + ", about " +
+                             std::to_string(working_bytes(size)) + " bytes, got none"));
+    }
+  }
+
+ private:
+  int bins_;
+  Precision precision_;
+  std::string description_;
+  mutable NetworkLayers layers_;
+  mutable PlanCache plans_;
+  mutable BlockPool blocks_;
+};
+
+}  // namespace
+
+std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {
+  check_weights(weights, "the weights");
+  const OnednnSupport support = onednn_support(precision);
+  if (!support.able) {
+    throw std::runtime_error("expected a processor on which oneDNN computes " +
+                             std::string(to_string(precision)) + ", got " +
+                             support.instruction_set);
+  }
+  try {
+    return std::make_unique<OnednnGenerator>(weights, precision);
+  } catch (const dnnl::error&) {
+    std::throw_with_nested(std::runtime_error("the generator could not be set up in oneDNN"));
+  }
+}
+
+}  // namespace eventgan

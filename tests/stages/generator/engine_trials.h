@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "manifests/image_size.h"
+#include "stages/generator/generator.h"
+#include "stages/generator/weights.h"
+
+namespace eventgan::testing {
+
+// What the tests of all engines share.
+
+/// Two frames [2, y, x] in [-1, 1] like a photograph: soft shapes and some noise, the second one
+/// shifted.
+std::vector<float> natural_frames(ImageSize size, std::uint64_t seed);
+
+/// The volume, written over numbers that no generator makes.
+std::vector<float> generated(const Generator& generator, const std::vector<float>& frames,
+                             ImageSize size);
+
+/// |a - expected| / |expected|, Euclidean; of two sequences of zeros 0.
+double relative_error(const std::vector<float>& a, const std::vector<float>& expected);
+
+float largest_difference(const std::vector<float>& a, const std::vector<float>& b);
+
+/// "37x1", width first.
+std::string size_text(ImageSize size);
+
+/// The weights with a calibration from a few natural_frames of this size.
+Weights calibrated(const Weights& weights, ImageSize size);
+
+}  // namespace eventgan::testing

@@ -1,0 +1,204 @@
+#include <gtest/gtest.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "stages/generator/checkpoints/checkpoint.h"
+#include "stages/generator/checkpoints/fold.h"
+#include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/onednn/onednn_support.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/untrained.h"
+#include "stages/generator/weights_files/shipped_weights.h"
+#include "tests/stages/generator/engine_trials.h"
+#include "tests/stages/generator/plain_network.h"
+#include "tests/testing/golden_numbers.h"
+#include "tests/testing/shared_data.h"
+
+// What every engine must do in every precision that it has.
+
+namespace eventgan {
+namespace {
+
+using testing::calibrated;
+using testing::generated;
+using testing::largest_difference;
+using testing::natural_frames;
+using testing::relative_error;
+
+struct EngineCase {
+  Engine engine = Engine::kTorch;
+  Precision precision = Precision::kFloat32;
+};
+
+/// Largest relative L2 error of the whole volume against float32, and largest single difference in
+/// units of the largest value.
+struct Tolerance {
+  double relative = 0;
+  double largest = 0;
+};
+
+const std::map<Precision, Tolerance> kTolerances = {{Precision::kFloat32, {1e-5, 1e-4}},
+                                                    {Precision::kBfloat16, {0.03, 0.1}},
+                                                    {Precision::kInt8, {0.06, 0.15}}};
+
+class Engines : public ::testing::TestWithParam<EngineCase> {
+ protected:
+  void SetUp() override {
+    const bool torch = GetParam().engine == Engine::kTorch;
+    if (torch && GetParam().precision == Precision::kFloat32) return;
+    // LibTorch computes bfloat16 by oneDNN too.
+    const OnednnSupport support = onednn_support(GetParam().precision);
+    if (support.built ? !support.able : !torch) {
+      GTEST_SKIP() << support.instruction_set << " does not compute "
+                   << to_string(GetParam().precision);
+    }
+  }
+
+  std::unique_ptr<Generator> engine(const Weights& weights) const {
+    const Precision precision = GetParam().precision;
+    if (GetParam().engine == Engine::kTorch) return make_torch_generator(weights, precision);
+    return make_onednn_generator(
+        precision == Precision::kInt8 ? calibrated(weights, {48, 64}) : weights, precision);
+  }
+
+  void expect_near(const std::vector<float>& volume, const std::vector<float>& expected,
+                   const std::string& what) const {
+    const Tolerance& tolerance = kTolerances.at(GetParam().precision);
+    const float largest = *std::ranges::max_element(expected);
+    ASSERT_GT(largest, 0.0f) << what;
+    EXPECT_LE(relative_error(volume, expected), tolerance.relative) << what;
+    EXPECT_LE(largest_difference(volume, expected), tolerance.largest * largest) << what;
+  }
+};
+
+TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
+  const Weights weights = untrained_weights(2, 3, 5);
+  const auto generator = engine(weights);
+  // The steps of int8 suit pictures like those it was calibrated on: a few pixels' values may be
+  // small against them.
+  const bool whole_numbers = GetParam().precision == Precision::kInt8;
+  const ImageSize usual{48, 64};
+  const float usual_largest =
+      std::ranges::max(testing::plain_network(weights, natural_frames(usual, 11), usual));
+  for (const ImageSize size :
+       {ImageSize{16, 32}, ImageSize{17, 23}, ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{33, 1},
+        ImageSize{31, 18}, ImageSize{2, 2}, ImageSize{3, 50}, ImageSize{18, 31}}) {
+    const auto frames = natural_frames(size, 11);
+    const auto volume = generated(*generator, frames, size);
+    const auto expected = testing::plain_network(weights, frames, size);
+    const std::string what = testing::size_text(size);
+    if (whole_numbers) {
+      EXPECT_LE(largest_difference(volume, expected), 0.1f * usual_largest) << what;
+    } else {
+      expect_near(volume, expected, what);
+    }
+  }
+}
+
+TEST_P(Engines, EqualsThePublishedNetworkWhateverRanBefore) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto golden = data / "golden" / "golden.h5";
+  const auto checkpoint = data / "golden" / "checkpoint_zip.pt";
+  const auto generator =
+      engine(fold_generator(read_checkpoint(checkpoint, "gen"), checkpoint.string()));
+  int cases = 0;
+  for (int round = 0; round < 2; ++round) {
+    for (const std::string& name : testing::member_names(golden, "generator")) {
+      if (name == "state") continue;
+      const auto input = testing::read_array(golden, "generator/" + name + "/input");
+      const ImageSize size{int(input.shape[1]), int(input.shape[2])};
+      expect_near(generated(*generator, input.values, size),
+                  testing::read_array(golden, "generator/" + name + "/volume").values, name);
+      ++cases;
+    }
+  }
+  EXPECT_EQ(cases, 6);
+}
+
+TEST_P(Engines, EqualsTheReferenceWithShippedWeightsAtTheUsualSize) {
+  const Weights weights = read_shipped_weights(default_shipped_width());
+  const ImageSize size{260, 861};
+  const auto frames = natural_frames(size, 3);
+  expect_near(generated(*engine(weights), frames, size),
+              generated(*make_torch_generator(weights), frames, size), "shipped");
+}
+
+TEST_P(Engines, DependsOnItsFramesAlone) {
+  const auto generator = engine(untrained_weights(4, 9, 1));
+  const ImageSize size{37, 45};
+  const auto frames = natural_frames(size, 1);
+  const auto first = generated(*generator, frames, size);
+  generated(*generator, natural_frames({64, 64}, 2), {64, 64});
+  EXPECT_EQ(generated(*generator, frames, size), first);
+
+  std::vector<std::vector<float>> volumes(4);
+  std::vector<std::jthread> threads;
+  for (auto& volume : volumes) {
+    threads.emplace_back([&] {
+      for (int round = 0; round < 5; ++round) volume = generated(*generator, frames, size);
+    });
+  }
+  threads.clear();
+  for (const auto& volume : volumes) EXPECT_EQ(volume, first);
+  EXPECT_EQ(generated(*engine(untrained_weights(4, 9, 1)), frames, size), first)
+      << "another engine of the same weights";
+}
+
+TEST_P(Engines, IsTheSameWhateverTheCallersOpenmpSettingIs) {
+  const Weights weights = untrained_weights(4, 9, 1);
+  const ImageSize size{70, 90};
+  const auto frames = natural_frames(size, 1);
+  const auto expected = generated(*engine(weights), frames, size);
+  for (const int threads : {1, 2, 5}) {
+    const auto generator = engine(weights);  // so that its plan is built under the setting, too
+    std::vector<float> volume;
+    std::jthread([&] {
+      omp_set_num_threads(threads);
+      volume = generated(*generator, frames, size);
+      EXPECT_EQ(omp_get_max_threads(), 1);  // of this thread, from its first call on
+    }).join();
+    EXPECT_EQ(volume, expected) << threads;
+  }
+}
+
+TEST_P(Engines, LosesNoNan) {
+  const auto generator = engine(untrained_weights(4, 9, 1));
+  const ImageSize size{20, 21};
+  for (const float bad :
+       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+    auto frames = natural_frames(size, 1);
+    frames[200] = bad;
+    const auto volume = generated(*generator, frames, size);
+    EXPECT_TRUE(std::ranges::any_of(volume, [](float value) { return !std::isfinite(value); }));
+  }
+}
+
+TEST_P(Engines, RefusesSpansOfOtherSizes) {
+  const auto generator = engine(untrained_weights(2, 9, 1));
+  std::vector<float> frames(2 * 6), volume(18 * 6);
+  EXPECT_THROW(generator->generate(frames, {3, 3}, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate(frames, {0, 0}, volume), std::invalid_argument);
+  volume.pop_back();
+  EXPECT_THROW(generator->generate(frames, {2, 3}, volume), std::invalid_argument);
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Engines,
+                         ::testing::Values(EngineCase{Engine::kTorch, Precision::kFloat32},
+                                           EngineCase{Engine::kTorch, Precision::kBfloat16},
+                                           EngineCase{Engine::kOnednn, Precision::kFloat32},
+                                           EngineCase{Engine::kOnednn, Precision::kBfloat16},
+                                           EngineCase{Engine::kOnednn, Precision::kInt8}),
+                         [](const auto& one) {
+                           return std::string(to_string(one.param.engine)) + "_" +
+                                  std::string(to_string(one.param.precision));
+                         });
+
+}  // namespace
+}  // namespace eventgan
