@@ -52,9 +52,11 @@ GeneratorSpec read_generator(const StrictValue& value) {
         "\"untrained:WIDTH\" with WIDTH in 1..64",
         [](std::string_view text) { return parse_weights_name(text).has_value(); });
   }
+  if (const auto engine = keys.find("engine", {kNetwork})) {
+    spec.engine = engine->choice(kEngineWords);
+  }
   if (const auto precision = keys.find("precision", {kNetwork})) {
-    spec.precision = precision->text("\"float32\" (the only precision there is)",
-                                     [](std::string_view text) { return text == "float32"; });
+    spec.precision = precision->choice(kPrecisionWords);
   }
   if (const auto sensor = keys.find("sensor", {kEsim, kDifference})) {
     spec.sensor = read_sensor(*sensor);

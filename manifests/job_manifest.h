@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "manifests/engine.h"
 #include "manifests/image_size.h"
 #include "manifests/manifest_origin.h"
 #include "manifests/sensor_spec.h"
@@ -83,11 +84,13 @@ struct GeneratorSpec {
   /// kNetwork: path of a .safetensors file, "shipped" or "shipped:WIDTH" (manifests/weights), or
   /// "untrained:WIDTH", WIDTH 1..64.
   std::string weights = "shipped";
-  std::string precision = "float32";  ///< kNetwork
-  SensorSpec sensor;                  ///< kEsim, kDifference
-  double duration_s = 0.1;            ///< kEsim, kDifference: time between the two frames, for the
-                                      ///< noise and the refractory time; 1e-4..10
-  double max_displacement_px = 10;    ///< kEsim: of the random motion, 0.1..100
+  /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
+  std::optional<Engine> engine;
+  Precision precision = Precision::kFloat32;  ///< kNetwork
+  SensorSpec sensor;                          ///< kEsim, kDifference
+  double duration_s = 0.1;          ///< kEsim, kDifference: time between the two frames, for the
+                                    ///< noise and the refractory time; 1e-4..10
+  double max_displacement_px = 10;  ///< kEsim: of the random motion, 0.1..100
 };
 
 enum class Normalization { kNone, kEta98 };

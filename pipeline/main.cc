@@ -1,4 +1,3 @@
-#include <malloc.h>
 #include <stdlib.h>
 
 #include <CLI/CLI.hpp>
@@ -9,24 +8,11 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/error_text.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/memory/big_buffers.h"
 #include "pipeline/planning/fingerprint.h"
 
-namespace {
-
-/// glibc gives big buffers back to the system on every free and faults them in again on the next
-/// use; the generator's tensors and volumes are such buffers. One arena for all threads: buffers
-/// travel from thread to thread here, and with an arena for each, what is kept grows slowly for
-/// thousands of pairs.
-void keep_big_buffers() {
-  mallopt(M_ARENA_MAX, 1);
-  mallopt(M_MMAP_THRESHOLD, 1 << 30);
-  mallopt(M_TRIM_THRESHOLD, 1 << 30);
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
-  keep_big_buffers();
+  eventgan::keep_big_buffers();
   setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", /*overwrite=*/0);  // quiet
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
   // Decoding errors are reported by us, with the sample they belong to.
@@ -52,6 +38,7 @@ int main(int argc, char** argv) {
   eventgan::add_preview_command(app, exit_code);
   eventgan::add_make_demo_command(app, exit_code);
   eventgan::add_import_weights_command(app, exit_code);
+  eventgan::add_calibrate_command(app, exit_code);
   eventgan::add_realism_command(app, exit_code);
   eventgan::add_simulate_command(app, exit_code);
   eventgan::add_train_command(app, exit_code);

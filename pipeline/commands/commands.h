@@ -18,6 +18,7 @@ void add_inspect_command(CLI::App& app, int& exit_code);
 void add_preview_command(CLI::App& app, int& exit_code);
 void add_make_demo_command(CLI::App& app, int& exit_code);
 void add_import_weights_command(CLI::App& app, int& exit_code);
+void add_calibrate_command(CLI::App& app, int& exit_code);
 void add_realism_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
 void add_train_command(CLI::App& app, int& exit_code);

@@ -6,11 +6,14 @@
 #include "manifests/error_limits.h"
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/generator_notes.h"
 #include "pipeline/commands/job_options.h"
+#include "pipeline/commands/profile_option.h"
 #include "pipeline/commands/progress_option.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_generator.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/stopping/stop_signal.h"
 
 namespace eventgan {
@@ -20,6 +23,7 @@ struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
   double grace_s = ConversionOptions().grace_s;
+  std::optional<std::string> profile;
 };
 
 void warn(const JobOptions& job, const std::string& text) {
@@ -34,6 +38,19 @@ int judge(const ConversionReport& report, const ErrorSpec& errors) {
   }
   if (report.complete()) return kComplete;
   return report.stopped ? kStopped : kFailed;
+}
+
+int convert_and_report(const JobOptions& job, const JobManifest& manifest,
+                       const ConversionOptions& options) {
+  const LoadedGenerator loaded = [&] {
+    const TraceSpan span(options.trace, "load generator", "job");
+    return load_generator(manifest);
+  }();
+  tell_generator(loaded, job.as_json());
+  const ConversionReport report =
+      convert(manifest, *loaded.generator, loaded.weights_hash, options);
+  std::cout << (job.as_json() ? to_json(report) : to_text(report)) << std::flush;
+  return judge(report, manifest.errors);
 }
 
 int run(const ConvertArguments& arguments) {
@@ -52,12 +69,13 @@ int run(const ConvertArguments& arguments) {
   options.note = [&](const std::string& text) {
     std::cerr << (job.as_json() ? note_json(text) : text) << std::endl;
   };
-  const LoadedGenerator loaded = load_generator(manifest);
-  if (!loaded.warning.empty()) warn(job, loaded.warning);
-  const ConversionReport report =
-      convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  std::cout << (job.as_json() ? to_json(report) : to_text(report)) << std::flush;
-  return judge(report, manifest.errors);
+  const std::filesystem::path folder =
+      options.output.value_or(resolve(manifest, manifest.output.directory));
+  return run_profiled({arguments.profile, "convert", folder, job.as_json()},
+                      [&](TraceRecorder* trace) {
+                        options.trace = trace;
+                        return convert_and_report(job, manifest, options);
+                      });
 }
 
 }  // namespace
@@ -81,6 +99,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "Seconds after a signal to finish the shard under way; default: 20")
       ->check(CLI::Range(0.0, 1e9))
       ->option_text("SECONDS");
+  add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -8,6 +8,7 @@
 #include "manifests/faults.h"
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/generator_notes.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_generator.h"
 #include "pipeline/inspection/plan_summary.h"
@@ -58,7 +59,7 @@ int freeze(const Arguments& arguments, const JobManifest& manifest, Plan plan) {
 int run(const Arguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
-  if (!loaded.warning.empty()) std::cerr << "warning: " << loaded.warning << std::endl;
+  tell_generator(loaded, /*as_json=*/false);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description());
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);

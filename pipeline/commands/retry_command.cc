@@ -6,10 +6,13 @@
 
 #include "manifests/error_limits.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/generator_notes.h"
+#include "pipeline/commands/profile_option.h"
 #include "pipeline/commands/progress_option.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_generator.h"
 #include "pipeline/output/recorded_manifest.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/retry/retry.h"
 #include "pipeline/stopping/stop_signal.h"
 
@@ -21,6 +24,7 @@ struct RetryArguments {
   std::optional<std::string> manifest;
   int threads = 0;
   double grace_s = RetryOptions().grace_s;
+  std::optional<std::string> profile;
   ProgressStyle progress = ProgressStyle::kAuto;
 
   bool as_json() const { return progress == ProgressStyle::kJson; }
@@ -37,17 +41,21 @@ int finish(const RetryArguments& arguments, const RetryReport& report, const Err
   return report.damaged_shards.empty() ? kComplete : kFailed;
 }
 
-int run(const RetryArguments& arguments) {
-  const StopSignal signal;
+int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder* trace) {
   const FrozenOutline frozen = read_frozen_outline(arguments.folder);
   if (const auto report = nothing_to_retry(arguments.folder, frozen)) {
     return finish(arguments, *report, {});
   }
   const JobManifest manifest = recorded_manifest(arguments.folder, frozen.plan, arguments.manifest);
-  const LoadedGenerator loaded = load_generator(manifest);
+  const LoadedGenerator loaded = [&] {
+    const TraceSpan span(trace, "load generator", "job");
+    return load_generator(manifest);
+  }();
+  tell_generator(loaded, arguments.as_json());
   RetryOptions options;
   options.threads = arguments.threads;
   options.grace_s = arguments.grace_s;
+  options.trace = trace;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total);
@@ -78,7 +86,12 @@ void add_retry_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(0.0, 1e9))
       ->option_text("SECONDS");
   add_progress_option(*command, arguments->progress);
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  add_profile_option(*command, arguments->profile);
+  command->callback([arguments, &exit_code] {
+    const StopSignal signal;
+    exit_code = run_profiled({arguments->profile, "retry", arguments->folder, arguments->as_json()},
+                             [&](TraceRecorder* trace) { return run(*arguments, signal, trace); });
+  });
 }
 
 }  // namespace eventgan

@@ -16,6 +16,7 @@
 #include "pipeline/output/shard_backup.h"
 #include "pipeline/output/shard_state.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
 
@@ -52,6 +53,7 @@ void record_place(const fs::path& folder, const JobManifest& manifest,
 /// Makes the folder ready and freezes the plan in it, or takes the one that is there.
 FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, Plan plan,
                           const ConversionOptions& options) {
+  const TraceSpan span(options.trace, "freeze plan", "job");
   if (options.overwrite && options.part.count != 1) {
     throw UsageError("expected --overwrite without parts, got " + options.part.origin +
                      ": every worker would discard what the others have made");
@@ -94,8 +96,9 @@ void say_part(const ConversionReport& report, const ConversionOptions& options) 
 /// Checks what earlier runs left, and reports it.
 EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
                         ConversionReport& report) {
+  const TraceSpan span(job.options.trace, "check earlier shards", "job");
   const EarlierCheck check{job.threads, [&] { return stop_requested(job.options); },
-                           job.options.note};
+                           job.options.note, job.options.trace};
   EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, split.part, check);
   for (const std::string& fault : earlier.faults) {
     tell(job.options.warn, fault + "; it is made again");
@@ -131,6 +134,7 @@ void add_made(const ConversionJob& job, const ShardMaker& maker, ConversionRepor
 /// A last look at the part, so that "complete" is what stands in the folder: beside this run
 /// another may have overwritten, or a person deleted, what was committed.
 void look_again(const ConversionJob& job, const PartOfPlan& split, ConversionReport& report) {
+  const TraceSpan span(job.options.trace, "look again at all shards", "job");
   std::vector<ShardCondition> conditions(split.part.size());
   for_each_index(split.part.size(), job.threads, [&](std::size_t i) {
     conditions[i] = shard_state(job.folder, outline_of(*split.part[i]), job.frozen.hash).condition;
@@ -150,8 +154,9 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
-  PlannedJob planned = make_plan(manifest, weights_hash, generator.description(),
-                                 [&] { return stop_requested(options); });
+  PlannedJob planned = make_plan(
+      manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
+      options.trace);
   const FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
   const ConversionJob job{manifest,         options,   folder,       frozen,
                           planned.datasets, generator, weights_hash, thread_count(options.threads)};

@@ -8,6 +8,7 @@
 
 #include "manifests/job_manifest.h"
 #include "pipeline/conversion/conversion_report.h"
+#include "pipeline/profile/trace_recorder.h"
 #include "pipeline/progress/progress.h"
 #include "pipeline/workers/shard_part.h"
 #include "stages/generator/generator.h"
@@ -29,6 +30,7 @@ struct ConversionOptions {
   std::function<void(const std::string&)> warn;
   /// Told what goes on: which part this is, that checking takes long. None: silent.
   std::function<void(const std::string&)> note;
+  TraceRecorder* trace = nullptr;  ///< of every stage and thread; null: nobody asks
 };
 
 /// The job: plans, freezes the plan, converts every shard of this worker's part that is not done,

@@ -7,6 +7,7 @@
 
 #include "manifests/plan_outline.h"
 #include "pipeline/output/shard_state.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/threads/for_each_index.h"
 
 namespace eventgan {
@@ -44,6 +45,9 @@ EarlierShards check_earlier_shards(const std::filesystem::path& folder, const Fr
   tell_if_long(states, check);
   for_each_index(shards.size(), check.threads, [&](std::size_t i) {
     if (!states[i].done()) return;
+    TraceSpan span(check.trace, "hash earlier shard", "shard");
+    span.note("shard", shards[i]->name);
+    span.note("bytes", states[i].marker->size_bytes);
     states[i] = is_stopped(check) ? ShardState{}
                                   : hashed_shard_state(folder, outline_of(*shards[i]), frozen.hash);
   });

@@ -9,6 +9,7 @@
 
 #include "manifests/marker.h"
 #include "pipeline/output/output_folder.h"
+#include "pipeline/profile/trace_recorder.h"
 
 namespace eventgan {
 
@@ -31,6 +32,7 @@ struct EarlierCheck {
   std::function<bool()> stop;  ///< asked between shards; true leaves those not looked at yet out
   /// Told before it takes long.
   std::function<void(const std::string&)> note;
+  TraceRecorder* trace = nullptr;  ///< of the hashing; null: nobody asks
 };
 
 /// Looks at what the folder holds of `shards` of the plan, and hashes those that are committed,

@@ -6,6 +6,8 @@
 
 #include "pipeline/conversion/part_of_plan.h"
 #include "pipeline/conversion/shard_header.h"
+#include "pipeline/memory/memory_limit.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/samples/conversion_graph.h"
 
 namespace eventgan {
@@ -13,7 +15,7 @@ namespace eventgan {
 ShardMaker::ShardMaker(const ConversionJob& job, EarlierShards earlier,
                        std::int64_t quarantined_before)
     : job_(job),
-      limits_(graph_limits(earlier.left, job.manifest.volume.bins, job.threads)),
+      limits_(graph_limits(earlier.left, job.generator, job.threads, memory_limit_bytes())),
       stages_(job.manifest, job.datasets, job.generator, static_cast<int>(limits_.in_flight)),
       shared_(job.folder, job.frozen.hash, std::move(earlier.distrusted)),
       pace_(job.threads),
@@ -38,6 +40,7 @@ SinkSetup ShardMaker::sink_setup(std::int64_t quarantined_before) {
   };
   setup.order = [this] { return monitor_.order(); };
   setup.opened = [this](const PlannedShard& shard) { shared_.opened(shard); };
+  setup.trace = job_.options.trace;
   setup.is_done = [this](const PlannedShard& shard) { return shared_.is_done(shard); };
   return setup;
 }
@@ -62,6 +65,7 @@ void ShardMaker::make() {
 }
 
 void ShardMaker::run_graph(Progress* progress) {
+  const TraceSpan span(job_.options.trace, "make shards", "job");
   run_conversion_graph([this] { return queue_.next(); },
                        {[this](SampleMessage& message) { stages_.read(message); },
                         [this](SampleMessage& message) { stages_.generate(message); },
@@ -73,7 +77,7 @@ void ShardMaker::run_graph(Progress* progress) {
                           }
                           return !sink_.closed();
                         }},
-                       limits_, [this] { return monitor_.order(); });
+                       limits_, [this] { return monitor_.order(); }, job_.options.trace);
 }
 
 std::vector<const PlannedShard*> ShardMaker::done_by_others() const {

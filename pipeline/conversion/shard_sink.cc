@@ -4,6 +4,8 @@
 
 #include "manifests/error_limits.h"
 #include "manifests/faults.h"
+#include "pipeline/profile/processor_time.h"
+#include "pipeline/profile/trace_span.h"
 #include "stages/files/atomic_file.h"
 
 namespace eventgan {
@@ -11,6 +13,10 @@ namespace {
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double busy_seconds_since(std::int64_t start_ns) {
+  return 1e-9 * static_cast<double>(thread_processor_ns() - start_ns);
 }
 
 double& write_seconds(ShardMarker& marker) {
@@ -28,7 +34,7 @@ ShardSink::ShardSink(SinkSetup setup, ShardPace& pace)
 
 bool ShardSink::accept(SampleMessage& message) {
   if (!obey()) return false;
-  const auto start = std::chrono::steady_clock::now();
+  const std::int64_t start_ns = thread_processor_ns();
   const PlannedShard& shard = *message.shard;
   if (message.failed() && setup_.errors.policy == ErrorPolicy::kFail) {
     throw TooManyFaults("errors.policy is \"fail\": " + message.sample.fault);
@@ -44,7 +50,7 @@ bool ShardSink::accept(SampleMessage& message) {
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
-  write_seconds(marker_) += seconds_since(start);
+  write_seconds(marker_) += busy_seconds_since(start_ns);
   pace_.take(std::ssize(message.chunk));
   if (marker_.samples == static_cast<int>(shard.samples.size())) commit(shard);
   return true;
@@ -66,6 +72,8 @@ bool ShardSink::obey() {
 }
 
 void ShardSink::open(const PlannedShard& shard) {
+  TraceSpan span(setup_.trace, "open shard", "shard");
+  span.note("shard", shard.name);
   writer_ = std::make_unique<ShardWriter>(setup_.folder, setup_.header_of(shard));
   if (setup_.opened) setup_.opened(shard);
   marker_ = {};
@@ -75,10 +83,14 @@ void ShardSink::open(const PlannedShard& shard) {
 }
 
 void ShardSink::commit(const PlannedShard& shard) {
-  const auto start = std::chrono::steady_clock::now();
+  TraceSpan span(setup_.trace, "commit shard", "shard");
+  span.note("shard", shard.name);
+  span.note("samples", marker_.samples);
+  const std::int64_t start_ns = thread_processor_ns();
   pace_.begin_commit();
   ShardReceipt receipt;
   try {
+    const TraceSpan file(setup_.trace, "close, fsync, hash, rename", "shard");
     receipt = writer_->commit();
   } catch (const UnfinishedShardLost&) {
     if (!setup_.is_done || !setup_.is_done(shard)) throw;
@@ -89,10 +101,14 @@ void ShardSink::commit(const PlannedShard& shard) {
   writer_.reset();
   marker_.sha256 = receipt.sha256;
   marker_.size_bytes = receipt.size_bytes;
+  span.note("bytes", receipt.size_bytes);
   enter(std::move(receipt.contents), marker_);
-  write_seconds(marker_) += seconds_since(start);
+  write_seconds(marker_) += busy_seconds_since(start_ns);
   marker_.wall_seconds = seconds_since(committed_at_);
-  write_file_atomically(setup_.folder / marker_name(shard.name), to_json(marker_));
+  {
+    const TraceSpan file(setup_.trace, "write marker", "shard");
+    write_file_atomically(setup_.folder / marker_name(shard.name), to_json(marker_));
+  }
   pace_.close();
   committed_at_ = std::chrono::steady_clock::now();
   quarantined_ += std::ssize(marker_.quarantined);

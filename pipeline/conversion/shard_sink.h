@@ -13,6 +13,7 @@
 #include "manifests/plan.h"
 #include "manifests/shard.h"
 #include "pipeline/conversion/earlier_shards.h"
+#include "pipeline/profile/trace_recorder.h"
 #include "pipeline/samples/sample_message.h"
 #include "pipeline/stopping/shard_pace.h"
 #include "pipeline/stopping/stop_order.h"
@@ -32,6 +33,7 @@ struct SinkSetup {
   std::function<void(const PlannedShard&)> opened{};  ///< told of each shard whose file is there
   /// Whether another worker has committed the shard; asked if the file under way was lost.
   std::function<bool(const PlannedShard&)> is_done{};
+  TraceRecorder* trace = nullptr;  ///< of opening and committing shards; null: nobody asks
 };
 
 /// Takes finished samples in plan order, writes them into shards and commits each shard with its

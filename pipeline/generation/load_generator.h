@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "manifests/job_manifest.h"
 #include "stages/generator/generator.h"
@@ -14,12 +15,14 @@ struct LoadedGenerator {
   /// SHA-256 of the weights file (untrained: of what the file would be; a simulator, which has
   /// none: of its description).
   std::string weights_hash;
-  std::string warning;  ///< not empty: what the user must know before trusting the volumes
+  /// The engine that was chosen and why, for people: "generator: onednn float32 on avx2 (auto:
+  /// ...)"; empty for a simulator.
+  std::string choice;
+  std::vector<std::string> warnings;  ///< what the user must know before trusting the volumes
 };
 
-/// Loads the weights that a path or "shipped" names, or makes untrained ones for "untrained:WIDTH"
-/// (seeded by the manifest); or sets up the manifest's simulator. Throws InputError if the weights
-/// cannot be used, UsageError if their bins are not the manifest's.
+/// Loads the weights and makes the engine for them (load_weights, choose_engine), or sets up the
+/// manifest's simulator; throws as they do, and InputError if the engine refuses the weights.
 LoadedGenerator load_generator(const JobManifest& manifest);
 
 }  // namespace eventgan

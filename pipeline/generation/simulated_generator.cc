@@ -11,6 +11,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/files/sha256.h"
+#include "stages/generator/generator_spans.h"
 
 namespace eventgan {
 namespace {
@@ -46,9 +47,7 @@ class SimulatedGenerator final : public Generator {
                 std::span<float> volume) const override {
     const VolumeShape shape{bins_, size};
     const std::size_t pixels = size.pixel_count();
-    if (frames.size() != 2 * pixels || volume.size() != shape.value_count()) {
-      throw std::invalid_argument("expected two frames and a volume of one size, got other spans");
-    }
+    check_generator_spans(frames, size, volume, bins_);
     const GreyImage previous = grey_image(frames.first(pixels), size);
     const GreyImage next = grey_image(frames.last(pixels), size);
     const std::vector<float> values = event_volume(events(previous, next), shape);

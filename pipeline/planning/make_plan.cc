@@ -7,6 +7,7 @@
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/planning/pair_choice.h"
 #include "pipeline/planning/shard_layout.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/stopping/stopped.h"
 #include "stages/frames/decoding/image_size_probe.h"
 #include "stages/frames/open_dataset.h"
@@ -76,7 +77,9 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine, const std::function<bool()>& stop) {
+                     const std::string& engine, const std::function<bool()>& stop,
+                     TraceRecorder* trace) {
+  TraceSpan whole(trace, "make plan", "job");
   const auto stop_if_asked = [&] {
     if (stop && stop()) throw Stopped("stopped while planning; nothing was written: run again");
   };
@@ -87,6 +90,8 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
   std::vector<std::string> annotation_files;
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
+    TraceSpan span(trace, "plan source", "job");
+    span.note("root", manifest.sources[i].root);
     const auto& dataset =
         job.datasets.emplace_back(open_dataset(manifest.sources[i], manifest.directory));
     job.plan.sources.push_back(
@@ -95,6 +100,8 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
   }
   job.plan.shards = layout.finish();
+  whole.note("pairs", job.plan.sample_count());
+  const TraceSpan span(trace, "fingerprint", "job");
   job.plan.fingerprint = make_fingerprint(manifest, job.plan.shards, annotation_files, weights_hash,
                                           engine, stop_if_asked);
   return job;

@@ -7,6 +7,7 @@
 
 #include "manifests/job_manifest.h"
 #include "manifests/plan.h"
+#include "pipeline/profile/trace_recorder.h"
 #include "stages/frames/dataset.h"
 
 namespace eventgan {
@@ -22,8 +23,10 @@ struct PlannedJob {
 /// min_pairs.
 ///
 /// A million frames on a network file system take minutes to look at: `stop` is asked for each, and
-/// if it says yes, Stopped is thrown. None: nobody asks.
+/// if it says yes, Stopped is thrown. None: nobody asks. `trace` gets what takes time; null: nobody
+/// asks.
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine, const std::function<bool()>& stop = {});
+                     const std::string& engine, const std::function<bool()>& stop = {},
+                     TraceRecorder* trace = nullptr);
 
 }  // namespace eventgan

@@ -8,9 +8,11 @@
 #include "manifests/error_limits.h"
 #include "manifests/faults.h"
 #include "manifests/plan_outline.h"
+#include "pipeline/memory/memory_limit.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/shard_backup.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/profile/trace_span.h"
 #include "pipeline/retry/retry_sink.h"
 #include "pipeline/retry/retry_work.h"
 #include "pipeline/samples/conversion_graph.h"
@@ -65,7 +67,7 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
   EarlierShards earlier = check_earlier_shards(
       folder, frozen, shards,
-      {thread_count(options.threads), [&] { return stop_requested(options); }, {}});
+      {thread_count(options.threads), [&] { return stop_requested(options); }, {}, options.trace});
   for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
   if (!stop_requested(options)) {
     report.quarantined = 0;  // what a damaged shard held does not count
@@ -87,15 +89,16 @@ void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob&
     to_do += std::ssize(shard.slots);
   }
   const GraphLimits limits =
-      graph_limits(samples, manifest.volume.bins, thread_count(options.threads));
+      graph_limits(samples, generator, thread_count(options.threads), memory_limit_bytes());
   const SampleStages stages(manifest, job.datasets, generator, static_cast<int>(limits.in_flight));
   const std::unique_ptr<Progress> progress =
       options.make_progress && to_do > 0 ? options.make_progress(to_do) : nullptr;
   ShardPace pace(limits.threads);
   const StopMonitor monitor(options.since_stop_request, options.grace_s,
                             [&] { return pace.open_shard(); });
-  RetrySink sink(folder, shards, pace, report);
+  RetrySink sink(folder, shards, pace, report, options.trace);
   auto next = samples.begin();
+  const TraceSpan span(options.trace, "redo samples", "job");
   run_conversion_graph([&] { return next == samples.end() ? nullptr : *next++; },
                        {[&](SampleMessage& message) { stages.read(message); },
                         [&](SampleMessage& message) { stages.generate(message); },
@@ -109,7 +112,7 @@ void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob&
                             progress->advance(message.failed(), std::ssize(message.chunk));
                           return true;
                         }},
-                       limits, [&] { return monitor.order(); });
+                       limits, [&] { return monitor.order(); }, options.trace);
   sink.abandon();
   if (progress) progress->finish();
 }
@@ -133,8 +136,9 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
   if (found.count == 0) return report;
 
-  const PlannedJob job = make_plan(manifest, weights_hash, generator.description(),
-                                   [&] { return stop_requested(options); });
+  const PlannedJob job = make_plan(
+      manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
+      options.trace);
   const Fingerprint changed =
       changed_inputs(folder, amended(frozen.plan.fingerprint, read_amendments(folder, frozen.hash)),
                      job.plan.fingerprint);

@@ -9,6 +9,7 @@
 
 #include "manifests/job_manifest.h"
 #include "pipeline/output/output_folder.h"
+#include "pipeline/profile/trace_recorder.h"
 #include "pipeline/progress/progress.h"
 #include "pipeline/retry/retry_report.h"
 #include "stages/generator/generator.h"
@@ -23,6 +24,7 @@ struct RetryOptions {
   std::function<std::optional<double>()> since_stop_request;
   /// Called with the number of samples to redo; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
+  TraceRecorder* trace = nullptr;  ///< of every stage and thread; null: nobody asks
 };
 
 /// The report where no committed shard of the folder has a quarantined sample; none if one has.

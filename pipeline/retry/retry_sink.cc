@@ -2,11 +2,18 @@
 
 #include <cstddef>
 
+#include "pipeline/profile/trace_span.h"
+
 namespace eventgan {
 
 RetrySink::RetrySink(const std::filesystem::path& folder, const std::vector<RetriedShard>& shards,
-                     ShardPace& pace, RetryReport& report)
-    : folder_(folder), next_(shards.begin()), shard_(shards.end()), pace_(pace), report_(report) {}
+                     ShardPace& pace, RetryReport& report, TraceRecorder* trace)
+    : folder_(folder),
+      next_(shards.begin()),
+      shard_(shards.end()),
+      pace_(pace),
+      report_(report),
+      trace_(trace) {}
 
 void RetrySink::accept(const SampleMessage& message) {
   if (!rewrite_) open();
@@ -33,6 +40,8 @@ void RetrySink::open() {
 }
 
 void RetrySink::commit() {
+  TraceSpan span(trace_, "commit shard", "shard");
+  span.note("shard", shard_->samples.name);
   pace_.begin_commit();
   report_.shards_rewritten += rewrite_->commit();
   rewrite_.reset();

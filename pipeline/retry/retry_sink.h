@@ -4,6 +4,7 @@
 #include <memory>
 #include <vector>
 
+#include "pipeline/profile/trace_recorder.h"
 #include "pipeline/retry/retry_report.h"
 #include "pipeline/retry/retry_work.h"
 #include "pipeline/retry/shard_rewrite.h"
@@ -17,9 +18,10 @@ namespace eventgan {
 class RetrySink {
  public:
   /// `pace` is told how it gets on; `report` gets tried, mended, failed, shards_rewritten and what
-  /// is quarantined still, for each shard once it is through. All must outlive the sink.
+  /// is quarantined still, for each shard once it is through. `trace` gets the commits; null:
+  /// nobody asks. All must outlive the sink.
   RetrySink(const std::filesystem::path& folder, const std::vector<RetriedShard>& shards,
-            ShardPace& pace, RetryReport& report);
+            ShardPace& pace, RetryReport& report, TraceRecorder* trace = nullptr);
 
   /// The next sample; its slot is its place among the shard's retried samples. Throws
   /// std::runtime_error if the disk fails.
@@ -42,6 +44,7 @@ class RetrySink {
   std::vector<SampleLeft> failed_;                   // of the shard under way
   ShardPace& pace_;
   RetryReport& report_;
+  TraceRecorder* trace_;
 };
 
 }  // namespace eventgan

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "pipeline/samples/sample_span.h"
+
 namespace eventgan {
 namespace {
 
@@ -50,7 +52,7 @@ class Cursor {
 
 std::size_t run(const std::function<const PlannedShard*()>& next_shard,
                 const ConversionBodies& bodies, const GraphLimits& limits,
-                const std::function<StopOrder()>& order) {
+                const std::function<StopOrder()>& order, TraceRecorder* trace) {
   flow::graph graph;
   Cursor cursor(next_shard);
   std::atomic<bool> stop = false;
@@ -60,25 +62,31 @@ std::size_t run(const std::function<const PlannedShard*()>& next_shard,
   flow::input_node<Message> source(graph, [&](oneapi::tbb::flow_control& control) -> Message {
     Message message = stop ? nullptr : cursor.next(order(), at_writer);
     if (!message) control.stop();
+    if (message && trace) ++trace->gauges().samples_in_flight;
     return message;
   });
   flow::limiter_node<Message> limiter(graph, limits.in_flight);
-  const auto parallel = [&](const std::function<void(SampleMessage&)>& body) {
-    return flow::function_node<Message, Message>(graph, static_cast<std::size_t>(limits.threads),
-                                                 [&body, &order](Message message) {
-                                                   if (order() != StopOrder::kAbort) body(*message);
+  const auto parallel = [&](Stage stage, int at_once,
+                            const std::function<void(SampleMessage&)>& body) {
+    return flow::function_node<Message, Message>(graph, static_cast<std::size_t>(at_once),
+                                                 [&body, &order, stage, trace](Message message) {
+                                                   if (order() == StopOrder::kAbort) return message;
+                                                   const SampleSpan span(trace, stage, *message);
+                                                   body(*message);
                                                    return message;
                                                  });
   };
-  auto read = parallel(bodies.read);
-  auto generate = parallel(bodies.generate);
-  auto finish = parallel(bodies.finish);
+  auto read = parallel(Stage::kRead, limits.threads, bodies.read);
+  auto generate = parallel(Stage::kGenerate, limits.generators, bodies.generate);
+  auto finish = parallel(Stage::kFinish, limits.threads, bodies.finish);
   flow::sequencer_node<Message> sequencer(graph,
                                           [](const Message& message) { return message->number; });
   flow::function_node<Message, flow::continue_msg> write(graph, flow::serial, [&](Message message) {
     ++arrived;
     at_writer = message->shard;
+    const SampleSpan span(trace, Stage::kWrite, *message);
     if (!bodies.write(*message)) stop = true;
+    if (trace) --trace->gauges().samples_in_flight;
     return flow::continue_msg();
   });
 
@@ -108,11 +116,11 @@ std::size_t samples_in_flight(int threads, std::size_t sample_bytes, std::size_t
 
 std::size_t run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
                                  const ConversionBodies& bodies, const GraphLimits& limits,
-                                 const std::function<StopOrder()>& order) {
+                                 const std::function<StopOrder()>& order, TraceRecorder* trace) {
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
                                            static_cast<std::size_t>(limits.threads));
   oneapi::tbb::task_arena arena(limits.threads);
-  return arena.execute([&] { return run(next_shard, bodies, limits, order); });
+  return arena.execute([&] { return run(next_shard, bodies, limits, order, trace); });
 }
 
 }  // namespace eventgan

@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "manifests/plan.h"
+#include "pipeline/profile/trace_recorder.h"
 #include "pipeline/samples/sample_message.h"
 #include "pipeline/stopping/stop_order.h"
 
@@ -21,6 +22,7 @@ struct ConversionBodies {
 struct GraphLimits {
   int threads = 1;            ///< the one budget of threads, the calling one included
   std::size_t in_flight = 2;  ///< samples between source and writer at most; ≥ 1
+  int generators = 1;         ///< calls of the generator at the same time; 1..threads
 };
 
 /// Samples that may be under way at once: enough to keep every thread busy while the writer commits
@@ -41,10 +43,12 @@ std::size_t samples_in_flight(int threads, std::size_t sample_bytes, std::size_t
 ///                 which has to drop them;
 ///   kAbort        the source gives nothing more; messages pass the parallel bodies untouched and
 ///                 come to `write`, which has to drop them.
+/// `trace` gets each body's work (SampleSpan) and the gauges of samples; null: nobody asks.
 /// Returns the number of samples that left the source. Throws std::logic_error if fewer reached
 /// `write`: a sample lost on the way would otherwise go unnoticed.
 std::size_t run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
                                  const ConversionBodies& bodies, const GraphLimits& limits,
-                                 const std::function<StopOrder()>& order);
+                                 const std::function<StopOrder()>& order,
+                                 TraceRecorder* trace = nullptr);
 
 }  // namespace eventgan

@@ -8,18 +8,26 @@ namespace eventgan {
 namespace {
 
 constexpr std::size_t kInFlightBytes = std::size_t{1} << 30;
-/// A sample's volume stands in memory about this often while it is generated, finished and encoded.
-constexpr std::size_t kVolumeCopies = 3;
+/// A sample is one volume from the generator on, then its chunk, which is hardly ever larger; both
+/// stand for a moment while it is finished. Beside that its frames are little, those that are kept
+/// for other pairs included. (The codec's working memory belongs to the threads.)
+constexpr std::size_t kVolumeCopies = 2;
 
 }  // namespace
 
-GraphLimits graph_limits(const std::vector<const PlannedShard*>& shards, int bins, int threads) {
-  std::size_t largest = 1;
+GraphLimits graph_limits(const std::vector<const PlannedShard*>& shards, const Generator& generator,
+                         int threads, std::size_t memory_bytes) {
+  std::size_t sample_bytes = 1;
+  std::size_t generator_bytes = 1;
   for (const PlannedShard* shard : shards) {
-    const VolumeShape shape{bins, shard->volume_size};
-    largest = std::max(largest, kVolumeCopies * shape.value_count() * sizeof(float));
+    const VolumeShape shape{generator.bins(), shard->volume_size};
+    sample_bytes = std::max(sample_bytes, kVolumeCopies * shape.value_count() * sizeof(float));
+    generator_bytes = std::max(generator_bytes, generator.working_bytes(shard->volume_size));
   }
-  return {threads, samples_in_flight(threads, largest, kInFlightBytes)};
+  const std::size_t generators = memory_bytes / 4 * 3 / generator_bytes;
+  return {
+      threads, samples_in_flight(threads, sample_bytes, kInFlightBytes),
+      static_cast<int>(std::clamp<std::size_t>(generators, 1, static_cast<std::size_t>(threads)))};
 }
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "manifests/plan.h"
@@ -10,7 +11,8 @@
 
 namespace eventgan {
 
-/// The stages whose busy time is reported.
+/// The stages whose busy time is reported: the processor time of the threads at work in them, since
+/// waiting for a disk or for another thread is not work.
 enum class Stage { kRead, kGenerate, kFinish, kWrite };
 inline constexpr std::size_t kStageCount = 4;
 inline constexpr std::array<const char*, kStageCount> kStageNames = {"read", "generate", "finish",
@@ -30,6 +32,7 @@ struct SampleMessage {
   std::vector<float> volume;     ///< generate → finish: [2 bins, H, W] of the content
   std::vector<std::byte> chunk;  ///< finish → write
   StageSeconds seconds{};
+  std::int64_t traced_ns = 0;  ///< end of the last stage, by the trace; 0: none, or no trace
 
   const PlannedSample& planned() const { return shard->samples[static_cast<std::size_t>(slot)]; }
   bool failed() const { return !sample.valid; }

@@ -1,9 +1,9 @@
 #include "pipeline/samples/sample_stages.h"
 
-#include <ctime>
 #include <limits>
 #include <optional>
 
+#include "pipeline/profile/processor_time.h"
 #include "stages/events/normalization.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/labels/label_mapping.h"
@@ -14,25 +14,18 @@ namespace {
 /// Gap that the published generator never saw in training (DESIGN section 4).
 constexpr int kFirstExtrapolatedGap = 6;
 
-/// Adds the processor time that the calling thread spends in its scope to one stage of a message:
-/// waiting for another thread is not work.
+/// Adds the processor time that the calling thread spends in its scope to one stage of a message.
 class Stopwatch {
  public:
   Stopwatch(SampleMessage& message, Stage stage)
       : seconds_(message.seconds[static_cast<std::size_t>(stage)]) {}
-  ~Stopwatch() { seconds_ += thread_seconds() - start_; }
+  ~Stopwatch() { seconds_ += 1e-9 * static_cast<double>(thread_processor_ns() - start_ns_); }
   Stopwatch(const Stopwatch&) = delete;
   Stopwatch& operator=(const Stopwatch&) = delete;
 
  private:
-  static double thread_seconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  }
-
   double& seconds_;
-  double start_ = thread_seconds();
+  std::int64_t start_ns_ = thread_processor_ns();
 };
 
 std::string frame_names(const FramePair& pair) {

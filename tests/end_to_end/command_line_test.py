@@ -34,7 +34,7 @@ class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
         for command in ["convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
-                        "import-weights", "simulate", "train", "realism"]:
+                        "import-weights", "calibrate", "simulate", "train", "realism"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -65,6 +65,7 @@ class CommandLine(program.InFolder):
         run("preview", self.folder / "none.h5", "--out", self.folder / "p", expect=66)
         run("import-weights", self.folder / "none.pt", self.folder / "w.safetensors", expect=66)
         run("simulate", self.folder / "none.json", expect=66)
+        run("calibrate", self.folder / "none.json", expect=66)
         run("train", self.folder / "none.json", expect=66)
         run("realism", self.folder / "none.hdf5", "--with", "difference", expect=66)
 

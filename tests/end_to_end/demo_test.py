@@ -72,7 +72,7 @@ class Demo(program.InFolder):
         out, err = run("convert", demo / "manifest.json", "--output", self.folder / "out", "--progress", "json")
         self.assertEqual(json.loads(out)["event"], "report")
         for line in err.splitlines():
-            self.assertIn(json.loads(line)["event"], ["progress", "warning"])
+            self.assertIn(json.loads(line)["event"], ["progress", "warning", "note"])
 
     def test_kitti_labels_are_the_file_and_lie_in_the_volume(self):
         self.convert()

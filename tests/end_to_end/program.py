@@ -15,9 +15,10 @@ SHARED = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shar
 SKIPPED = 77  # what ctest knows as skipped
 
 
-def run(*arguments, expect=0):
-    """Runs the program; its output as (stdout, stderr). Fails the test on another exit code."""
-    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True)
+def run(*arguments, expect=0, environment=None):
+    """Runs the program, with changes to its environment; its output as (stdout, stderr). Fails the test on another exit code."""
+    done = subprocess.run([PROGRAM, *map(str, arguments)], capture_output=True, text=True,
+                          env={**os.environ, **(environment or {})})
     if done.returncode != expect:
         raise AssertionError(
             f"expected exit code {expect}, got {done.returncode}, of {' '.join(map(str, arguments))}\n"

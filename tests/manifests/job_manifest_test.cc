@@ -49,7 +49,8 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.sources[0].frames_per_second, std::nullopt);
   EXPECT_EQ(manifest.image.fit, ImageFit::kStretch);
   EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
-  EXPECT_EQ(manifest.generator.precision, "float32");
+  EXPECT_EQ(manifest.generator.engine, std::nullopt);
+  EXPECT_EQ(manifest.generator.precision, Precision::kFloat32);
   EXPECT_EQ(manifest.volume.bins, 9);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
   EXPECT_EQ(manifest.output.samples_per_shard, 64);
@@ -71,7 +72,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
       {"dataset": "human36m", "root": "g", "layout": "extracted", "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97, "pairs": {"gaps": [2]}}],
     "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
-    "generator": {"weights": "untrained:8", "precision": "float32"},
+    "generator": {"weights": "untrained:8", "engine": "onednn", "precision": "int8"},
     "volume": {"bins": 3, "normalize": "eta98"},
     "output": {"directory": "o", "samples_per_shard": 7, "dtype": "uint8", "deflate_level": 9},
     "errors": {"policy": "fail", "max_count": 3, "max_fraction": 0.5}})");
@@ -99,6 +100,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.image.grey, GreyOrder::kAfterResize);
   EXPECT_EQ(manifest.image.blur, 5);
   EXPECT_EQ(manifest.generator.weights, "untrained:8");
+  EXPECT_EQ(manifest.generator.engine, Engine::kOnednn);
+  EXPECT_EQ(manifest.generator.precision, Precision::kInt8);
   EXPECT_EQ(manifest.volume.bins, 3);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kEta98);
   EXPECT_EQ(manifest.output.directory, "o");

@@ -29,9 +29,16 @@ TEST(JobWords, GoThereAndBack) {
   expect_one_to_one(kFitWords);
   expect_one_to_one(kGreyWords);
   expect_one_to_one(kGeneratorWords);
+  expect_one_to_one(kPrecisionWords);
   expect_one_to_one(kNormalizationWords);
   expect_one_to_one(kStoredTypeWords);
   expect_one_to_one(kPolicyWords);
+}
+
+TEST(JobWords, NameTheEnginesAndTheProgramsChoice) {
+  EXPECT_EQ(word_of(kEngineWords, std::optional<Engine>()), "auto");
+  EXPECT_EQ(to_string(Engine::kTorch), "torch");
+  EXPECT_EQ(to_string(Engine::kOnednn), "onednn");
 }
 
 TEST(JobWords, AreThoseThatFilesHold) {

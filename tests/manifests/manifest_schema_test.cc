@@ -50,6 +50,8 @@ TEST(ManifestSchema, ListsTheSameWords) {
   EXPECT_EQ(listed("/definitions/image/properties/fit"), words(kFitWords));
   EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
   EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
+  EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
+  EXPECT_EQ(listed("/properties/generator/properties/precision"), words(kPrecisionWords));
   EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
   EXPECT_EQ(listed("/properties/output/properties/dtype"), words(kStoredTypeWords));
   EXPECT_EQ(listed("/properties/errors/properties/policy"), words(kPolicyWords));
@@ -68,7 +70,9 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   const GeneratorSpec& generator = manifest.generator;
   EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
   EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
-  EXPECT_EQ(stated("/properties/generator/properties/precision"), generator.precision);
+  EXPECT_EQ(stated("/properties/generator/properties/precision"), to_string(generator.precision));
+  EXPECT_EQ(stated("/properties/generator/properties/engine"),
+            word_of(kEngineWords, generator.engine));
   EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
   EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
             generator.max_displacement_px);

@@ -46,7 +46,9 @@ StopOrder go_on() { return StopOrder::kGoOn; }
 
 class ConversionGraph : public ::testing::TestWithParam<int> {
  protected:
-  GraphLimits limits() const { return {GetParam(), static_cast<std::size_t>(GetParam()) + 1}; }
+  GraphLimits limits() const {
+    return {GetParam(), static_cast<std::size_t>(GetParam()) + 1, GetParam()};
+  }
 
   /// Of the shards a, e and b. The same number of samples must leave the source and arrive.
   std::size_t run(const ConversionBodies& bodies,

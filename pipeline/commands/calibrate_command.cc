@@ -1,0 +1,117 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "manifests/faults.h"
+#include "manifests/job_manifest.h"
+#include "pipeline/calibration/calibrate.h"
+#include "pipeline/calibration/calibrated_file.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/progress_option.h"
+#include "pipeline/errors/exit_codes.h"
+#include "pipeline/generation/load_weights.h"
+#include "pipeline/planning/make_plan.h"
+#include "pipeline/stopping/stop_signal.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
+#include "stages/generator/calibration/calibration.h"
+#include "stages/generator/weights_files/weights_file.h"
+
+namespace eventgan {
+namespace {
+
+struct CalibrateArguments {
+  std::string manifest;
+  int pairs = kDefaultCalibrationPairs;
+  std::optional<std::string> out;
+  ProgressStyle progress = ProgressStyle::kAuto;
+};
+
+void warn(const CalibrateArguments& arguments, const std::string& text) {
+  const bool as_json = arguments.progress == ProgressStyle::kJson;
+  std::cerr << (as_json ? warning_json(text) : "warning: " + text) << std::endl;
+}
+
+std::string decimals(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3f", value);
+  return text;
+}
+
+/// What int8 costs, or why that is not known.
+std::string error_line(const CalibrationOutcome& outcome) {
+  if (!outcome.unmeasured.empty()) return "int8 error: not measured, " + outcome.unmeasured;
+  std::vector<double> sorted = outcome.distances;
+  if (sorted.empty()) return "int8 error: not measured, no other pairs to measure it on";
+  std::ranges::sort(sorted);
+  const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
+  return "int8 error against float32, relative L2, on " + std::to_string(sorted.size()) +
+         " other pairs: median " + decimals(median) + ", worst " + decimals(sorted.back());
+}
+
+CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobManifest& manifest,
+                                 const LoadedWeights& loaded, const StopSignal& signal) {
+  CalibrationOptions options;
+  options.pairs = arguments.pairs;
+  options.stop_requested = [&] { return signal.requested(); };
+  options.make_progress = [&](std::int64_t total) {
+    return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
+  };
+  // The plan is used here and then dropped, so its fingerprint needs no engine.
+  const PlannedJob job = make_plan(manifest, loaded.hash, "none", options.stop_requested);
+  return calibrate(manifest, job, loaded.weights, options);
+}
+
+int run(const CalibrateArguments& arguments) {
+  const StopSignal signal;
+  const JobManifest manifest = read_job_manifest(arguments.manifest);
+  if (manifest.generator.kind != GeneratorKind::kNetwork) {
+    throw UsageError(
+        "$.generator.kind: expected \"network\", which alone has weights to calibrate, got \"" +
+        std::string(to_string(manifest.generator.kind)) + "\"");
+  }
+  const LoadedWeights loaded = load_weights(manifest);
+  const std::filesystem::path file =
+      calibrated_file(manifest, loaded.weights.base_channels, arguments.out);
+  if (!loaded.warning.empty()) warn(arguments, loaded.warning);
+
+  const CalibrationOutcome outcome = calibrate_job(arguments, manifest, loaded, signal);
+  for (const std::string& skipped : outcome.skipped) warn(arguments, "skipped " + skipped);
+  const std::string bytes = serialize_weights(outcome.weights);
+  write_file_atomically(file, bytes);
+  std::cout << file.string() << ": calibrated on " << outcome.weights.calibration->pairs
+            << " pairs, " << outcome.skipped.size() << " skipped, SHA-256 " << sha256_hex(bytes)
+            << "\n"
+            << error_line(outcome) << "\nFor the manifest:\n  "
+            << calibrated_generator_line(manifest, file) << std::endl;
+  return kComplete;
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("calibrate",
+                         "Makes weights ready for \"precision\": \"int8\": finds the ranges of "
+                         "activations on pairs of a manifest, measures what int8 costs on others, "
+                         "writes a weights file");
+  const auto arguments = std::make_shared<CalibrateArguments>();
+  command->add_option("MANIFEST", arguments->manifest, "The job, whose generator is calibrated")
+      ->required();
+  command
+      ->add_option("--pairs", arguments->pairs,
+                   "Pairs to calibrate on, spread evenly over the job; default: 32")
+      ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--out", arguments->out,
+                   "The weights file to write, *.safetensors; default: beside the manifest, named "
+                   "after the weights with -calibrated")
+      ->option_text("FILE");
+  add_progress_option(*command, arguments->progress);
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+namespace eventgan {
+
+/// Memory that this process may use, in bytes: the machine's, or what its control group of version
+/// 2 (a container, a batch job) is granted if that is less. Thread safe.
+std::size_t memory_limit_bytes();
+
+/// The least limit among a control group of version 2 and those above it: `group`, a path below
+/// `root`, each with a file memory.max of a number or "max". `most` if none says less. Thread safe.
+std::size_t group_memory_limit_bytes(const std::filesystem::path& root,
+                                     const std::filesystem::path& group, std::size_t most);
+
+}  // namespace eventgan

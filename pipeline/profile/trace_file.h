@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace eventgan {
+
+/// How every trace of this program begins.
+inline constexpr std::string_view kTraceBegins = "{\"traceEvents\":[";
+
+/// A trace that grows under a temporary name beside `target`, so that it need not stand in memory,
+/// and is there whole or not at all. Thread safety: one thread at a time.
+class TraceFile {
+ public:
+  /// Throws UsageError if `target` cannot be written to, or holds what is neither empty nor a
+  /// trace: a trace given the wrong name by a slip of the hand is not worth a manifest. If it is a
+  /// link, what it points to is written. Deletes what dead writers of the same trace have left.
+  explicit TraceFile(std::filesystem::path target);
+
+  /// Deletes the temporary file unless it was committed.
+  ~TraceFile();
+  TraceFile(const TraceFile&) = delete;
+  TraceFile& operator=(const TraceFile&) = delete;
+
+  /// Throws std::runtime_error naming the path.
+  void write(std::string_view text);
+
+  /// Flushes to disk and renames, over an earlier trace too. Throws as `write` does. Once.
+  void commit();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;
+  int descriptor_ = -1;
+};
+
+}  // namespace eventgan
