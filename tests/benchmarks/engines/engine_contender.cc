@@ -1,0 +1,89 @@
+#include "tests/benchmarks/engines/engine_contender.h"
+
+#include <ATen/Parallel.h>
+#include <omp.h>
+
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <utility>
+
+#include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/torch/torch_generator.h"
+
+namespace eventgan {
+namespace {
+
+constexpr int kWarmUpPasses = 2;
+constexpr ImageSize kSmallSize{16, 16};
+
+double process_ms() {
+  timespec now{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
+  return 1e3 * double(now.tv_sec) + 1e-6 * double(now.tv_nsec);
+}
+
+std::vector<float> volume_of(const Weights& weights, ImageSize size) {
+  return std::vector<float>(2 * static_cast<std::size_t>(weights.bins) * size.pixel_count());
+}
+
+std::unique_ptr<Generator> make_generator(const ContenderSetup& setup, const Weights& weights) {
+  return setup.engine == Engine::kTorch ? make_torch_generator(weights, setup.precision)
+                                        : make_onednn_generator(weights, setup.precision);
+}
+
+/// LibTorch computes bfloat16 with the oneDNN it carries.
+bool has_instructions(const ContenderSetup& setup) {
+  return setup.precision == Precision::kFloat32 || onednn_support(setup.precision).native;
+}
+
+}  // namespace
+
+EngineContender::EngineContender(const ContenderSetup& setup, Weights weights)
+    : setup_(setup),
+      weights_(std::move(weights)),
+      native_(has_instructions(setup_)),
+      generator_(make_generator(setup_, weights_)),
+      instances_(
+          setup.instances, [this] { allow_intra_op_threads(); },
+          [this](int instance) { generate(instance); }) {}
+
+void EngineContender::set_input(ImageSize size, std::vector<float> frames) {
+  size_ = size;
+  frames_ = std::move(frames);
+  volumes_.assign(static_cast<std::size_t>(setup_.instances), volume_of(weights_, size));
+  for (int pass = 0; pass < kWarmUpPasses; ++pass) instances_.run();
+}
+
+PassTime EngineContender::run() {
+  if (volumes_.empty()) throw std::logic_error("expected an input before run");
+  const double cpu_ms = process_ms();
+  const auto start = std::chrono::steady_clock::now();
+  instances_.run();
+  const std::chrono::duration<double, std::milli> wall = std::chrono::steady_clock::now() - start;
+  return {wall.count(), process_ms() - cpu_ms};
+}
+
+VolumeError EngineContender::error() {
+  if (volumes_.empty()) throw std::logic_error("expected an input before error");
+  instances_.run();
+  std::vector<float> expected = volume_of(weights_, size_);
+  make_torch_generator(weights_)->generate(frames_, size_, expected);
+  return volume_error(volumes_.front(), expected);
+}
+
+/// The engines take one thread on the first call of each thread; after it the setting is ours.
+void EngineContender::allow_intra_op_threads() {
+  if (setup_.intra_op == 1) return;
+  std::vector<float> volume = volume_of(weights_, kSmallSize);
+  const std::vector<float> frames(2 * kSmallSize.pixel_count());
+  generator_->generate(frames, kSmallSize, volume);
+  at::set_num_threads(setup_.intra_op);
+  omp_set_num_threads(setup_.intra_op);
+}
+
+void EngineContender::generate(int instance) {
+  generator_->generate(frames_, size_, volumes_[static_cast<std::size_t>(instance)]);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,67 @@
+#!/usr/bin/python3
+"""All benchmarks, one after the other: OUT/benchmarks.md and OUT/benchmarks.png.
+
+    cmake --preset release && cmake --build --preset release
+    docker/bootstrap.sh packages benchmark
+    tests/benchmarks/run.py [--quick] [--out OUT]
+
+Leave the machine alone meanwhile. What takes turns in a round meets the same noise, so ratios can be trusted further than
+times. Each part can also be run by itself, for instance tests/benchmarks/engines.py.
+"""
+
+import argparse
+import pathlib
+import shlex
+import sys
+import tempfile
+import time
+
+import engines
+import intra_op
+import pair_counts
+import picture_sizes
+import stages
+import storage
+import threads
+import whole_conversion
+from measuring.bench import Bench, add_arguments, check_programs
+from measuring.machine import description, processor_name
+from measuring.picture import draw
+from measuring.report import markdown
+
+PARTS = {"engines": engines, "intra_op": intra_op, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
+         "pair_counts": pair_counts, "threads": threads, "storage": storage}
+
+
+def measure_parts(bench, names):
+    for name in names:
+        start = time.monotonic()
+        print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
+        part_bench = Bench(bench.build, bench.effort, bench.folder(name))
+        yield PARTS[name].measure(part_bench)
+        print(f"{time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    add_arguments(parser)
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("."), help="folder of the results; default: this one")
+    parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="default: all")
+    arguments = parser.parse_args()
+    check_programs(arguments.build)
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(prefix="eventgan-benchmark-") as scratch:
+        bench = Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch))
+        sections = list(measure_parts(bench, arguments.parts))
+        libraries = {text for section in sections for text in section.libraries}
+        machine = "\n".join(description(bench, shlex.join(sys.argv), libraries))
+    page = f"# Benchmarks\n\n{machine}\n\n{markdown(sections)}"
+    if curves := [curves for section in sections for curves in section.curves]:
+        draw(curves, arguments.out / "benchmarks.png", processor_name())
+        page += "\n![curves](benchmarks.png)\n"
+    (arguments.out / "benchmarks.md").write_text(page, encoding="utf-8")
+    print(arguments.out / "benchmarks.md")
+
+
+if __name__ == "__main__":
+    main()
