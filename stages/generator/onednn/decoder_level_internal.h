@@ -8,7 +8,7 @@
 
 #include "manifests/image_size.h"
 #include "stages/generator/onednn/activation_rows.h"
-#include "stages/generator/onednn/buffer_layout.h"
+#include "stages/generator/onednn/buffers/buffer_layout.h"
 #include "stages/generator/onednn/decoder_strips.h"
 #include "stages/generator/onednn/network_layers_internal.h"
 #include "stages/generator/onednn/row_convolution_internal.h"

@@ -4,7 +4,7 @@
 #include <mutex>
 #include <vector>
 
-#include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/numbers/layer_numbers.h"
 
 namespace eventgan {
 

@@ -3,8 +3,8 @@
 #include <utility>
 
 #include "stages/generator/calibration/quantized_kernel.h"
-#include "stages/generator/onednn/layer_numbers.h"
 #include "stages/generator/onednn/network_layers_internal.h"
+#include "stages/generator/onednn/numbers/layer_numbers.h"
 #include "stages/generator/onednn/onednn_support.h"
 
 namespace eventgan {

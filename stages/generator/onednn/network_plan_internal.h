@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "manifests/image_size.h"
-#include "stages/generator/onednn/buffer_layout.h"
+#include "stages/generator/onednn/buffers/buffer_layout.h"
 #include "stages/generator/onednn/decoder_level_internal.h"
 #include "stages/generator/onednn/fused_convolution_internal.h"
 #include "stages/generator/onednn/network_layers_internal.h"

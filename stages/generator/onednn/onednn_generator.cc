@@ -11,7 +11,7 @@
 #include <string>
 
 #include "stages/generator/generator_spans.h"
-#include "stages/generator/onednn/block_pool.h"
+#include "stages/generator/onednn/buffers/block_pool.h"
 #include "stages/generator/onednn/plan_cache_internal.h"
 
 namespace eventgan {

@@ -1,4 +1,4 @@
-#include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/numbers/layer_numbers.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

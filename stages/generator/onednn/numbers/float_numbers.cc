@@ -1,5 +1,5 @@
 #include "stages/generator/decoder_kernels.h"
-#include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/numbers/layer_numbers.h"
 
 namespace eventgan {
 

@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "stages/generator/onednn/page_buffer.h"
+#include "stages/generator/onednn/buffers/page_buffer.h"
 
 namespace eventgan {
 

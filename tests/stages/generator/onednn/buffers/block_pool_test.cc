@@ -1,4 +1,4 @@
-#include "stages/generator/onednn/block_pool.h"
+#include "stages/generator/onednn/buffers/block_pool.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "stages/generator/onednn/page_buffer.h"
+#include "stages/generator/onednn/buffers/page_buffer.h"
 
 #include <sys/mman.h>
 

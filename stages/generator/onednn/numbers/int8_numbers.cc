@@ -11,7 +11,7 @@
 #include "stages/generator/calibration/quantized_network.h"
 #include "stages/generator/calibration/quantized_tensors.h"
 #include "stages/generator/decoder_kernels.h"
-#include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/onednn/numbers/layer_numbers.h"
 
 namespace eventgan {
 namespace {
