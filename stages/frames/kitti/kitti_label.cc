@@ -9,6 +9,7 @@ namespace eventgan {
 namespace {
 
 constexpr std::size_t kColumns = 15;
+constexpr float kIgnoredLevel = 2;  // of truncation in KITTI tracking
 
 /// Takes one column after the other and remembers the first that is not the number it should be.
 class ColumnReader {
@@ -17,20 +18,34 @@ class ColumnReader {
 
   template <class Number>
   void read(Number& number, const char* name) {
-    const std::string_view token = columns_.front();
-    columns_ = columns_.subspan(1);
-    if (const auto parsed = parse_number<Number>(token)) {
-      number = *parsed;
-    } else if (!complaint_) {
-      complaint_ = std::string("expected ") +
-                   (std::is_integral_v<Number> ? "a whole number" : "a finite number") + " for " +
-                   name + ", got " + in_quotes(token);
-    }
+    read(number, name, std::is_integral_v<Number> ? "a whole number" : "a finite number",
+         [](Number) { return true; });
   }
+
+  /// The number must be -1 or one of those that `known` is true for; `meaning` names these.
+  template <class Number, class Known>
+  void read_or_unknown(Number& number, const char* name, const char* meaning, Known known) {
+    read(number, name, meaning, [&](Number value) { return value == -1 || known(value); });
+  }
+
+  bool empty() const { return columns_.empty(); }
 
   const std::optional<std::string>& complaint() const { return complaint_; }
 
  private:
+  template <class Number, class Fits>
+  void read(Number& number, const char* name, const char* expected, Fits fits) {
+    const std::string_view token = columns_.front();
+    columns_ = columns_.subspan(1);
+    const auto parsed = parse_number<Number>(token);
+    if (parsed && fits(*parsed)) {
+      number = *parsed;
+    } else if (!complaint_) {
+      complaint_ =
+          std::string("expected ") + expected + " for " + name + ", got " + in_quotes(token);
+    }
+  }
+
   std::span<const std::string_view> columns_;
   std::optional<std::string> complaint_;
 };
@@ -59,14 +74,16 @@ int kitti_class_id(std::string_view name) {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
-Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, int leading,
+Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, KittiColumns kind,
                                 const std::string& where) {
-  const std::size_t expected = kColumns + static_cast<std::size_t>(leading);
+  const bool tracking = kind == KittiColumns::kTracking;
+  const std::size_t leading = tracking ? 2 : 0;
+  const std::size_t expected = kColumns + leading;
   if (columns.size() != expected && columns.size() != expected + 1) {
     return SampleFault{"expected " + std::to_string(expected) + " columns, got " +
                        std::to_string(columns.size()) + ", in " + where};
   }
-  columns = columns.subspan(static_cast<std::size_t>(leading));
+  columns = columns.subspan(leading);
 
   Box box;
   box.class_id = kitti_class_id(columns[0]);
@@ -74,11 +91,17 @@ Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, int l
     return SampleFault{"expected one of " + class_list() + ", got " + in_quotes(columns[0]) +
                        ", in " + where};
   }
-  box.ignore = box.class_id == kKittiDontCare;
 
   ColumnReader numbers(columns.subspan(1));
-  numbers.read(box.truncation, "truncated");
-  numbers.read(box.occlusion, "occluded");
+  if (tracking) {
+    numbers.read_or_unknown(box.truncation, "truncated", "0, 1, 2 or -1",
+                            [](float level) { return level == 0 || level == 1 || level == 2; });
+  } else {
+    numbers.read_or_unknown(box.truncation, "truncated", "a number from 0 to 1, or -1",
+                            [](float share) { return share >= 0 && share <= 1; });
+  }
+  numbers.read_or_unknown(box.occlusion, "occluded", "a whole number from 0 to 3, or -1",
+                          [](int level) { return level >= 0 && level <= 3; });
   numbers.read(box.alpha, "alpha");
   numbers.read(box.xyxy.left, "left");
   numbers.read(box.xyxy.top, "top");
@@ -86,7 +109,13 @@ Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, int l
   numbers.read(box.xyxy.bottom, "bottom");
   constexpr const char* kNames3d[] = {"height", "width", "length", "x", "y", "z", "rotation_y"};
   for (std::size_t i = 0; i < box.box3d.size(); ++i) numbers.read(box.box3d[i], kNames3d[i]);
+  double score = 0;
+  if (!numbers.empty()) numbers.read(score, "score");
   if (numbers.complaint()) return SampleFault{*numbers.complaint() + ", in " + where};
+
+  constexpr decltype(box.box3d) kTrackingUnknown{-1000, -1000, -1000, -10, -1, -1, -1};
+  if (box.box3d == kTrackingUnknown) box.box3d = Box().box3d;
+  box.ignore = box.class_id == kKittiDontCare || (tracking && box.truncation == kIgnoredLevel);
   return box;
 }
 
@@ -95,7 +124,7 @@ Outcome<Annotation> parse_kitti_label(std::string text, const std::string& path)
   for (const TextLine& line : split_lines(text)) {
     const auto columns = split_columns(line.bytes);
     if (columns.empty()) continue;
-    auto box = parse_kitti_object(columns, 0, place_in_file(path, line.number));
+    auto box = parse_kitti_object(columns, KittiColumns::kObject, place_in_file(path, line.number));
     if (is_fault(box)) return std::get<SampleFault>(box);
     annotation.boxes.push_back(std::get<Box>(box));
   }

@@ -19,13 +19,20 @@ inline constexpr int kKittiDontCare = 8;
 /// Person_sitting.
 int kitti_class_id(std::string_view name);
 
-/// One object of a label file: type, truncated, occluded, alpha, left, top, right, bottom, h, w, l,
-/// x, y, z, rotation_y, and perhaps a score, which is not kept. Numbers are taken as they are: in
-/// KITTI tracking `truncated` is a level 0, 1, 2 rather than a fraction. DontCare becomes `ignore`.
+/// Which benchmark's columns a label file has.
+enum class KittiColumns {
+  kObject,   ///< truncated is a fraction 0..1
+  kTracking  ///< frame and track id stand in front; truncated is a level 0, 1 or 2
+};
+
+/// One object of a label file: type, truncated, occluded (0..3), alpha, left, top, right, bottom,
+/// h, w, l, x, y, z, rotation_y, and perhaps a score, which is not kept. Truncated and occluded are
+/// -1 where they are unknown. Numbers are taken as they are, except that the unknown 3-D box of
+/// tracking's DontCare (location, rotation_y and size, in this order) becomes Box's own.
 ///
-/// `columns` may have `leading` columns before these (tracking: frame, track id). A fault reads
-/// "expected 15 columns, got 7, in WHERE".
-Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, int leading,
+/// DontCare becomes `ignore`, and so does tracking's level 2, an object to be ignored. A fault
+/// reads "expected 15 columns, got 7, in WHERE".
+Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, KittiColumns kind,
                                 const std::string& where);
 
 /// A whole label file of KITTI object: one object a line, blank lines passed over, `original` is

@@ -2,6 +2,7 @@
 
 #include <charconv>
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,15 +24,23 @@ std::vector<TextLine> split_lines(std::string_view text);
 /// The columns of a line between spaces, tabs and line ends (LF or CRLF). Views into `line`.
 std::vector<std::string_view> split_columns(std::string_view line);
 
-/// The whole token as a finite number, or nothing.
+/// The whole token as a finite number, or nothing. What is too small for the type becomes 0.
 template <class Number>
 std::optional<Number> parse_number(std::string_view token) {
   Number number{};
   const char* end = token.data() + token.size();
   const auto [stop, error] = std::from_chars(token.data(), end, number);
-  if (error != std::errc() || stop != end) return std::nullopt;
+  if (stop != end) return std::nullopt;
   if constexpr (std::is_floating_point_v<Number>) {
+    // from_chars does not tell too small from too large.
+    if (error == std::errc::result_out_of_range) {
+      number = static_cast<Number>(std::strtod(std::string(token).c_str(), nullptr));
+    } else if (error != std::errc()) {
+      return std::nullopt;
+    }
     if (!std::isfinite(number)) return std::nullopt;
+  } else if (error != std::errc()) {
+    return std::nullopt;
   }
   return number;
 }

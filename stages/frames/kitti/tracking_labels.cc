@@ -38,7 +38,6 @@ std::vector<std::int64_t> TrackingLabels::frames() const {
 }
 
 Outcome<Annotation> TrackingLabels::annotation(std::int64_t frame) const {
-  constexpr int kLeading = 2;  // frame, track id
   if (fault_) return *fault_;
   Annotation annotation;
   const auto found = lines_.find(frame);
@@ -47,7 +46,7 @@ Outcome<Annotation> TrackingLabels::annotation(std::int64_t frame) const {
     const std::string_view bytes = std::string_view(text_).substr(line.offset, line.length);
     const auto columns = split_columns(bytes);
     const std::string where = place_in_file(path_, line.number);
-    auto box = parse_kitti_object(columns, kLeading, where);
+    auto box = parse_kitti_object(columns, KittiColumns::kTracking, where);
     if (is_fault(box)) return std::get<SampleFault>(box);
     const auto track = parse_number<std::int64_t>(columns[1]);
     if (!track) {

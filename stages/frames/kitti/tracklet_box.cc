@@ -63,15 +63,17 @@ std::optional<Rectangle> outline(const TrackletPose& pose, const RawCalibration&
       if ((from & axis) == 0) add_edge(corner[from], corner[from | axis], calibration, hull);
     }
   }
-  const double width = calibration.picture.width;
-  const double height = calibration.picture.height;
-  if (!(hull.box.left < width && hull.box.right > 0 && hull.box.top < height &&
+  // Where KITTI's own labels end: a box that reaches beyond the picture is 1241, 374 at the most of
+  // 1242 x 375 pixels.
+  const double right = calibration.picture.width - 1;
+  const double bottom = calibration.picture.height - 1;
+  if (!(hull.box.left < right && hull.box.right > 0 && hull.box.top < bottom &&
         hull.box.bottom > 0)) {
     return std::nullopt;
   }
-  return Rectangle{std::clamp(hull.box.left, 0.0, width), std::clamp(hull.box.top, 0.0, height),
-                   std::clamp(hull.box.right, 0.0, width),
-                   std::clamp(hull.box.bottom, 0.0, height)};
+  return Rectangle{std::clamp(hull.box.left, 0.0, right), std::clamp(hull.box.top, 0.0, bottom),
+                   std::clamp(hull.box.right, 0.0, right),
+                   std::clamp(hull.box.bottom, 0.0, bottom)};
 }
 
 }  // namespace

@@ -95,6 +95,37 @@ TEST(KittiLabel, TakesAScoreAndLeavesItOut) {
   EXPECT_EQ(parsed(std::string(kCar) + " 0.97").boxes, parsed(kCar).boxes);
 }
 
+TEST(KittiLabel, AScoreMustBeANumber) {
+  for (const char* token : {"high", "nan", "0.9x"}) {
+    EXPECT_EQ(fault(std::string(kCar) + " " + token),
+              std::string("expected a finite number for score, got '") + token +
+                  "', in label_2/000008.txt:1");
+  }
+}
+
+// The object devkit's readme: "truncated: Float from 0 (non-truncated) to 1 (truncated)",
+// "occluded: Integer (0,1,2,3)"; -1 stands where DontCare has none.
+TEST(KittiLabel, TruncatedAndOccludedHaveTheirRanges) {
+  for (const char* token : {"-1", "0", "0.50", "1.00"}) EXPECT_EQ(fault(car_with(1, token)), "");
+  for (const char* token : {"1.5", "1.01", "2", "-0.5", "-2"}) {
+    EXPECT_EQ(fault(car_with(1, token)),
+              std::string("expected a number from 0 to 1, or -1 for truncated, got '") + token +
+                  "', in label_2/000008.txt:1");
+  }
+  for (const char* token : {"-1", "0", "1", "2", "3"}) EXPECT_EQ(fault(car_with(2, token)), "");
+  for (const char* token : {"4", "-2", "99"}) {
+    EXPECT_EQ(fault(car_with(2, token)),
+              std::string("expected a whole number from 0 to 3, or -1 for occluded, got '") +
+                  token + "', in label_2/000008.txt:1");
+  }
+}
+
+TEST(KittiLabel, ANumberTooSmallForItsColumnIsZero) {
+  EXPECT_EQ(parsed(car_with(3, "1e-50")).boxes.at(0).alpha, 0.0f);
+  EXPECT_EQ(parsed(car_with(3, "-1e-400")).boxes.at(0).alpha, 0.0f);
+  EXPECT_EQ(parsed(car_with(4, "1e-400")).boxes.at(0).xyxy.left, 0.0);
+}
+
 TEST(KittiLabel, TakesWindowsLineEnds) {
   EXPECT_EQ(parsed(std::string(kCar) + "\r\n" + kDontCare + "\r\n").boxes,
             parsed(std::string(kCar) + "\n" + kDontCare).boxes);
@@ -131,7 +162,8 @@ TEST(KittiLabel, EveryColumnMustBeAFiniteNumber) {
 
 TEST(KittiLabel, OccludedMustBeAWholeNumber) {
   EXPECT_EQ(fault(car_with(2, "1.5")),
-            "expected a whole number for occluded, got '1.5', in label_2/000008.txt:1");
+            "expected a whole number from 0 to 3, or -1 for occluded, got '1.5', in "
+            "label_2/000008.txt:1");
 }
 
 TEST(KittiLabel, ReadsTheOriginalLabels) {
@@ -142,6 +174,15 @@ TEST(KittiLabel, ReadsTheOriginalLabels) {
   ASSERT_EQ(annotation.boxes.size(), 10u);  // six cars, four DontCare
   EXPECT_EQ(annotation.boxes[2].xyxy, (Rectangle{937.29, 197.39, 1241, 374}));
   EXPECT_EQ(std::ranges::count_if(annotation.boxes, &Box::ignore), 4);
+}
+
+TEST(KittiLabel, ReadsLabelsWhoseOtherColumnsAreUnknown) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const Annotation annotation =
+      parsed(testing::read_file(data / "kitti_object/training/label_2/001497.txt"));
+  ASSERT_EQ(annotation.boxes.size(), 8u);
+  EXPECT_EQ(annotation.boxes[0].truncation, -1);
+  EXPECT_EQ(annotation.boxes[0].occlusion, -1);
 }
 
 }  // namespace

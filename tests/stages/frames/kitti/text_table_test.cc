@@ -50,6 +50,16 @@ TEST(ParseNumber, RefusesWhatAFloatCannotHold) {
   EXPECT_TRUE(parse_number<double>("1e300"));
 }
 
+TEST(ParseNumber, WhatIsTooSmallIsZero) {
+  EXPECT_EQ(parse_number<float>("1e-50"), 0.0f);
+  EXPECT_EQ(parse_number<float>("1e-400"), 0.0f);
+  EXPECT_EQ(parse_number<double>("1e-50"), 1e-50);
+  EXPECT_EQ(parse_number<double>("-1e-400"), 0.0);
+  EXPECT_EQ(parse_number<double>("0." + std::string(400, '0') + "1"), 0.0);
+  EXPECT_FALSE(parse_number<double>("1e-400x"));
+  EXPECT_FALSE(parse_number<double>("1" + std::string(400, '0')));
+}
+
 TEST(InQuotes, ShowsForeignBytesAsOneLineOfPlainText) {
   EXPECT_EQ(in_quotes("Car"), "'Car'");
   EXPECT_EQ(in_quotes(std::string_view("a\0\xff\nb", 5)), "'a???b'");

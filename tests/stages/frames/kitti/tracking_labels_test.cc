@@ -35,6 +35,36 @@ TEST(TrackingLabels, GivesAFrameItsOwnLinesByteForByte) {
   EXPECT_THAT(annotation.boxes[1].box3d, ElementsAre(2.0f, 1.8f, 4.4f, -4.5f, 1.8f, 13.4f, -2.1f));
 }
 
+// The tracking devkit's readme: "truncated: Integer (0,1,2) indicating the level of truncation",
+// where 2 means an ignored object.
+TEST(TrackingLabels, TruncationTwoIsAnObjectToIgnore) {
+  const auto with_truncation = [](const std::string& level) {
+    const std::string text = "0 2 Van " + level + kColumns.substr(1) + "\n";
+    return TrackingLabels(text, "l.txt").annotation(0);
+  };
+  for (const char* level : {"0", "1", "2"}) {
+    const Box box = std::get<Annotation>(with_truncation(level)).boxes.at(0);
+    EXPECT_EQ(box.truncation, std::stof(level));
+    EXPECT_EQ(box.ignore, std::string(level) == "2");
+  }
+  for (const char* level : {"3", "0.5", "-2"}) {
+    EXPECT_EQ(std::get<SampleFault>(with_truncation(level)).reason,
+              std::string("expected 0, 1, 2 or -1 for truncated, got '") + level + "', in l.txt:1");
+  }
+}
+
+// As the training labels have it: the unknown location and rotation_y stand before the unknown
+// size.
+TEST(TrackingLabels, DontCareHasTheUnknownThreeDimensionalBox) {
+  const TrackingLabels labels(
+      "0 -1 DontCare -1 -1 -10.000000 219.310000 188.490000 245.500000 218.560000 -1000.000000 "
+      "-1000.000000 -1000.000000 -10.000000 -1.000000 -1.000000 -1.000000\n",
+      "l.txt");
+  const Box box = std::get<Annotation>(labels.annotation(0)).boxes.at(0);
+  EXPECT_THAT(box.box3d, ElementsAre(-1, -1, -1, -1000, -1000, -1000, -10));
+  EXPECT_TRUE(box.ignore);
+}
+
 TEST(TrackingLabels, FindsLinesOfAFrameWhereverTheyStand) {
   const TrackingLabels labels(line("3", "0", "Car") + line("1", "0", "Car") + line("3", "1", "Car"),
                               "l.txt");

@@ -103,7 +103,14 @@ TEST(TrackletBox, AnObjectBesideTheCameraReachesToThePicturesEdge) {
   EXPECT_NEAR(box->xyxy.right, 25, 1e-9);
   EXPECT_EQ(box->xyxy.left, 0);
   EXPECT_EQ(box->xyxy.top, 0);
-  EXPECT_EQ(box->xyxy.bottom, 40);
+  EXPECT_EQ(box->xyxy.bottom, 39);
+}
+
+TEST(TrackletBox, EndsAtTheLastPixelAsKittisOwnLabelsDo) {
+  // From 2 m behind the camera to 2 m before it, to its right: out of the picture on that side.
+  const auto box = to_box(car(0, -1, -1), kCalibration);
+  ASSERT_TRUE(box);
+  EXPECT_EQ(box->xyxy, (Rectangle{75, 0, 99, 39}));  // 50 + 100 0.5/2; 100 x 40 pixels
 }
 
 TEST(TrackletBox, NothingBehindTheCameraOrOutsideThePictureIsSeen) {
