@@ -32,8 +32,10 @@ ListedClip list_video(const fs::path& path, std::optional<double> rate_hz, std::
   const VideoClip video = measure_video(path, enough);
   const double rate = rate_hz.value_or(video.frames_per_second.value_or(kUsualRate_hz));
   ListedClip clip{rate, {}, file_line(path)};
+  const bool own_times = !rate_hz && !video.uneven_times_s.empty();
   for (std::int64_t i = 0; i < video.frame_count; ++i) {
-    clip.frames.push_back({path.string(), i, i, static_cast<double>(i) / rate});
+    const double time_s = own_times ? video.time_s(i) : static_cast<double>(i) / rate;
+    clip.frames.push_back({path.string(), i, i, time_s});
   }
   return clip;
 }

@@ -26,7 +26,10 @@ class VideoDataset final : public Dataset {
  public:
   VideoDataset(const SourceSpec& spec, const fs::path& base)
       : path_(fs::path(spec.root).generic_string()), clip_(measure_video(base / spec.root)) {
-    if (spec.frames_per_second) clip_.frames_per_second = spec.frames_per_second;
+    if (spec.frames_per_second) {
+      clip_.frames_per_second = spec.frames_per_second;
+      clip_.uneven_times_s.clear();
+    }
     read_sidecar(base);
     const std::string stem = fs::path(spec.root).stem().string();
     // At least six digits, and one width for all: so the samples' order is that of the frames.
@@ -37,6 +40,10 @@ class VideoDataset final : public Dataset {
       labelled_.push_back({stem + "/" + padded_number(i, width), stem, frame(i), key});
     }
     note_frames_that_do_not_decode();
+    if (!clip_.times_ascend && !spec.frames_per_second) {
+      notes_.push_back("the times of the frames do not ascend, their rate is taken instead, in " +
+                       path_);
+    }
     const auto first_beyond = labels_.lower_bound(clip_.frame_count);
     if (const auto count = std::distance(first_beyond, labels_.end()); count > 0) {
       notes_.push_back(std::to_string(count) + " labels for frames beyond the video's " +
@@ -99,11 +106,7 @@ class VideoDataset final : public Dataset {
   }
 
   FrameRef frame(std::int64_t number) const {
-    FrameRef frame{path_, number, number};
-    if (clip_.frames_per_second) {
-      frame.time_s = static_cast<double>(number) / *clip_.frames_per_second;
-    }
-    return frame;
+    return {path_, number, number, clip_.time_s(number)};
   }
 
   std::string path_;

@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/videoio.hpp>
 
+#include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -56,6 +57,27 @@ TEST_F(VideoDatasetTest, EveryFrameIsASample) {
 TEST_F(VideoDatasetTest, TheManifestsRateGoesBeforeTheContainers) {
   spec_.frames_per_second = 50;
   EXPECT_DOUBLE_EQ(open()->labelled_frames()[5].frame.time_s, 5.0 / 50);
+}
+
+TEST_F(VideoDatasetTest, FramesThatComeUnevenlyHaveTheirOwnTimes) {
+  testing::write_timed_video(folder_ / "v/uneven.mkv", {0, 100, 600, 700, 1200});
+  spec_.root = "v/uneven.mkv";
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 5u);
+  const double steps_s[] = {0.1, 0.5, 0.1, 0.5};
+  for (std::size_t i = 1; i < 5; ++i) {
+    const FramePair pair{dataset->neighbour(frames[i], -1).frame, frames[i].frame};
+    EXPECT_NEAR(pair.gap_s(), steps_s[i - 1], 1e-9);
+  }
+  spec_.frames_per_second = 10;
+  EXPECT_DOUBLE_EQ(open()->labelled_frames()[4].frame.time_s, 0.4);
+}
+
+TEST_F(VideoDatasetTest, NotesTimesThatDoNotAscend) {
+  testing::write_timed_video(folder_ / "v/stuck.mkv", {0, 100, 100, 200});
+  spec_.root = "v/stuck.mkv";
+  EXPECT_THAT(open()->notes(), ElementsAre(HasSubstr("the times of the frames do not ascend")));
 }
 
 TEST_F(VideoDatasetTest, NotesAFileCutShort) {
