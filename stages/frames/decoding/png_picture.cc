@@ -6,6 +6,8 @@
 #include <cstdint>
 #include <cstring>
 #include <span>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -69,22 +71,51 @@ class PngFile {
     std::vector<png_bytep> rows;
     rows.reserve(static_cast<std::size_t>(frame.size.height));
     for (int y = 0; y < frame.size.height; ++y) rows.push_back(frame.bgr.data() + y * row_bytes);
+    const bool has_palette = png_get_color_type(png_, info_) == PNG_COLOR_TYPE_PALETTE;
     run_guarded(escape_, [&] {
-      set_conversions();
+      if (has_palette) {
+        png_set_packing(png_);  // a byte for each index
+        png_set_interlace_handling(png_);
+      } else {
+        set_conversions();
+      }
       png_read_update_info(png_, info_);
-      if (png_get_rowbytes(png_, info_) != row_bytes) escape_.leave("unexpected kind of pixels");
+      if (png_get_rowbytes(png_, info_) != (has_palette ? row_bytes / 3 : row_bytes)) {
+        escape_.leave("unexpected kind of pixels");
+      }
       png_read_image(png_, rows.data());
       png_read_end(png_, nullptr);
     });
+    if (has_palette) look_up_colours(frame, rows);
     return frame;
   }
 
  private:
-  /// Whatever the file holds, to 8-bit blue, green, red.
+  /// Each row's indices, which stand at its start, become colours. libpng would do it, but takes an
+  /// index beyond the palette for black.
+  void look_up_colours(const ColourFrame& frame, const std::vector<png_bytep>& rows) {
+    png_colorp palette = nullptr;
+    int count = 0;
+    png_get_PLTE(png_, info_, &palette, &count);
+    for (const png_bytep row : rows) {
+      for (int x = frame.size.width - 1; x >= 0; --x) {  // a colour never covers an index still due
+        const int index = row[x];
+        if (index >= count) {
+          throw std::runtime_error("a pixel of colour " + std::to_string(index) +
+                                   " in a palette of " + std::to_string(count));
+        }
+        const png_color& colour = palette[index];
+        row[3 * x] = colour.blue;
+        row[3 * x + 1] = colour.green;
+        row[3 * x + 2] = colour.red;
+      }
+    }
+  }
+
+  /// Whatever the file holds but a palette, to 8-bit blue, green, red.
   void set_conversions() {
     png_set_strip_16(png_);
     png_set_strip_alpha(png_);
-    png_set_palette_to_rgb(png_);
     const png_byte kind = png_get_color_type(png_, info_);
     if ((kind & PNG_COLOR_MASK_COLOR) == 0) {
       if (png_get_bit_depth(png_, info_) < 8) png_set_expand_gray_1_2_4_to_8(png_);

@@ -43,6 +43,7 @@ void write_png(const std::filesystem::path& path, ImageSize size, int kind, int 
     png_set_PLTE(png, info, palette.data(), palette.size());
     png_set_tRNS(png, info, transparent.data(), transparent.size(), nullptr);
   }
+  png_set_check_for_invalid_index(png, -1);  // let pixels be colours that the palette lacks
   png_write_info(png, info);
   if (pixels) {
     std::vector<std::vector<png_byte>> rows(size.height);
@@ -115,6 +116,20 @@ TEST(PngPicture, AnyChangedByteOfThePixelDataIsRefused) {
     changed[at] = static_cast<char>(changed[at] ^ 0x10);
     write_file(file, changed);
     EXPECT_NE(why_refused(file), "") << "byte " << at;
+  }
+}
+
+TEST(PngPicture, AnIndexBeyondThePaletteIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  // Pixels count up by 37, so that they reach any number; the palette has four colours.
+  for (const int interlace : {0, 1}) {
+    for (const int bits : {4, 8}) {
+      write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, bits, interlace);
+      EXPECT_NE(why_refused(file), "") << bits << " bits";
+    }
+    write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, 2, interlace);
+    EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
   }
 }
 
