@@ -51,7 +51,8 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, PairSide
   if (!result.sample.fault.empty()) {
     result.state = State::kHole;
   } else if (previous.state == State::kPresent && next.state == State::kPresent) {
-    result.state = State::kPresent;
+    result.state = frame.fault.empty() ? State::kPresent : State::kHole;
+    result.sample.fault = frame.fault;
   }
   return result;
 }

@@ -21,7 +21,8 @@ struct PairChoiceResult {
 /// choose = one: one of the gaps whose frames exist, drawn by (seed, dataset, sample id), so that
 /// no other source, sample or order of files changes the draw. choose = all: each gap; the gap and
 /// side are added to the sample id as "ID@before2". A gap that meets a hole in the sequence becomes
-/// a sample with a fault that names the missing file (choose = one: only if no gap can be had).
+/// a sample with a fault that names the missing file (choose = one: only if no gap can be had). All
+/// pairs of a frame that is itself at fault (LabelledFrame::fault) have that fault.
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed);
 

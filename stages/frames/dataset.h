@@ -17,6 +17,9 @@ struct LabelledFrame {
   std::string sequence;   ///< the sequence it belongs to; empty if none is known
   FrameRef frame;         ///< the frame itself; its file may be absent (see Dataset::neighbour)
   std::string label_key;  ///< what Dataset::annotation takes; stands alone in a frozen plan
+  /// Why no pair of it can be trusted, if opening the dataset told so already (damaged timestamps);
+  /// empty otherwise.
+  std::string fault = {};
 };
 
 /// A frame some steps away from a labelled one.
@@ -31,7 +34,8 @@ struct Neighbour {
 };
 
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
-/// their labels say. Opening one lists files and reads annotation files; it decodes no picture.
+/// their labels say. Opening one lists files and reads annotation files; it decodes no picture, but
+/// for KITTI object with its raw drives, a picture of each drive, and videos.
 ///
 /// Steps between frames are counted in *stored* frames: where a sequence stores every fifth frame
 /// of a video, one step is five frames of that video, and FrameRef::index and time_s tell so.

@@ -7,6 +7,15 @@
 
 namespace eventgan {
 
+std::string counted(const std::vector<std::string>& names, const std::string& what) {
+  constexpr std::size_t kNamed = 20;
+  std::string text = std::to_string(names.size()) + " " + what;
+  for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i) {
+    text += (i == 0 ? ": " : ", ") + names[i];
+  }
+  return names.size() > kNamed ? text + ", ..." : text;
+}
+
 FolderListing list_folder(const std::filesystem::path& folder) {
   FolderListing listing;
   std::error_code error;

@@ -68,9 +68,13 @@ NumberedSequence NumberedSequence::list(const std::filesystem::path& folder,
     std::string name;
   };
   std::map<std::int64_t, Listed> found;
+  std::vector<std::string> left_out;
   for (std::string& name : list_folder(folder).files) {
     const auto parsed = parse_name(name, prefix, extensions);
-    if (!parsed) continue;
+    if (!parsed) {
+      if (!name.starts_with('.')) left_out.push_back(std::move(name));
+      continue;
+    }
     const auto place = found.find(parsed->number);
     if (place == found.end()) {
       found.emplace(parsed->number, Listed{parsed->extension, std::move(name)});
@@ -81,13 +85,18 @@ NumberedSequence NumberedSequence::list(const std::filesystem::path& folder,
       throw InputError("expected one file for each frame number, got " + other.name + " and " +
                        name + ", in " + folder.string());
     }
-    if (parsed->extension < other.extension) other = {parsed->extension, std::move(name)};
+    Listed listed{parsed->extension, std::move(name)};
+    if (listed.extension < other.extension) std::swap(listed, other);
+    left_out.push_back(std::move(listed.name));
   }
+  std::ranges::sort(left_out);
 
   std::vector<Frame> frames;
   frames.reserve(found.size());
   for (auto& [number, listed] : found) frames.emplace_back(number, std::move(listed.name));
-  return NumberedSequence(std::move(frames), stride);
+  NumberedSequence sequence(std::move(frames), stride);
+  sequence.left_out_ = std::move(left_out);
+  return sequence;
 }
 
 std::vector<NumberedSequence::Frame>::const_iterator NumberedSequence::lower_bound(

@@ -13,8 +13,8 @@ namespace eventgan {
 
 /// Pictures that a folder of frames may hold. Where a frame is there under two of them, the first
 /// counts.
-inline const std::vector<std::string_view> kPictureExtensions = {".png", ".jpg", ".jpeg",
-                                                                 ".bmp", ".tif", ".tiff"};
+inline const std::vector<std::string_view> kPictureExtensions = {".png", ".jpg",  ".jpeg", ".bmp",
+                                                                 ".tif", ".tiff", ".webp"};
 
 /// A folder of frames whose names end in their number: "img_000006.jpg" is frame 6. Listed once;
 /// after that no question goes to the disk. A value; reading it from several threads is safe.
@@ -42,8 +42,8 @@ class NumberedSequence {
   explicit NumberedSequence(std::vector<Frame> frames, Stride stride = Stride::kOne);
 
   /// Lists the files of `folder` named `prefix` (not ending in a digit), digits (18 at most), one
-  /// of `extensions` (lower case, with the dot; the file's may be in capitals); others are passed
-  /// over. An absent folder gives an empty sequence. Throws InputError if the folder cannot be read
+  /// of `extensions` (lower case, with the dot; the file's may be in capitals); others are left
+  /// out. An absent folder gives an empty sequence. Throws InputError if the folder cannot be read
   /// or two files of one extension have the same number ("1.png", "01.png").
   static NumberedSequence list(const std::filesystem::path& folder, std::string_view prefix = "",
                                const std::vector<std::string_view>& extensions = kPictureExtensions,
@@ -53,6 +53,10 @@ class NumberedSequence {
 
   /// Ascending by number.
   const std::vector<Frame>& frames() const { return frames_; }
+
+  /// Files that `list` left out, those hidden by a dot not among them: other names than asked for,
+  /// and frames that are there under an earlier extension. Sorted.
+  const std::vector<std::string>& left_out() const { return left_out_; }
 
   /// The difference of numbers that is one step.
   std::int64_t stride() const { return stride_; }
@@ -71,6 +75,7 @@ class NumberedSequence {
   std::string name_for(std::int64_t number) const;
 
   std::vector<Frame> frames_;
+  std::vector<std::string> left_out_;
   std::int64_t stride_ = 1;
 };
 

@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
+#include "stages/frames/decoding/picture_file.h"
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/object_pictures.h"
 #include "stages/frames/kitti/raw_drive.h"
@@ -26,6 +29,24 @@ RawMapping read_mapping(const SourceRoot& devkit) {
           devkit.read_or_throw(kMappingFile), devkit.written(kMappingFile)};
 }
 
+/// Whether two picture files show the same; nothing if one of them cannot be read. Raw frames and
+/// object pictures are the same files as KITTI gives them out: pixels are compared only where
+/// somebody has written one of them anew.
+std::optional<bool> same_picture(const SourceRoot& base, const std::string& a,
+                                 const std::string& b) {
+  const auto bytes_a = base.read(a);
+  const auto bytes_b = base.read(b);
+  if (is_fault(bytes_a) || is_fault(bytes_b)) return std::nullopt;
+  if (bytes_a == bytes_b) return true;
+  try {
+    const ColourFrame frame_a = decode_picture_file(base.on_disk(a));
+    const ColourFrame frame_b = decode_picture_file(base.on_disk(b));
+    return frame_a.size == frame_b.size && frame_a.bgr == frame_b.bgr;
+  } catch (const std::runtime_error&) {
+    return std::nullopt;
+  }
+}
+
 class KittiObjectDataset : public Dataset {
  public:
   KittiObjectDataset(const SourceSpec& spec, const std::filesystem::path& base)
@@ -34,8 +55,13 @@ class KittiObjectDataset : public Dataset {
     const auto labels = NumberedSequence::list(root_.on_disk("label_2"), "", {".txt"});
     frames_.reserve(labels.frames().size());
     for (const auto& [number, name] : labels.frames()) add_frame(number, name);
+    note_left_out(labels.left_out(), "label_2");
+    note_left_out(pictures_.labelled().left_out(), "image_2");
+    note_left_out(pictures_.previous_left_out(), "prev_2");
     if (spec.raw_root) {
-      follow_to_raw(SourceRoot(*spec.raw_root, base), SourceRoot(*spec.devkit, base));
+      const SourceRoot devkit(*spec.devkit, base);
+      follow_to_raw(SourceRoot(*spec.raw_root, base), devkit);
+      check_mapping(SourceRoot("", base), devkit.written(kMappingFile));
     }
     std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
@@ -116,6 +142,63 @@ class KittiObjectDataset : public Dataset {
     note(without_drive, "labelled frames whose raw drive is missing in " + raw.written(""));
   }
 
+  /// Tells the frames of drives that are at fault so. A wrong mapping leads to pictures of any
+  /// other drive, so that one picture shows it; which of a drive's pictures does not matter.
+  void check_mapping(const SourceRoot& base, const std::string& mapping_path) {
+    std::map<std::string, std::optional<std::string>> faults;  // by drive; empty: compared, equal
+    for (const LabelledFrame& frame : frames_) {
+      const RawDrive* drive = drive_of(frame);
+      if (drive == nullptr) continue;
+      std::optional<std::string>& fault = faults[frame.sequence];
+      if (!fault && !drive->fault().empty()) fault = drive->fault();
+      if (!fault) fault = contradiction(frame, *drive, base, mapping_path);
+    }
+    for (const auto& [drive, fault] : faults) {
+      if (fault && !fault->empty()) {
+        notes_.push_back("no frame of " + drive + " can be used: " + *fault);
+      }
+    }
+    note(std::ranges::count_if(faults, [](const auto& drive) { return !drive.second; }),
+         "drives of which no picture could be compared with what " + mapping_path + " says");
+    for (LabelledFrame& frame : frames_) {
+      const auto found = faults.find(frame.sequence);
+      if (found != faults.end()) frame.fault = found->second.value_or("");
+      if (frame.fault.empty()) frame.fault = before_the_first(frame, mapping_path);
+    }
+  }
+
+  /// Compares the frame's picture or one before it with the drive's: what is wrong, "" if they are
+  /// equal, nothing if there are no two to compare.
+  std::optional<std::string> contradiction(const LabelledFrame& frame, const RawDrive& drive,
+                                           const SourceRoot& base,
+                                           const std::string& mapping_path) const {
+    for (int steps = 0; steps >= -ObjectPictures::kPrevious; --steps) {
+      const auto place = pictures_.at(number_of(frame), frame.sample_id, steps);
+      const Neighbour raw = drive.frame(frame.frame.index + steps);
+      if (place.state != State::kPresent || raw.state != State::kPresent) continue;
+      const std::string picture = root_.written(place.path);
+      const auto same = same_picture(base, picture, raw.frame.path);
+      if (!same) continue;
+      if (*same) return "";
+      return "expected the picture " + raw.frame.path + ", to which " + mapping_path +
+             " leads, got another, in " + picture;
+    }
+    return std::nullopt;
+  }
+
+  /// What is wrong if there is a picture before the drive's frame 0; "" if there is none.
+  std::string before_the_first(const LabelledFrame& frame, const std::string& mapping_path) const {
+    if (frame.sequence.empty()) return "";  // not in the mapping: previous frames are -1, -2, -3
+    for (int back = 1; back <= ObjectPictures::kPrevious; ++back) {
+      const auto place = pictures_.at(number_of(frame), frame.sample_id, -back);
+      if (frame.frame.index >= back || place.state != State::kPresent) continue;
+      return "expected no frame before number 0 of " + frame.sequence + ", got one " +
+             std::to_string(back) + " before number " + std::to_string(frame.frame.index) +
+             " (to which " + mapping_path + " leads), in " + root_.written(place.path);
+    }
+    return "";
+  }
+
   void open_drive(const SourceRoot& raw, const std::string& folder,
                   std::optional<RawDrive>& drive) {
     RawDrive opened(raw, folder);
@@ -137,6 +220,11 @@ class KittiObjectDataset : public Dataset {
 
   void note(std::int64_t count, const std::string& what) {
     if (count > 0) notes_.push_back(std::to_string(count) + " " + what);
+  }
+
+  void note_left_out(const std::vector<std::string>& names, const std::string& folder) {
+    if (names.empty()) return;
+    notes_.push_back(counted(names, "files left out in " + root_.written(folder)));
   }
 
   SourceRoot root_;

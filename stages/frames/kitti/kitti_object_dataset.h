@@ -18,6 +18,11 @@ namespace eventgan {
 /// is 0 for the labelled frame and -K for the frame K before. Times are the drive's timestamps, or
 /// 0.1 s a frame.
 ///
+/// What the mapping says is compared with what is stored: of each drive one picture, labelled or
+/// previous, with the raw frame it should be, and the pixels must be equal. Where they are not,
+/// where a previous picture would come before the drive's first frame, and where the drive's
+/// timestamps are damaged, the frames are at fault (LabelledFrame::fault).
+///
 /// Throws UsageError if only one of `raw_root` and `devkit` is given.
 std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
                                                    const std::filesystem::path& base);

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <map>
 #include <optional>
+#include <set>
 #include <utility>
 
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_calibration.h"
 #include "stages/frames/kitti/raw_drive.h"
@@ -39,9 +41,15 @@ class KittiRawDataset : public Dataset {
   KittiRawDataset(const SourceSpec& spec, const std::filesystem::path& base)
       : root_(spec.root, base) {
     root_.require_folder("");
+    std::vector<std::string> others;
     for (const std::string& date : root_.folders_in("")) {
-      if (is_date(date)) add_date(date);
+      if (is_date(date)) {
+        add_date(date);
+      } else if (!date.starts_with('.')) {
+        others.push_back(date);
+      }
     }
+    note(others, "folders that are no date left out in", "");
     if (drives_.empty()) {
       throw InputError("expected DATE/DATE_drive_NNNN_sync folders, got none, in " +
                        root_.written(""));
@@ -95,7 +103,10 @@ class KittiRawDataset : public Dataset {
 
   void add_date(const std::string& date) {
     std::vector<std::string> names = root_.folders_in(date);
-    std::erase_if(names, [&](const std::string& name) { return !is_drive_of(name, date); });
+    const auto others = std::ranges::stable_partition(
+        names, [&](const std::string& name) { return is_drive_of(name, date); });
+    note({others.begin(), others.end()}, "folders that are no drive left out in", date);
+    names.erase(others.begin(), others.end());
     if (names.empty()) return;
 
     const RawCalibration* calibration = nullptr;
@@ -127,27 +138,50 @@ class KittiRawDataset : public Dataset {
     if (root_.has_file(labels)) {
       annotation_files_.push_back(root_.written(labels));
       drive.tracklets.emplace(root_.read_or_throw(labels), root_.written(labels));
-      note_labels_without_pictures(drive, root_.written(labels));
+      note_labels_beyond_pictures(drive, root_.written(labels));
     }
-    for (const auto& [number, file] : drive.frames.pictures().frames()) {
+    for (const std::int64_t number : labelled_numbers(drive)) {
       LabelledFrame frame;
-      frame.sample_id = name + "/" + file.substr(0, file.rfind('.'));
-      frame.sequence = name;
       frame.frame = drive.frames.frame(number).frame;
+      frame.sample_id = name + "/" + std::filesystem::path(frame.frame.path).stem().string();
+      frame.sequence = name;
       frame.label_key = folder + "#" + std::to_string(number);
+      frame.fault = drive.frames.fault();
       frames_.push_back(std::move(frame));
     }
+    if (!drive.frames.fault().empty()) {
+      notes_.push_back("no frame of " + name + " can be used: " + drive.frames.fault());
+    }
+    note(drive.frames.pictures().left_out(), "files left out in", folder + "/image_02/data");
     const bool has_tracklets = drive.tracklets.has_value();
     drives_.emplace(name, std::move(drive));
     return has_tracklets;
   }
 
-  void note_labels_without_pictures(const Drive& drive, const std::string& path) {
+  /// The frames with a picture, and those with tracklets that lost theirs.
+  static std::set<std::int64_t> labelled_numbers(const Drive& drive) {
+    std::set<std::int64_t> numbers;
+    for (const auto& [number, file] : drive.frames.pictures().frames()) numbers.insert(number);
+    if (!drive.tracklets) return numbers;
+    for (const std::int64_t number : drive.tracklets->frames()) {
+      if (drive.frames.frame(number).state == Neighbour::State::kHole) numbers.insert(number);
+    }
+    return numbers;
+  }
+
+  void note_labels_beyond_pictures(const Drive& drive, const std::string& path) {
     const auto frames = drive.tracklets->frames();
-    const auto missing = std::ranges::count_if(
-        frames, [&](std::int64_t frame) { return !drive.frames.pictures().contains(frame); });
-    if (missing == 0) return;
-    notes_.push_back(std::to_string(missing) + " frames without a picture in " + path);
+    const auto beyond = std::ranges::count_if(frames, [&](std::int64_t frame) {
+      return drive.frames.frame(frame).state == Neighbour::State::kBeyond;
+    });
+    if (beyond == 0) return;
+    notes_.push_back(std::to_string(beyond) + " frames beyond the drive's pictures left out in " +
+                     path);
+  }
+
+  void note(const std::vector<std::string>& names, const std::string& what,
+            const std::string& folder) {
+    if (!names.empty()) notes_.push_back(counted(names, what + " " + root_.written(folder)));
   }
 
   SourceRoot root_;

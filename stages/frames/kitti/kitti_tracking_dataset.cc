@@ -5,6 +5,7 @@
 #include <set>
 #include <utility>
 
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/text_table.h"
 #include "stages/frames/kitti/timestamps.h"
@@ -27,9 +28,15 @@ class KittiTrackingDataset : public Dataset {
       : root_(spec.root, base) {
     root_.require_folder("label_02");
     root_.require_folder("image_02");
+    std::vector<std::string> left_out;
     for (const std::string& name : root_.files_in("label_02")) {
-      if (name.ends_with(".txt")) add_sequence(name.substr(0, name.size() - 4));
+      if (name.ends_with(".txt")) {
+        add_sequence(name.substr(0, name.size() - 4));
+      } else if (!name.starts_with('.')) {
+        left_out.push_back(name);
+      }
     }
+    note_left_out(left_out, "label_02");
     std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
     const auto pictures = root_.folders_in("image_02");
     const auto unlabelled = std::ranges::count_if(
@@ -47,6 +54,7 @@ class KittiTrackingDataset : public Dataset {
 
   Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
     const auto place = sequences_.at(frame.sequence).pictures.at(frame.frame.index, steps);
+    if (place.number < 0) return {};
     return {place.state, frame_ref(frame.sequence, place)};
   }
 
@@ -76,6 +84,7 @@ class KittiTrackingDataset : public Dataset {
         name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
                        TrackingLabels(root_.read_or_throw(label), root_.written(label))});
     const Sequence& sequence = place->second;
+    note_left_out(sequence.pictures.left_out(), "image_02/" + name);
 
     std::set<std::int64_t> numbers;
     for (const std::int64_t number : sequence.labels.frames()) numbers.insert(number);
@@ -88,6 +97,11 @@ class KittiTrackingDataset : public Dataset {
       frame.label_key = label + "#" + std::to_string(number);
       frames_.push_back(std::move(frame));
     }
+  }
+
+  void note_left_out(const std::vector<std::string>& names, const std::string& folder) {
+    if (names.empty()) return;
+    notes_.push_back(counted(names, "files left out in " + root_.written(folder)));
   }
 
   FrameRef frame_ref(const std::string& sequence, const NumberedSequence::Place& place) const {

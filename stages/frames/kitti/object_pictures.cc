@@ -1,5 +1,9 @@
 #include "stages/frames/kitti/object_pictures.h"
 
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
 namespace eventgan {
 namespace {
 
@@ -18,8 +22,13 @@ ObjectPictures::ObjectPictures(const SourceRoot& root) {
     // extension.
     const std::string png = previous_mark(k) + ".png";
     const std::string jpg = previous_mark(k) + ".jpg";
-    previous_[static_cast<std::size_t>(k - 1)] =
+    const NumberedSequence& listed = previous_[static_cast<std::size_t>(k - 1)] =
         NumberedSequence::list(root.on_disk("prev_2"), "", {png, jpg});
+    // The frames of one K are left out of the others' lists.
+    std::vector<std::string> in_none = k == 1 ? listed.left_out() : std::vector<std::string>();
+    std::ranges::set_intersection(previous_left_out_, listed.left_out(),
+                                  std::back_inserter(in_none));
+    previous_left_out_ = std::move(in_none);
   }
 }
 

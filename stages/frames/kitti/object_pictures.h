@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "stages/frames/numbered_sequence.h"
 #include "stages/frames/source_root.h"
@@ -20,6 +21,9 @@ class ObjectPictures {
 
   const NumberedSequence& labelled() const { return labelled_; }
 
+  /// Files of prev_2 whose names are none of a previous frame, sorted.
+  const std::vector<std::string>& previous_left_out() const { return previous_left_out_; }
+
   /// The picture `steps` (-3..0) after picture `number`, below the root; where it is absent, the
   /// path it would have, given that the picture's name is `stem`. A hole if an earlier frame is
   /// there.
@@ -32,6 +36,7 @@ class ObjectPictures {
  private:
   NumberedSequence labelled_;
   std::array<NumberedSequence, kPrevious> previous_;  ///< by K - 1
+  std::vector<std::string> previous_left_out_;
 };
 
 }  // namespace eventgan

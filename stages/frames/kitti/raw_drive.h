@@ -16,7 +16,7 @@ namespace eventgan {
 class RawDrive {
  public:
   /// `folder` is DATE/DRIVE below `root`. A drive that is not there has no frames. Throws
-  /// InputError for a folder or a timestamps.txt that cannot be read.
+  /// InputError for a folder that cannot be read.
   RawDrive(const SourceRoot& root, const std::string& folder);
 
   const NumberedSequence& pictures() const { return pictures_; }
@@ -26,6 +26,10 @@ class RawDrive {
 
   /// The frame `steps` after frame `number`, which is there: the drive stores every frame.
   Neighbour neighbour(std::int64_t number, int steps) const;
+
+  /// Why none of its frames can be timed: its timestamps.txt cannot be read, is not as
+  /// parse_timestamps asks, or ends before the last picture. Empty if nothing is wrong.
+  const std::string& fault() const { return fault_; }
 
   /// Seconds since the first timestamp (NaN past the last one); without timestamps 0.1 s a frame.
   double time_s(std::int64_t number) const;
@@ -38,6 +42,7 @@ class RawDrive {
 
   std::string pictures_path_;
   std::string timestamps_path_;
+  std::string fault_;
   NumberedSequence pictures_;
   std::vector<double> times_s_;
 };

@@ -1,13 +1,10 @@
 #include "stages/frames/kitti/timestamps.h"
 
-#include <algorithm>
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <limits>
 #include <optional>
 
-#include "manifests/faults.h"
 #include "stages/frames/kitti/text_table.h"
 
 namespace eventgan {
@@ -15,65 +12,81 @@ namespace {
 
 using std::chrono::nanoseconds;
 
-/// The parts of `text` between the characters of `separators`, which must all occur in this order.
-template <std::size_t N>
-std::optional<std::array<int, N>> split_numbers(std::string_view text,
-                                                std::string_view separators) {
-  std::array<int, N> numbers{};
-  for (std::size_t i = 0; i < N; ++i) {
-    const std::size_t end = i + 1 < N ? text.find(separators[i]) : text.size();
-    if (end == std::string_view::npos) return std::nullopt;
-    const auto number = parse_number<int>(text.substr(0, end));
-    if (!number || *number < 0) return std::nullopt;
-    numbers[i] = *number;
-    text.remove_prefix(std::min(end + 1, text.size()));
-  }
-  return numbers;
+/// The number that the digits from `begin` on are; nothing if one of them is none.
+std::optional<std::int64_t> digits(std::string_view text, std::size_t begin, std::size_t count) {
+  const std::string_view part = text.substr(begin, count);
+  if (part.find_first_not_of("0123456789") != std::string_view::npos) return std::nullopt;
+  return parse_number<std::int64_t>(part);
 }
 
 /// Digits after the decimal point as nanoseconds; more than nine are cut off.
-std::optional<nanoseconds> parse_fraction(std::string_view digits) {
-  std::string nine(digits.substr(0, 9));
+std::optional<nanoseconds> parse_fraction(std::string_view fraction) {
+  if (fraction.empty()) return std::nullopt;
+  std::string nine(fraction.substr(0, 9));
   nine.resize(9, '0');
-  const auto value = parse_number<std::int64_t>(nine);
-  if (!value || *value < 0) return std::nullopt;
-  return nanoseconds(*value);
+  const auto value = digits(nine, 0, nine.size());
+  return value ? std::optional(nanoseconds(*value)) : std::nullopt;
 }
 
-/// Since 1970, as if the clock ran on UTC; only differences are used.
+/// "2011-09-26 13:02:25.594360375", every number with all its digits, since 1970, as if the clock
+/// ran on UTC; only differences are used.
 std::optional<nanoseconds> parse_timestamp(std::string_view line) {
   const auto columns = split_columns(line);
   if (columns.size() != 2) return std::nullopt;
-  const std::size_t point = std::min(columns[1].find('.'), columns[1].size());
-  const auto date = split_numbers<3>(columns[0], "--");
-  const auto clock = split_numbers<3>(columns[1].substr(0, point), "::");
-  const auto fraction = parse_fraction(columns[1].substr(std::min(point + 1, columns[1].size())));
-  if (!date || !clock || !fraction) return std::nullopt;
+  const std::string_view date = columns[0];
+  const std::string_view clock = columns[1];
+  if (date.size() != 10 || date[4] != '-' || date[7] != '-' || clock.size() < 8 ||
+      clock[2] != ':' || clock[5] != ':' || (clock.size() > 8 && clock[8] != '.')) {
+    return std::nullopt;
+  }
+  const auto year = digits(date, 0, 4), month = digits(date, 5, 2), day = digits(date, 8, 2);
+  const auto hour = digits(clock, 0, 2), minute = digits(clock, 3, 2), second = digits(clock, 6, 2);
+  const auto fraction = clock.size() == 8 ? nanoseconds(0) : parse_fraction(clock.substr(9));
+  if (!year || !month || !day || !hour || !minute || !second || !fraction) return std::nullopt;
 
-  const std::chrono::year_month_day day{std::chrono::year((*date)[0]),
-                                        std::chrono::month(static_cast<unsigned>((*date)[1])),
-                                        std::chrono::day(static_cast<unsigned>((*date)[2]))};
-  if (!day.ok() || (*clock)[0] > 23 || (*clock)[1] > 59 || (*clock)[2] > 60) return std::nullopt;
-  return std::chrono::sys_days(day).time_since_epoch() + std::chrono::hours((*clock)[0]) +
-         std::chrono::minutes((*clock)[1]) + std::chrono::seconds((*clock)[2]) + *fraction;
+  const std::chrono::year_month_day when{std::chrono::year(static_cast<int>(*year)),
+                                         std::chrono::month(static_cast<unsigned>(*month)),
+                                         std::chrono::day(static_cast<unsigned>(*day))};
+  if (!when.ok() || *hour > 23 || *minute > 59 || *second > 60) return std::nullopt;
+  return std::chrono::sys_days(when).time_since_epoch() + std::chrono::hours(*hour) +
+         std::chrono::minutes(*minute) + std::chrono::seconds(*second) + *fraction;
+}
+
+/// "2011-09-26 13:02:25.5\n" has 21.
+std::size_t length_without_end(std::string_view line) {
+  return line.find_last_not_of(" \t\r\n") + 1;
 }
 
 }  // namespace
 
-std::vector<double> parse_timestamps(std::string_view text, const std::string& path) {
+Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::string& path) {
   std::vector<double> seconds;
-  std::optional<nanoseconds> first;
+  std::optional<nanoseconds> first, latest;
+  std::string_view first_line, latest_line;
+  const auto refuse = [&](const std::string& expected, const TextLine& line) {
+    return SampleFault{"expected " + expected + ", got " + in_quotes(line.bytes) + ", in " +
+                       place_in_file(path, line.number)};
+  };
   for (const TextLine& line : split_lines(text)) {
     if (split_columns(line.bytes).empty()) {
       seconds.push_back(std::numeric_limits<double>::quiet_NaN());
       continue;
     }
     const auto time = parse_timestamp(line.bytes);
-    if (!time) {
-      throw InputError("expected a time such as 2011-09-26 13:02:25.594360375, got " +
-                       in_quotes(line.bytes) + ", in " + place_in_file(path, line.number));
+    if (!time) return refuse("a time such as 2011-09-26 13:02:25.594360375", line);
+    if (!first) {
+      first = time;
+      first_line = line.bytes;
     }
-    if (!first) first = time;
+    if (!line.bytes.ends_with('\n') &&
+        length_without_end(line.bytes) < length_without_end(first_line)) {
+      return refuse("a whole line", line);
+    }
+    if (latest && *time <= *latest) {
+      return refuse("a time after " + in_quotes(latest_line), line);
+    }
+    latest = time;
+    latest_line = line.bytes.substr(0, length_without_end(line.bytes));
     seconds.push_back(std::chrono::duration<double>(*time - *first).count());
   }
   return seconds;

@@ -1,5 +1,6 @@
 #include "stages/frames/kitti/tracklets.h"
 
+#include <iterator>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <pugixml.hpp>
@@ -30,6 +31,23 @@ Number number(const pugi::xml_node& parent, const char* name) {
                  " number for " + name + ", got " + in_quotes(text));
 }
 
+double size(const pugi::xml_node& tracklet, const char* name) {
+  const auto metres = number<double>(tracklet, name);
+  if (metres > 0) return metres;
+  throw BadField(std::string("expected a size above 0 for ") + name + ", got " +
+                 in_quotes(tracklet.child_value(name)));
+}
+
+/// boost writes beside the items how many there are.
+void check_count(const pugi::xml_node& list, std::string_view what) {
+  const auto count = number<std::int64_t>(list, "count");
+  const auto items = list.children("item");
+  const auto found = std::distance(items.begin(), items.end());
+  if (count == found) return;
+  throw BadField("expected " + std::to_string(count) + " " + std::string(what) +
+                 " as <count> says, got " + std::to_string(found));
+}
+
 /// The field's text as the JSON value that holds it without loss of meaning.
 Json json_value(std::string_view text) {
   if (const auto whole = parse_number<std::int64_t>(text)) return *whole;
@@ -53,9 +71,9 @@ TrackletPose read_pose(const pugi::xml_node& tracklet, const pugi::xml_node& pos
   const std::string_view type = tracklet.child_value("objectType");
   read.class_id = kitti_class_id(type);
   if (read.class_id < 0) throw BadField("expected one of KITTI's classes, got " + in_quotes(type));
-  read.height = number<double>(tracklet, "h");
-  read.width = number<double>(tracklet, "w");
-  read.length = number<double>(tracklet, "l");
+  read.height = size(tracklet, "h");
+  read.width = size(tracklet, "w");
+  read.length = size(tracklet, "l");
   read.x = number<double>(pose, "tx");
   read.y = number<double>(pose, "ty");
   read.z = number<double>(pose, "tz");
@@ -93,6 +111,11 @@ Tracklets::Tracklets(const std::string& xml, std::string path)
                      std::string(result ? "another root" : result.description()) + "', in " +
                      document_->path);
   }
+  try {
+    check_count(tracklets, "tracklets");
+  } catch (const BadField& error) {
+    throw InputError(error.what() + (", in " + document_->path));
+  }
   std::int64_t track = 0;
   for (const pugi::xml_node& tracklet : tracklets.children("item")) {
     try {
@@ -101,6 +124,7 @@ Tracklets::Tracklets(const std::string& xml, std::string path)
         throw BadField("expected a first_frame from 0 to " + std::to_string(kMaxFrame) + ", got " +
                        std::to_string(frame));
       }
+      check_count(tracklet.child("poses"), "poses");
       for (const pugi::xml_node& pose : tracklet.child("poses").children("item")) {
         document_->entries[frame++].push_back({track, tracklet, pose});
       }

@@ -13,7 +13,7 @@ namespace eventgan {
 struct TrackletPose {
   std::int64_t track = 0;                    ///< place in the file, from 0
   int class_id = 0;                          ///< index into kitti_label_schema().class_names
-  double height = 0, width = 0, length = 0;  ///< m
+  double height = 0, width = 0, length = 0;  ///< m, above 0
   double x = 0, y = 0, z = 0;  ///< the middle of its underside, m, in the scanner's frame
   double rotation_z = 0;       ///< rad about the scanner's z; at 0 its length lies along x
   int occlusion = -1;          ///< 0 visible, 1 partly, 2 largely; -1 not annotated
@@ -31,8 +31,8 @@ struct TrackletFrame {
 /// A tracklet_labels.xml of KITTI raw, held in memory; thread-safe.
 class Tracklets {
  public:
-  /// `path` is for messages. Throws InputError if it is not such a file or a tracklet's first_frame
-  /// is not a frame's number.
+  /// `path` is for messages. Throws InputError if it is not such a file, a tracklet's first_frame
+  /// is not a frame's number, or there are not as many tracklets or poses as <count> says.
   Tracklets(const std::string& xml, std::string path);
   ~Tracklets();
   Tracklets(Tracklets&&) noexcept;

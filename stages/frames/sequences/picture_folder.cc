@@ -71,18 +71,24 @@ PictureFolder list_picture_folder(const fs::path& folder) {
   listed.folders = std::move(folders);
   Pictures pictures(natural_less);
   for (const fs::path name : files) {
-    if (lower_extension(name) == ".json") {
-      listed.sidecars.try_emplace(name.stem().string(), name.string());
-    }
     const std::size_t rank = extension_rank(name);
-    if (rank == kPictureExtensions.size()) continue;
-    const auto [picture, is_new] = pictures.try_emplace(name.stem().string(), name.string());
-    const std::size_t other_rank = extension_rank(picture->second);
-    // "a.png" and "a.PNG" are of one rank: the one whose name comes first counts.
-    if (!is_new && std::pair(rank, name.string()) < std::pair(other_rank, picture->second)) {
-      picture->second = name.string();
+    if (rank == kPictureExtensions.size()) {
+      const bool counts = lower_extension(name) == ".json" &&
+                          listed.sidecars.try_emplace(name.stem().string(), name.string()).second;
+      if (!counts) listed.left_out.push_back(name.string());
+      continue;
     }
+    const auto [picture, is_new] = pictures.try_emplace(name.stem().string(), name.string());
+    if (is_new) continue;
+    const std::size_t other_rank = extension_rank(picture->second);
+    std::string other = name.string();
+    // "a.png" and "a.PNG" are of one rank: the one whose name comes first counts.
+    if (std::pair(rank, other) < std::pair(other_rank, picture->second)) {
+      picture->second.swap(other);
+    }
+    listed.left_out.push_back(std::move(other));
   }
+  std::ranges::sort(listed.left_out);
   listed.frames = number(pictures);
   return listed;
 }

@@ -18,11 +18,13 @@ struct PictureFolder {
   /// only in the extension's letters, the first by name counts.
   std::map<std::string, std::string> sidecars;
   std::vector<std::string> folders;  ///< names of the folders in it, sorted
+  /// Other files, and pictures and .json files that give way to another of their name; sorted.
+  std::vector<std::string> left_out;
 };
 
-/// Lists `folder`, passing over hidden entries and other files. Of two pictures of one name the one
-/// of the extension that stands first in kPictureExtensions counts. An absent
-/// folder is empty. Throws InputError if it cannot be listed.
+/// Lists `folder`, passing over hidden entries. Of two pictures of one name the one of the
+/// extension that stands first in kPictureExtensions counts. An absent folder is empty. Throws
+/// InputError if it cannot be listed.
 PictureFolder list_picture_folder(const std::filesystem::path& folder);
 
 }  // namespace eventgan

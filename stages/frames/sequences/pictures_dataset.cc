@@ -4,11 +4,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "manifests/faults.h"
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/sequences/lower_extension.h"
 #include "stages/frames/sequences/picture_folder.h"
 #include "stages/frames/source_root.h"
@@ -31,6 +33,7 @@ class PicturesDataset final : public Dataset {
       note(top.folders.size(), "folders beside the pictures left out");
       add_sequence("", std::move(top));
     } else {
+      note_unused(top, "");
       std::size_t without_pictures = 0;
       for (const std::string& name : top.folders) {
         PictureFolder folder = list_picture_folder(root_.on_disk(name));
@@ -84,7 +87,25 @@ class PicturesDataset final : public Dataset {
     return frame;
   }
 
+  /// Tells of the files in a folder that become neither frame nor label.
+  void note_unused(const PictureFolder& folder, const std::string& sequence) {
+    const std::string place = " in " + root_.written(sequence);
+    std::set<std::string> stems;
+    for (const auto& [number, name] : folder.frames.frames()) {
+      stems.insert(fs::path(name).stem().string());
+    }
+    std::vector<std::string> alone;
+    for (const auto& [stem, name] : folder.sidecars) {
+      if (!stems.contains(stem)) alone.push_back(name);
+    }
+    if (!alone.empty()) notes_.push_back(counted(alone, "labels without a picture" + place));
+    if (!folder.left_out.empty()) {
+      notes_.push_back(counted(folder.left_out, "files left out" + place));
+    }
+  }
+
   void add_sequence(const std::string& sequence, PictureFolder folder) {
+    note_unused(folder, sequence);
     for (const auto& [number, name] : folder.frames.frames()) {
       const fs::path below = fs::path(sequence) / name;
       LabelledFrame labelled;

@@ -108,5 +108,23 @@ TEST(ChoosePairs, AHoleBecomesASampleThatNamesTheMissingFile) {
       ::testing::HasSubstr("root/0010.png"));
 }
 
+TEST(ChoosePairs, AFrameAtFaultGivesThatFaultAndNoOtherDraw) {
+  const FakeDataset dataset("root", 20);
+  for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
+    const SourceSpec spec = source({1, 2, 3, 4}, PairSide::kBefore, choice);
+    LabelledFrame frame = dataset.labelled_frames()[3];  // nothing is 4 before it
+    const auto sound = choose_pairs(dataset, frame, spec, 7);
+    frame.fault = "expected a time, got none, in timestamps.txt";
+    const auto faulty = choose_pairs(dataset, frame, spec, 7);
+    EXPECT_EQ(faulty.without_partner, sound.without_partner);
+    ASSERT_EQ(faulty.samples.size(), sound.samples.size());
+    for (std::size_t i = 0; i < sound.samples.size(); ++i) {
+      EXPECT_EQ(faulty.samples[i].fault, frame.fault);
+      EXPECT_EQ(faulty.samples[i].sample_id, sound.samples[i].sample_id);
+      EXPECT_EQ(faulty.samples[i].pair.gap_frames, sound.samples[i].pair.gap_frames);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace eventgan

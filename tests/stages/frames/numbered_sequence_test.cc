@@ -30,15 +30,23 @@ TEST(NumberedSequence, ListsFilesOfItsPatternByNumber) {
                            "img_4.txt", "img_5.jpg.part", "img_1234567890123456789.jpg"}) {
     write_file(folder / name, "");
   }
-  EXPECT_THAT(NumberedSequence::list(folder.path(), "img_").frames(),
-              ElementsAre(Pair(2, "img_2.JPG"), Pair(10, "img_10.jpg")));
+  write_file(folder / ".hidden.jpg", "");
+  const NumberedSequence sequence = NumberedSequence::list(folder.path(), "img_");
+  EXPECT_THAT(sequence.frames(), ElementsAre(Pair(2, "img_2.JPG"), Pair(10, "img_10.jpg")));
+  EXPECT_THAT(sequence.left_out(),
+              ElementsAre("img_.jpg", "img_1234567890123456789.jpg", "img_4.txt", "img_5.jpg.part",
+                          "img_x.jpg", "other_3.jpg"));
 }
 
 TEST(NumberedSequence, PrefersTheFirstExtension) {
   const TemporaryFolder folder;
-  for (const char* name : {"7.jpg", "7.png", "8.jpg"}) write_file(folder / name, "");
-  EXPECT_THAT(NumberedSequence::list(folder.path()).frames(),
-              ElementsAre(Pair(7, "7.png"), Pair(8, "8.jpg")));
+  for (const char* name : {"7.jpg", "7.png", "7.webp", "8.jpg", "9.webp"}) {
+    write_file(folder / name, "");
+  }
+  const NumberedSequence sequence = NumberedSequence::list(folder.path());
+  EXPECT_THAT(sequence.frames(),
+              ElementsAre(Pair(7, "7.png"), Pair(8, "8.jpg"), Pair(9, "9.webp")));
+  EXPECT_THAT(sequence.left_out(), ElementsAre("7.jpg", "7.webp"));
 }
 
 TEST(NumberedSequence, RefusesTwoFilesForOneNumber) {

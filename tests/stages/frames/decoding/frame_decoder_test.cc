@@ -37,11 +37,26 @@ std::string fault(const Outcome<ColourFrame>& outcome) {
 TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
   const TemporaryFolder folder;
   const FrameDecoder decoder(folder.path());
-  for (const std::string name : {"a.png", "b.jpg", "c.bmp", "d.ppm", "e.tiff"}) {
+  for (const std::string name : {"a.png", "b.jpg", "c.bmp", "d.ppm", "e.tiff", "f.webp"}) {
     ASSERT_TRUE(cv::imwrite((folder / name).string(), gradient_picture({12, 20})));
     const auto outcome = decoder.decode(picture_ref(name));
     ASSERT_EQ(fault(outcome), "no fault");
     EXPECT_TRUE(same_pixels(std::get<ColourFrame>(outcome), opencv_read(folder / name))) << name;
+  }
+}
+
+TEST(FrameDecoder, ATruncatedWebpIsAFault) {
+  const TemporaryFolder folder;
+  const FrameDecoder decoder(folder.path());
+  for (const int quality : {80, 101}) {  // beyond 100: without loss
+    ASSERT_TRUE(cv::imwrite((folder / "a.webp").string(), gradient_picture({120, 160}),
+                            {cv::IMWRITE_WEBP_QUALITY, quality}));
+    const std::string whole = testing::read_file(folder / "a.webp");
+    for (std::size_t length = whole.size() - 1; length > 0; length = length * 9 / 10) {
+      write_file(folder / "a.webp", whole.substr(0, length));
+      EXPECT_NE(fault(decoder.decode(picture_ref("a.webp"))), "no fault")
+          << length << " of " << whole.size() << " bytes, quality " << quality;
+    }
   }
 }
 

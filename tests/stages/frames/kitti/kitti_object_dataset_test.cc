@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
+#include "tests/testing/picture_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -12,6 +13,8 @@ namespace eventgan {
 namespace {
 
 using State = Neighbour::State;
+using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -158,7 +161,8 @@ TEST_F(KittiObjectDatasetTest, TimestampsTimeThePreviousFramesToo) {
   add_raw();
   write(std::string(kDrive) + "timestamps.txt",
         "2011-09-26 13:00:00\n2011-09-26 13:00:01\n2011-09-26 13:00:02\n2011-09-26 13:00:03.25\n"
-        "2011-09-26 13:00:05\n");
+        "2011-09-26 13:00:05\n" +
+            std::string(25, '\n') + "2011-09-26 13:00:30\n");
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[0];
   EXPECT_EQ(frame.frame.time_s, 5);
@@ -168,6 +172,102 @@ TEST_F(KittiObjectDatasetTest, TimestampsTimeThePreviousFramesToo) {
               ElementsAre("devkit/mapping/train_mapping.txt", "devkit/mapping/train_rand.txt",
                           std::string(kDrive) + "timestamps.txt", "training/label_2/000000.txt",
                           "training/label_2/000001.txt", "training/label_2/000002.txt"));
+}
+
+// Frames 4 and 30 of the drive and the pictures 0 and 1 that are the same.
+TEST_F(KittiObjectDatasetTest, AMappingThatContradictsThePicturesIsAFaultThatNamesBoth) {
+  add_raw();
+  const auto write_picture = [&](const std::string& path, int value) {
+    testing::write_flat_picture(folder_ / path, {4, 6}, value);
+  };
+  write_picture("training/image_2/000000.png", 40);
+  write_picture(std::string(kDrive) + "data/0000000004.png", 40);
+  EXPECT_EQ(open()->labelled_frames()[0].fault, "");
+
+  write_picture(std::string(kDrive) + "data/0000000004.png", 41);
+  const std::string fault = "expected the picture " + std::string(kDrive) +
+                            "data/0000000004.png, to which devkit/mapping/train_mapping.txt leads, "
+                            "got another, in training/image_2/000000.png";
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames()[0].fault, fault);
+  EXPECT_EQ(dataset->labelled_frames()[1].fault, fault);  // of the same drive
+  EXPECT_EQ(dataset->labelled_frames()[2].fault, "");     // of another, which is not there
+  EXPECT_THAT(dataset->notes(),
+              Contains("no frame of 2011_09_26_drive_0052_sync can be used: " + fault));
+}
+
+TEST_F(KittiObjectDatasetTest, PicturesWrittenAnewAreComparedByTheirPixels) {
+  add_raw();
+  // Without loss, but not the same bytes.
+  testing::write_flat_picture(folder_ / "training/image_2/000000.bmp", {4, 6}, 40);
+  std::filesystem::remove(folder_ / "training/image_2/000000.png");
+  std::filesystem::rename(folder_ / "training/image_2/000000.bmp",
+                          folder_ / "training/image_2/000000.png");
+  testing::write_flat_picture(folder_ / (std::string(kDrive) + "data/0000000004.png"), {4, 6}, 40);
+  EXPECT_EQ(open()->labelled_frames()[0].fault, "");
+}
+
+TEST_F(KittiObjectDatasetTest, WhereTheLabelledFrameIsNotStoredAPreviousOneIsCompared) {
+  add_raw();
+  std::filesystem::remove(folder_ / (std::string(kDrive) + "data/0000000004.png"));
+  std::filesystem::remove(folder_ / (std::string(kDrive) + "data/0000000030.png"));
+  testing::write_flat_picture(folder_ / "training/prev_2/000000_01.png", {4, 6}, 1);
+  testing::write_flat_picture(folder_ / (std::string(kDrive) + "data/0000000003.png"), {4, 6}, 2);
+  EXPECT_THAT(open()->labelled_frames()[1].fault,
+              AllOf(HasSubstr("data/0000000003.png"), HasSubstr("prev_2/000000_01.png")));
+}
+
+TEST_F(KittiObjectDatasetTest, ADriveOfWhichNothingCanBeComparedIsNoted) {
+  add_raw();
+  write("training/image_2/000000.png", "no picture");
+  write("training/image_2/000001.png", "no picture");
+  for (const char* name : {"000000_01", "000000_02"}) {
+    std::filesystem::remove(folder_ / ("training/prev_2/" + std::string(name) + ".png"));
+  }
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames()[0].fault, "");
+  EXPECT_THAT(dataset->notes(), Contains("1 drives of which no picture could be compared with what "
+                                         "devkit/mapping/train_mapping.txt says"));
+}
+
+TEST_F(KittiObjectDatasetTest, APreviousPictureBeforeFrameZeroContradictsTheMapping) {
+  add_raw();
+  write("devkit/mapping/train_mapping.txt",
+        "2011_09_26 2011_09_26_drive_0052_sync 0000000030\n"
+        "2011_09_26 2011_09_26_drive_0052_sync 0000000001\n"
+        "2011_09_28 2011_09_28_drive_0001_sync 0000000000\n");
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames()[0].fault,
+            "expected no frame before number 0 of 2011_09_26_drive_0052_sync, got one 2 before "
+            "number 1 (to which devkit/mapping/train_mapping.txt leads), in "
+            "training/prev_2/000000_02.png");
+  EXPECT_EQ(dataset->labelled_frames()[1].fault, "");
+  EXPECT_THAT(dataset->labelled_frames()[2].fault, HasSubstr("training/prev_2/000002_01.png"));
+}
+
+TEST_F(KittiObjectDatasetTest, DamagedTimestampsAreAFaultOfTheirDrivesFrames) {
+  add_raw();
+  write(std::string(kDrive) + "timestamps.txt", "2011-09-26 13:00:00\n");
+  const auto dataset = open();
+  const std::string fault = "expected a line for each frame up to 30, got 1 lines, in " +
+                            std::string(kDrive) + "timestamps.txt";
+  EXPECT_EQ(dataset->labelled_frames()[0].fault, fault);
+  EXPECT_EQ(dataset->labelled_frames()[1].fault, fault);
+  EXPECT_EQ(dataset->labelled_frames()[2].fault, "");
+}
+
+TEST_F(KittiObjectDatasetTest, FilesLeftOutAreCountedAndNamed) {
+  write("training/label_2/img_000007.txt", kLabel);
+  write("training/image_2/img_000007.png");
+  write("training/image_2/000002.jpg");
+  write("training/prev_2/000000_04.png");
+  write("training/prev_2/old/000000_01.png");
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames().size(), 3u);
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 files left out in training/label_2: img_000007.txt",
+                          "2 files left out in training/image_2: 000002.jpg, img_000007.png",
+                          "1 files left out in training/prev_2: 000000_04.png"));
 }
 
 TEST_F(KittiObjectDatasetTest, WithoutItsDriveAFrameFallsBackOnThePreviousFrames) {
@@ -228,6 +328,7 @@ TEST(KittiObjectData, RealFramesReachSixStepsThroughTheMapping) {
   EXPECT_THAT(dataset->notes(),
               ElementsAre("3 labelled frames whose raw drive is missing in kitti_raw"));
   for (const LabelledFrame& labelled : dataset->labelled_frames()) {
+    EXPECT_EQ(labelled.fault, "");
     const auto annotation = dataset->annotation(labelled.label_key);
     ASSERT_FALSE(is_fault(annotation));
     EXPECT_EQ(std::get<Annotation>(annotation).original,

@@ -92,7 +92,8 @@ TEST_F(KittiRawDatasetTest, WithoutTrackletsAnnotationsAreEmpty) {
 TEST_F(KittiRawDatasetTest, TrackletsBecomeBoxesThroughTheCalibration) {
   write_tracklets();
   write_calibration();
-  write(kSecond + "/image_02/timestamps.txt", "2011-09-28 13:00:00\n");
+  write(kSecond + "/image_02/timestamps.txt",
+        "2011-09-28 13:00:00\n2011-09-28 13:00:01\n2011-09-28 13:00:02\n");
   const auto dataset = open();
   EXPECT_EQ(annotation_of(*dataset, 0).original, "[]");
   EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[1].label_key),
@@ -128,7 +129,56 @@ TEST_F(KittiRawDatasetTest, TrackletsBeyondThePicturesAreNoted) {
   const auto dataset = open();
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
   EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 frames without a picture in raw/" + kFirst + "/tracklet_labels.xml"));
+              ElementsAre("1 frames beyond the drive's pictures left out in raw/" + kFirst +
+                          "/tracklet_labels.xml"));
+}
+
+TEST_F(KittiRawDatasetTest, ATrackletsFrameWithoutPictureInsideADriveIsAHole) {
+  write_tracklets();  // frames 1 and 2
+  write_calibration();
+  write(kFirst + "/image_02/data/0000000003.png");
+  std::filesystem::remove(folder_ / ("raw/" + kFirst + "/image_02/data/0000000002.png"));
+  std::filesystem::remove(folder_ / ("raw/" + kSecond + "/image_02/data/0000000001.png"));
+  const auto dataset = open();
+  // Of the second drive's hole nothing is labelled.
+  ASSERT_THAT(dataset->labelled_frames(), SizeIs(4 + 2));
+  const LabelledFrame& lost = dataset->labelled_frames()[2];
+  EXPECT_EQ(lost.sample_id, "2011_09_26_drive_0001_sync/0000000002");
+  EXPECT_EQ(lost.label_key, kFirst + "#2");
+  EXPECT_EQ(dataset->neighbour(lost, 0).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(lost, 0).frame.path,
+            "raw/" + kFirst + "/image_02/data/0000000002.png");
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+}
+
+TEST_F(KittiRawDatasetTest, DamagedTimestampsAreAFaultOfTheirDrivesFrames) {
+  write(kFirst + "/image_02/timestamps.txt",
+        "2011-09-26 13:00:01\n2011-09-26 13:00:00\n2011-09-26 13:00:02\n");
+  const auto dataset = open();
+  const std::string fault =
+      "expected a time after '2011-09-26 13:00:01', got '2011-09-26 13:00:00?', in raw/" + kFirst +
+      "/image_02/timestamps.txt:2";
+  ASSERT_THAT(dataset->labelled_frames(), SizeIs(6));
+  for (std::size_t i = 0; i < 6; ++i) {
+    EXPECT_EQ(dataset->labelled_frames()[i].fault, i < 3 ? fault : "") << i;
+  }
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("no frame of 2011_09_26_drive_0001_sync can be used: " + fault));
+}
+
+TEST_F(KittiRawDatasetTest, FilesAndFoldersLeftOutAreCountedAndNamed) {
+  write(kFirst + "/image_02/data/left.png");
+  write(kFirst + "/image_02/data/0000000001.jpg");
+  write("2011_09_26/2011_09_26_drive_0001_extract/image_02/data/0.png");
+  write("devkit/readme.txt");
+  const auto dataset = open();
+  EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
+  EXPECT_THAT(
+      dataset->notes(),
+      ElementsAre("1 folders that are no drive left out in raw/2011_09_26: "
+                  "2011_09_26_drive_0001_extract",
+                  "2 files left out in raw/" + kFirst + "/image_02/data: 0000000001.jpg, left.png",
+                  "1 folders that are no date left out in raw: devkit"));
 }
 
 TEST_F(KittiRawDatasetTest, AMalformedTrackletIsAFaultOfItsFrame) {

@@ -115,6 +115,25 @@ TEST_F(KittiTrackingDatasetTest, ALabelWithoutAPictureIsAHole) {
   EXPECT_EQ(without_folder.frame.path, "tracking/image_02/0002/000000.png");
 }
 
+TEST_F(KittiTrackingDatasetTest, NoFrameIsBeforeNumberZero) {
+  std::filesystem::remove(folder_ / "tracking/image_02/0001/000000.png");
+  const auto dataset = open();
+  const LabelledFrame& first = dataset->labelled_frames()[0];
+  EXPECT_EQ(dataset->neighbour(first, 0).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(first, -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(first, -1).frame.path, "");
+}
+
+TEST_F(KittiTrackingDatasetTest, FilesLeftOutAreCountedAndNamed) {
+  write_file(folder_ / "tracking/label_02/0003.csv", "");
+  write_file(folder_ / "tracking/image_02/0001/frame_7.png", "");
+  write_file(folder_ / "tracking/image_02/0001/000002.jpg", "");
+  EXPECT_THAT(open()->notes(),
+              ElementsAre("2 files left out in tracking/image_02/0001: 000002.jpg, frame_7.png",
+                          "1 files left out in tracking/label_02: 0003.csv",
+                          "1 sequences without labels in tracking/image_02"));
+}
+
 TEST_F(KittiTrackingDatasetTest, NeedsItsFolders) {
   spec_.root = "elsewhere";
   EXPECT_THROW(open(), InputError);

@@ -16,7 +16,7 @@ using testing::write_file;
 
 constexpr const char* kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
 
-/// Frames 0, 2 and 4, and times for 0..2.
+/// Frames 0, 2 and 4.
 class RawDriveTest : public ::testing::Test {
  protected:
   RawDriveTest() {
@@ -25,9 +25,8 @@ class RawDriveTest : public ::testing::Test {
     }
   }
 
-  void write_timestamps() {
-    write_file(folder_ / ("raw/" + std::string(kFolder) + "/image_02/timestamps.txt"),
-               "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n");
+  void write_timestamps(const std::string& text) {
+    write_file(folder_ / ("raw/" + std::string(kFolder) + "/image_02/timestamps.txt"), text);
   }
 
   RawDrive open() const { return {SourceRoot("raw", folder_.path()), kFolder}; }
@@ -65,13 +64,38 @@ TEST_F(RawDriveTest, TimesAreTenAStepWithoutTimestamps) {
 }
 
 TEST_F(RawDriveTest, TimesComeFromTheTimestamps) {
-  write_timestamps();
+  write_timestamps(
+      "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n"
+      "2011-09-26 13:02:31\n");
   const RawDrive drive = open();
   EXPECT_EQ(drive.timestamps_path(),
             "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/timestamps.txt");
+  EXPECT_EQ(drive.fault(), "");
   EXPECT_EQ(drive.frame(2).frame.time_s, 3);
-  EXPECT_TRUE(std::isnan(drive.frame(4).frame.time_s));  // past the last line
+  EXPECT_EQ(drive.frame(4).frame.time_s, 6);
+  EXPECT_TRUE(std::isnan(drive.time_s(5)));  // past the last line
   EXPECT_TRUE(std::isnan(drive.time_s(-1)));
+}
+
+TEST_F(RawDriveTest, DamagedTimestampsAreAFaultOfTheDriveAndItsTimesUnknown) {
+  const std::string place =
+      ", in raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/timestamps.txt";
+  const std::string four =
+      "2011-09-26 13:02:25\n2011-09-26 13:02:26\n2011-09-26 13:02:28\n2011-09-26 13:02:29\n";
+  const std::pair<std::string, std::string> damaged[] = {
+      {four, "expected a line for each frame up to 4, got 4 lines" + place},
+      {"", "expected a line for each frame up to 4, got 0 lines" + place},
+      {four + "2011-09-26 13:02:20\n",
+       "expected a time after '2011-09-26 13:02:29', got '2011-09-26 13:02:20?'" + place + ":5"},
+      {four + "soon\n",
+       "expected a time such as 2011-09-26 13:02:25.594360375, got 'soon?'" + place + ":5"}};
+  for (const auto& [text, fault] : damaged) {
+    write_timestamps(text);
+    const RawDrive drive = open();
+    EXPECT_EQ(drive.fault(), fault);
+    EXPECT_EQ(drive.frame(2).state, State::kPresent);
+    EXPECT_TRUE(std::isnan(drive.frame(2).frame.time_s));
+  }
 }
 
 TEST_F(RawDriveTest, AnAbsentDriveHasNoFrames) {

@@ -26,16 +26,27 @@ inline std::string pose_xml(const std::string& x, const std::string& rz = "0") {
 /// A tracklet, 2 m high, 1 m wide and 4 m long.
 inline std::string tracklet_xml(const std::string& type, const std::string& first_frame,
                                 const std::string& poses) {
+  // Each of the poses has one "tx".
+  std::size_t count = 0;
+  for (auto at = poses.find("<tx>"); at != std::string::npos; at = poses.find("<tx>", at + 1)) {
+    ++count;
+  }
   return "<item><objectType>" + type + "</objectType><h>2.0</h><w>1</w><l>4</l><first_frame>" +
-         first_frame + "</first_frame><poses><count>1</count><item_version>2</item_version>" +
-         poses + "</poses><finished>1</finished></item>";
+         first_frame + "</first_frame><poses><count>" + std::to_string(count) +
+         "</count><item_version>2</item_version>" + poses + "</poses><finished>1</finished></item>";
 }
 
 inline std::string tracklets_xml(const std::string& tracklets) {
+  std::size_t count = 0;
+  for (auto at = tracklets.find("<objectType>"); at != std::string::npos;
+       at = tracklets.find("<objectType>", at + 1)) {
+    ++count;
+  }
   return "<?xml version=\"1.0\" encoding=\"UTF-8\" standalone=\"yes\" ?>\n"
          "<!DOCTYPE boost_serialization>\n<boost_serialization version=\"9\"><tracklets>"
-         "<count>1</count><item_version>1</item_version>" +
-         tracklets + "</tracklets></boost_serialization>\n";
+         "<count>" +
+         std::to_string(count) + "</count><item_version>1</item_version>" + tracklets +
+         "</tracklets></boost_serialization>\n";
 }
 
 }  // namespace eventgan::testing

@@ -81,6 +81,41 @@ TEST(Tracklets, AnUnknownTypeIsAFault) {
               AllOf(HasSubstr("got 'Lorry'"), HasSubstr("in t.xml (tracklet 0)")));
 }
 
+TEST(Tracklets, ASizeThatIsNotAboveZeroIsAFault) {
+  for (const auto& [right, wrong] : {std::pair("<h>2.0<", "<h>-2.0<"), std::pair("<w>1<", "<w>0<"),
+                                     std::pair("<l>4<", "<l>-1<")}) {
+    std::string xml = tracklets_xml(tracklet_xml("Car", "0", pose_xml("10")));
+    xml.replace(xml.find(right), std::string(right).size(), wrong);
+    EXPECT_THAT(
+        std::get<SampleFault>(Tracklets(xml, "t.xml").frame(0)).reason,
+        AllOf(HasSubstr("expected a size above 0 for "), HasSubstr("in t.xml (tracklet 0)")))
+        << wrong;
+  }
+}
+
+TEST(Tracklets, ACountThatIsNotThatOfTheItemsIsAnError) {
+  const std::string xml =
+      tracklets_xml(tracklet_xml("Car", "0", pose_xml("10") + pose_xml("11")) +
+                    tracklet_xml("Car", "0", pose_xml("10") + pose_xml("11") + pose_xml("12")));
+  const auto error = [&](const std::string& right, const std::string& wrong) -> std::string {
+    std::string changed = xml;
+    changed.replace(changed.find(right), right.size(), wrong);
+    try {
+      Tracklets(changed, "t.xml");
+      return "";
+    } catch (const InputError& refused) {
+      return refused.what();
+    }
+  };
+  EXPECT_EQ(error("<count>2", "<count>2"), "");
+  EXPECT_EQ(error("<tracklets><count>2", "<tracklets><count>3"),
+            "expected 3 tracklets as <count> says, got 2, in t.xml");
+  EXPECT_EQ(error("<poses><count>3", "<poses><count>2"),
+            "expected 2 poses as <count> says, got 3, in t.xml (tracklet 1)");
+  EXPECT_EQ(error("<poses><count>3</count>", "<poses>"),
+            "expected a whole number for count, got '', in t.xml (tracklet 1)");
+}
+
 TEST(Tracklets, BytesThatAreNotUtf8DoNotStopTheJson) {
   std::string xml = tracklets_xml(tracklet_xml("Car", "0", pose_xml("10")));
   xml.insert(xml.find("</poses>") + 8, "<remark>\xff</remark>");

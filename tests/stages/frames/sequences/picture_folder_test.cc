@@ -54,6 +54,13 @@ TEST(PictureFolder, FindsSidecarsAndFoldersAndPassesOverHiddenEntries) {
   EXPECT_THAT(folder.frames.frames(), ElementsAre(Frame(1, "1.png")));
 }
 
+TEST(PictureFolder, TellsWhatItLeavesOut) {
+  const auto folder = list({"1.jpg", "1.png", "1.json", "2.webp", "2.JSON", "2.json", "3.gif",
+                            "notes.txt", ".hidden", "sub/1.png"});
+  EXPECT_THAT(folder.frames.frames(), ElementsAre(Frame(1, "1.png"), Frame(2, "2.webp")));
+  EXPECT_THAT(folder.left_out, ElementsAre("1.jpg", "2.json", "3.gif", "notes.txt"));
+}
+
 TEST(PictureFolder, MayBeEmpty) { EXPECT_THAT(list({}).frames.frames(), IsEmpty()); }
 
 }  // namespace

@@ -67,13 +67,27 @@ TEST_F(PicturesDatasetTest, EachFolderIsASequence) {
   EXPECT_EQ(last.frame.path, "clip/a/2.png");
   EXPECT_EQ(dataset->neighbour(last, -1).frame.path, "clip/a/1.png");
   EXPECT_EQ(dataset->neighbour(last, 1).state, State::kBeyond);  // never into the next folder
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 folders without pictures in clip"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 files left out in clip/empty: readme.txt",
+                                            "1 folders without pictures in clip"));
 }
 
 TEST_F(PicturesDatasetTest, PicturesBesideFoldersCount) {
   touch({"1.png", "a/1.png"});
   EXPECT_THAT(ids(), ElementsAre("1"));
   EXPECT_THAT(open()->notes(), ElementsAre("1 folders beside the pictures left out in clip"));
+}
+
+TEST_F(PicturesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
+  touch({"a/001.png", "a/002.png", "a/002.jpg", "a/009.json", "b/1.webp", "b/1.txt", "b/10.json",
+         "b/11.json", "readme.md"});
+  const auto dataset = open();
+  EXPECT_THAT(ids(), ElementsAre("a/001", "a/002", "b/1"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 files left out in clip: readme.md",
+                          "1 labels without a picture in clip/a: 009.json",
+                          "1 files left out in clip/a: 002.jpg",
+                          "2 labels without a picture in clip/b: 10.json, 11.json",
+                          "1 files left out in clip/b: 1.txt"));
 }
 
 TEST_F(PicturesDatasetTest, PassesSidecarsThroughByteForByte) {
