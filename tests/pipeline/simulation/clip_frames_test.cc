@@ -80,6 +80,16 @@ TEST_F(ClipFramesTest, OfAVideoHaveItsRateAndAreNotCountedFurtherThanAsked) {
               ::testing::HasSubstr("got 2 of a clip of 20, in"));
 }
 
+TEST_F(ClipFramesTest, OfAnUnevenVideoHaveTheirOwnTimesUnlessTheRateIsGiven) {
+  testing::write_timed_video(folder_ / "clip.mkv", {0, 100, 600, 700, 1200});
+  const ClipFrames clip = open(R"({"path": "clip.mkv", "first_frame": 1})");
+  ASSERT_EQ(clip.count(), 4);
+  EXPECT_EQ(clip.time_s(0), 0);
+  EXPECT_NEAR(clip.time_s(1), 0.5, 1e-9);
+  EXPECT_NEAR(clip.time_s(3), 1.1, 1e-9);
+  EXPECT_NEAR(open(R"({"path": "clip.mkv", "frames_per_second": 20})").time_s(4), 0.2, 1e-12);
+}
+
 TEST_F(ClipFramesTest, ComeAsLargeAsTheSensor) {
   write_frame(0);
   write_frame(1);
