@@ -20,10 +20,12 @@ ObjectPictures::ObjectPictures(const SourceRoot& root) {
   for (int k = 1; k <= kPrevious; ++k) {
     // A frame's number in prev_2 is the labelled picture's; the mark counts as part of the
     // extension.
-    const std::string png = previous_mark(k) + ".png";
-    const std::string jpg = previous_mark(k) + ".jpg";
+    std::vector<std::string> marked;
+    for (const std::string_view extension : kPictureExtensions) {
+      marked.push_back(previous_mark(k).append(extension));
+    }
     const NumberedSequence& listed = previous_[static_cast<std::size_t>(k - 1)] =
-        NumberedSequence::list(root.on_disk("prev_2"), "", {png, jpg});
+        NumberedSequence::list(root.on_disk("prev_2"), "", {marked.begin(), marked.end()});
     // The frames of one K are left out of the others' lists.
     std::vector<std::string> in_none = k == 1 ? listed.left_out() : std::vector<std::string>();
     std::ranges::set_intersection(previous_left_out_, listed.left_out(),

@@ -99,6 +99,9 @@ class PicturesDataset final : public Dataset {
       if (!stems.contains(stem)) alone.push_back(name);
     }
     if (!alone.empty()) notes_.push_back(counted(alone, "labels without a picture" + place));
+    if (!sequence.empty() && !folder.folders.empty()) {
+      notes_.push_back(counted(folder.folders, "folders left out" + place));
+    }
     if (!folder.left_out.empty()) {
       notes_.push_back(counted(folder.left_out, "files left out" + place));
     }

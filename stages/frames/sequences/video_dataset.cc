@@ -81,17 +81,21 @@ class VideoDataset final : public Dataset {
   }
 
  private:
-  /// Of NAME.json and NAME.JSON beside the video, the first by name that is no manifest.
+  /// Of NAME.json and NAME.JSON beside the video, the first by name that is no manifest; the other
+  /// is noted.
   void read_sidecar(const fs::path& base) {
     const fs::path video(path_);
     const fs::path folder = base / video.parent_path();
     for (const fs::path name : list_folder(folder.empty() ? "." : folder).files) {
       if (name.stem() != video.stem() || lower_extension(name) != ".json") continue;
+      if (!sidecar_.empty()) {
+        notes_.push_back("1 labels left out, since " + sidecar_ + " counts: " + name.string());
+        continue;
+      }
       auto labels = read_video_labels(folder / name, path_);
       if (!labels) continue;
       labels_ = std::move(*labels);
       sidecar_ = (video.parent_path() / name).generic_string();
-      return;
     }
   }
 

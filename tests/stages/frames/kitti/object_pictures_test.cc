@@ -15,12 +15,12 @@ using testing::write_file;
 TEST(ObjectPictures, FindsThePictureAndTheThreeBeforeIt) {
   const TemporaryFolder folder;
   for (const char* name : {"image_2/001497.png", "prev_2/001497_01.png", "prev_2/001497_02.jpg",
-                           "prev_2/001497_03.png", "prev_2/001498_01.png"}) {
+                           "prev_2/001497_03.webp", "prev_2/001498_01.png"}) {
     write_file(folder / name, "");
   }
   const ObjectPictures pictures(SourceRoot(".", folder.path()));
   const char* expected[] = {"image_2/001497.png", "prev_2/001497_01.png", "prev_2/001497_02.jpg",
-                            "prev_2/001497_03.png"};
+                            "prev_2/001497_03.webp"};
   for (int back = 0; back <= 3; ++back) {
     const auto place = pictures.at(1497, "001497", -back);
     EXPECT_EQ(place.state, State::kPresent);

@@ -79,15 +79,16 @@ TEST_F(PicturesDatasetTest, PicturesBesideFoldersCount) {
 
 TEST_F(PicturesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
   touch({"a/001.png", "a/002.png", "a/002.jpg", "a/009.json", "b/1.webp", "b/1.txt", "b/10.json",
-         "b/11.json", "readme.md"});
+         "b/11.json", "b/deeper/1.png", "readme.md"});
   const auto dataset = open();
   EXPECT_THAT(ids(), ElementsAre("a/001", "a/002", "b/1"));
-  EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 files left out in clip: readme.md",
-                          "1 labels without a picture in clip/a: 009.json",
-                          "1 files left out in clip/a: 002.jpg",
-                          "2 labels without a picture in clip/b: 10.json, 11.json",
-                          "1 files left out in clip/b: 1.txt"));
+  EXPECT_THAT(
+      dataset->notes(),
+      ElementsAre("1 files left out in clip: readme.md",
+                  "1 labels without a picture in clip/a: 009.json",
+                  "1 files left out in clip/a: 002.jpg",
+                  "2 labels without a picture in clip/b: 10.json, 11.json",
+                  "1 folders left out in clip/b: deeper", "1 files left out in clip/b: 1.txt"));
 }
 
 TEST_F(PicturesDatasetTest, PassesSidecarsThroughByteForByte) {

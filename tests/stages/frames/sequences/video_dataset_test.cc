@@ -109,6 +109,10 @@ TEST_F(VideoDatasetTest, ALabelFilesExtensionMayBeInCapitals) {
   testing::write_file(folder_ / "v/clip.JSON", R"({"2": "two"})");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
   EXPECT_EQ(std::get<Annotation>(open()->annotation("2")).original, "\"two\"");
+  testing::write_file(folder_ / "v/clip.json", "{}");
+  EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
+  EXPECT_THAT(open()->notes(),
+              ElementsAre("1 labels left out, since v/clip.JSON counts: clip.json"));
 }
 
 TEST_F(VideoDatasetTest, AManifestNamedAsTheVideoHoldsNoLabels) {
