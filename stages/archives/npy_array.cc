@@ -11,11 +11,6 @@
 namespace eventgan {
 namespace {
 
-[[noreturn]] void fail(const std::string& expected, const std::string& got,
-                       const std::string& name) {
-  throw std::runtime_error("expected " + expected + ", got " + got + ", in " + name);
-}
-
 // The header is a Python dictionary of exactly the keys descr, fortran_order and shape. This reads
 // that and no other Python.
 class HeaderReader {
@@ -54,7 +49,7 @@ class HeaderReader {
   [[noreturn]] void fail(const std::string& expected) const {
     const std::string rest =
         text_.empty() ? "its end" : "\"" + std::string(text_.substr(0, 40)) + "\"";
-    eventgan::fail(expected + " in the .npy header", rest, name_);
+    refuse_numpy(expected + " in the .npy header", rest, name_);
   }
 
   void skip_spaces() {
@@ -118,19 +113,19 @@ TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) 
   constexpr std::string_view kMagic = "\x93NUMPY";
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!text.starts_with(kMagic) || text.size() < 8) {
-    fail("a .npy file", std::to_string(text.size()) + " bytes without its magic", name);
+    refuse_numpy("a .npy file", std::to_string(text.size()) + " bytes without its magic", name);
   }
   const int version = std::to_integer<int>(bytes[6]);
-  if (version < 1 || version > 3) fail(".npy version 1-3", std::to_string(version), name);
+  if (version < 1 || version > 3) refuse_numpy(".npy version 1-3", std::to_string(version), name);
   // After the magic and two bytes of version: the header's length, 2 bytes in version 1, 4 later.
   const std::size_t start = version == 1 ? 10 : 12;
-  if (text.size() < start) fail("a .npy header", "the end of the file", name);
+  if (text.size() < start) refuse_numpy("a .npy header", "the end of the file", name);
   std::size_t length = 0;
   for (std::size_t i = start; i-- > 8;)
     length = length << 8 | std::to_integer<std::size_t>(bytes[i]);
   if (length > text.size() - start) {
-    fail("a .npy header of " + std::to_string(length) + " bytes",
-         std::to_string(text.size() - start), name);
+    refuse_numpy("a .npy header of " + std::to_string(length) + " bytes",
+                 std::to_string(text.size() - start), name);
   }
   const NumpyLayout layout = HeaderReader(text.substr(start, length), name).read();
   return decode_numpy_elements(layout, bytes.subspan(start + length), name);

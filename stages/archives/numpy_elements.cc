@@ -18,11 +18,6 @@ static_assert(std::endian::native == std::endian::little, "numpy's '<' is copied
 
 constexpr std::size_t kMostDimensions = 32;  // numpy's own limit
 
-[[noreturn]] void fail(const std::string& expected, const std::string& got,
-                       const std::string& name) {
-  throw std::runtime_error("expected " + expected + ", got " + got + ", in " + name);
-}
-
 std::optional<std::size_t> product(std::size_t a, std::size_t b) {
   if (a != 0 && b > std::numeric_limits<std::size_t>::max() / a) return std::nullopt;
   return a * b;
@@ -65,7 +60,8 @@ std::string utf32_text(std::span<const std::byte> element, const std::string& na
   for (std::size_t i = 0; i < end; i += 4) {
     std::uint32_t code = 0;
     std::memcpy(&code, element.data() + i, sizeof(code));
-    if (!append_utf8(code, text)) fail("Unicode text", "code point " + std::to_string(code), name);
+    if (!append_utf8(code, text))
+      refuse_numpy("Unicode text", "code point " + std::to_string(code), name);
   }
   return text;
 }
@@ -73,7 +69,7 @@ std::string utf32_text(std::span<const std::byte> element, const std::string& na
 std::string byte_text(std::span<const std::byte> element, const std::string& name) {
   std::string text(reinterpret_cast<const char*>(element.data()), element.size());
   text.resize(text.find_last_not_of('\0') + 1);
-  if (!is_utf8(text)) fail("ASCII or UTF-8 text", "other bytes", name);
+  if (!is_utf8(text)) refuse_numpy("ASCII or UTF-8 text", "other bytes", name);
   return text;
 }
 
@@ -105,33 +101,39 @@ std::optional<std::size_t> item_size_of(std::string_view descr) {
 
 }  // namespace
 
+void refuse_numpy(const std::string& expected, std::string got, const std::string& name) {
+  std::ranges::replace_if(
+      got, [](char c) { return c < ' ' || c > '~'; }, '?');
+  throw std::runtime_error("expected " + expected + ", got " + got + ", in " + name);
+}
+
 TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std::byte> data,
                                  const std::string& name) {
   const std::string& descr = layout.descr;
   if (descr.find('O') != std::string::npos) {
-    fail("an array of numbers or text", "Python objects (dtype '" + descr + "')", name);
+    refuse_numpy("an array of numbers or text", "Python objects (dtype '" + descr + "')", name);
   }
   const auto item_size = item_size_of(descr);
   if (!item_size) {
-    fail("dtype <f4, <f8, <i4, <i8, |u1, |b1, <U or |S", "'" + descr + "'", name);
+    refuse_numpy("dtype <f4, <f8, <i4, <i8, |u1, |b1, <U or |S", "'" + descr + "'", name);
   }
   TypedArray array{.shape = layout.shape, .values = {}};
   if (array.shape.size() > kMostDimensions) {
-    fail("at most 32 dimensions", std::to_string(array.shape.size()), name);
+    refuse_numpy("at most 32 dimensions", std::to_string(array.shape.size()), name);
   }
   std::optional<std::size_t> size_bytes = item_size;
   for (const std::size_t size : array.shape) {
     if (size_bytes) size_bytes = product(*size_bytes, size);
   }
   if (size_bytes != data.size()) {
-    fail((size_bytes ? std::to_string(*size_bytes) : "countless") + " bytes for shape " +
-             array.shape_text() + " of " + descr,
-         std::to_string(data.size()), name);
+    refuse_numpy((size_bytes ? std::to_string(*size_bytes) : "countless") + " bytes for shape " +
+                     array.shape_text() + " of " + descr,
+                 std::to_string(data.size()), name);
   }
   if (*item_size == 0) {
     // Elements without bytes: their number could not be checked against the input.
     const bool empty = std::ranges::find(array.shape, 0u) != array.shape.end();
-    if (!empty) fail("text of at least one character", "'" + descr + "'", name);
+    if (!empty) refuse_numpy("text of at least one character", "'" + descr + "'", name);
   }
 
   if (descr == "<f8") {

@@ -22,4 +22,9 @@ struct NumpyLayout {
 TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std::byte> data,
                                  const std::string& name);
 
+/// Throws std::runtime_error "expected X, got Y, in NAME". What is not printable in `got`, which
+/// may be foreign, becomes '?': a NUL would end the message before the name.
+[[noreturn]] void refuse_numpy(const std::string& expected, std::string got,
+                               const std::string& name);
+
 }  // namespace eventgan
