@@ -78,10 +78,18 @@ TEST_F(Span, IsRecordedWhenAnExceptionEndsIt) {
   EXPECT_EQ(events(finished(), "X", "a").size(), 1u);
 }
 
-TEST(SpanWithoutARecorder, DoesNothing) {
-  TraceSpan span(nullptr, "a", "c");
-  span.note("text", "x");
-  span.note("number", 1);
+TEST_F(Span, WithoutARecorderDoesNothing) {
+  {
+    TraceSpan span(nullptr, "a", "c");
+    span.note("text", "x");
+    span.note("number", 1);
+    const TraceSpan recorded(&trace_, "b", "c");
+  }
+  // Neither an event nor a note of it, though this thread has a recorder.
+  const auto spans = events(finished(), "X");
+  ASSERT_EQ(spans.size(), 1u);
+  EXPECT_EQ(spans[0].at("name"), "b");
+  EXPECT_TRUE(spans[0].at("args").empty());
 }
 
 }  // namespace

@@ -13,8 +13,8 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 TEST(FrameTimesTest, TakesAscendingTimes) {
-  check_frame_times({-1}, "f");
-  check_frame_times({0, 1, std::nextafter(1.0, 2.0)}, "f");
+  EXPECT_NO_THROW(check_frame_times({-1}, "f"));
+  EXPECT_NO_THROW(check_frame_times({0, 1, std::nextafter(1.0, 2.0)}, "f"));
 }
 
 TEST(FrameTimesTest, RefusesOthers) {
