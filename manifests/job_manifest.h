@@ -39,6 +39,9 @@ struct PairSpec {
   PairSide side = PairSide::kBefore;
   PairChoice choose = PairChoice::kOne;
   std::int64_t min_pairs = 1;  ///< fewer pairs than this from the source is an error
+  /// Frames farther apart in time than this are no partners; > 0. Where times are unknown, and
+  /// without it, all are.
+  std::optional<double> max_gap_s = std::nullopt;
 };
 
 /// One dataset on disk. Paths are as written in the manifest.

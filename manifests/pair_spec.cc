@@ -28,6 +28,7 @@ PairSpec read_pairs(const StrictValue& value) {
   if (const auto least = object.find("min_pairs")) {
     spec.min_pairs = least->integer<std::int64_t>(0, 1'000'000'000);
   }
+  if (const auto most = object.find("max_gap_s")) spec.max_gap_s = most->number(1e-6, 1e6);
   spec.gaps = read_gaps(object.at("gaps"), spec.side);
   object.finish();
   return spec;

@@ -1,5 +1,6 @@
 #include "pipeline/planning/pair_choice.h"
 
+#include <optional>
 #include <string_view>
 
 #include "manifests/counter_random.h"
@@ -30,9 +31,16 @@ struct Candidate {
   PlannedSample sample;
 };
 
-Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, PairSide side, int gap) {
+/// Times are differences of large numbers: what the clock ticks off as 0.1 s may be a little more.
+bool too_far_apart(const FramePair& pair, std::optional<double> max_gap_s) {
+  constexpr double kTolerance_s = 1e-6;
+  return max_gap_s && pair.gap_s() > *max_gap_s + kTolerance_s;  // false if a time is unknown
+}
+
+Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const PairSpec& spec,
+                    int gap) {
   using State = Neighbour::State;
-  const Window place = window(side, gap);
+  const Window place = window(spec.side, gap);
   const Neighbour previous = dataset.neighbour(frame, place.first);
   const Neighbour next = dataset.neighbour(frame, place.last);
 
@@ -42,6 +50,7 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, PairSide
                    frame.label_key,
                    {previous.frame, next.frame, gap, frame.frame.index, place.position},
                    ""};
+  if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
   for (const Neighbour* neighbour : {&previous, &next}) {
     if (neighbour->state == State::kHole && result.sample.fault.empty()) {
       result.sample.fault = "expected a frame, got no file, in " + neighbour->frame.path + " (" +
@@ -62,7 +71,7 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   std::vector<PlannedSample> present;
   std::vector<PlannedSample> damaged;
   for (const int gap : source.pairs.gaps) {
-    Candidate found = candidate(dataset, frame, source.pairs.side, gap);
+    Candidate found = candidate(dataset, frame, source.pairs, gap);
     if (found.state == Neighbour::State::kPresent) present.push_back(std::move(found.sample));
     if (found.state == Neighbour::State::kHole) damaged.push_back(std::move(found.sample));
   }
@@ -77,7 +86,7 @@ PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
                             const SourceSpec& source) {
   PairChoiceResult result;
   for (const int gap : source.pairs.gaps) {
-    Candidate found = candidate(dataset, frame, source.pairs.side, gap);
+    Candidate found = candidate(dataset, frame, source.pairs, gap);
     if (found.state == Neighbour::State::kBeyond) {
       result.without_partner.push_back(gap);
       continue;

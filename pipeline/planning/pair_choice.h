@@ -12,7 +12,8 @@ namespace eventgan {
 /// What becomes of one labelled frame.
 struct PairChoiceResult {
   std::vector<PlannedSample> samples;
-  /// Gaps whose partner lies beyond the sequence's ends (with choose = one: all of them, or none).
+  /// Gaps whose partner lies beyond the sequence's ends or pairs.max_gap_s (with choose = one: all
+  /// of them, or none).
   std::vector<int> without_partner;
 };
 

@@ -44,6 +44,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.sources[0].pairs.side, PairSide::kBefore);
   EXPECT_EQ(manifest.sources[0].pairs.choose, PairChoice::kOne);
   EXPECT_EQ(manifest.sources[0].pairs.min_pairs, 1);
+  EXPECT_EQ(manifest.sources[0].pairs.max_gap_s, std::nullopt);
   EXPECT_EQ(manifest.sources[0].raw_root, std::nullopt);
   EXPECT_EQ(manifest.sources[0].layout, std::nullopt);
   EXPECT_EQ(manifest.sources[0].frames_per_second, std::nullopt);
@@ -66,7 +67,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
     "format": "eventgan-manifest", "version": 1, "name": "n", "seed": 9223372036854775807,
     "sources": [
       {"dataset": "kitti_object", "root": "a", "split": "val", "raw_root": "b", "devkit": "c",
-       "pairs": {"gaps": [6, 1, 4], "side": "after", "choose": "all", "min_pairs": 5}},
+       "pairs": {"gaps": [6, 1, 4], "side": "after", "choose": "all", "min_pairs": 5,
+                 "max_gap_s": 0.4}},
       {"dataset": "mpii", "root": "d", "annotations": "e", "sequences": "f",
        "pairs": {"gaps": [4], "side": "around"}},
       {"dataset": "human36m", "root": "g", "layout": "extracted", "pairs": {"gaps": [2]}},
@@ -89,6 +91,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(kitti.pairs.side, PairSide::kAfter);
   EXPECT_EQ(kitti.pairs.choose, PairChoice::kAll);
   EXPECT_EQ(kitti.pairs.min_pairs, 5);
+  EXPECT_EQ(kitti.pairs.max_gap_s, 0.4);
   EXPECT_EQ(manifest.sources[1].annotations, "e");
   EXPECT_EQ(manifest.sources[1].sequences, "f");
   EXPECT_EQ(manifest.sources[1].pairs.side, PairSide::kAround);

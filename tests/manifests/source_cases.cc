@@ -118,15 +118,18 @@ std::vector<ManifestCase> source_cases() {
       {"other pairs",
        {{"/sources/0/pairs/side", R"("after")"},
         {"/sources/0/pairs/choose", R"("all")"},
-        {"/sources/0/pairs/min_pairs", "0"}},
+        {"/sources/0/pairs/min_pairs", "0"},
+        {"/sources/0/pairs/max_gap_s", "0.5"}},
        {}},
       {"pairs of no kind",
        {{"/sources/0/pairs/side", R"("Before")"},
         {"/sources/0/pairs/choose", R"("two")"},
-        {"/sources/0/pairs/min_pairs", "-1"}},
+        {"/sources/0/pairs/min_pairs", "-1"},
+        {"/sources/0/pairs/max_gap_s", "0"}},
        {R"($.sources[0].pairs.side: expected "before", "after" or "around", got "Before")",
         R"($.sources[0].pairs.choose: expected "one" or "all", got "two")",
-        "$.sources[0].pairs.min_pairs: expected an integer 0..1000000000, got -1"}},
+        "$.sources[0].pairs.min_pairs: expected an integer 0..1000000000, got -1",
+        "$.sources[0].pairs.max_gap_s: expected a number 1e-06..1e+06, got 0"}},
   };
 }
 

@@ -76,8 +76,7 @@ std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root,
   }
   std::map<std::string, NumberedSequence> sequences;
   for (const auto& [sequence, files] : names) {
-    sequences.emplace(sequence, NumberedSequence({files.begin(), files.end()},
-                                                 NumberedSequence::Stride::kInferred));
+    sequences.emplace(sequence, NumberedSequence({files.begin(), files.end()}));
   }
   return sequences;
 }

@@ -36,9 +36,7 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
     dataset.add_video(
         action + "/" + camera,
         FrameFolder(root.written(folder), kPrefix,
-                    NumberedSequence::list(root.on_disk(folder), kPrefix, kPictureExtensions,
-                                           NumberedSequence::Stride::kInferred),
-                    labelled_numbers));
+                    NumberedSequence::list(root.on_disk(folder), kPrefix), labelled_numbers));
   }
   for (std::size_t row = 0; labelled && row < table->row_count(); ++row) {
     const std::string sequence = action + "/" + std::to_string(table->camera(row));

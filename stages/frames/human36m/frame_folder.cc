@@ -8,21 +8,14 @@ namespace eventgan {
 
 FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequence stored,
                          const std::vector<std::int64_t>& labelled)
-    : folder_(std::move(folder)), prefix_(std::move(prefix)), stored_(std::move(stored)) {
-  std::vector<std::int64_t> numbers = labelled;
-  for (const auto& [number, name] : stored_.frames()) numbers.push_back(number);
-  if (numbers.empty()) return;
-  const auto [first, last] = std::ranges::minmax(numbers);
-  first_ = first;
-  last_ = last;
-  stride_ = stored_.stride();
-  if (stored_.frames().size() >= 2) return;
-  // Next to nothing is stored: the labels tell better how the video was sampled.
-  std::ranges::sort(numbers);
-  numbers.erase(std::ranges::unique(numbers).begin(), numbers.end());
-  std::vector<NumberedSequence::Frame> frames;
-  for (const std::int64_t one : numbers) frames.emplace_back(one, "");
-  stride_ = NumberedSequence(std::move(frames), NumberedSequence::Stride::kInferred).stride();
+    : folder_(std::move(folder)),
+      prefix_(std::move(prefix)),
+      stored_(std::move(stored)),
+      numbers_(labelled) {
+  for (const auto& [number, name] : stored_.frames()) numbers_.push_back(number);
+  std::ranges::sort(numbers_);
+  const auto repeated = std::ranges::unique(numbers_);
+  numbers_.erase(repeated.begin(), repeated.end());
 }
 
 FrameRef FrameFolder::frame(std::int64_t number) const {
@@ -35,10 +28,15 @@ FrameRef FrameFolder::frame(std::int64_t number) const {
 }
 
 Neighbour FrameFolder::neighbour(std::int64_t number, int steps) const {
-  const std::int64_t target = number + steps * stride_;
-  if (stored_.contains(target)) return {Neighbour::State::kPresent, frame(target)};
-  if (steps != 0 && (target < first_ || target > last_)) return {};
-  return {Neighbour::State::kHole, frame(target)};
+  const auto here = std::ranges::lower_bound(numbers_, number);
+  const bool is_known = here != numbers_.end() && *here == number;
+  if (steps == 0 && !is_known) return {Neighbour::State::kHole, frame(number)};
+  const std::ptrdiff_t place =
+      here - numbers_.begin() + (steps > 0 && !is_known ? steps - 1 : steps);
+  if (place < 0 || place >= std::ssize(numbers_)) return {};
+  const std::int64_t target = numbers_[static_cast<std::size_t>(place)];
+  return {stored_.contains(target) ? Neighbour::State::kPresent : Neighbour::State::kHole,
+          frame(target)};
 }
 
 }  // namespace eventgan

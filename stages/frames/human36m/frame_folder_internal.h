@@ -22,17 +22,16 @@ class FrameFolder {
 
   FrameRef frame(std::int64_t number) const;
 
-  /// The frame `steps` strides after `number`. The video reaches from the smallest to the largest
-  /// number that is stored or labelled; what is absent between them is a hole.
+  /// The frame `steps` frames after `number` of those that are stored or labelled, however far
+  /// apart their numbers: h36m-fetch keeps a frame when the person has moved. One that is labelled
+  /// but not stored is a hole.
   Neighbour neighbour(std::int64_t number, int steps) const;
 
  private:
   std::string folder_;
   std::string prefix_;
   NumberedSequence stored_;
-  std::int64_t first_ = 0;
-  std::int64_t last_ = -1;
-  std::int64_t stride_ = 1;
+  std::vector<std::int64_t> numbers_;  ///< stored or labelled; ascending, each once
 };
 
 }  // namespace eventgan

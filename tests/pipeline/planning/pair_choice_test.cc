@@ -15,7 +15,7 @@ using testing::FakeDataset;
 SourceSpec source(std::vector<int> gaps, PairSide side, PairChoice choose) {
   SourceSpec spec;
   spec.dataset = DatasetKind::kKittiObject;
-  spec.pairs = {std::move(gaps), side, choose, 1};
+  spec.pairs = {std::move(gaps), side, choose};
   return spec;
 }
 
@@ -94,6 +94,24 @@ TEST(ChoosePairs, BeyondTheSequenceThereIsNoPartnerAndNoSample) {
   const auto result = choose(dataset, 0, source({1, 2}, PairSide::kBefore, PairChoice::kOne));
   EXPECT_TRUE(result.samples.empty());
   EXPECT_THAT(result.without_partner, ::testing::ElementsAre(1, 2));
+}
+
+TEST(ChoosePairs, FramesFartherApartThanAskedAreNoPartners) {
+  FakeDataset dataset("root", 20);  // a frame each 0.1 s
+  auto spec = source({1, 2, 3, 4}, PairSide::kBefore, PairChoice::kAll);
+  for (const double most : {0.3, 0.35}) {  // 12 * 0.1 - 9 * 0.1 is 0.30000000000000016
+    spec.pairs.max_gap_s = most;
+    const auto result = choose(dataset, 12, spec);
+    ASSERT_EQ(result.samples.size(), 3u) << most;
+    EXPECT_EQ(result.samples.back().pair.gap_frames, 3);
+    EXPECT_THAT(result.without_partner, ::testing::ElementsAre(4));
+  }
+  spec.pairs.max_gap_s = 0.05;
+  EXPECT_TRUE(choose(dataset, 12, spec).samples.empty());
+  dataset.make_hole(11);
+  EXPECT_TRUE(choose(dataset, 12, spec).samples.empty()) << "nobody asked for that frame";
+  spec.pairs.choose = PairChoice::kOne;
+  EXPECT_THAT(choose(dataset, 12, spec).without_partner, ::testing::ElementsAre(1, 2, 3, 4));
 }
 
 TEST(ChoosePairs, AHoleBecomesASampleThatNamesTheMissingFile) {

@@ -126,8 +126,8 @@ TEST_F(FetchLayoutTest, RowsAsManyAsIntrinsicsAreNotMixedUp) {
   EXPECT_EQ(original["intrinsics/7"].size(), 4u);
 }
 
-TEST_F(FetchLayoutTest, NeighboursStepByTheStoredStride) {
-  add_pictures("7", {1, 6, 16, 21});  // every fifth; 11 is lost
+TEST_F(FetchLayoutTest, NeighboursCountFramesThatAreStoredOrLabelled) {
+  add_pictures("7", {1, 6, 16, 21});  // 11 and 26 are labelled, but lost
   add_annotations(fetch_annotations({{7, 6}, {7, 11}, {7, 26}}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
@@ -142,7 +142,6 @@ TEST_F(FetchLayoutTest, NeighboursStepByTheStoredStride) {
   EXPECT_EQ(hole.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000011.jpg");
   EXPECT_EQ(dataset->neighbour(frames[0], 2).frame.index, 16);
   EXPECT_NEAR(dataset->neighbour(frames[0], 2).frame.time_s, 0.3, 1e-12);
-  // A row for frame 26 says that the video goes on to there.
   EXPECT_EQ(dataset->neighbour(frames[0], 4).state, State::kHole);
   EXPECT_EQ(dataset->neighbour(frames[0], 5).state, State::kBeyond);
   EXPECT_EQ(dataset->neighbour(frames[0], -2).state, State::kBeyond);
@@ -225,10 +224,29 @@ TEST_F(FetchLayoutTest, RefusesMissingAndMisshapenDatasets) {
     EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("no such array"),
                                                                  HasSubstr("(" + name + ")"))));
   }
+  EXPECT_EQ(dataset->neighbour(frames[0], 4).frame.index, 26);
 }
 
 TEST_F(FetchLayoutTest, RefusesOddNumbersAndFilesAndDoubleRows) {
   auto datasets = fetch_annotations({{7, 1}});
+TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNoHoles) {
+  // As h36m-fetch selects them: those at which a joint has moved by 40 mm.
+  const std::vector<int> kept = {1, 14, 16, 17, 30};
+  add_pictures("7", kept);
+  add_annotations(fetch_annotations({{7, 1}, {7, 14}, {7, 16}, {7, 17}, {7, 30}}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  for (int i = 0; i < 5; ++i) {
+    for (int step = -i; step < 5 - i; ++step) {
+      const Neighbour found = dataset->neighbour(frames[static_cast<std::size_t>(i)], step);
+      EXPECT_EQ(found.state, State::kPresent);
+      EXPECT_EQ(found.frame.index, kept[static_cast<std::size_t>(i + step)]);
+    }
+  }
+  EXPECT_NEAR(dataset->neighbour(frames[0], 1).frame.time_s - frames[0].frame.time_s, 13 / 50.0,
+              1e-12);
+}
+
   for (const double frame : {-1.0, 1.5, 1e9, std::nan("")}) {
     datasets["frame"] = {{1}, std::vector<double>{frame}};
     add_annotations(datasets);

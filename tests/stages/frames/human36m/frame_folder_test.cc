@@ -12,27 +12,39 @@ NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
   for (const std::int64_t number : numbers) {
     frames.emplace_back(number, "img_00" + std::to_string(number) + ".png");
   }
-  return NumberedSequence(std::move(frames), NumberedSequence::Stride::kInferred);
+  return NumberedSequence(std::move(frames));
 }
 
-TEST(FrameFolderTest, StrideComesFromTheStoredFrames) {
+TEST(FrameFolderTest, CountsStoredFramesWhateverTheirNumbers) {
   // Labels lie farther apart than pictures.
-  const FrameFolder folder("root/7", "img_", stored({1000, 1005, 1010, 1015}), {1000, 1015});
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005, 1006, 1040}), {1000, 1040});
   const Neighbour next = folder.neighbour(1000, 1);
   EXPECT_EQ(next.state, State::kPresent);
   EXPECT_EQ(next.frame.path, "root/7/img_001005.png");
-  EXPECT_EQ(folder.neighbour(1000, 3).frame.index, 1015);
+  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1006);
+  EXPECT_EQ(folder.neighbour(1000, 3).frame.index, 1040);
   EXPECT_EQ(folder.neighbour(1000, 4).state, State::kBeyond);
+  EXPECT_EQ(folder.neighbour(1040, -3).frame.index, 1000);
+  EXPECT_EQ(folder.neighbour(1040, -4).state, State::kBeyond);
 }
 
-TEST(FrameFolderTest, StrideComesFromTheLabelsWhereNothingIsStored) {
-  for (const auto& numbers : {std::vector<std::int64_t>{}, std::vector<std::int64_t>{1000}}) {
-    const FrameFolder folder("root/7", "img_", stored(numbers), {1010, 1000, 1005, 1005});
-    const Neighbour next = folder.neighbour(1005, 1);
-    EXPECT_EQ(next.state, State::kHole);
-    EXPECT_EQ(next.frame.index, 1010);
-    EXPECT_EQ(folder.neighbour(1005, 2).state, State::kBeyond);
-  }
+TEST(FrameFolderTest, ALabelledFrameWithoutPictureCountsAsAHole) {
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {1010, 1000, 1003, 1003});
+  const Neighbour hole = folder.neighbour(1000, 1);
+  EXPECT_EQ(hole.state, State::kHole);
+  EXPECT_EQ(hole.frame.path, "root/7/img_001003.png");
+  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1005);
+  EXPECT_EQ(folder.neighbour(1003, 0).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1005, 1).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1005, 2).state, State::kBeyond);
+}
+
+TEST(FrameFolderTest, AFrameThatIsNotThereHasThoseBesideIt) {
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {});
+  EXPECT_EQ(folder.neighbour(1002, 0).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1002, 1).frame.index, 1005);
+  EXPECT_EQ(folder.neighbour(1002, -1).frame.index, 1000);
+  EXPECT_EQ(folder.neighbour(1002, 2).state, State::kBeyond);
 }
 
 TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
