@@ -38,8 +38,9 @@ std::vector<std::string> human36m_joint_names(std::size_t count) {
             "R_Wrist_End_Site"};
   }
   if (count == 17) {
-    return {"root (pelvis)", "left_hip",      "left_knee",  "left_foot",  "right_hip",
-            "right_knee",    "right_foot",    "spine",      "thorax",     "neck_base",
+    // Lists such as h36m_coco.json have the legs the other way round, which is an old mistake.
+    return {"root (pelvis)", "right_hip",     "right_knee", "right_foot", "left_hip",
+            "left_knee",     "left_foot",     "spine",      "thorax",     "neck_base",
             "head",          "left_shoulder", "left_elbow", "left_wrist", "right_shoulder",
             "right_elbow",   "right_wrist"};
   }

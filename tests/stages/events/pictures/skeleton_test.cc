@@ -14,8 +14,8 @@ const std::vector<std::string> kMpii{"r_ankle",    "r_knee",     "r_hip",   "l_h
 
 // The two ways in which Human3.6M's 17 joints are named.
 const std::vector<std::string> kHuman36m17{
-    "root (pelvis)", "left_hip",   "left_knee",      "left_foot",   "right_hip",  "right_knee",
-    "right_foot",    "spine",      "thorax",         "neck_base",   "head",       "left_shoulder",
+    "root (pelvis)", "right_hip",  "right_knee",     "right_foot",  "left_hip",   "left_knee",
+    "left_foot",     "spine",      "thorax",         "neck_base",   "head",       "left_shoulder",
     "left_elbow",    "left_wrist", "right_shoulder", "right_elbow", "right_wrist"};
 const std::vector<std::string> kHuman36m17Short{
     "Hip",       "RHip", "RKnee",     "RFoot",  "LHip",   "LKnee",     "LFoot",  "Spine", "Thorax",
