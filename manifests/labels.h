@@ -61,15 +61,30 @@ struct Intrinsics {
   bool operator==(const Intrinsics&) const = default;
 };
 
+/// Lens distortion as Human3.6M models it, for a point (a, b) = (X/Z, Y/Z) with r2 = a^2 + b^2:
+///   d = 1 + k1 r2 + k2 r2^2 + k3 r2^3 + p1 b + p2 a,   a' = a d + p2 r2,   b' = b d + p1 r2,
+/// and (a', b') goes through the pinhole camera in place of (a, b). It acts before pixels come in,
+/// so scaling or cutting a picture leaves it as it is. (OpenCV's model has twice this p1 b + p2 a.)
+struct LensDistortion {
+  double k1 = 0;
+  double k2 = 0;
+  double k3 = 0;
+  double p1 = 0;
+  double p2 = 0;
+  bool operator==(const LensDistortion&) const = default;
+};
+
 /// One person as annotated, in pixels of the source picture, 0-based.
 struct Person {
   std::vector<Joint> joints;     ///< one for each of LabelSchema::joint_names, in that order
   Point center = kMissingPoint;  ///< kMissingPoint if not annotated
   double scale = -1;             ///< as annotated (MPII: height / 200 px); -1 if not annotated
   std::optional<Rectangle> head_box;
-  /// [J][x, y, z] in mm in the camera frame; empty if the dataset has none.
-  std::vector<std::array<double, 3>> joints3d_mm;
+  /// [J][x, y, z] in mm in the camera frame, none for a joint that is not known; empty if no joint
+  /// is.
+  std::vector<std::optional<std::array<double, 3>>> joints3d_mm;
   std::optional<Intrinsics> camera;
+  std::optional<LensDistortion> distortion;  ///< of `camera`; none if it is not known
   bool operator==(const Person&) const = default;
 };
 

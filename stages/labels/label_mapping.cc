@@ -31,6 +31,10 @@ bool is_finite(const Intrinsics& camera) {
                                                   camera.centre_y});
 }
 
+bool is_finite(const LensDistortion& lens) {
+  return all_finite(std::initializer_list<double>{lens.k1, lens.k2, lens.k3, lens.p1, lens.p2});
+}
+
 bool overlaps(const Rectangle& box, ImageSize picture) {
   return box.left < picture.width && box.right > 0 && box.top < picture.height && box.bottom > 0;
 }
@@ -47,6 +51,16 @@ std::ostream& operator<<(std::ostream& out, const Rectangle& box) {
 
 std::ostream& operator<<(std::ostream& out, Point point) {
   return out << "(" << point.x << ", " << point.y << ")";
+}
+
+std::ostream& operator<<(std::ostream& out, const Intrinsics& camera) {
+  return out << "f_x " << camera.focal_x << ", f_y " << camera.focal_y << ", c_x "
+             << camera.centre_x << ", c_y " << camera.centre_y;
+}
+
+std::ostream& operator<<(std::ostream& out, const LensDistortion& lens) {
+  return out << "k1 " << lens.k1 << ", k2 " << lens.k2 << ", k3 " << lens.k3 << ", p1 " << lens.p1
+             << ", p2 " << lens.p2;
 }
 
 std::ostream& operator<<(std::ostream& out, ImageSize size) {
@@ -97,11 +111,16 @@ Complaint check(const Person& person, ImageSize picture) {
   if (person.head_box && !is_finite(*person.head_box)) {
     return text("expected a finite head box, got ", *person.head_box);
   }
-  if (!std::ranges::all_of(person.joints3d_mm, all_finite<std::array<double, 3>>)) {
-    return text("expected finite joints in 3-D, got NaN or infinity");
+  for (const auto& joint : person.joints3d_mm) {
+    if (!joint || all_finite(*joint)) continue;
+    return text("expected finite joints in 3-D, got (", (*joint)[0], ", ", (*joint)[1], ", ",
+                (*joint)[2], ") mm");
   }
   if (person.camera && !is_finite(*person.camera)) {
-    return text("expected a finite camera, got NaN or infinity");
+    return text("expected a finite camera, got ", *person.camera);
+  }
+  if (person.distortion && !is_finite(*person.distortion)) {
+    return text("expected a finite lens distortion, got ", *person.distortion);
   }
   return check_joints(person.joints, picture);
 }

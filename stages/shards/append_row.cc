@@ -1,3 +1,4 @@
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -8,6 +9,8 @@
 
 namespace eventgan {
 namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 void push(std::vector<double>& column, Point point) {
   column.insert(column.end(), {point.x, point.y});
@@ -23,9 +26,7 @@ void push(std::vector<double>& column, const std::optional<Rectangle>& box) {
 }
 
 /// Makes an optional column as long as if every row before `size` had NaN for "none".
-void pad(std::vector<double>& column, std::size_t size) {
-  column.resize(size, std::numeric_limits<double>::quiet_NaN());
-}
+void pad(std::vector<double>& column, std::size_t size) { column.resize(size, kNan); }
 
 void push_camera(std::vector<double>& column, const std::optional<Intrinsics>& camera,
                  std::size_t persons_before) {
@@ -97,11 +98,17 @@ void append_person(const Person& person, const VolumePerson& mapped, PoseColumns
   if (!person.joints3d_mm.empty()) {
     pad(to.joints3d_mm, 3 * person.joints3d_mm.size() * persons_before);
     for (const auto& joint : person.joints3d_mm) {
-      to.joints3d_mm.insert(to.joints3d_mm.end(), joint.begin(), joint.end());
+      const auto place = joint.value_or(std::array{kNan, kNan, kNan});
+      to.joints3d_mm.insert(to.joints3d_mm.end(), place.begin(), place.end());
     }
   }
   push_camera(to.camera, mapped.camera, persons_before);
   push_camera(to.camera_source, person.camera, persons_before);
+  if (const auto& lens = person.distortion) {
+    pad(to.camera_distortion, 5 * persons_before);
+    to.camera_distortion.insert(to.camera_distortion.end(),
+                                {lens->k1, lens->k2, lens->k3, lens->p1, lens->p2});
+  }
 }
 
 /// Persons after the last with a 3-D pose or a camera.
@@ -110,6 +117,7 @@ void pad_optional(std::size_t joints, PoseColumns& poses) {
   if (!poses.joints3d_mm.empty()) pad(poses.joints3d_mm, 3 * joints * persons);
   if (!poses.camera.empty()) pad(poses.camera, 4 * persons);
   if (!poses.camera_source.empty()) pad(poses.camera_source, 4 * persons);
+  if (!poses.camera_distortion.empty()) pad(poses.camera_distortion, 5 * persons);
 }
 
 void check_labels(const LabelSchema& schema, const ShardSample& sample) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <optional>
@@ -21,10 +22,26 @@ std::optional<Rectangle> box_if_any(const std::vector<double>& column, std::size
   return box == Rectangle{-1, -1, -1, -1} ? std::nullopt : std::optional(box);
 }
 
+/// Row `row` of an optional column of `width` numbers; none if the column is absent or all of them
+/// are NaN.
+const double* row_if_any(const std::vector<double>& column, std::size_t width, std::size_t row) {
+  if (column.empty()) return nullptr;
+  const double* first = &column[width * row];
+  const bool any = !std::all_of(first, first + width, [](double x) { return std::isnan(x); });
+  return any ? first : nullptr;
+}
+
 std::optional<Intrinsics> camera_if_any(const std::vector<double>& column, std::size_t row) {
-  if (column.empty() || std::isnan(column[4 * row])) return std::nullopt;
-  const double* number = &column[4 * row];
+  const double* number = row_if_any(column, 4, row);
+  if (number == nullptr) return std::nullopt;
   return Intrinsics{number[0], number[1], number[2], number[3]};
+}
+
+std::optional<LensDistortion> distortion_if_any(const std::vector<double>& column,
+                                                std::size_t row) {
+  const double* number = row_if_any(column, 5, row);
+  if (number == nullptr) return std::nullopt;
+  return LensDistortion{number[0], number[1], number[2], number[3], number[4]};
 }
 
 FramePair pair_at(const PairColumns& from, std::size_t row) {
@@ -70,13 +87,15 @@ Person annotated_person(const PoseColumns& from, std::size_t joints, std::size_t
   person.center = point_at(from.center_source, row);
   person.scale = from.scale[row];
   person.head_box = box_if_any(from.head_box_source, row);
-  const std::vector<double>& mm = from.joints3d_mm;
-  if (!mm.empty() && !std::isnan(mm[3 * row * joints])) {
+  if (row_if_any(from.joints3d_mm, 3 * joints, row) != nullptr) {
     for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
-      person.joints3d_mm.push_back({mm[3 * j], mm[3 * j + 1], mm[3 * j + 2]});
+      const double* mm = row_if_any(from.joints3d_mm, 3, j);
+      auto& joint = person.joints3d_mm.emplace_back();
+      if (mm != nullptr) joint = {mm[0], mm[1], mm[2]};
     }
   }
   person.camera = camera_if_any(from.camera_source, row);
+  person.distortion = distortion_if_any(from.camera_distortion, row);
   return person;
 }
 

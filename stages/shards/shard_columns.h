@@ -79,6 +79,8 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
   visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, true}, h.joints3d_mm);
   visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, true}, h.camera);
   visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, true}, h.camera_source);
+  visit(ColumnSpec{"/labels/poses/camera_distortion", Rows::kPersons, {5}, true},
+        h.camera_distortion);
 
   visit(ColumnSpec{"/valid", Rows::kSamples, {}}, tables.valid);
 }

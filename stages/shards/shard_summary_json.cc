@@ -1,3 +1,4 @@
+#include <array>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <type_traits>
@@ -20,6 +21,12 @@ Json json(const Intrinsics& camera) {
           {"centre_x", camera.centre_x},
           {"centre_y", camera.centre_y}};
 }
+
+Json json(const LensDistortion& lens) {
+  return {{"k1", lens.k1}, {"k2", lens.k2}, {"k3", lens.k3}, {"p1", lens.p1}, {"p2", lens.p2}};
+}
+
+Json json(const std::array<double, 3>& place) { return place; }
 
 template <class Value>
 Json json(const std::optional<Value>& value) {
@@ -65,6 +72,8 @@ Json json(const ShardHeader& header, const Person& person, const VolumePerson& m
                       {"at_source", json(person.joints[j].at)},
                       {"visible", person.joints[j].visible}});
   }
+  Json joints3d = Json::array();
+  for (const auto& joint : person.joints3d_mm) joints3d.push_back(json(joint));
   return {{"center", json(mapped.center)},
           {"center_source", json(person.center)},
           {"scale", person.scale},
@@ -73,8 +82,9 @@ Json json(const ShardHeader& header, const Person& person, const VolumePerson& m
           {"head_box_source", json(person.head_box)},
           {"camera", json(mapped.camera)},
           {"camera_source", json(person.camera)},
+          {"camera_distortion", json(person.distortion)},
           {"joints", joints},
-          {"joints3d_mm", person.joints3d_mm}};
+          {"joints3d_mm", joints3d}};
 }
 
 /// Annotations and paths need not be UTF-8, but JSON must be.

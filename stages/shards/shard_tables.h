@@ -49,7 +49,7 @@ struct BoxColumns {
   std::vector<std::int64_t> track_id;
 };
 
-/// `/labels/poses/*`, rows offsets[i] to offsets[i + 1] for sample i. The last three are empty as
+/// `/labels/poses/*`, rows offsets[i] to offsets[i + 1] for sample i. The last four are empty as
 /// long as no person has such a thing.
 struct PoseColumns {
   std::vector<std::int64_t> offsets{0};
@@ -58,7 +58,7 @@ struct PoseColumns {
   std::vector<double> center, center_source;
   std::vector<double> scale, scale_volume;
   std::vector<double> head_box, head_box_source;
-  std::vector<double> joints3d_mm, camera, camera_source;
+  std::vector<double> joints3d_mm, camera, camera_source, camera_distortion;
 };
 
 struct ShardTables {

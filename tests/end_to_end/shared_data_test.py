@@ -1,6 +1,7 @@
 """Real frames and labels, and the golden numbers, through the whole program."""
 
 import json
+import shutil
 import unittest
 
 import h5py
@@ -113,7 +114,17 @@ class SharedData(program.InFolder):
         self.assertIn("000000001.jpg", json.dumps(original))
 
     def test_human36m(self):
-        root = SHARED / "human36m_fetch"
+        # Its joints in 3-D and its cameras are random numbers, so no camera is claimed.
+        source = {"dataset": "human36m", "root": str(SHARED / "human36m_fetch"), "layout": "fetch", "pairs": pairs([1])}
+        self.assertIn("no camera for 18 of 18 rows", run("plan", self.write_manifest(manifest([source])))[0])
+
+        root = self.folder / "h36m"
+        shutil.copytree(SHARED / "human36m_fetch", root)
+        with h5py.File(root / "S1" / "Directions-1" / "annot.h5", "r+") as annotations:
+            for row, camera in enumerate(annotations["camera"][:]):  # the joints that these cameras see
+                fx, cx, fy, cy = annotations[f"intrinsics/{camera}"][:]
+                seen = (annotations["pose/2d"][row] - [cx, cy]) / [fx, fy]
+                annotations["pose/3d-univ"][row] = np.append(5000 * seen, np.full((len(seen), 1), 5000), axis=1)
         _, shards = self.convert(manifest([{"dataset": "human36m", "root": str(root), "layout": "fetch",
                                            "pairs": pairs([1, 6], "after", "one")}],
                                          image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"}))

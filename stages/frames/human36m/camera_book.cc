@@ -1,6 +1,10 @@
+#include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <span>
+#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -46,16 +50,37 @@ nlohmann::ordered_json json_of(const PickleNode& node, const std::string& file) 
   }
 }
 
-std::pair<double, double> two_numbers(const PickleNode& camera, const char* name,
-                                      const std::string& file) {
+std::vector<double> numbers(const PickleNode& camera, const char* name, std::size_t count,
+                            const std::string& file) {
   const PickleNode* node = camera.find(name);
   const std::string where = file + " (" + name + ")";
   if (node == nullptr) throw InputError("expected a camera's values, got none, in " + where);
   const TypedArray array = parse_pickled_array(*node, where);
-  if (array.size() != 2 || array.is_text()) {
-    throw InputError("expected two numbers, got " + array.shape_text() + ", in " + where);
+  if (array.size() != count || array.is_text()) {
+    throw InputError("expected " + std::to_string(count) + " numbers, got " + array.shape_text() +
+                     ", in " + where);
   }
-  return {array.number(0), array.number(1)};
+  std::vector<double> values(count);
+  for (std::size_t i = 0; i < count; ++i) values[i] = array.number(i);
+  return values;
+}
+
+std::optional<LensDistortion> distortion_of(const PickleNode& camera, const std::string& file) {
+  if (camera.find("k") == nullptr && camera.find("p") == nullptr) return std::nullopt;
+  const auto k = numbers(camera, "k", 3, file);
+  const auto p = numbers(camera, "p", 2, file);
+  return LensDistortion{k[0], k[1], k[2], p[0], p[1]};
+}
+
+/// Where the camera sees a place before it, by the equations in manifests/labels.h.
+Point project(const Intrinsics& camera, const LensDistortion& lens,
+              const std::array<double, 3>& place) {
+  const double a = place[0] / place[2];
+  const double b = place[1] / place[2];
+  const double r2 = a * a + b * b;
+  const double d = 1 + r2 * (lens.k1 + r2 * (lens.k2 + r2 * lens.k3)) + lens.p1 * b + lens.p2 * a;
+  return {camera.focal_x * (a * d + lens.p2 * r2) + camera.centre_x,
+          camera.focal_y * (b * d + lens.p1 * r2) + camera.centre_y};
 }
 
 std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
@@ -81,10 +106,11 @@ CameraBook read_camera_book(const std::filesystem::path& path) try {
       fail("keys (subject, camera)", key, file);
     }
     if (camera.kind != Kind::kDict) fail("a dictionary for each camera", camera, file);
-    const auto [focal_x, focal_y] = two_numbers(camera, "f", file);
-    const auto [centre_x, centre_y] = two_numbers(camera, "c", file);
+    const auto f = numbers(camera, "f", 2, file);
+    const auto c = numbers(camera, "c", 2, file);
     Human36mCamera entry;
-    entry.intrinsics = {focal_x, focal_y, centre_x, centre_y};
+    entry.intrinsics = {f[0], f[1], c[0], c[1]};
+    entry.distortion = distortion_of(camera, file);
     entry.fields = nlohmann::ordered_json::object();
     for (std::size_t k = 0; k + 1 < camera.items.size(); k += 2) {
       entry.fields[text_of(*camera.items[k], file)] = json_of(*camera.items[k + 1], file);
@@ -96,6 +122,38 @@ CameraBook read_camera_book(const std::filesystem::path& path) try {
   throw;
 } catch (const std::runtime_error& error) {  // the pickle itself
   throw InputError(error.what());
+}
+
+double projection_error_px(const Person& person) {
+  double largest = 0;
+  if (!person.camera) return largest;
+  for (std::size_t j = 0; j < person.joints3d_mm.size(); ++j) {
+    const auto& place = person.joints3d_mm[j];
+    if (!place || person.joints[j].at == kMissingPoint) continue;
+    if ((*place)[2] <= 0) return std::numeric_limits<double>::infinity();
+    const Point at = project(*person.camera, person.distortion.value_or(LensDistortion{}), *place);
+    largest =
+        std::max(largest, std::hypot(at.x - person.joints[j].at.x, at.y - person.joints[j].at.y));
+  }
+  return largest;
+}
+
+void take_wrong_camera(Person& person) {
+  if (projection_error_px(person) <= kProjectionTolerance_px) return;
+  person.camera.reset();
+  person.distortion.reset();
+}
+
+std::string wrong_camera_note(const std::vector<double>& errors_px, const std::string& what,
+                              const std::string& file) {
+  const auto wrong =
+      std::ranges::count_if(errors_px, [](double e) { return e > kProjectionTolerance_px; });
+  if (wrong == 0) return "";
+  std::ostringstream note;
+  note << "no camera for " << wrong << " of " << errors_px.size() << " rows: by " << what
+       << " a joint lies up to " << std::ranges::max(errors_px) << " px from where it is annotated"
+       << " (expected at most " << kProjectionTolerance_px << "), in " << file;
+  return note.str();
 }
 
 }  // namespace eventgan

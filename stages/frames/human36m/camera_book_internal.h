@@ -3,8 +3,10 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "manifests/labels.h"
 
@@ -13,6 +15,7 @@ namespace eventgan {
 /// One entry of cameras.pkl.
 struct Human36mCamera {
   Intrinsics intrinsics;
+  std::optional<LensDistortion> distortion;
   nlohmann::ordered_json fields;  ///< everything the entry says (R, T, c, f, k, p, w, h, name, id)
 };
 
@@ -20,7 +23,26 @@ struct Human36mCamera {
 using CameraBook = std::map<std::pair<std::string, std::string>, Human36mCamera>;
 
 /// Reads cameras.pkl: a dictionary of (subject, serial number) to a dictionary with at least the
-/// numpy arrays f and c of two elements, in pixels. Executes nothing of it. Throws InputError.
+/// numpy arrays f and c of two elements, in pixels; k of three (k1, k2, k3) and p of two (p1, p2)
+/// are the lens distortion, if they are there. Executes nothing of it. Throws InputError.
 CameraBook read_camera_book(const std::filesystem::path& file);
+
+/// How far a camera may put a joint in 3-D from the joint in the picture. A camera fitted without
+/// lens distortion, as h36m-fetch does it, is up to 11 px off at Human3.6M's borders.
+inline constexpr double kProjectionTolerance_px = 20;
+
+/// The largest distance in px of a joint from where the person's camera projects its joint in 3-D;
+/// infinity if one lies behind the camera, 0 without a camera.
+double projection_error_px(const Person& person);
+
+/// Takes the camera from a person whose joints in 3-D it does not project onto those in the
+/// picture, to within kProjectionTolerance_px: they do not belong together then, and which of them
+/// is wrong cannot be told.
+void take_wrong_camera(Person& person);
+
+/// Of how many rows, with these errors, that takes the camera; `what` names the camera and the two
+/// fields of joints. Empty if of none.
+std::string wrong_camera_note(const std::vector<double>& errors_px, const std::string& what,
+                              const std::string& file);
 
 }  // namespace eventgan

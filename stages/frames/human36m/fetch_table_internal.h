@@ -28,9 +28,13 @@ class FetchTable final : public PoseTable {
 
  private:
   std::optional<Intrinsics> intrinsics(std::size_t row) const;
+  Person person(std::size_t row) const;
 
   std::vector<std::string> notes_;
   TableColumns columns_;
+  // Joints in 3-D and the group of cameras that goes with them.
+  std::string pose_3d_;
+  std::string cameras_;
   std::size_t row_count_ = 0;
   std::size_t joint_count_ = 0;
 };

@@ -12,24 +12,28 @@ namespace eventgan {
 ///
 /// - fetch (h36m-fetch): S1/Directions-1/imageSequence/54138969/img_000001.jpg with
 /// S1/Directions-1/annot.h5,
-///   whose rows give `pose/2d` [M, J, 2] px, `pose/3d-univ` [M, J, 3] mm in the camera frame,
-///   `camera` and `frame` [M], and `intrinsics/CAMERA` = [fx, cx, fy, cy]. Sample
-///   "S1/Directions-1/54138969/000001", label key "S1/Directions-1/annot.h5#0".
+///   whose rows give `pose/2d` [M, J, 2] px, `camera` and `frame` [M], and joints in the camera
+///   frame [M, J, 3] mm with cameras [fx, cx, fy, cy]: `pose/3d` with `intrinsics/CAMERA`, or
+///   `pose/3d-univ` with `intrinsics-univ/CAMERA` (in a file without `pose/3d` and those, with
+///   `intrinsics/CAMERA`). Sample "S1/Directions-1/54138969/000001", label key
+///   "S1/Directions-1/annot.h5#0".
 /// - extracted: S1/S1_Directions_1.54138969/S1_Directions_1.54138969_000001.jpg with one .npz of
 /// `imgname`,
-///   `center` [N, 2] px, `scale` [N], `part` [N, J, 3] (x, y, visible) and `S` [N, J, 4] (x, y, z
-///   in metres, confidence): `spec.annotations`, or else the only such file of 17 joints in the
-///   root. `imgname` is a path below the root, or a bare file name. Intrinsics come from
-///   cameras.pkl in the root, if it is there. Sample "S1_Directions_1.54138969_000001", label key
-///   "FILE.npz#0".
+///   `center` [N, 2] px, `scale` [N], `part` [N, J, 3] (x, y, confidence) and `S` [N, J, 4] (x, y,
+///   z in metres, confidence): `spec.annotations`, or else the only such file of 17 joints in the
+///   root. `imgname` is a path below the root, or a bare file name. Intrinsics and distortion come
+///   from cameras.pkl in the root, if it is there. Sample "S1_Directions_1.54138969_000001", label
+///   key "FILE.npz#0".
 ///
 /// Every row is a sample of one person. Frame numbers are the official ones, from 1 at 50 frames a
-/// second, so time_s = (number - 1) / 50; one step is the smallest distance of two stored frames of
-/// a sequence. A row whose picture is absent stays a labelled frame, a hole at 0 steps. A joint at
-/// (0, 0) that is not visible is how an .npz marks a joint without annotation: it becomes
-/// kMissingPoint. Values that are not finite are a fault of their row; in fields that this program
-/// does not use, JSON makes them null. Annotation::original is an object with every field of the
-/// row, and the camera's.
+/// second, so time_s = (number - 1) / 50; one step is one frame of those stored or labelled. A row
+/// whose picture is absent stays a labelled frame, a hole. Visibility is not annotated:
+/// Joint::visible is -1. In an .npz a joint at (0, 0) without confidence is one without annotation,
+/// kMissingPoint; elsewhere it stays, with visible 0; a joint in 3-D without confidence is unknown.
+/// A person whose camera does not project the joints in 3-D onto those in the picture
+/// (kProjectionTolerance_px) has no camera; notes() tell how many. Values that are not finite are a
+/// fault of their row; in fields that this program does not use, JSON makes them null.
+/// Annotation::original is an object with every field of the row, and the camera's.
 ///
 /// The annotations are read whole into memory here (about 1-2 kB a row), so that nothing uses HDF5
 /// later: it is not thread safe, and open_human36m_dataset must not run while another thread is in

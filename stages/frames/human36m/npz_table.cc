@@ -65,6 +65,11 @@ NpzTable::NpzTable(const std::filesystem::path& file, const std::string& shown, 
                      " cameras of subjects, the first " + *unknown.begin() +
                      ": not in a cameras.pkl in the root");
   }
+  std::vector<double> errors_px;
+  for (std::size_t row = 0; row < rows; ++row)
+    errors_px.push_back(projection_error_px(person(row)));
+  const std::string note = wrong_camera_note(errors_px, "cameras.pkl and S", shown);
+  if (!note.empty()) notes_.push_back(note);
 }
 
 const Human36mCamera* NpzTable::camera(std::size_t row) const {
@@ -72,35 +77,46 @@ const Human36mCamera* NpzTable::camera(std::size_t row) const {
   return found == cameras_.end() ? nullptr : &found->second;
 }
 
-Outcome<Annotation> NpzTable::annotation(std::size_t row) const {
-  for (const char* name : {"part", "S", "center", "scale"}) {
-    if (auto fault = columns_.not_finite(columns_.row_of(name, row), name, row)) return *fault;
-  }
+Person NpzTable::person(std::size_t row) const {
   const auto part = columns_.row_of("part", row);
   const auto joints3d = columns_.row_of("S", row);
   const auto center = columns_.row_of("center", row);
   Person person;
+  bool any_in_3d = false;
   for (std::size_t j = 0; j < joint_count_; ++j) {
+    // The third number is a confidence, 1 for whatever is annotated: it says nothing of visibility.
     const Point at{part[3 * j], part[3 * j + 1]};
-    const bool visible = part[3 * j + 2] > 0;
-    const bool annotated = visible || at != Point{0, 0};
-    person.joints.push_back({.at = annotated ? at : kMissingPoint, .visible = visible ? 1 : 0});
+    const bool sure = part[3 * j + 2] > 0;
+    const bool annotated = sure || at != Point{0, 0};
+    person.joints.push_back({.at = annotated ? at : kMissingPoint, .visible = sure ? -1 : 0});
     constexpr double kMmPerMetre = 1000;
-    person.joints3d_mm.push_back({kMmPerMetre * joints3d[4 * j], kMmPerMetre * joints3d[4 * j + 1],
-                                  kMmPerMetre * joints3d[4 * j + 2]});
+    auto& place = person.joints3d_mm.emplace_back();
+    if (!(joints3d[4 * j + 3] > 0)) continue;
+    place = {kMmPerMetre * joints3d[4 * j], kMmPerMetre * joints3d[4 * j + 1],
+             kMmPerMetre * joints3d[4 * j + 2]};
+    any_in_3d = true;
   }
+  if (!any_in_3d) person.joints3d_mm.clear();
   person.center = {center[0], center[1]};
   person.scale = columns_.row_of("scale", row)[0];
-  auto original = columns_.fields(row, row_count());
   if (const Human36mCamera* one = camera(row)) {
     person.camera = one->intrinsics;
-    original["cameras.pkl"] = one->fields;
+    person.distortion = one->distortion;
+  }
+  return person;
+}
+
+Outcome<Annotation> NpzTable::annotation(std::size_t row) const {
+  for (const char* name : {"part", "S", "center", "scale"}) {
+    if (auto fault = columns_.not_finite(columns_.row_of(name, row), name, row)) return *fault;
   }
   Annotation annotation;
+  take_wrong_camera(annotation.persons.emplace_back(person(row)));
+  auto original = columns_.fields(row, row_count());
+  if (const Human36mCamera* one = camera(row)) original["cameras.pkl"] = one->fields;
   // Text of a Python 2 pickle may be in any encoding.
   annotation.original =
       original.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
-  annotation.persons.push_back(std::move(person));
   return annotation;
 }
 

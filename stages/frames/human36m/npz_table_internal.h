@@ -28,6 +28,7 @@ class NpzTable final : public PoseTable {
 
  private:
   const Human36mCamera* camera(std::size_t row) const;
+  Person person(std::size_t row) const;
 
   std::vector<std::string> notes_;
   TableColumns columns_;

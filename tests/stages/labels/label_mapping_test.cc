@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "stages/labels/geometry.h"
 
@@ -200,8 +202,10 @@ TEST(MapLabels, NumbersOfAPersonMustBeFinite) {
   one.head_box = Rectangle{0, 0, kNan, 1};
   EXPECT_THAT(fault(one), HasSubstr("head box"));
   one = good;
-  one.joints3d_mm = {{0, 0, 1}, {0, kNan, 1}};
-  EXPECT_THAT(fault(one), HasSubstr("3-D"));
+  one.joints3d_mm = {std::array{0.0, 0.0, 1.0}, std::array{0.0, kNan, 1.0}};
+  EXPECT_THAT(fault(one), HasSubstr("expected finite joints in 3-D, got (0, nan, 1) mm"));
+  one.joints3d_mm = {std::array{0.0, 0.0, 1.0}, std::nullopt};
+  EXPECT_EQ(fault(one), "") << "unknown";
   one = good;
   one.camera = Intrinsics{1, 1, kNan, 1};
   EXPECT_THAT(fault(one), HasSubstr("camera"));

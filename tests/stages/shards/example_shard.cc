@@ -1,6 +1,7 @@
 #include "tests/stages/shards/example_shard.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <limits>
 #include <string>
@@ -87,8 +88,9 @@ Person full_person() {
   person.center = {6, 5};
   person.scale = 1.75;
   person.head_box = Rectangle{1, 2, 5, 6.5};
-  person.joints3d_mm = {{1.5, 2, 3000}, {4, 5, 3001}, {7, 8, 3002}};
+  person.joints3d_mm = {std::nullopt, std::array{4.0, 5.0, 3001.0}, std::array{7.0, 8.0, 3002.0}};
   person.camera = Intrinsics{1145.0494, 1143.7811, 7.5, 5.5};
+  person.distortion = {.k1 = -0.2071, .k2 = 0.2478, .k3 = -0.0031, .p1 = -0.0014, .p2 = -0.001};
   return person;
 }
 

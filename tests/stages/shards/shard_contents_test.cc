@@ -30,9 +30,10 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
   EXPECT_EQ(marker.persons, persons);
   EXPECT_EQ(marker.classes, classes);
   EXPECT_EQ(marker.gaps, gaps);
-  EXPECT_EQ(marker.optional_columns,
-            (std::vector<std::string>{"/labels/poses/joints3d_mm", "/labels/poses/camera",
-                                      "/labels/poses/camera_source"}));
+  EXPECT_EQ(
+      marker.optional_columns,
+      (std::vector<std::string>{"/labels/poses/joints3d_mm", "/labels/poses/camera",
+                                "/labels/poses/camera_source", "/labels/poses/camera_distortion"}));
 }
 
 TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {

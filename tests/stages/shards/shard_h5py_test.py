@@ -77,7 +77,9 @@ class ShardInH5py(unittest.TestCase):
         poses = self.open("float16-1")["labels/poses"]
         has_none = np.isnan(poses["joints3d_mm"]).all(axis=(1, 2))
         np.testing.assert_array_equal(has_none, [True, False, True])
-        np.testing.assert_array_equal(poses["joints3d_mm"][1, 2], [7, 8, 3002])
+        np.testing.assert_array_equal(poses["joints3d_mm"][1], [[np.nan] * 3, [4, 5, 3001], [7, 8, 3002]])
+        lens = [-0.2071, 0.2478, -0.0031, -0.0014, -0.001]
+        np.testing.assert_array_equal(poses["camera_distortion"], [[np.nan] * 5, lens, [np.nan] * 5])
 
     def test_a_source_without_labels_has_empty_datasets(self):
         labels = self.open("unlabelled")["labels"]

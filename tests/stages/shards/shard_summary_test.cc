@@ -76,6 +76,10 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
   EXPECT_EQ(first["boxes"][0]["xyxy"], (nlohmann::json{1, 1, 4.25, 4.5}));
   EXPECT_EQ(first["persons"][1]["joints"][0]["at_source"], (nlohmann::json{3.5, 4}));
   EXPECT_TRUE(first["persons"][0]["head_box"].is_null());
+  EXPECT_TRUE(first["persons"][0]["camera_distortion"].is_null());
+  EXPECT_EQ(first["persons"][1]["camera_distortion"]["p1"], -0.0014);
+  EXPECT_EQ(first["persons"][1]["joints3d_mm"],
+            nlohmann::json::parse("[null, [4, 5, 3001], [7, 8, 3002]]"));
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 1))["gap_s"].is_null());
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 2))["source_to_volume"][0].is_null());
 }

@@ -53,6 +53,58 @@ TEST(CameraBookTest, ReadsIntrinsicsAndAllFields) {
             R"({"f":[11,12],"c":[5,6],"name":"cam1","w":1000,"o":null,"x":1.0})");
 }
 
+TEST(CameraBookTest, ReadsTheLensDistortion) {
+  const std::string intrinsics =
+      "U\x01"
+      "f" +
+      byte_array("\x0b\x0c") +
+      "U\x01"
+      "c" +
+      byte_array("\x05\x06");
+  const std::string k = "U\x01k" + byte_array("\x01\x02\x03");
+  const std::string p = "U\x01p" + byte_array("\x04\x05");
+  EXPECT_EQ(read(book(intrinsics + k + p)).at({"S1", "7"}).distortion,
+            (LensDistortion{.k1 = 1, .k2 = 2, .k3 = 3, .p1 = 4, .p2 = 5}));
+  EXPECT_FALSE(read(book(intrinsics)).at({"S1", "7"}).distortion);
+  EXPECT_THAT([&] { read(book(intrinsics + k)); }, ThrowsMessage<InputError>(HasSubstr("(p)")));
+  EXPECT_THAT([&] { read(book(intrinsics + p + "U\x01k" + byte_array("\x01\x02"))); },
+              ThrowsMessage<InputError>(HasSubstr("expected 3 numbers, got [2]")));
+}
+
+/// One joint at (X, Y, Z) = (500, -250, 1000) mm, so at (a, b) = (0.5, -0.25).
+Person person_seen_at(Point at) {
+  Person person;
+  person.joints = {{at, -1}, {kMissingPoint, 0}, {{9, 9}, -1}};
+  person.joints3d_mm = {std::array{500.0, -250.0, 1000.0}, std::array{1.0, 1.0, 1.0}, std::nullopt};
+  person.camera = Intrinsics{1000, 2000, 500, 600};
+  return person;
+}
+
+TEST(ProjectionErrorTest, IsTheDistanceFromWhereTheCameraProjects) {
+  // Without distortion: 1000 * 0.5 + 500, 2000 * -0.25 + 600.
+  EXPECT_EQ(projection_error_px(person_seen_at({1000, 100})), 0);
+  EXPECT_EQ(projection_error_px(person_seen_at({1003, 96})), 5);
+
+  // r2 = 0.3125; d = 1 + 0.5 * 0.3125 + 0.25 * 0.3125^2 + 2 * 0.3125^3 + 0.2 * -0.25 + 0.4 * 0.5
+  // = 1.39170...; a' = 0.5 d + 0.4 r2, b' = -0.25 d + 0.2 r2.
+  const double d = 1 + 0.15625 + 0.0244140625 + 0.06103515625 - 0.05 + 0.2;
+  Person person =
+      person_seen_at({1000 * (0.5 * d + 0.125) + 500, 2000 * (-0.25 * d + 0.0625) + 600});
+  person.distortion = {.k1 = 0.5, .k2 = 0.25, .k3 = 2, .p1 = 0.2, .p2 = 0.4};
+  EXPECT_NEAR(projection_error_px(person), 0, 1e-9);
+}
+
+TEST(ProjectionErrorTest, OnlyACameraThatFitsIsKept) {
+  for (const double off : {0.0, 19.0, 21.0}) {
+    Person person = person_seen_at({1000 + off, 100});
+    person.distortion = LensDistortion{};
+    take_wrong_camera(person);
+    EXPECT_EQ(person.camera.has_value(), off < kProjectionTolerance_px);
+    EXPECT_EQ(person.distortion.has_value(), off < kProjectionTolerance_px);
+    EXPECT_EQ(person.joints3d_mm.size(), 3u);
+  }
+}
+
 TEST(CameraBookTest, RefusesOtherPickles) {
   const std::string focal =
       "U\x01"
@@ -92,6 +144,13 @@ TEST(CameraBookTest, ReadsSharedData) {
   EXPECT_NEAR(camera.intrinsics.focal_y, 1143.78109572, 1e-8);
   EXPECT_NEAR(camera.intrinsics.centre_x, 512.54150496, 1e-8);
   EXPECT_NEAR(camera.intrinsics.centre_y, 515.45148698, 1e-8);
+  // k = -0.20709891, 0.24777518, -0.00307515; p = -0.00142447, -0.0009757.
+  ASSERT_TRUE(camera.distortion);
+  EXPECT_NEAR(camera.distortion->k1, -0.20709891, 1e-8);
+  EXPECT_NEAR(camera.distortion->k2, 0.24777518, 1e-8);
+  EXPECT_NEAR(camera.distortion->k3, -0.00307515, 1e-8);
+  EXPECT_NEAR(camera.distortion->p1, -0.00142447, 1e-8);
+  EXPECT_NEAR(camera.distortion->p2, -0.0009757, 1e-8);
 }
 
 }  // namespace

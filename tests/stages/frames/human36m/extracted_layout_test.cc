@@ -1,11 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
 #include "manifests/faults.h"
 #include "stages/frames/human36m/human36m_dataset.h"
+#include "stages/labels/label_mapping.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -32,8 +36,8 @@ SourceSpec extracted_spec(const std::string& root) {
   return spec;
 }
 
-/// The members of an .npz. In row r of J joints, joint j lies at (10 r + j, 10 r + j + 0.5), is
-/// visible unless it is joint 1, and at (0.001 j, 0.002, 5) m.
+/// The members of an .npz. In row r of J joints, joint j lies at (10 r + j, 10 r + j + 0.5), with
+/// confidence unless it is joint 1, and at (0.001 j, 0.002, 5) m.
 std::map<std::string, std::string> members(const std::vector<std::string>& names,
                                            std::size_t joints = 17) {
   std::vector<double> center;
@@ -109,14 +113,31 @@ TEST_F(ExtractedLayoutTest, ReadsThePersonOfARow) {
   const auto outcome = dataset->annotation("a.npz#1");
   const Person& person = std::get<Annotation>(outcome).persons.at(0);
   ASSERT_EQ(person.joints.size(), 17u);
-  EXPECT_EQ(person.joints[0], (Joint{{10, 10.5}, 1}));
-  EXPECT_EQ(person.joints[1], (Joint{{11, 11.5}, 0})) << "hidden, but annotated";
+  EXPECT_EQ(person.joints[0], (Joint{{10, 10.5}, -1})) << "Human3.6M annotates no visibility";
+  EXPECT_EQ(person.joints[1], (Joint{{11, 11.5}, 0})) << "a place without confidence";
   EXPECT_EQ(person.center, (Point{501, 400}));
   EXPECT_EQ(person.scale, 3);
   EXPECT_FALSE(person.camera);
-  EXPECT_EQ(person.joints3d_mm.at(3)[1], 2);
-  EXPECT_DOUBLE_EQ(person.joints3d_mm.at(3)[0], 3);
-  EXPECT_EQ(person.joints3d_mm.at(3)[2], 5000);
+  ASSERT_TRUE(person.joints3d_mm.at(3));
+  EXPECT_EQ(person.joints3d_mm.at(3)->at(1), 2);
+  EXPECT_DOUBLE_EQ(person.joints3d_mm.at(3)->at(0), 3);
+  EXPECT_EQ(person.joints3d_mm.at(3)->at(2), 5000);
+}
+
+TEST_F(ExtractedLayoutTest, JointsInSpaceWithoutConfidenceAreUnknown) {
+  auto arrays = members({kVideo + "_000001.jpg", kVideo + "_000006.jpg"}, 2);
+  arrays["S"] = testing::npy_doubles({2, 2, 4}, {0, 0, 0, 0, 0.5, 0.25, 4, 1,  //
+                                                 1, 1, 5, 0, 0, 0, 0, 0});
+  add_npz(arrays);
+  spec_.annotations = "h36m/a.npz";
+  const auto dataset = open();
+  const auto joints3d = [&](const char* key) {
+    const auto outcome = dataset->annotation(key);
+    return std::get<Annotation>(outcome).persons.at(0).joints3d_mm;
+  };
+  EXPECT_THAT(joints3d("a.npz#0"),
+              ElementsAre(std::nullopt, ::testing::Optional(std::array{500.0, 250.0, 4000.0})));
+  EXPECT_THAT(joints3d("a.npz#1"), IsEmpty());
 }
 
 TEST_F(ExtractedLayoutTest, JointsWithoutAnnotationAreMissing) {
@@ -126,7 +147,7 @@ TEST_F(ExtractedLayoutTest, JointsWithoutAnnotationAreMissing) {
   spec_.annotations = "h36m/a.npz";
   const auto outcome = open()->annotation("a.npz#0");
   EXPECT_THAT(std::get<Annotation>(outcome).persons.at(0).joints,
-              ElementsAre(Joint{kMissingPoint, 0}, Joint{{0, 0}, 1}));
+              ElementsAre(Joint{kMissingPoint, 0}, Joint{{0, 0}, -1}));
 }
 
 TEST_F(ExtractedLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
@@ -278,15 +299,6 @@ TEST_F(ExtractedLayoutTest, ReadsSharedData) {
   }
   const auto outcome = dataset->annotation(frames[0].label_key);
   ASSERT_FALSE(is_fault(outcome));
-  const Person& person = std::get<Annotation>(outcome).persons.at(0);
-  ASSERT_TRUE(person.camera);
-  // The intrinsics project the joints in the camera frame onto those in the picture. Lens
-  // distortion, which the intrinsics leave out, stays below 2 px here.
-  for (std::size_t j = 0; j < person.joints.size(); ++j) {
-    const auto& [x, y, z] = person.joints3d_mm[j];
-    EXPECT_NEAR(person.camera->focal_x * x / z + person.camera->centre_x, person.joints[j].at.x, 2);
-    EXPECT_NEAR(person.camera->focal_y * y / z + person.camera->centre_y, person.joints[j].at.y, 2);
-  }
   const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
   EXPECT_EQ(original["cameras.pkl"]["name"], "camera1");
   EXPECT_EQ(original["cameras.pkl"]["w"], 1000);
@@ -298,6 +310,80 @@ TEST_F(ExtractedLayoutTest, ReadsSharedData) {
             "test_h36m_body3d.npz#0");
   spec.annotations = "human36m_lists/test_h36m.npz";
   EXPECT_EQ(open_human36m_dataset(spec, data)->label_schema().joint_names.size(), 24u);
+}
+
+/// The people of the shared data, by what a name of a joint means.
+class RealPeopleTest : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    EVENTGAN_SHARED_DATA_OR_SKIP(data);
+    SourceSpec spec = extracted_spec("human36m_lists");
+    spec.annotations = "human36m_lists/test_h36m_body3d.npz";
+    const auto dataset = open_human36m_dataset(spec, data);
+    names_ = dataset->label_schema().joint_names;
+    for (const LabelledFrame& frame : dataset->labelled_frames()) {
+      annotations_.push_back(std::get<Annotation>(dataset->annotation(frame.label_key)));
+    }
+    ASSERT_EQ(annotations_.size(), 4u);
+  }
+
+  std::array<double, 3> joint3d(const Person& person, const std::string& name) const {
+    return person.joints3d_mm.at(std::ranges::find(names_, name) - names_.begin()).value();
+  }
+
+  std::vector<std::string> names_;
+  std::vector<Annotation> annotations_;
+};
+
+TEST_F(RealPeopleTest, HipsAndShouldersHaveTheSameSides) {
+  for (const Annotation& annotation : annotations_) {
+    const Person& person = annotation.persons.at(0);
+    double product = 0, hips = 0, shoulders = 0;
+    for (std::size_t i = 0; i < 3; ++i) {
+      const double hip = joint3d(person, "right_hip")[i] - joint3d(person, "left_hip")[i];
+      const double shoulder =
+          joint3d(person, "right_shoulder")[i] - joint3d(person, "left_shoulder")[i];
+      product += hip * shoulder;
+      hips += hip * hip;
+      shoulders += shoulder * shoulder;
+    }
+    EXPECT_GT(product / std::sqrt(hips * shoulders), 0.9);
+  }
+}
+
+/// As shard_format.md says.
+Point projected(const Intrinsics& camera, const LensDistortion& lens,
+                const std::array<double, 3>& at) {
+  const double a = at[0] / at[2], b = at[1] / at[2], r2 = a * a + b * b;
+  const double d = 1 + lens.k1 * r2 + lens.k2 * std::pow(r2, 2) + lens.k3 * std::pow(r2, 3) +
+                   lens.p1 * b + lens.p2 * a;
+  return {camera.focal_x * (a * d + lens.p2 * r2) + camera.centre_x,
+          camera.focal_y * (b * d + lens.p1 * r2) + camera.centre_y};
+}
+
+TEST_F(RealPeopleTest, CameraAndDistortionProjectTheJointsInThePictureAndInTheVolume) {
+  for (const Annotation& annotation : annotations_) {
+    const Person& person = annotation.persons.at(0);
+    ASSERT_TRUE(person.camera && person.distortion);
+    // Stretched to other shapes, with borders, and cut.
+    for (const Placement& placement :
+         {Placement{{1000, 1000}, {260, 861}, {260, 861}, 0, 0},
+          Placement{{1000, 1000}, {260, 260}, {260, 346}, 43, 0},
+          Placement{{1000, 1000}, {400, 600}, {260, 346}, -127, -70}}) {
+      const auto outcome = map_labels(annotation, placement, "a.npz");
+      ASSERT_FALSE(is_fault(outcome));
+      const VolumePerson& mapped = std::get<VolumeLabels>(outcome).persons.at(0);
+      for (std::size_t j = 0; j < person.joints.size(); ++j) {
+        const Point source = projected(*person.camera, *person.distortion, *person.joints3d_mm[j]);
+        EXPECT_NEAR(source.x, person.joints[j].at.x, 1e-3);
+        EXPECT_NEAR(source.y, person.joints[j].at.y, 1e-3);
+        const Point volume =
+            projected(mapped.camera.value(), *person.distortion, *person.joints3d_mm[j]);
+        EXPECT_NEAR(volume.x, mapped.joints[j].x, 1e-3);
+        EXPECT_NEAR(volume.y, mapped.joints[j].y, 1e-3);
+      }
+    }
+  }
 }
 
 }  // namespace

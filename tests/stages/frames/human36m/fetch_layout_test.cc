@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -85,18 +86,98 @@ TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
   const Person& person = annotation.persons[0];
   EXPECT_THAT(person.joints, ElementsAre(Joint{{100.25, 101.25}, -1}, Joint{{110.25, 111.25}, -1}));
   ASSERT_EQ(person.joints3d_mm.size(), 2u);
-  EXPECT_THAT(person.joints3d_mm[1], ElementsAre(110.25, 111.25, 5000));
+  EXPECT_EQ(person.joints3d_mm[1], (std::array{-1609.0, -2021.25, 5000.0}));
   EXPECT_EQ(person.center, kMissingPoint);
   EXPECT_EQ(person.scale, -1);
   EXPECT_FALSE(person.head_box);
   // The file holds [fx, cx, fy, cy].
-  EXPECT_EQ(person.camera, (Intrinsics{1145, 1143.75, 512.5, 515.5}));
+  EXPECT_EQ(person.camera, (Intrinsics{1250, 1000, 512.5, 515.5}));
+  EXPECT_FALSE(person.distortion);
+}
+
+/// What h36m-fetch writes: joints as they are, and of a skeleton of universal size, here a tenth
+/// larger about the first joint; a camera fitted to each.
+Datasets present_annotations() {
+  Datasets datasets = fetch_annotations({{7, 1}});
+  datasets["pose/3d"] = datasets["pose/3d-univ"];
+  auto& universal = std::get<std::vector<double>>(datasets["pose/3d-univ"].values);
+  for (double& coordinate : universal) coordinate *= 1.1;
+  datasets["intrinsics-univ/7"] = {{4}, std::vector<double>{1251, 512, 1001, 515}};
+  return datasets;
+}
+
+Person only_person(const Dataset& dataset) {
+  const auto outcome = dataset.annotation("S1/Walking-1/annot.h5#0");
+  EXPECT_FALSE(is_fault(outcome));
+  return std::get<Annotation>(outcome).persons.at(0);
+}
+
+TEST_F(FetchLayoutTest, TakesJointsInSpaceAndTheCameraThatWasFittedToThem) {
+  const auto z_and_focal = [&](const Datasets& datasets) {
+    add_annotations(datasets);
+    const auto dataset = open();
+    EXPECT_THAT(dataset->notes(), ::testing::IsEmpty());
+    const Person person = only_person(*dataset);
+    return std::pair(person.joints3d_mm.at(0)->at(2), person.camera.value().focal_x);
+  };
+  const Datasets present = present_annotations();
+  EXPECT_EQ(z_and_focal(present), std::pair(5000.0, 1250.0)) << "pose/3d with intrinsics";
+
+  Datasets universal = present;
+  universal.erase("pose/3d");
+  EXPECT_EQ(z_and_focal(universal), std::pair(5500.0, 1251.0)) << "3d-univ with intrinsics-univ";
+  universal["pose/3d"] = present.at("pose/3d");
+  universal.erase("intrinsics/7");
+  EXPECT_EQ(z_and_focal(universal), std::pair(5500.0, 1251.0)) << "the other has no camera";
+
+  Datasets old = present;  // as h36m-fetch wrote it at first
+  old.erase("pose/3d");
+  old.erase("intrinsics-univ/7");
+  EXPECT_EQ(z_and_focal(old), std::pair(5500.0, 1250.0)) << "3d-univ with intrinsics";
+}
+
+TEST_F(FetchLayoutTest, OriginalHoldsBothCameras) {
+  add_annotations(present_annotations());
+  const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
+  const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
+  EXPECT_EQ(original["intrinsics/7"][0], 1250);
+  EXPECT_EQ(original["intrinsics-univ/7"][0], 1251);
+}
+
+TEST_F(FetchLayoutTest, ACameraThatDoesNotProjectTheJointsIsNotClaimed) {
+  Datasets datasets = fetch_annotations({{7, 1}, {7, 6}, {7, 11}});
+  auto& joints3d = std::get<std::vector<double>>(datasets["pose/3d-univ"].values);
+  // A pixel is 4 mm wide at 5 m, 5 mm high; so 19 px, and 15 and 20 px: 25 px.
+  joints3d[0] += 4 * 19;
+  joints3d[6] += 4 * 15;
+  joints3d[7] += 5 * 20;
+  add_annotations(datasets);
+  const auto dataset = open();
+  EXPECT_THAT(
+      dataset->notes(),
+      ElementsAre("no camera for 1 of 3 rows: by intrinsics/CAMERA and pose/3d-univ a joint "
+                  "lies up to 25 px from where it is annotated (expected at most 20), in "
+                  "h36m/S1/Walking-1/annot.h5"));
+  const auto person = [&](int row) {
+    const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#" + std::to_string(row));
+    return std::get<Annotation>(outcome).persons.at(0);
+  };
+  EXPECT_TRUE(person(0).camera);
+  EXPECT_FALSE(person(1).camera);
+  EXPECT_EQ(person(1).joints[1].at, (Point{110.25, 111.25}));
+  EXPECT_EQ(person(1).joints3d_mm.size(), 2u);
+  EXPECT_TRUE(person(2).camera);
+
+  // Behind the camera, where the same pixel comes out.
+  for (int i = 12; i < 15; ++i) joints3d[static_cast<std::size_t>(i)] *= -1;
+  add_annotations(datasets);
+  EXPECT_THAT(open()->notes(), ElementsAre(HasSubstr("2 of 3 rows")));
 }
 
 TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
   add_pictures("7", {1, 6});
   auto datasets = fetch_annotations({{7, 1}, {7, 6}});
-  datasets["pose/3d"] = {{2, 1}, std::vector<double>{0.1, 1.0 / 3}};
+  datasets["pose/other"] = {{2, 1}, std::vector<double>{0.1, 1.0 / 3}};
   datasets["float"] = {{2}, std::vector<float>{0.5f, 0.1f}};
   datasets["odd"] = {{2}, std::vector<double>{1, std::numeric_limits<double>::quiet_NaN()}};
   datasets["action"] = {{2}, std::vector<std::string>{"walk", "stand"}};
@@ -108,10 +189,10 @@ TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
   std::vector<std::string> names;
   for (const auto& field : original.items()) names.push_back(field.key());
   EXPECT_THAT(names, ElementsAre("action", "camera", "float", "frame", "intrinsics/7", "odd",
-                                 "pose/2d", "pose/3d", "pose/3d-univ"));
+                                 "pose/2d", "pose/3d-univ", "pose/other"));
   EXPECT_EQ(original["action"], "stand");
   EXPECT_EQ(original["frame"], 6);
-  EXPECT_EQ(original["pose/3d"][0].get<double>(), 1.0 / 3) << "to the last bit";
+  EXPECT_EQ(original["pose/other"][0].get<double>(), 1.0 / 3) << "to the last bit";
   EXPECT_EQ(original["float"].get<float>(), 0.1f);
   EXPECT_TRUE(original["odd"].is_null());
   EXPECT_EQ(original["pose/2d"], nlohmann::json::parse("[[100.25, 101.25], [110.25, 111.25]]"));
@@ -143,8 +224,27 @@ TEST_F(FetchLayoutTest, NeighboursCountFramesThatAreStoredOrLabelled) {
   EXPECT_EQ(dataset->neighbour(frames[0], 2).frame.index, 16);
   EXPECT_NEAR(dataset->neighbour(frames[0], 2).frame.time_s, 0.3, 1e-12);
   EXPECT_EQ(dataset->neighbour(frames[0], 4).state, State::kHole);
+  EXPECT_EQ(dataset->neighbour(frames[0], 4).frame.index, 26);
   EXPECT_EQ(dataset->neighbour(frames[0], 5).state, State::kBeyond);
   EXPECT_EQ(dataset->neighbour(frames[0], -2).state, State::kBeyond);
+}
+
+TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNoHoles) {
+  // As h36m-fetch selects them: those at which a joint has moved by 40 mm.
+  const std::vector<int> kept = {1, 14, 16, 17, 30};
+  add_pictures("7", kept);
+  add_annotations(fetch_annotations({{7, 1}, {7, 14}, {7, 16}, {7, 17}, {7, 30}}));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  for (int i = 0; i < 5; ++i) {
+    for (int step = -i; step < 5 - i; ++step) {
+      const Neighbour found = dataset->neighbour(frames[static_cast<std::size_t>(i)], step);
+      EXPECT_EQ(found.state, State::kPresent);
+      EXPECT_EQ(found.frame.index, kept[static_cast<std::size_t>(i + step)]);
+    }
+  }
+  EXPECT_NEAR(dataset->neighbour(frames[0], 1).frame.time_s - frames[0].frame.time_s, 13 / 50.0,
+              1e-12);
 }
 
 TEST_F(FetchLayoutTest, RowsWithoutPictureStayLabelled) {
@@ -224,29 +324,10 @@ TEST_F(FetchLayoutTest, RefusesMissingAndMisshapenDatasets) {
     EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("no such array"),
                                                                  HasSubstr("(" + name + ")"))));
   }
-  EXPECT_EQ(dataset->neighbour(frames[0], 4).frame.index, 26);
 }
 
 TEST_F(FetchLayoutTest, RefusesOddNumbersAndFilesAndDoubleRows) {
   auto datasets = fetch_annotations({{7, 1}});
-TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNoHoles) {
-  // As h36m-fetch selects them: those at which a joint has moved by 40 mm.
-  const std::vector<int> kept = {1, 14, 16, 17, 30};
-  add_pictures("7", kept);
-  add_annotations(fetch_annotations({{7, 1}, {7, 14}, {7, 16}, {7, 17}, {7, 30}}));
-  const auto dataset = open();
-  const auto& frames = dataset->labelled_frames();
-  for (int i = 0; i < 5; ++i) {
-    for (int step = -i; step < 5 - i; ++step) {
-      const Neighbour found = dataset->neighbour(frames[static_cast<std::size_t>(i)], step);
-      EXPECT_EQ(found.state, State::kPresent);
-      EXPECT_EQ(found.frame.index, kept[static_cast<std::size_t>(i + step)]);
-    }
-  }
-  EXPECT_NEAR(dataset->neighbour(frames[0], 1).frame.time_s - frames[0].frame.time_s, 13 / 50.0,
-              1e-12);
-}
-
   for (const double frame : {-1.0, 1.5, 1e9, std::nan("")}) {
     datasets["frame"] = {{1}, std::vector<double>{frame}};
     add_annotations(datasets);
@@ -287,7 +368,9 @@ TEST_F(FetchLayoutTest, ReadsSharedData) {
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames.size(), 18u);  // two cameras, nine frames each
   EXPECT_EQ(frames[1].sample_id, "S1/Directions-1/54138969/000006");
-  EXPECT_TRUE(dataset->notes().empty());
+  // Its joints and intrinsics are random numbers.
+  EXPECT_THAT(dataset->notes(), ElementsAre(AllOf(HasSubstr("no camera for 18 of 18 rows"),
+                                                  HasSubstr("Directions-1/annot.h5"))));
   EXPECT_EQ(dataset->label_schema().joint_names.size(), 32u);
   for (const LabelledFrame& frame : frames) {
     EXPECT_EQ(dataset->neighbour(frame, 0).state, State::kPresent);
@@ -297,9 +380,7 @@ TEST_F(FetchLayoutTest, ReadsSharedData) {
   EXPECT_EQ(dataset->neighbour(frames[0], 6).frame.index, 31);
   EXPECT_EQ(dataset->neighbour(frames[0], 9).state, State::kBeyond);
   const auto outcome = dataset->annotation(frames[17].label_key);
-  // fx, cx, fy, cy = 1149.7, 508.8, 1147.6, 508.1 for camera 55011271.
-  EXPECT_EQ(std::get<Annotation>(outcome).persons[0].camera,
-            (Intrinsics{1149.7, 1147.6, 508.8, 508.1}));
+  EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
 }
 
 }  // namespace

@@ -12,7 +12,8 @@
 namespace eventgan {
 
 /// An annot.h5 of two joints, one row for each (camera, frame). In row r, joint j lies at
-/// (100 r + 10 j + 0.25, 100 r + 10 j + 1.25) px and at those, plus 5000 mm deep.
+/// (100 r + 10 j + 0.25, 100 r + 10 j + 1.25) px, and in 3-D, 5000 mm deep, where intrinsics/7
+/// projects it onto that.
 inline std::map<std::string, testing::Hdf5Dataset> fetch_annotations(
     const std::vector<std::pair<std::int64_t, std::int64_t>>& rows) {
   std::vector<double> joints;
@@ -23,7 +24,7 @@ inline std::map<std::string, testing::Hdf5Dataset> fetch_annotations(
     for (int j = 0; j < 2; ++j) {
       const double x = 100.0 * static_cast<double>(r) + 10 * j + 0.25;
       joints.insert(joints.end(), {x, x + 1});
-      joints3d.insert(joints3d.end(), {x, x + 1, 5000});
+      joints3d.insert(joints3d.end(), {4 * (x - 512.5), 5 * (x + 1 - 515.5), 5000});
     }
     cameras.push_back(rows[r].first);
     frames.push_back(rows[r].second);
@@ -33,7 +34,7 @@ inline std::map<std::string, testing::Hdf5Dataset> fetch_annotations(
           {"pose/3d-univ", {{count, 2, 3}, joints3d}},
           {"camera", {{count}, cameras}},
           {"frame", {{count}, frames}},
-          {"intrinsics/7", {{4}, std::vector<double>{1145, 512.5, 1143.75, 515.5}}}};
+          {"intrinsics/7", {{4}, std::vector<double>{1250, 512.5, 1000, 515.5}}}};
 }
 
 }  // namespace eventgan
