@@ -20,6 +20,8 @@ bool all_finite(const Numbers& numbers) {
   return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
 }
 
+bool is_finite(double number) { return std::isfinite(number); }
+
 bool is_finite(Point point) { return std::isfinite(point.x) && std::isfinite(point.y); }
 
 bool is_finite(const Rectangle& box) {
@@ -76,8 +78,12 @@ std::string text(const Parts&... parts) {
 
 Complaint check(const Box& box, ImageSize picture) {
   if (!is_finite(box.xyxy)) return text("expected finite edges, got ", box.xyxy);
-  if (!std::isfinite(box.truncation) || !std::isfinite(box.alpha) || !all_finite(box.box3d)) {
-    return text("expected finite numbers, got NaN or infinity");
+  // A number beyond 3.4e38 is infinite in the 32 bits that these have.
+  if (!std::isfinite(box.truncation))
+    return text("expected a finite truncation, got ", box.truncation);
+  if (!std::isfinite(box.alpha)) return text("expected a finite alpha, got ", box.alpha);
+  for (const float number : box.box3d) {
+    if (!std::isfinite(number)) return text("expected a finite box in 3-D, got ", number);
   }
   if (box.xyxy.right < box.xyxy.left || box.xyxy.bottom < box.xyxy.top) {
     return text("expected left <= right and top <= bottom, got ", box.xyxy);
@@ -151,6 +157,32 @@ VolumePerson map(const Person& person, const Placement& placement) {
   return mapped;
 }
 
+/// A number that is finite as annotated may not be so after scaling.
+template <class Label>
+Complaint check_mapped(const char* expected, const Label& mapped, const Label& annotated) {
+  if (is_finite(mapped)) return std::nullopt;
+  return text("expected ", expected, " in the volume, got ", mapped, " from ", annotated);
+}
+
+Complaint check(const VolumeBox& mapped, const Box& box) {
+  return check_mapped("finite edges", mapped.unclipped, box.xyxy);
+}
+
+Complaint check(const VolumePerson& mapped, const Person& person) {
+  Complaint complaint = check_mapped("a finite centre", mapped.center, person.center);
+  if (!complaint) complaint = check_mapped("a finite scale", mapped.scale, person.scale);
+  for (std::size_t j = 0; j < mapped.joints.size() && !complaint; ++j) {
+    complaint = check_mapped("finite joints", mapped.joints[j], person.joints[j].at);
+  }
+  if (mapped.head_box && !complaint) {
+    complaint = check_mapped("a finite head box", *mapped.head_box, *person.head_box);
+  }
+  if (mapped.camera && !complaint) {
+    complaint = check_mapped("a finite camera", *mapped.camera, *person.camera);
+  }
+  return complaint;
+}
+
 /// Checks and maps one kind of label; "box 2 of 8" says which one is at fault.
 template <class Label, class Mapped>
 std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char* kind,
@@ -158,11 +190,15 @@ std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char*
                                    std::vector<Mapped>& mapped) {
   mapped.reserve(labels.size());
   for (const Label& label : labels) {
-    if (const Complaint complaint = check(label, placement.source)) {
-      return SampleFault{text(*complaint, ", in ", kind, " ", mapped.size() + 1, " of ",
+    Complaint complaint = check(label, placement.source);
+    if (!complaint) {
+      mapped.push_back(map(label, placement));
+      complaint = check(mapped.back(), label);
+    }
+    if (complaint) {
+      return SampleFault{text(*complaint, ", in ", kind, " ", &label - labels.data() + 1, " of ",
                               labels.size(), ", in ", where)};
     }
-    mapped.push_back(map(label, placement));
   }
   return std::nullopt;
 }

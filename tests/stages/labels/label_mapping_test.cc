@@ -130,13 +130,14 @@ TEST(MapLabels, NumbersOfABoxMustBeFinite) {
   EXPECT_NE(fault(box(10, 10, std::numeric_limits<double>::infinity(), 30)), "");
   Box one = box(10, 10, 20, 30);
   one.box3d[5] = kInfinity;
-  EXPECT_THAT(fault(one), HasSubstr("box 1 of 1"));
+  EXPECT_EQ(fault(one),
+            "expected a finite box in 3-D, got inf, in box 1 of 1, in label_2/001497.txt");
   one = box(10, 10, 20, 30);
   one.alpha = std::nanf("");
-  EXPECT_NE(fault(one), "");
+  EXPECT_THAT(fault(one), HasSubstr("finite alpha, got nan"));
   one = box(10, 10, 20, 30);
-  one.truncation = kInfinity;
-  EXPECT_NE(fault(one), "");
+  one.truncation = static_cast<float>(1e300);
+  EXPECT_THAT(fault(one), HasSubstr("finite truncation, got inf"));
 }
 
 TEST(MapLabels, MissingPointsStayAndOthersMove) {
@@ -209,6 +210,41 @@ TEST(MapLabels, NumbersOfAPersonMustBeFinite) {
   one = good;
   one.camera = Intrinsics{1, 1, kNan, 1};
   EXPECT_THAT(fault(one), HasSubstr("camera"));
+  one = good;
+  one.distortion = LensDistortion{.k1 = -0.2, .p2 = kNan};
+  EXPECT_THAT(fault(one), HasSubstr("expected a finite lens distortion, got k1 -0.2"));
+}
+
+TEST(MapLabels, ANumberThatIsNotFiniteInTheVolumeIsAFault) {
+  // The largest double is 1.8e308.
+  const Placement fourfold{{100, 100}, {400, 400}, {400, 400}, 0, 0};
+  const auto reason = [&](const Annotation& annotation) -> std::string {
+    const auto labels = map_labels(annotation, fourfold, "a.txt");
+    return is_fault(labels) ? std::get<SampleFault>(labels).reason : "";
+  };
+  EXPECT_EQ(reason({"", {box(1, 2, 3, 4), box(10, 10, 1e308, 20)}, {}}),
+            "expected finite edges in the volume, got left 40, top 40, right inf, bottom 80 from "
+            "left 10, top 10, right 1e+308, bottom 20, in box 2 of 2, in a.txt");
+  EXPECT_EQ(reason({"", {box(10, 10, 4e307, 20)}, {}}), "");
+
+  const Person good = person({{{10, 10}, 1}});
+  Person one = good;
+  one.joints.push_back({{3, -1e308}, 1});
+  EXPECT_EQ(reason({"", {}, {one}}),
+            "expected finite joints in the volume, got (13.5, -inf) from (3, -1e+308), in person 1 "
+            "of 1, in a.txt");
+  one = good;
+  one.center = {1e308, 5};
+  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("finite centre in the volume, got (inf, "));
+  one = good;
+  one.scale = 1e308;
+  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("scale in the volume, got inf from 1e+308"));
+  one = good;
+  one.head_box = Rectangle{-1e308, 0, 5, 5};
+  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("head box in the volume, got left -inf"));
+  one = good;
+  one.camera = Intrinsics{1000, 1e308, 50, 50};
+  EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("camera in the volume, got f_x 4000, f_y inf"));
 }
 
 }  // namespace

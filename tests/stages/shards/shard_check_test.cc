@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <cmath>
 #include <functional>
 #include <limits>
+#include <utility>
 
 #include "stages/files/sha256.h"
 #include "tests/stages/shards/example_shard.h"
@@ -243,6 +245,56 @@ TEST_F(ShardCheck, NanInALabelIsFound) {
   example.samples[0].labels.boxes[1].clipped.top = std::numeric_limits<double>::quiet_NaN();
   write(example);
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 1")));
+}
+
+TEST_F(ShardCheck, InfinityInAnyLabelIsFound) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  constexpr float kFloatInfinity = std::numeric_limits<float>::infinity();
+  const std::vector<std::pair<std::string, std::function<void(Annotation&, VolumeLabels&)>>> cases{
+      {"xyxy_source of box 0", [](auto& a, auto&) { a.boxes[0].xyxy.left = -kInfinity; }},
+      {"xyxy_unclipped of box 0", [](auto&, auto& v) { v.boxes[0].unclipped.right = kInfinity; }},
+      {"xyxy of box 0", [](auto&, auto& v) { v.boxes[0].clipped.top = kInfinity; }},
+      {"truncation of box 1", [](auto& a, auto&) { a.boxes[1].truncation = kFloatInfinity; }},
+      {"alpha of box 0", [](auto& a, auto&) { a.boxes[0].alpha = -kFloatInfinity; }},
+      {"box3d of box 0", [](auto& a, auto&) { a.boxes[0].box3d[5] = kFloatInfinity; }},
+      {"joints_source of person 0",
+       [](auto& a, auto&) { a.persons[0].joints[0].at.x = kInfinity; }},
+      {"joints of person 0", [](auto&, auto& v) { v.persons[0].joints[1].y = kInfinity; }},
+      {"center_source of person 1", [](auto& a, auto&) { a.persons[1].center.y = kInfinity; }},
+      {"center of person 1", [](auto&, auto& v) { v.persons[1].center.x = kInfinity; }},
+      {"scale of person 1", [](auto& a, auto&) { a.persons[1].scale = kInfinity; }},
+      {"scale_volume of person 1", [](auto&, auto& v) { v.persons[1].scale = kInfinity; }},
+      {"head_box_source of person 1",
+       [](auto& a, auto&) { a.persons[1].head_box->left = kInfinity; }},
+      {"head_box of person 1", [](auto&, auto& v) { v.persons[1].head_box->bottom = kInfinity; }},
+      {"joints3d_mm of person 1",
+       [](auto& a, auto&) { a.persons[1].joints3d_mm[1]->at(2) = kInfinity; }},
+      {"joints3d_mm of person 1",  // half known
+       [](auto& a, auto&) {
+         a.persons[1].joints3d_mm[0] = {1, 2, std::nan("")};
+       }},
+      {"camera_source of person 1",
+       [](auto& a, auto&) { a.persons[1].camera->focal_x = kInfinity; }},
+      {"camera of person 1", [](auto&, auto& v) { v.persons[1].camera->centre_y = kInfinity; }},
+      {"camera_distortion of person 1",
+       [](auto& a, auto&) { a.persons[1].distortion->p2 = kInfinity; }},
+  };
+  for (const auto& [column, change] : cases) {
+    testing::ExampleShard example = testing::example_shard();
+    change(example.samples[0].annotation, example.samples[0].labels);
+    write(example);
+    EXPECT_THAT(faults(),
+                ElementsAre(HasSubstr("expected finite numbers in " + column + ", got ")));
+  }
+}
+
+TEST_F(ShardCheck, LabelsFarAwayAreSound) {
+  testing::ExampleShard example = testing::example_shard();
+  example.samples[0].annotation.boxes[0].xyxy.right = 3e300;
+  example.samples[0].labels.boxes[0].unclipped.right = 1.5e300 * (1 + 1e-15);  // s = 1/2, rounded
+  example.samples[0].labels.boxes[0].clipped.right = 8;
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty());
 }
 
 }  // namespace
