@@ -44,7 +44,8 @@ class Shards:
         are, and reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False.
 
     Files are opened when they are needed, anew in every process, so that an object can be handed to the
-    workers of a data loader; at most eight stay open, however many shards there are. One object must not be
+    workers of a data loader (PyTorch's needs batch_size=None or a collate_fn of its own, since samples differ in their
+    numbers of boxes and persons); at most eight stay open, however many shards there are. One object must not be
     used by several threads at a time.
     """
 
@@ -126,14 +127,14 @@ def read_sample(file, slot):
     valid         bool
     original      bytes, the annotation as the dataset holds it
     pair          dictionary of everything in /pairs: texts, numbers, `source_to_volume` [2, 3]
-    statistics    dictionary of /events/statistics/* and eta98
+    statistics    dictionary of /events/statistics/* and eta98; flags as int64, since PyTorch has no uint32
     boxes         dictionary of arrays, a row for each box: xyxy, class_id, ignore…
     persons       dictionary of arrays, a row for each person: joints, visible, center…
     shard, slot   where it comes from
     """
     volume = file["events/volume"][slot].astype(np.float32)
     volume *= file["events/scale"][slot]
-    statistics = {name: values[slot] for name, values in file["events/statistics"].items()}
+    statistics = {name: _value(values, slot) for name, values in file["events/statistics"].items()}
     statistics["eta98"] = file["events/eta98"][slot]
     return {
         "volume": volume,
@@ -149,7 +150,9 @@ def read_sample(file, slot):
 
 
 def _value(dataset, slot):
-    return dataset.asstr()[slot] if h5py.check_string_dtype(dataset.dtype) else dataset[slot]
+    if h5py.check_string_dtype(dataset.dtype):
+        return dataset.asstr()[slot]
+    return np.int64(dataset[slot]) if dataset.dtype == np.uint32 else dataset[slot]
 
 
 def _rows(group, slot):

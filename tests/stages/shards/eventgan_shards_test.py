@@ -110,6 +110,27 @@ class ReadingShards(unittest.TestCase):
         with self.assertRaisesRegex(ValueError, "expected eventgan-shard 1.*other.h5"):
             Shards(self.folder / "other.h5")
 
+    def test_every_column_of_a_person(self):
+        persons = Shards(self.folder)[0]["persons"]
+        self.assertEqual(persons["camera_distortion"].shape, (2, 5))
+        self.assertTrue(np.isnan(persons["joints3d_mm"][1, 0]).all())  # this joint is not known
+        self.assertEqual(persons["joints3d_mm"][1, 1].tolist(), [4, 5, 3001])
+
+    def test_pytorch_can_batch_samples(self):
+        try:
+            from torch.utils.data import DataLoader
+        except ImportError:
+            self.skipTest("skipped: no PyTorch")
+        self.add_second_shard()
+        # Two samples of as many boxes and persons: the same slot of both shards.
+        shards = Shards(self.folder)
+        for sample, batch in ((shards[i], next(iter(DataLoader([shards[i], shards[i + 4]], batch_size=2))))
+                              for i in range(4)):
+            self.assertEqual(batch["volume"].shape, (2, 4, 6, 8))
+            self.assertEqual(batch["statistics"]["flags"].tolist(), [sample["statistics"]["flags"]] * 2)
+            self.assertEqual(batch["pair"]["sample_id"], [sample["pair"]["sample_id"]] * 2)
+        self.assertEqual(len(list(DataLoader(shards, batch_size=None, num_workers=2))), 8)
+
     def test_a_loader_s_workers_can_share_it(self):
         shards = Shards(self.folder)
         shards[0]
