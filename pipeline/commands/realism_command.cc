@@ -74,6 +74,10 @@ int run_realism(const RealismArguments& arguments) {
   const RealismReport report = measure_realism(*recording, options, [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
   });
+  const bool json_lines = arguments.progress == ProgressStyle::kJson;
+  for (const std::string& note : recording->notes()) {
+    std::cerr << (json_lines ? note_json(note) : "note: " + note) << std::endl;
+  }
   std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
   return kComplete;
 }

@@ -32,6 +32,9 @@ int run(const TrainArguments& arguments) {
   options.warn = [&](const std::string& text) {
     std::cerr << (json ? warning_json(text) : "warning: " + text) << std::endl;
   };
+  options.note = [&](const std::string& text) {
+    std::cerr << (json ? note_json(text) : "note: " + text) << std::endl;
+  };
   options.make_progress = [&] {
     return std::make_unique<TrainingProgress>(std::cerr, arguments.job.progress,
                                               isatty(STDERR_FILENO) != 0);

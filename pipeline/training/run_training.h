@@ -23,6 +23,7 @@ struct TrainingOptions {
   std::function<bool()> stop;
   std::optional<std::int64_t> max_steps;  ///< stop after so many steps of this run; for tests
   std::function<void(const std::string&)> warn;                      ///< none: silent
+  std::function<void(const std::string&)> note;                      ///< none: silent
   std::function<std::unique_ptr<TrainingProgress>()> make_progress;  ///< none: silent
 };
 

@@ -64,6 +64,11 @@ TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions
   const std::string advice =
       precision_advice(manifest.precision, options.device, instruction_sets());
   if (!advice.empty()) warn(advice);
+  for (const TrainingRecording& recording : source_.recordings()) {
+    for (const std::string& note : recording.recording->notes()) {
+      if (options_.note) options_.note(note);
+    }
+  }
   if (options.overwrite) folder_.discard();
   folder_.prepare();
   resume();

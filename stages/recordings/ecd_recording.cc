@@ -27,29 +27,18 @@ EcdImageList list_of_present_images(const std::filesystem::path& folder) {
   return images;
 }
 
-/// Runs `read` on a picture file; errors become InputError.
-template <class Read>
-auto read_picture(const std::filesystem::path& file, Read read) {
-  try {
-    return read(file);
-  } catch (const std::runtime_error& error) {
-    std::throw_with_nested(InputError(std::string(error.what()) + ", in " + file.string()));
-  }
-}
-
 std::string describe_size(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-/// Decoding gives colour; of a grey picture all three channels are one.
-GreyImage grey_of(const ColourFrame& colour) {
+/// Decoding gives colour; of a grey picture all three channels are one, and stay what they are.
+GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
   GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
   for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
     const std::uint8_t* const bgr = &colour.bgr[3 * i];
-    if (bgr[0] != bgr[1] || bgr[1] != bgr[2]) {
-      throw std::runtime_error("expected a grey picture, got colour");
-    }
-    grey.pixels[i] = bgr[0];
+    has_colour |= bgr[0] != bgr[1] || bgr[1] != bgr[2];
+    const int thousandths = 114 * bgr[0] + 587 * bgr[1] + 299 * bgr[2];
+    grey.pixels[i] = static_cast<std::uint8_t>((thousandths + 500) / 1000);
   }
   return grey;
 }
@@ -61,7 +50,7 @@ EcdRecording::EcdRecording(const std::filesystem::path& folder)
       name_(folder.string()),
       images_(list_of_present_images(folder)),
       events_(folder / "events.txt"),
-      size_(read_picture(folder / images_.paths.front(), picture_file_size)),
+      size_(read_frame(0).size),
       boundaries_(images_.times_s.size()) {}
 
 double EcdRecording::frame_time_s(std::int64_t index) const {
@@ -70,12 +59,32 @@ double EcdRecording::frame_time_s(std::int64_t index) const {
 
 GreyImage EcdRecording::frame(std::int64_t index) const {
   const std::size_t position = frame_position(index, frame_count(), name_);
-  return read_picture(folder_ / images_.paths[position], [&](const std::filesystem::path& file) {
-    GreyImage image = grey_of(decode_picture_file(file));
-    if (image.size == size_) return image;
-    throw std::runtime_error("expected frames of one size, " + describe_size(size_) + ", got " +
-                             describe_size(image.size));
-  });
+  GreyImage image = read_frame(position);
+  if (image.size == size_) return image;
+  throw InputError("expected frames of one size, " + describe_size(size_) + ", got " +
+                   describe_size(image.size) + ", in " +
+                   (folder_ / images_.paths[position]).string());
+}
+
+GreyImage EcdRecording::read_frame(std::size_t position) const {
+  const std::filesystem::path file = folder_ / images_.paths[position];
+  try {
+    bool has_colour = false;
+    GreyImage image = grey_of(decode_picture_file(file), has_colour);
+    std::ptrdiff_t none_yet = -1;
+    if (has_colour)
+      colour_frame_.compare_exchange_strong(none_yet, static_cast<std::ptrdiff_t>(position));
+    return image;
+  } catch (const std::runtime_error& error) {
+    std::throw_with_nested(InputError(std::string(error.what()) + ", in " + file.string()));
+  }
+}
+
+std::vector<std::string> EcdRecording::notes() const {
+  const std::ptrdiff_t frame = colour_frame_;
+  if (frame < 0) return {};
+  return {"frames in colour are made grey, in " +
+          (folder_ / images_.paths[static_cast<std::size_t>(frame)]).string()};
 }
 
 std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,

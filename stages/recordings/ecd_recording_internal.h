@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -13,7 +14,7 @@
 namespace eventgan {
 
 /// A folder as those of the Event Camera Dataset (ECD): `images.txt`, the pictures it names, and
-/// `events.txt`. It knows no flow.
+/// `events.txt`. It knows no flow. The first picture, which tells the size, is read on opening.
 class EcdRecording final : public Recording {
  public:
   /// Throws InputError, also if a picture is not there.
@@ -29,14 +30,18 @@ class EcdRecording final : public Recording {
   std::vector<Event> events_between(std::int64_t first_frame,
                                     std::int64_t last_frame) const override;
   std::optional<FlowField> flow(std::int64_t index) const override;
+  std::vector<std::string> notes() const override;
 
  private:
+  GreyImage read_frame(std::size_t position) const;
   std::int64_t first_byte_after(std::size_t frame) const;
 
   std::filesystem::path folder_;
   std::string name_;
   EcdImageList images_;
   EcdEventFile events_;
+  mutable std::atomic<std::ptrdiff_t> colour_frame_ =
+      -1;  ///< the first read in colour; -1: none yet
   ImageSize size_;
   EventBoundaries boundaries_;
 };

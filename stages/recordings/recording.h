@@ -34,7 +34,8 @@ class Recording {
   /// Time of a frame in seconds, on the events' clock; strictly ascending.
   virtual double frame_time_s(std::int64_t index) const = 0;
 
-  /// Throws InputError (cause nested) if it cannot be read, or is in colour or of another size.
+  /// A frame in colour is made grey (ITU-R BT.601). Throws InputError (cause nested) if it cannot
+  /// be read or is of another size.
   virtual GreyImage frame(std::int64_t index) const = 0;
 
   /// Events with t(first frame) < t ≤ t(last frame), in time order; none for one frame twice. A
@@ -47,6 +48,10 @@ class Recording {
   /// The true flow from frame `index` to the next one, of recordings that know it (simulated ones);
   /// its values are finite. Throws InputError (cause nested) if it cannot be read.
   virtual std::optional<FlowField> flow(std::int64_t index) const = 0;
+
+  /// What a user should know of the recording, a line each: what was found on opening it, and in
+  /// the frames read since then.
+  virtual std::vector<std::string> notes() const { return {}; }
 };
 
 }  // namespace eventgan

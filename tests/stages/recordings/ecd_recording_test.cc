@@ -10,6 +10,7 @@ namespace eventgan {
 namespace {
 
 using ::testing::Each;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
@@ -70,13 +71,24 @@ TEST_F(EcdRecordingTest, RefusesFramesThatAreNotThere) {
   EXPECT_THROW(recording.flow(2), std::out_of_range);
 }
 
-TEST_F(EcdRecordingTest, RefusesColourAndOtherSizesAndDamage) {
-  write("b.pgm", "P6 4 3 255\n" + std::string(35, '\x0a') + "\x0b");
+TEST_F(EcdRecordingTest, MakesColourGreyAndSaysSo) {
+  EXPECT_THAT(open().notes(), IsEmpty());
+  // ITU-R BT.601: 0.299 x 200 + 0.587 x 100 + 0.114 x 50 = 124.2.
+  std::string colour = "P6 4 3 255\n";
+  for (int pixel = 0; pixel < 12; ++pixel) colour += "\xc8\x64\x32";
+  write("b.pgm", colour);
+  const EcdRecording late = open();
+  EXPECT_THAT(late.notes(), IsEmpty());
+  EXPECT_THAT(late.frame(1).pixels, Each(124));
+  EXPECT_THAT(late.notes(),
+              ElementsAre("frames in colour are made grey, in " + (folder_ / "b.pgm").string()));
+  write("a.pgm", colour);
+  EXPECT_THAT(open().notes(), ElementsAre(HasSubstr("a.pgm")));
+}
+
+TEST_F(EcdRecordingTest, RefusesOtherSizesAndDamage) {
   write("c.pgm", "P5 3 4 255\n" + std::string(12, '\x0a'));
   const EcdRecording recording = open();
-  EXPECT_THAT([&] { recording.frame(1); },
-              ThrowsMessage<InputError>(HasSubstr("expected a grey picture, got colour, in " +
-                                                  (folder_ / "b.pgm").string())));
   EXPECT_THAT([&] { recording.frame(2); },
               ThrowsMessage<InputError>(HasSubstr("one size, 4x3, got 3x4")));
   write("c.pgm", "no picture");
