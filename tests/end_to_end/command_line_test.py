@@ -88,6 +88,21 @@ class CommandLine(program.InFolder):
         run("import-weights", old, weights)
         self.assertEqual(weights.read_bytes(), before)
 
+    def test_import_weights_refuses_layers_that_it_does_not_know(self):
+        old = self.folder / "old.pt"
+        weights = self.folder / "w.safetensors"
+        extra = checkpoint_seeds.Tensor(checkpoint_seeds.Storage("extra", "f", [0.5]), [1])
+        for key in ["resblocks.2.conv1.weight", "encoders.4.conv2d.bias"]:
+            network = folded_network()
+            network[key] = extra
+            old.write_bytes(checkpoint_seeds.legacy_checkpoint({"gen": network}))
+            _, err = run("import-weights", old, weights, expect=66)
+            self.assertIn(key, err)
+            self.assertFalse(weights.exists())
+        known = {"dis": {"disc.model.0.weight": extra}, "optimizer_gen": {"state": {}}, "epoch": 3}
+        old.write_bytes(checkpoint_seeds.legacy_checkpoint({"gen": folded_network(), **known}))
+        run("import-weights", old, weights)
+
     def test_import_weights_says_what_is_there_instead(self):
         old = self.folder / "old.pt"
         weights = self.folder / "w.safetensors"

@@ -4,6 +4,7 @@
 #include <exception>
 #include <map>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string_view>
 
@@ -39,13 +40,15 @@ std::unique_ptr<CheckpointArchive> open_checkpoint(const std::filesystem::path& 
        is_tar ? "a tar file, the format before PyTorch 0.1.10" : "another file");
 }
 
+bool is_ordered_dict(const PickleNode& node) {
+  return node.kind == Kind::kCall &&
+         expect_item(node, 0, Kind::kGlobal, "a function's name").text == "collections.OrderedDict";
+}
+
 /// Key and value nodes of a dict or an OrderedDict.
 const std::vector<const PickleNode*>& entries(const PickleNode& node) {
   if (node.kind == Kind::kDict) return node.items;
-  if (node.kind == Kind::kCall &&
-      expect_item(node, 0, Kind::kGlobal, "a function's name").text == "collections.OrderedDict") {
-    return node.assigned;
-  }
+  if (is_ordered_dict(node)) return node.assigned;
   fail("a dict of tensors", describe(node.kind));
 }
 
@@ -66,8 +69,27 @@ std::string key_list(const PickleNode& node) {
   return count == 0 ? "no keys" : "the keys " + keys;
 }
 
+/// The published code's networks and optimisers are known, and left out unless asked for; counters
+/// are no dicts. Any other dict may be a part of the network that is asked for.
+void refuse_unknown_parts(const PickleNode& root, const std::string& network) {
+  static const std::set<std::string> networks = {"gen", "dis", "flow", "recons"};
+  const auto& all = entries(root);
+  for (std::size_t i = 0; i + 1 < all.size(); i += 2) {
+    const std::string& key = all[i]->text;
+    const PickleNode& value = *all[i + 1];
+    const bool is_dict = value.kind == Kind::kDict || is_ordered_dict(value);
+    if (!is_dict || key == network || networks.contains(key) || key.starts_with("optimizer")) {
+      continue;
+    }
+    fail("gen, dis, flow, recons, optimizers and counters", "key '" + printable(key) + "'");
+  }
+}
+
 const PickleNode& choose_network(const PickleNode& root, const std::string& network) {
-  if (const PickleNode* found = root.find(network)) return *found;
+  if (const PickleNode* found = root.find(network)) {
+    refuse_unknown_parts(root, network);
+    return *found;
+  }
   for (const char* key : {"head.conv2d.weight", "head.weight"}) {
     if (root.find(key) != nullptr) return root;  // a bare state dict
   }

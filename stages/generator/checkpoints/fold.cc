@@ -51,6 +51,14 @@ class FoldedState {
     return std::move(node.mapped().values);
   }
 
+  /// Takes out what is known to play no part.
+  void leave_out(const std::string& key) { tensors_.erase(key); }
+
+  /// Throws if anything has not been taken: the network does what is not known here.
+  void check_empty() const {
+    if (!tensors_.empty()) fail("no other tensors than the generator's", tensors_.begin()->first);
+  }
+
   [[noreturn]] void fail(const std::string& expected, const std::string& got) const {
     throw std::runtime_error("expected " + expected + ", got " + got + ", in " + name_);
   }
@@ -113,6 +121,7 @@ std::vector<double> effective_weight(FoldedState& state, const std::string& key,
   }
   const std::vector<float> raw = state.take_weight(module + ".weight_bar", layer);
   const double sigma = spectral_sigma(raw, state.take(module + ".weight_u", layer.out_channels));
+  state.leave_out(module + ".weight_v");  // follows from u
   if (!(std::abs(sigma) > 0)) {
     state.fail("a spectral norm above 0 of " + module, std::to_string(sigma));
   }
@@ -144,6 +153,7 @@ void fold_layer(FoldedState& state, Convolution& layer) {
     const auto beta = state.take(keys.batch_norm + ".bias", rows);
     const auto mean = state.take(keys.batch_norm + ".running_mean", rows);
     const auto variance = state.take(keys.batch_norm + ".running_var", rows);
+    state.leave_out(keys.batch_norm + ".num_batches_tracked");  // of use in training only
     for (std::size_t r = 0; r < rows; ++r) {
       const double factor = gamma[r] / std::sqrt(double(variance[r]) + kBatchNormEpsilon);
       bias[r] = beta[r] + (bias[r] - mean[r]) * factor;
@@ -178,6 +188,7 @@ Weights fold_generator(StateDict tensors, const std::string& name) {
   weights.bins = static_cast<int>(pred[0] / 2);
   weights.convolutions = network_layout(weights.base_channels, weights.bins);
   for (Convolution& layer : weights.convolutions) fold_layer(state, layer);
+  state.check_empty();
   check_weights(weights, name);
   return weights;
 }

@@ -20,7 +20,8 @@ namespace eventgan {
 /// v| + 1e-12), σ = uᵀ W v, W ← W/σ, so that the output is the reference's first forward after
 /// loading. Batch norm: W ← W γ/√(var + 1e-5), bias = β + (own bias - mean) γ/√(var + 1e-5). Sums
 /// in double precision. A tensor is freed when its layer is done. Throws std::runtime_error naming
-/// the key that is missing or has another shape, or σ = 0.
+/// the key that is missing, has another shape or belongs to no layer (a network with more blocks
+/// computes something else), or σ = 0.
 Weights fold_generator(StateDict state, const std::string& name);
 
 }  // namespace eventgan

@@ -103,6 +103,20 @@ TEST_F(ZipCheckpointFile, SaysWhichKeysAreThereWhenTheNetworkIsNot) {
               HasSubstr("got the keys state_dict, epoch"));
 }
 
+TEST_F(ZipCheckpointFile, LeavesOutKnownPartsByNameAndRefusesOthers) {
+  const auto with = [](const std::string& key, const std::string& value) {
+    return pickled_dict(pickled_text("gen") + pickled_dict(pickled_text("w") + pickled_tensor({})) +
+                        pickled_text(key) + value);
+  };
+  const std::string part = pickled_dict(pickled_text("weight") + pickled_tensor({}));
+  for (const char* known : {"dis", "flow", "recons", "optimizer_gen", "optimizer_dis"}) {
+    EXPECT_EQ(read(with(known, part), floats_).size(), 1u) << known;
+  }
+  EXPECT_EQ(read(with("total_step_count", pickled_integer(9)), floats_).size(), 1u);
+  EXPECT_THAT(refusal(with("gen_second_half", part), floats_),
+              HasSubstr("got key 'gen_second_half'"));
+}
+
 TEST_F(ZipCheckpointFile, RefusesTensorsOutsideTheirStorage) {
   const auto refused = [&](PickledTensor t) {
     return refusal(generator_of(pickled_tensor(t)), floats_);

@@ -111,6 +111,23 @@ TEST(FoldGenerator, RefusesALayerWithNeitherBatchNormNorBias) {
                   ::testing::HasSubstr("decoders.1.norm_layer.weight or decoders.1.conv2d.bias")));
 }
 
+TEST(FoldGenerator, RefusesWhatBelongsToNoLayer) {
+  StateDict state = plain_state(1, 1.0f);
+  state["encoders.0.norm_layer.num_batches_tracked"] = {{}, {7}};  // counts, and plays no part
+  EXPECT_NO_THROW(fold_generator(state, "test"));
+  for (const char* key :
+       {"resblocks.2.conv1.weight", "encoders.4.conv2d.weight", "attention.weight",
+        "encoders.1.conv2d.weight_v", "pred.norm_layer.running_mean"}) {
+    StateDict larger = state;
+    larger[key] = {{1}, {1}};
+    EXPECT_THAT([&] { fold_generator(larger, "FILE"); },
+                ::testing::ThrowsMessage<std::runtime_error>(
+                    ::testing::HasSubstr("expected no other tensors than the generator's, got " +
+                                         std::string(key) + ", in FILE")))
+        << key;
+  }
+}
+
 TEST(FoldGenerator, NamesWhatIsMissing) {
   StateDict state = plain_state(1, 1.0f);
   state.erase("encoders.2.norm_layer.running_var");
