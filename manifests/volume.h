@@ -23,7 +23,7 @@ struct VolumeShape {
 /// What was noteworthy about a stored volume; bits of `/events/statistics/flags`.
 enum VolumeFlag : std::uint32_t {
   kFlagEmpty = 1u << 0,         ///< no value is different from zero
-  kFlagExtrapolated = 1u << 1,  ///< gap 6, which the published generator never saw in training
+  kFlagExtrapolated = 1u << 1,  ///< a gap that the generator never saw in training
   kFlagSaturated = 1u << 2,     ///< values beyond the stored type's range were clipped to it
 };
 

@@ -17,6 +17,8 @@ namespace {
 
 /// The published checkpoint's name for the generator.
 constexpr char kGenerator[] = "gen";
+/// What the authors' training draws gaps from (DESIGN section 4), whatever it is configured for.
+constexpr GapRange kAuthorsGaps{1, 5};
 
 struct Arguments {
   std::string in;
@@ -34,12 +36,14 @@ int run(const Arguments& arguments) {
   } catch (const std::runtime_error&) {
     std::throw_with_nested(InputError("not the published generator's network"));
   }
+  weights.training_gaps = kAuthorsGaps;
   weights.metadata["origin"] = "PyTorch checkpoint";
   weights.metadata["origin_sha256"] = sha256_of_file(arguments.in);
   const std::string bytes = serialize_weights(weights);
   write_file_atomically(arguments.out, bytes);
   std::cout << arguments.out << ": base width " << weights.base_channels << ", " << weights.bins
-            << " bins, SHA-256 " << sha256_hex(bytes) << std::endl;
+            << " bins, " << describe_training_gaps(weights.training_gaps) << ", SHA-256 "
+            << sha256_hex(bytes) << std::endl;
   return kComplete;
 }
 

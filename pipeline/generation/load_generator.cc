@@ -25,10 +25,11 @@ LoadedGenerator load_simulator(const JobManifest& manifest) {
 }
 
 std::string choice_text(const EngineChoice& choice, Precision precision,
-                        const EngineSupport& support) {
+                        const EngineSupport& support, const std::optional<GapRange>& gaps) {
   std::string text = "generator: ";
   text.append(to_string(choice.engine)).append(" ").append(to_string(precision));
-  return text + " on " + support.processor + " (" + choice.reason + ")";
+  text += " on " + support.processor + " (" + choice.reason + "), " + describe_training_gaps(gaps);
+  return gaps ? text : text + ", so none is marked as extrapolated";
 }
 
 /// Weights that the engine refuses are an input that cannot be used.
@@ -53,7 +54,7 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   LoadedGenerator result;
   result.generator = make_engine(choice.engine, loaded.weights, spec);
   result.weights_hash = std::move(loaded.hash);
-  result.choice = choice_text(choice, spec.precision, support);
+  result.choice = choice_text(choice, spec.precision, support, loaded.weights.training_gaps);
   for (const std::string& warning : {loaded.warning, choice.warning}) {
     if (!warning.empty()) result.warnings.push_back(warning);
   }

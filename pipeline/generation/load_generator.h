@@ -16,7 +16,7 @@ struct LoadedGenerator {
   /// none: of its description).
   std::string weights_hash;
   /// The engine that was chosen and why, for people: "generator: onednn float32 on avx2 (auto:
-  /// ...)"; empty for a simulator.
+  /// ...), trained on gaps 1-6"; empty for a simulator.
   std::string choice;
   std::vector<std::string> warnings;  ///< what the user must know before trusting the volumes
 };

@@ -11,9 +11,6 @@
 namespace eventgan {
 namespace {
 
-/// Gap that the published generator never saw in training (DESIGN section 4).
-constexpr int kFirstExtrapolatedGap = 6;
-
 /// Adds the processor time that the calling thread spends in its scope to one stage of a message.
 class Stopwatch {
  public:
@@ -119,8 +116,8 @@ void SampleStages::finish(SampleMessage& message) const {
     return;
   }
   VolumeStatistics& statistics = message.sample.statistics = *found;
-  if (manifest_.generator.kind == GeneratorKind::kNetwork &&
-      message.planned().pair.gap_frames >= kFirstExtrapolatedGap) {
+  const std::optional<GapRange> trained = generator_.training_gaps();
+  if (trained && !trained->contains(message.planned().pair.gap_frames)) {
     statistics.flags |= kFlagExtrapolated;
   }
   float largest = statistics.max;

@@ -1,12 +1,21 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 
 #include "manifests/image_size.h"
 
 namespace eventgan {
+
+/// The gaps between two frames, in frames, that a network has seen in training.
+struct GapRange {
+  int first = 1;
+  int last = 1;  ///< itself included
+  bool contains(int gap_frames) const { return first <= gap_frames && gap_frames <= last; }
+  bool operator==(const GapRange&) const = default;
+};
 
 /// The EventGAN generator (DESIGN section 4), ready to run; the seam between the pipeline and the
 /// inference engines, and where tests put a fake.
@@ -31,6 +40,10 @@ class Generator {
   /// Memory that one call needs beyond its spans, about; calls at the same time need it each. 0:
   /// hardly any.
   virtual std::size_t working_bytes(ImageSize) const { return 0; }
+
+  /// What it was trained on; beyond it, it extrapolates. None: not known, or not trained at all (a
+  /// model of a sensor).
+  virtual std::optional<GapRange> training_gaps() const { return std::nullopt; }
 
   /// Engine, precision and the libraries that change bytes, for the plan's fingerprint.
   virtual std::string description() const = 0;

@@ -46,6 +46,11 @@ std::vector<Convolution> network_layout(int base_channels, int bins) {
   return layout;
 }
 
+std::string describe_training_gaps(const std::optional<GapRange>& gaps) {
+  if (!gaps) return "training gaps unknown";
+  return "trained on gaps " + std::to_string(gaps->first) + "-" + std::to_string(gaps->last);
+}
+
 std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes) {
   // What the encoders read and the decoders but the last write: levels of half the side and twice
   // the channels, the topmost once, the others twice; and two tensors at the bottom.

@@ -3,10 +3,12 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "manifests/image_size.h"
+#include "stages/generator/generator.h"
 
 namespace eventgan {
 
@@ -33,12 +35,16 @@ struct Weights {
   int bins = 0;                                 ///< per polarity; the last layer has 2 bins outputs
   std::vector<Convolution> convolutions;        ///< in the order of network_layout()
   std::map<std::string, std::string> metadata;  ///< origin: where the numbers come from
-  std::shared_ptr<const Calibration> calibration;  ///< what int8 needs; null: none
+  std::shared_ptr<const Calibration> calibration;        ///< what int8 needs; null: none
+  std::optional<GapRange> training_gaps = std::nullopt;  ///< none: not known
 };
 
 /// Names and shapes of the network's convolutions for a base width, without numbers: head,
 /// encoders.0-3, resblocks.0-1.conv1-2, decoders.0-3, pred.
 std::vector<Convolution> network_layout(int base_channels, int bins);
+
+/// "trained on gaps 1-5" or "training gaps unknown"; for people.
+std::string describe_training_gaps(const std::optional<GapRange>& gaps);
 
 /// Bytes of the activations between the network's layers for one picture, each held once, with
 /// `value_bytes` a value, and of its input and output: what an engine that reuses nothing needs,

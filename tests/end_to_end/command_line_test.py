@@ -83,6 +83,7 @@ class CommandLine(program.InFolder):
         self.assertIn("base width 1, 9 bins", out)
         tensors, metadata = read_safetensors(weights)
         self.assertEqual(metadata["base_channels"], "1")
+        self.assertEqual(metadata["training_gaps"], "1-5")  # what the authors' code draws from
         self.assertEqual(tensors["pred.bias"], ([18], struct.pack("<18f", *[0.25] * 18)))
         before = weights.read_bytes()
         run("import-weights", old, weights)

@@ -70,12 +70,12 @@ class Engines(program.InFolder):
     def test_both_engines_make_the_same_volumes_and_say_their_name(self):
         self.needs_onednn()
         torch, err = self.convert("torch", engine="torch")
-        self.assertRegex(err, r"(?m)^generator: torch float32 on \S+ \(as the manifest says\)$")
+        self.assertRegex(err, r"(?m)^generator: torch float32 on \S+ \(as the manifest says\), trained on gaps 1-6$")
         onednn, err = self.convert("onednn", engine="onednn", precision="float32")
-        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(as the manifest says\)$")
+        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(as the manifest says\), trained on gaps 1-6$")
         self.assert_near(onednn, torch)
         fastest, err = self.convert("auto", engine="auto")
-        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(auto: the fastest engine for float32 on this processor\)$")
+        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(auto: the fastest engine for float32 on this processor\), trained on gaps 1-6$")
         np.testing.assert_array_equal(fastest, onednn)
         engines = {name: json.loads((self.job / name / "plan.json").read_text())["fingerprint"]["engine"]
                    for name in ("torch", "onednn", "auto")}
@@ -110,7 +110,7 @@ class Engines(program.InFolder):
 
     def test_every_command_that_generates_says_so(self):
         path = self.manifest("out.json", engine="torch")
-        line = r"generator: torch float32 on .+ \(as the manifest says\)"
+        line = r"generator: torch float32 on .+ \(as the manifest says\), trained on gaps 1-6"
         self.assertRegex(run("plan", path)[1], line)
         with broken_cars(self.job, [1]):
             _, err = run("convert", path, "--progress", "json")

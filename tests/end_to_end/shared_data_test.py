@@ -87,7 +87,8 @@ class SharedData(program.InFolder):
         for slot, frame in enumerate([3, 2, 1]):
             self.assertTrue(text(shard["pairs/prev_path"][slot]).endswith(f"{frame:010d}.png"))
         np.testing.assert_allclose(shard["pairs/gap_s"][:], [0.4, 0.5, 0.6], atol=1e-6)
-        self.assertTrue(shard["events/statistics/flags"][2] & 2)  # 6 apart: extrapolated
+        # Nobody knows what gaps these weights were trained on: not even 6 counts as extrapolated.
+        self.assertFalse(shard["events/statistics/flags"][:].any())
 
     def test_kitti_raw(self):
         _, shards = self.convert(manifest([{"dataset": "kitti_raw", "root": str(SHARED / "kitti_raw"), "pairs": pairs([6])}],

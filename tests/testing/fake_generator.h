@@ -14,6 +14,9 @@ class FakeGenerator final : public Generator {
 
   /// Frames whose first previous value equals `value` get a volume with NaN in it.
   void fail_on(float value) { failing_value_ = value; }
+  /// As if it had been trained.
+  void train_on(GapRange gaps) { training_gaps_ = gaps; }
+  std::optional<GapRange> training_gaps() const override { return training_gaps_; }
   int calls() const { return calls_; }
 
   int bins() const override { return bins_; }
@@ -23,6 +26,7 @@ class FakeGenerator final : public Generator {
 
  private:
   int bins_;
+  std::optional<GapRange> training_gaps_;
   float failing_value_ = -100;
   mutable std::atomic<int> calls_ = 0;
 };

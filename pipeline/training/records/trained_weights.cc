@@ -46,6 +46,8 @@ std::string steps_text(const TrainingManifest& manifest, const TrainingPosition&
 Weights trained_weights(const StateDict& generator_state, const TrainingManifest& manifest,
                         const TrainingPosition& position) {
   Weights weights = fold_generator(generator_state, "the trained generator");
+  const auto [first, last] = std::ranges::minmax(manifest.gaps);
+  weights.training_gaps = GapRange{first, last};
   weights.metadata["origin"] = "eventgan train";
   weights.metadata["program"] = program_version();
   weights.metadata["training_manifest"] = manifest.text;

@@ -53,13 +53,16 @@ class OnednnGenerator final : public Generator {
  public:
   OnednnGenerator(const Weights& weights, Precision precision)
       : bins_(weights.bins),
+        training_gaps_(weights.training_gaps),
         precision_(precision),
         description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
-                     version_text() + ", " + onednn_support(precision).instruction_set),
+                     version_text() + ", " + onednn_support(precision).instruction_set + ", " +
+                     describe_training_gaps(weights.training_gaps)),
         layers_(weights, precision, dnnl::engine(dnnl::engine::kind::cpu, 0)),
         plans_(layers_) {}
 
   int bins() const override { return bins_; }
+  std::optional<GapRange> training_gaps() const override { return training_gaps_; }
   std::string description() const override { return description_; }
   std::size_t working_bytes(ImageSize size) const override {
     return activation_bytes(size, layers_.base_channels(), stored_bytes(precision_));
@@ -90,6 +93,7 @@ class OnednnGenerator final : public Generator {
 
  private:
   int bins_;
+  std::optional<GapRange> training_gaps_;
   Precision precision_;
   std::string description_;
   mutable NetworkLayers layers_;

@@ -19,14 +19,16 @@ class TorchGenerator final : public Generator {
   TorchGenerator(const Weights& weights, Precision precision)
       : bins_(weights.bins),
         base_channels_(weights.base_channels),
+        training_gaps_(weights.training_gaps),
         precision_(precision),
         forward_(weights, precision == Precision::kBfloat16 ? at::kBFloat16 : at::kFloat) {}
 
   int bins() const override { return bins_; }
+  std::optional<GapRange> training_gaps() const override { return training_gaps_; }
 
   std::string description() const override {
     return "torch " + std::string(to_string(precision_)) + ", 1 thread, LibTorch " + TORCH_VERSION +
-           ", " + at::get_mkldnn_version();
+           ", " + at::get_mkldnn_version() + ", " + describe_training_gaps(training_gaps_);
   }
 
   /// LibTorch holds a layer's input, its output and all phases of a decoder at once, beside the
@@ -54,6 +56,7 @@ class TorchGenerator final : public Generator {
  private:
   int bins_;
   int base_channels_;
+  std::optional<GapRange> training_gaps_;
   Precision precision_;
   NetworkForward forward_;
 };

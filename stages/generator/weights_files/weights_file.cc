@@ -1,9 +1,11 @@
 #include "stages/generator/weights_files/weights_file.h"
 
+#include <charconv>
 #include <exception>
 #include <stdexcept>
 
 #include "manifests/faults.h"
+#include "manifests/training_manifest.h"
 #include "stages/generator/weights_files/calibration_fields.h"
 #include "stages/generator/weights_files/content_fields.h"
 #include "stages/generator/weights_files/safetensors.h"
@@ -13,6 +15,35 @@ namespace {
 
 constexpr char kFormat[] = "eventgan-generator";
 constexpr char kVersion[] = "1";
+constexpr char kTrainingGaps[] = "training_gaps";
+
+GapRange parse_gap_range(const std::string& text) {
+  GapRange gaps;
+  const char* const end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, gaps.first);
+  const bool has_both = first.ec == std::errc() && first.ptr != end && *first.ptr == '-';
+  const auto last = std::from_chars(has_both ? first.ptr + 1 : end, end, gaps.last);
+  if (!has_both || last.ec != std::errc() || last.ptr != end || gaps.first < 1 ||
+      gaps.last < gaps.first) {
+    throw std::runtime_error("expected metadata training_gaps FIRST-LAST such as 1-5, got \"" +
+                             text + "\"");
+  }
+  return gaps;
+}
+
+/// As the file says; of files trained before they said it, as their training's manifest says.
+std::optional<GapRange> take_training_gaps(std::map<std::string, std::string>& metadata) {
+  const auto stated = metadata.extract(kTrainingGaps);
+  if (!stated.empty()) return parse_gap_range(stated.mapped());
+  const auto training = metadata.find("training_manifest");
+  if (training == metadata.end()) return std::nullopt;
+  try {
+    const auto gaps = parse_training_manifest(training->second, {}, "training_manifest").gaps;
+    return GapRange{gaps.front(), gaps.back()};
+  } catch (const UsageError&) {
+    return std::nullopt;  // another program's
+  }
+}
 
 Weights from_content(SafetensorsFile content, const std::string& name) {
   if (content.metadata["format"] != kFormat || content.metadata["format_version"] != kVersion) {
@@ -38,6 +69,7 @@ Weights from_content(SafetensorsFile content, const std::string& name) {
   if (!content.tensors.empty()) {
     throw std::runtime_error("expected no other tensors, got " + content.tensors.begin()->first);
   }
+  weights.training_gaps = take_training_gaps(content.metadata);
   weights.metadata = std::move(content.metadata);
   return weights;
 }
@@ -56,6 +88,9 @@ std::string serialize_weights(const Weights& weights) {
   metadata["format_version"] = kVersion;
   metadata["base_channels"] = std::to_string(weights.base_channels);
   metadata["bins"] = std::to_string(weights.bins);
+  if (const auto& gaps = weights.training_gaps) {
+    metadata[kTrainingGaps] = std::to_string(gaps->first) + "-" + std::to_string(gaps->last);
+  }
   std::map<std::string, TensorView> tensors;
   for (const Convolution& convolution : weights.convolutions) {
     const std::int64_t out = convolution.out_channels;

@@ -9,9 +9,9 @@
 namespace eventgan {
 
 /// The weights as a safetensors file: tensors NAME.weight and NAME.bias for each convolution;
-/// metadata `format` ("eventgan-generator"), `format_version`, `base_channels`, `bins` and
-/// Weights::metadata; the calibration, if there is one, as calibration_fields.h says.
-/// Deterministic.
+/// metadata `format` ("eventgan-generator"), `format_version`, `base_channels`, `bins`,
+/// `training_gaps` ("1-5"; absent if not known) and Weights::metadata; the calibration, if there is
+/// one, as calibration_fields.h says. Deterministic.
 std::string serialize_weights(const Weights& weights);
 
 /// Reads and checks such a file. Throws InputError (with the cause nested) if it is absent,

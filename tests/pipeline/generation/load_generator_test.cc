@@ -66,7 +66,9 @@ TEST(LoadGenerator, MakesTheEngineThatIsAskedForAndSaysWhich) {
   manifest.generator.engine = Engine::kTorch;
   const LoadedGenerator torch = load_generator(manifest);
   EXPECT_THAT(torch.choice, ::testing::StartsWith("generator: torch float32 on "));
-  EXPECT_THAT(torch.choice, ::testing::EndsWith("(as the manifest says)"));
+  EXPECT_THAT(torch.choice, ::testing::EndsWith(
+                                "(as the manifest says), training gaps unknown, so none is marked "
+                                "as extrapolated"));
   EXPECT_THAT(torch.generator->description(), ::testing::StartsWith("torch float32"));
 
   manifest.generator.engine = std::nullopt;
@@ -76,6 +78,23 @@ TEST(LoadGenerator, MakesTheEngineThatIsAskedForAndSaysWhich) {
   EXPECT_THAT(fastest.choice, ::testing::StartsWith("generator: " + name + " on " +
                                                     support.processor + " (auto: "));
   EXPECT_THAT(fastest.generator->description(), ::testing::StartsWith(name));
+}
+
+TEST(LoadGenerator, KnowsWhatGapsTheWeightsWereTrainedOn) {
+  const testing::TemporaryFolder folder;
+  Weights weights = trained_weights();
+  weights.training_gaps = GapRange{1, 5};
+  testing::write_file(folder / "w.safetensors", serialize_weights(weights));
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  for (const std::optional<Engine> engine : {std::optional<Engine>(), {Engine::kTorch}}) {
+    manifest.generator.engine = engine;
+    const LoadedGenerator loaded = load_generator(manifest);
+    EXPECT_EQ(loaded.generator->training_gaps(), (GapRange{1, 5}));
+    EXPECT_THAT(loaded.choice, ::testing::EndsWith(", trained on gaps 1-5"));
+    EXPECT_THAT(loaded.generator->description(), ::testing::EndsWith(", trained on gaps 1-5"));
+  }
 }
 
 TEST(LoadGenerator, RefusesInt8WithoutACalibration) {
@@ -107,6 +126,7 @@ TEST(LoadGenerator, SetsUpSimulators) {
   manifest.generator.kind = GeneratorKind::kDifference;
   const LoadedGenerator loaded = load_generator(manifest);
   EXPECT_EQ(loaded.generator->bins(), 5);
+  EXPECT_EQ(loaded.generator->training_gaps(), std::nullopt);
   EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
   EXPECT_EQ(loaded.choice, "");
   EXPECT_EQ(loaded.weights_hash, sha256_hex(loaded.generator->description()));

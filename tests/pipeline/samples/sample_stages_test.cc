@@ -112,10 +112,21 @@ TEST_F(SampleStagesTest, StoresWhatWasGeneratedInItsFrameAndNormalisedIfAsked) {
   }
 }
 
-TEST_F(SampleStagesTest, SixFramesApartIsMarkedAsExtrapolated) {
-  EXPECT_EQ(run().sample.statistics.flags & kFlagExtrapolated, 0u);
-  shard_.samples[0].pair.gap_frames = 6;
-  EXPECT_NE(run().sample.statistics.flags & kFlagExtrapolated, 0u);
+TEST_F(SampleStagesTest, AGapOutsideThoseTrainedOnIsMarkedAsExtrapolated) {
+  const auto marked = [&](int gap) {
+    shard_.samples[0].pair.gap_frames = gap;
+    return (run().sample.statistics.flags & kFlagExtrapolated) != 0;
+  };
+  EXPECT_FALSE(marked(6)) << "nobody knows what it was trained on";
+  generator_.train_on({1, 5});
+  EXPECT_FALSE(marked(5));
+  EXPECT_TRUE(marked(6));
+  generator_.train_on({1, 6});
+  EXPECT_FALSE(marked(6));
+  generator_.train_on({2, 3});
+  EXPECT_TRUE(marked(1));
+  EXPECT_FALSE(marked(2));
+  EXPECT_TRUE(marked(4));
 }
 
 TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {

@@ -23,6 +23,8 @@ TEST(TrainedWeights, RunAndSayWhereTheyComeFrom) {
     Weights weights = trained_weights(Trainer(manifest, "cpu").generator_state(), manifest,
                                       {TrainingPhase::kGenerator, 3});
     EXPECT_EQ(weights.metadata.at("origin"), "eventgan train");
+    const auto [first, last] = std::ranges::minmax(manifest.gaps);
+    EXPECT_EQ(weights.training_gaps, (GapRange{first, last}));
     EXPECT_EQ(weights.metadata.at("training_manifest"), manifest.text);
     EXPECT_EQ(weights.metadata.at("training_manifest_sha256"), sha256_hex(manifest.text));
     EXPECT_EQ(weights.metadata.at("training_steps"), "flow 2, reconstruction 2, generator 3");

@@ -42,6 +42,7 @@ TEST(ShippedWeights, AreNetworksOfTheirWidth) {
     const Weights weights = read_shipped_weights(width);
     EXPECT_EQ(weights.base_channels, width);
     EXPECT_EQ(weights.bins, 9);
+    EXPECT_EQ(weights.training_gaps, (GapRange{1, 6}));  // manifests/weights/train-8.json
   }
 }
 

@@ -32,6 +32,31 @@ TEST(WeightsFile, ParsesBytes) {
   EXPECT_THROW(parse_weights(bytes.substr(1), "NAME"), InputError);
 }
 
+TEST(WeightsFile, TellsWhatGapsItWasTrainedOn) {
+  Weights weights = untrained_weights(1, 9, 3);
+  const auto written_and_read = [&] { return parse_weights(serialize_weights(weights), "NAME"); };
+  EXPECT_EQ(written_and_read().training_gaps, std::nullopt);
+  weights.training_gaps = GapRange{1, 5};
+  EXPECT_EQ(written_and_read().training_gaps, (GapRange{1, 5}));
+  EXPECT_EQ(parse_safetensors(serialize_weights(weights), "").metadata.at("training_gaps"), "1-5");
+  for (const char* wrong : {"", "5", "1-", "-5", "0-5", "3-2", "1-5x", "1..5", "1-99999999999"}) {
+    SafetensorsFile content = parse_safetensors(serialize_weights(weights), "");
+    content.metadata["training_gaps"] = wrong;
+    EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError) << wrong;
+  }
+}
+
+TEST(WeightsFile, TakesTheGapsOfAnEarlierFileFromItsTrainingManifest) {
+  Weights weights = untrained_weights(1, 9, 3);
+  weights.metadata["training_manifest"] = R"({
+    "format": "eventgan-training", "version": 1, "name": "t",
+    "recordings": [{ "path": "r.hdf5", "format": "mvsec" }],
+    "gaps": [4, 2], "steps": { "flow": 1, "reconstruction": 1, "generator": 1 }, "output": { "directory": "out" } })";
+  EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").training_gaps, (GapRange{2, 4}));
+  weights.metadata["training_manifest"] = "gaps: 2, 4";
+  EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").training_gaps, std::nullopt);
+}
+
 TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {
   const testing::TemporaryFolder folder;
   SafetensorsFile content =
