@@ -1,11 +1,12 @@
 #include "pipeline/planning/fingerprint.h"
 
 #include <hdf5.h>
-#include <jconfig.h>
-#include <libdeflate.h>
+#include <link.h>
 #include <png.h>
+#include <zlib.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 #include <string_view>
@@ -58,6 +59,49 @@ std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedSh
   });
 }
 
+bool any_video(const std::vector<PlannedShard>& shards) {
+  return std::ranges::any_of(shards, [](const PlannedShard& shard) {
+    return std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
+      return sample.pair.previous.video_frame >= 0;
+    });
+  });
+}
+
+/// "libjpeg.so.62 0123456789abcdef": a library that cannot be asked for its version, as it is
+/// loaded in this process: the file's name and the first digits of its SHA-256, which are the same
+/// wherever the same package is installed. `name` alone if it is not loaded: then it is a part of
+/// the program.
+std::string loaded_library(const std::string& name) {
+  struct Search {
+    std::string start;
+    std::filesystem::path found;
+  } search{name + ".so", {}};
+  dl_iterate_phdr(
+      [](dl_phdr_info* library, std::size_t, void* data) {
+        auto& [start, found] = *static_cast<Search*>(data);
+        const std::filesystem::path file = library->dlpi_name;
+        if (!file.filename().string().starts_with(start)) return 0;
+        found = file;
+        return 1;
+      },
+      &search);
+  if (search.found.empty()) return name;
+  return search.found.filename().string() + " " + sha256_of_file(search.found).substr(0, 16);
+}
+
+/// Of all that makes or reads bytes, as it runs, which need not be what was compiled against.
+std::string libraries(bool with_videos) {
+  unsigned major = 0, minor = 0, release = 0;
+  H5get_libversion(&major, &minor, &release);
+  std::string text = "HDF5 " + std::to_string(major) + "." + std::to_string(minor) + "." +
+                     std::to_string(release) + ", zlib " + zlibVersion() + ", OpenCV " +
+                     cv::getVersionString() + ", libpng " + png_get_libpng_ver(nullptr) + ", " +
+                     loaded_library("libjpeg") + ", " + loaded_library("libdeflate");
+  // The one of FFmpeg's libraries that decodes; all come from one source.
+  if (with_videos) text += ", " + loaded_library("libavcodec");
+  return text;
+}
+
 }  // namespace
 
 std::string preprocessing_json(const ImageSpec& image) {
@@ -89,8 +133,6 @@ std::map<std::string, std::string> make_fingerprint(
     const JobManifest& manifest, const std::vector<PlannedShard>& shards,
     const std::vector<std::string>& annotation_files, const std::string& weights_hash,
     const std::string& engine, const std::function<void()>& before_file) {
-  unsigned major = 0, minor = 0, release = 0;
-  H5get_libversion(&major, &minor, &release);
   std::map<std::string, std::string> fingerprint = {
       {"annotations", annotations_hash(manifest, annotation_files, before_file)},
       {"frames", frames_hash(manifest, shards, before_file)},
@@ -98,11 +140,7 @@ std::map<std::string, std::string> make_fingerprint(
       {"engine", engine},
       {"preprocessing", preprocessing_json(manifest.image)},
       {"cpu", instruction_sets()},
-      {"libraries", "HDF5 " + std::to_string(major) + "." + std::to_string(minor) + "." +
-                        std::to_string(release) + ", OpenCV " + cv::getVersionString() +
-                        ", libjpeg-turbo " + std::to_string(LIBJPEG_TURBO_VERSION_NUMBER) +
-                        ", libpng " + png_get_libpng_ver(nullptr) + ", libdeflate " +
-                        LIBDEFLATE_VERSION_STRING},
+      {"libraries", libraries(any_video(shards))},
       {"program", program_version()}};
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;

@@ -1,7 +1,14 @@
 #include "pipeline/planning/fingerprint.h"
 
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <libdeflate.h>
+#include <zlib.h>
+
+#include <cstdio>
+// jpeglib.h needs the one above it.
+#include <jpeglib.h>
 
 #include "stages/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
@@ -41,6 +48,32 @@ TEST_F(Fingerprint, ListsEachPathOnceSortedWithItsSizeOrHash) {
   EXPECT_EQ(fields.at("annotations"),
             sha256_hex("labels.txt\t" + sha256_hex("Car 1") + "\nz.txt\tabsent\n"));
   EXPECT_EQ(make_fingerprint(manifest_, {}, {}, "", "").at("frames"), sha256_hex(""));
+}
+
+/// "libjpeg.so.62 0123456789abcdef" of the file that a function of this process lies in.
+template <class Function>
+std::string file_of(Function* function) {
+  Dl_info info{};
+  EXPECT_NE(dladdr(reinterpret_cast<void*>(function), &info), 0);
+  const std::filesystem::path file = info.dli_fname;
+  return file.filename().string() + " " + sha256_of_file(file).substr(0, 16);
+}
+
+TEST_F(Fingerprint, HasTheLibrariesThatAreLoaded) {
+  using ::testing::HasSubstr;
+  const std::string libraries = make().at("libraries");
+  EXPECT_THAT(libraries, HasSubstr(std::string("zlib ") + zlibVersion()));
+  EXPECT_THAT(file_of(jpeg_std_error), ::testing::StartsWith("libjpeg.so"));
+  EXPECT_THAT(libraries, HasSubstr(file_of(jpeg_std_error)));
+  EXPECT_THAT(file_of(libdeflate_alloc_compressor), ::testing::StartsWith("libdeflate.so"));
+  EXPECT_THAT(libraries, HasSubstr(file_of(libdeflate_alloc_compressor)));
+}
+
+TEST_F(Fingerprint, HasFfmpegWhereFramesComeFromVideos) {
+  EXPECT_THAT(make().at("libraries"), ::testing::Not(::testing::HasSubstr("libavcodec")));
+  shards_[0].samples[0].pair.previous.video_frame = 0;
+  EXPECT_THAT(make().at("libraries"),
+              ::testing::ContainsRegex(", libavcodec\\.so\\.[0-9.]+ [0-9a-f]{16}"));
 }
 
 TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
