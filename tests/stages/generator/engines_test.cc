@@ -102,6 +102,18 @@ TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
   }
 }
 
+/// The small network of published/make_published.py, so that one is compared on every machine.
+TEST_P(Engines, EqualsTheSmallPublishedNetwork) {
+  const std::filesystem::path folder =
+      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "tests/stages/generator/published";
+  const auto generator =
+      engine(fold_generator(read_checkpoint(folder / "published.pt", "gen"), ""));
+  const StateDict numbers = read_checkpoint(folder / "published_case.pt", "case");
+  const NamedTensor& input = numbers.at("input");
+  const ImageSize size{int(input.shape[1]), int(input.shape[2])};
+  expect_near(generated(*generator, input.values, size), numbers.at("volume").values, "published");
+}
+
 TEST_P(Engines, EqualsThePublishedNetworkWhateverRanBefore) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto golden = data / "golden" / "golden.h5";
