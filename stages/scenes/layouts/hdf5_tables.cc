@@ -5,20 +5,15 @@
 
 namespace eventgan {
 
-Hdf5Tables::Hdf5Tables(std::filesystem::path path) : path_(std::move(path)) {
-  parents_ = H5Pcreate(H5P_LINK_CREATE);
-  timeless_ = H5Pcreate(H5P_DATASET_CREATE);
-  file_ = H5Fcreate(path_.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT);
+Hdf5Tables::Hdf5Tables(std::filesystem::path path)
+    : path_(std::move(path)),
+      parents_(H5Pcreate(H5P_LINK_CREATE), H5Pclose),
+      timeless_(H5Pcreate(H5P_DATASET_CREATE), H5Pclose),
+      file_(H5Fcreate(path_.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT), H5Fclose) {
   require(parents_ >= 0 && timeless_ >= 0 && file_ >= 0);
   // Groups have no times of their own in this file version.
   require(H5Pset_create_intermediate_group(parents_, 1) >= 0);
   require(H5Pset_obj_track_times(timeless_, false) >= 0);
-}
-
-Hdf5Tables::~Hdf5Tables() {
-  if (file_ >= 0) H5Fclose(file_);
-  if (timeless_ >= 0) H5Pclose(timeless_);
-  if (parents_ >= 0) H5Pclose(parents_);
 }
 
 void Hdf5Tables::require(bool succeeded) const {
@@ -48,9 +43,11 @@ void Hdf5Tables::write(const std::string& name, const std::vector<hsize_t>& shap
 }
 
 void Hdf5Tables::close() {
-  const bool closed = H5Fclose(file_) >= 0;
-  file_ = -1;
-  require(closed);
+  try {
+    file_.close(path_.string());
+  } catch (const Hdf5Error&) {
+    require(false);
+  }
 }
 
 }  // namespace eventgan

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <hdf5.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
+
+#include "stages/hdf5/hdf5_handle_internal.h"
 
 namespace eventgan {
 
@@ -15,9 +15,6 @@ namespace eventgan {
 class Hdf5Tables {
  public:
   explicit Hdf5Tables(std::filesystem::path path);
-  ~Hdf5Tables();
-  Hdf5Tables(const Hdf5Tables&) = delete;
-  Hdf5Tables& operator=(const Hdf5Tables&) = delete;
 
   void write(const std::string& name, const std::vector<hsize_t>& shape,
              const std::vector<double>& values);
@@ -33,9 +30,9 @@ class Hdf5Tables {
   void require(bool succeeded) const;
 
   std::filesystem::path path_;
-  hid_t file_ = -1;
-  hid_t parents_ = -1;   ///< link creation: make groups on the way
-  hid_t timeless_ = -1;  ///< dataset creation: no time of writing
+  Hdf5Handle parents_;   ///< link creation: make groups on the way
+  Hdf5Handle timeless_;  ///< dataset creation: no time of writing
+  Hdf5Handle file_;
 };
 
 }  // namespace eventgan

@@ -60,5 +60,18 @@ TEST(Hdf5Tables, FailuresNameThePath) {
   EXPECT_THROW(tables.write("x", {1}, std::vector<double>{1}), std::runtime_error);
 }
 
+TEST(Hdf5Tables, AFileThatCannotBeMadeLeavesNothingOpen) {
+  const TemporaryFolder folder;
+  H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  // HDF5 numbers property lists as they are made.
+  const hid_t before = H5Pcreate(H5P_LINK_CREATE);
+  EXPECT_THROW(Hdf5Tables(folder / "none/t.h5"), std::runtime_error);
+  const hid_t after = H5Pcreate(H5P_LINK_CREATE);
+  ASSERT_GE(after - before, 3);  // it has made some
+  for (hid_t id = before + 1; id < after; ++id) EXPECT_LE(H5Iis_valid(id), 0) << id - before;
+  H5Pclose(after);
+  H5Pclose(before);
+}
+
 }  // namespace
 }  // namespace eventgan
