@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <thread>
+#include <vector>
+
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -29,6 +32,23 @@ TEST(Amendments, AreReadInTheOrderOfTheirRecording) {
   EXPECT_THAT(read_amendments(folder.path(), kPlan), ElementsAre(kFirst));
   record_amendment(folder.path(), kPlan, kSecond);
   EXPECT_THAT(read_amendments(folder.path(), kPlan), ElementsAre(kFirst, kSecond));
+}
+
+TEST(Amendments, RecordedAtOnceAreAllThere) {
+  const testing::TemporaryFolder folder;
+  constexpr int kWriters = 8;
+  std::vector<std::thread> writers;
+  for (int i = 0; i < kWriters; ++i) {
+    writers.emplace_back([&, i] {
+      record_amendment(folder.path(), kPlan, {{{"frames", "f"}}, {std::to_string(i)}});
+    });
+  }
+  for (std::thread& writer : writers) writer.join();
+  std::vector<std::string> samples;
+  for (const Amendment& one : read_amendments(folder.path(), kPlan)) {
+    samples.push_back(one.samples.at(0));
+  }
+  EXPECT_THAT(samples, ::testing::UnorderedElementsAre("0", "1", "2", "3", "4", "5", "6", "7"));
 }
 
 TEST(Amendments, OfAnotherPlanDoNotCountAndMakeRoom) {
