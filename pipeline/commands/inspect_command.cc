@@ -5,6 +5,7 @@
 #include "manifests/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
+#include "pipeline/inspection/shard_guard.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 
@@ -43,7 +44,9 @@ void add_inspect_command(CLI::App& app, int& exit_code) {
   command->add_option("--sample", arguments->sample, "A slot, counted from 0")
       ->check(CLI::NonNegativeNumber);
   command->add_flag("--json", arguments->json, "Print JSON");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  command->callback([arguments, &exit_code] {
+    exit_code = read_guarded(arguments->shard, [&] { return run(*arguments); });
+  });
 }
 
 }  // namespace eventgan

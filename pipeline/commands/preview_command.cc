@@ -5,6 +5,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/inspection/preview_shard.h"
+#include "pipeline/inspection/shard_guard.h"
 
 namespace eventgan {
 namespace {
@@ -48,7 +49,9 @@ void add_preview_command(CLI::App& app, int& exit_code) {
   command->add_option(
       "--frames", arguments->frames,
       "The manifest's folder, where frame paths start; default: as convert recorded it");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  command->callback([arguments, &exit_code] {
+    exit_code = read_guarded(arguments->shard, [&] { return run(*arguments); });
+  });
 }
 
 }  // namespace eventgan

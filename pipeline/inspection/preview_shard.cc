@@ -4,6 +4,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
+#include "pipeline/inspection/shard_guard.h"
 #include "pipeline/inspection/slot_selection.h"
 #include "pipeline/output/output_folder.h"
 #include "stages/events/pictures/preview_picture.h"
@@ -50,10 +51,12 @@ std::vector<std::uint8_t> frame_picture(const FrameDecoder& decoder, const Frame
 PreviewContent content_of(const ShardReader& reader, int slot, const FrameDecoder& decoder,
                           const ImageSpec& image, std::vector<std::string>& warnings) {
   const ShardHeader& header = reader.header();
+  renew_time_limit();
   ShardSample sample = reader.sample(slot);
   PreviewContent content;
   content.shape = header.volume;
   content.volume = reader.volume(slot);
+  lift_time_limit();
   content.previous_bgr = frame_picture(decoder, sample.pair.previous, sample, image, warnings);
   content.next_bgr = frame_picture(decoder, sample.pair.next, sample, image, warnings);
   content.title = header.dataset + " " + sample.sample_id + ", gap " +
