@@ -35,12 +35,12 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 void add_finalize_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("finalize",
-                         "Completes a dataset: checks that every shard is there and writes "
-                         "dataset.json and dataset.h5, in which all shards read as one; exit "
-                         "code 1 and a line for each missing shard, 65 beyond the manifest's "
-                         "limits for quarantined samples");
+  auto* command = app.add_subcommand(
+      "finalize",
+      "Completes a dataset: checks that every shard is there and whole and writes "
+      "dataset.json and dataset.h5, in which all shards read as one; exit "
+      "code 1 and a line for each missing shard, 65 beyond the manifest's "
+      "limits for quarantined samples");
   const auto arguments = std::make_shared<Arguments>();
   command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
   command->add_flag("--partial", arguments->partial,

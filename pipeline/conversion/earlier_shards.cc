@@ -3,12 +3,14 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdio>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/plan_outline.h"
 #include "pipeline/output/shard_state.h"
 #include "pipeline/profile/trace_span.h"
 #include "pipeline/threads/for_each_index.h"
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -33,6 +35,15 @@ void tell_if_long(const std::vector<ShardState>& states, const EarlierCheck& che
   check.note(text);
 }
 
+/// Empty if somebody has taken it away meanwhile.
+std::string marker_text(const std::filesystem::path& folder, const std::string& shard) {
+  try {
+    return read_text_file(folder / marker_name(shard));
+  } catch (const std::runtime_error&) {
+    return "";
+  }
+}
+
 }  // namespace
 
 EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
@@ -49,7 +60,7 @@ EarlierShards check_earlier_shards(const std::filesystem::path& folder, const Fr
     span.note("shard", shards[i]->name);
     span.note("bytes", states[i].marker->size_bytes);
     states[i] = is_stopped(check) ? ShardState{}
-                                  : hashed_shard_state(folder, outline_of(*shards[i]), frozen.hash);
+                                  : proven_shard_state(folder, outline_of(*shards[i]), frozen.hash);
   });
 
   EarlierShards earlier;
@@ -60,8 +71,9 @@ EarlierShards check_earlier_shards(const std::filesystem::path& folder, const Fr
     }
     earlier.left.push_back(shards[i]);
     if (!states[i].fault.empty()) earlier.faults.push_back(states[i].fault);
-    if (states[i].condition == ShardCondition::kOtherBytes) {
-      earlier.distrusted.insert(shards[i]->name);
+    if (states[i].condition == ShardCondition::kOtherBytes) earlier.distrusted[shards[i]->name];
+    if (states[i].condition == ShardCondition::kOtherCounts) {
+      earlier.distrusted[shards[i]->name] = marker_text(folder, shards[i]->name);
     }
   }
   return earlier;

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
-#include <set>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -24,7 +24,9 @@ struct EarlierShards {
   std::vector<CommittedShard> done;
   std::vector<const PlannedShard*> left;  ///< to be made, or made again
   std::vector<std::string> faults;        ///< "PATH: expected X, got Y": why some are made again
-  std::set<std::string> distrusted;       ///< names of shards whose bytes are not their marker's
+  /// Names of shards that only the look at their bytes told of; with the marker's text where that
+  /// is what is wrong, else empty.
+  std::map<std::string, std::string> distrusted;
 };
 
 struct EarlierCheck {
@@ -35,8 +37,8 @@ struct EarlierCheck {
   TraceRecorder* trace = nullptr;  ///< of the hashing; null: nobody asks
 };
 
-/// Looks at what the folder holds of `shards` of the plan, and hashes those that are committed,
-/// before they are trusted.
+/// Looks at what the folder holds of `shards` of the plan. Those that are committed are hashed, and
+/// their markers compared with them, before they are trusted (see proven_shard_state).
 EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                    const std::vector<const PlannedShard*>& shards,
                                    const EarlierCheck& check);

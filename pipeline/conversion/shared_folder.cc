@@ -13,6 +13,7 @@
 #include "manifests/plan_outline.h"
 #include "pipeline/output/shard_state.h"
 #include "stages/files/atomic_file.h"
+#include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"
 
 namespace eventgan {
@@ -29,7 +30,7 @@ bool is_ours(const TemporaryName& name) {
 }  // namespace
 
 SharedFolder::SharedFolder(std::filesystem::path folder, std::string plan_hash,
-                           std::set<std::string> distrusted)
+                           std::map<std::string, std::string> distrusted)
     : folder_(std::move(folder)),
       plan_hash_(std::move(plan_hash)),
       distrusted_(std::move(distrusted)),
@@ -58,8 +59,12 @@ void SharedFolder::opened(const PlannedShard& shard) {
 }
 
 bool SharedFolder::is_done(const PlannedShard& shard) const {
-  const auto state = distrusted_.contains(shard.name) ? hashed_shard_state : shard_state;
-  return state(folder_, outline_of(shard), plan_hash_).done();
+  const auto distrusted = distrusted_.find(shard.name);
+  if (distrusted == distrusted_.end()) {
+    return shard_state(folder_, outline_of(shard), plan_hash_).done();
+  }
+  return hashed_shard_state(folder_, outline_of(shard), plan_hash_).done() &&
+         read_text_file(folder_ / marker_name(shard.name)) != distrusted->second;
 }
 
 bool SharedFolder::is_busy(const PlannedShard& shard) {

@@ -17,9 +17,10 @@ namespace eventgan {
 /// make the same shards for ever. Thread safe.
 class SharedFolder {
  public:
-  /// The shards named in `distrusted` count as done only after their bytes were hashed.
+  /// The shards named in `distrusted` (see EarlierShards) count as done only after their bytes were
+  /// hashed, and with another marker if it was that.
   SharedFolder(std::filesystem::path folder, std::string plan_hash,
-               std::set<std::string> distrusted);
+               std::map<std::string, std::string> distrusted);
 
   /// Takes its claims back.
   ~SharedFolder();
@@ -42,7 +43,7 @@ class SharedFolder {
 
   std::filesystem::path folder_;
   std::string plan_hash_;
-  std::set<std::string> distrusted_;
+  std::map<std::string, std::string> distrusted_;  // with the text of a marker that is wrong
   std::mutex mutex_;
   std::map<std::string, std::filesystem::path> claims_;  // by shard
   std::set<std::string> busy_;                           // what others write, when last listed

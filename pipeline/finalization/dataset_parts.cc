@@ -26,7 +26,7 @@ JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
                            ", in " + file.string() + " (eventgan convert makes it again)");
 }
 
-/// The header of a shard whose size was all that was looked at before.
+/// The header of a shard whose bytes are its marker's.
 ShardHeader read_shard_header(const fs::path& folder, const FinishedShard& shard,
                               const std::string& plan_hash) {
   const fs::path file = folder / shard.outline.name;
@@ -40,12 +40,12 @@ ShardHeader read_shard_header(const fs::path& folder, const FinishedShard& shard
 
 }  // namespace
 
-DatasetParts read_dataset_parts(const fs::path& folder) {
+DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
+                                std::vector<ShardState> states, const std::vector<bool>& sound) {
   DatasetParts parts;
-  parts.frozen = read_frozen_outline(folder);
+  parts.frozen = std::move(frozen);
   parts.manifest = frozen_manifest(folder, parts.frozen.plan);
   parts.amendments = read_amendments(folder, parts.frozen.hash);
-  std::vector<ShardState> states = shard_states(folder, parts.frozen);
   for (std::size_t i = 0; i < states.size(); ++i) {
     const ShardOutline& outline = parts.frozen.plan.shards[i];
     ShardState& state = states[i];
@@ -55,12 +55,18 @@ DatasetParts read_dataset_parts(const fs::path& folder) {
       continue;
     }
     parts.shards.push_back({outline, std::move(*state.marker)});
-    if (!parts.headers.contains(outline.source)) {
+    if (sound[i] && !parts.headers.contains(outline.source)) {
       parts.headers[outline.source] =
           read_shard_header(folder, parts.shards.back(), parts.frozen.hash);
     }
   }
   return parts;
+}
+
+DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen) {
+  std::vector<ShardState> states = proven_shard_states(folder, frozen);
+  const std::vector<bool> sound(states.size(), true);
+  return read_dataset_parts(folder, std::move(frozen), std::move(states), sound);
 }
 
 }  // namespace eventgan

@@ -11,6 +11,7 @@
 #include "manifests/shard.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/output_folder.h"
+#include "pipeline/output/shard_state.h"
 
 namespace eventgan {
 
@@ -33,16 +34,23 @@ struct DatasetParts {
   std::vector<Amendment> amendments;
   std::vector<FinishedShard> shards;   ///< in plan order
   std::vector<MissingShard> missing;   ///< in plan order
-  std::map<int, ShardHeader> headers;  ///< by source: the header of its first finished shard
+  std::map<int, ShardHeader> headers;  ///< by source: of its first finished shard that is sound
 
   const SourceSpec& source_of(const ShardOutline& shard) const {
     return manifest.sources.at(static_cast<std::size_t>(shard.source));
   }
 };
 
-/// Looks at an output folder: the plan without its samples, every marker, and one shard of each
-/// source; no other shard is opened. Throws InputError if there is no plan, std::runtime_error
-/// naming the file if the plan or a shard that is looked at is damaged.
-DatasetParts read_dataset_parts(const std::filesystem::path& folder);
+/// Puts together what is known of an output folder whose plan is `frozen`. `states`: of each shard
+/// of the plan; those that are done are finished. Of one shard of each source the header is read:
+/// of the first that is finished and `sound`, that is, whose bytes were found to be its marker's.
+/// Throws std::runtime_error naming the file if the plan's manifest or such a shard is not as it
+/// should be.
+DatasetParts read_dataset_parts(const std::filesystem::path& folder, FrozenOutline frozen,
+                                std::vector<ShardState> states, const std::vector<bool>& sound);
+
+/// The same, after every shard was read (see proven_shard_state): those that are not what their
+/// markers say are missing.
+DatasetParts read_dataset_parts(const std::filesystem::path& folder, FrozenOutline frozen);
 
 }  // namespace eventgan

@@ -1,17 +1,21 @@
 #include "pipeline/finalization/finalize.h"
 
+#include <utility>
+
 #include "manifests/error_limits.h"
 #include "pipeline/finalization/dataset_description.h"
 #include "pipeline/finalization/dataset_parts.h"
 #include "pipeline/finalization/dataset_views.h"
+#include "pipeline/output/shard_backup.h"
 #include "stages/files/atomic_file.h"
-#include "stages/files/stale_temporaries.h"
 
 namespace eventgan {
 
 FinalizationReport finalize(const std::filesystem::path& folder,
                             const FinalizationOptions& options) {
-  const DatasetParts parts = read_dataset_parts(folder);
+  FrozenOutline frozen = read_frozen_outline(folder);
+  restore_shards(folder, frozen);  // and what a finalize that was killed has left goes
+  const DatasetParts parts = read_dataset_parts(folder, std::move(frozen));
   FinalizationReport report;
   report.folder = folder.string();
   report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
@@ -22,7 +26,6 @@ FinalizationReport finalize(const std::filesystem::path& folder,
                     parts.frozen.plan.sample_count());
   if (parts.shards.empty() || (!report.complete() && !options.partial)) return report;
 
-  remove_stale_temporaries(folder);  // of a finalize that was killed, for one
   const std::vector<DatasetView> views = views_of(parts);
   const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);
   write_file_atomically(folder / kDescriptionName, describe_dataset(parts, views, receipt));

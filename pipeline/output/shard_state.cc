@@ -4,9 +4,11 @@
 #include <stdexcept>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "stages/files/sha256.h"
 #include "stages/files/text_file.h"
+#include "stages/shards/shard_check.h"
 
 namespace eventgan {
 namespace {
@@ -72,6 +74,8 @@ const char* to_string(ShardCondition condition) {
       return "of another size";
     case ShardCondition::kOtherBytes:
       return "with other bytes";
+    case ShardCondition::kOtherCounts:
+      return "with other counts";
   }
   return "unknown";
 }
@@ -113,6 +117,21 @@ ShardState hashed_shard_state(const fs::path& folder, const ShardOutline& shard,
   if (got == state.marker->sha256) return state;
   return faulty(ShardCondition::kOtherBytes, folder / shard.name,
                 "expected SHA-256 " + state.marker->sha256 + ", got " + got);
+}
+
+ShardState proven_shard_state(const fs::path& folder, const ShardOutline& shard,
+                              const std::string& plan_hash) {
+  ShardState state = hashed_shard_state(folder, shard, plan_hash);
+  if (!state.done()) return state;
+  try {
+    const std::vector<std::string> faults = count_faults(folder / shard.name, *state.marker);
+    if (faults.empty()) return state;
+    return faulty(ShardCondition::kOtherCounts, folder / marker_name(shard.name), faults.front());
+  } catch (const std::exception& error) {
+    return faulty(ShardCondition::kOtherCounts, folder / marker_name(shard.name),
+                  "expected the marker of a shard that can be read, got one whose " +
+                      first_line(error.what()));
+  }
 }
 
 }  // namespace eventgan

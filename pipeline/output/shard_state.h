@@ -18,7 +18,8 @@ enum class ShardCondition {
   kTornMarker,     ///< the marker does not parse
   kForeignMarker,  ///< the marker is of another plan or another shard
   kOtherSize,      ///< the shard has not the marker's size
-  kOtherBytes      ///< the shard has not the marker's SHA-256
+  kOtherBytes,     ///< the shard has not the marker's SHA-256
+  kOtherCounts     ///< the shard is the marker's, but not what the marker says of its rows
 };
 
 /// Short words for a person: "done", "missing", "not committed", ...
@@ -39,6 +40,12 @@ ShardState shard_state(const std::filesystem::path& folder, const ShardOutline& 
 
 /// The same, and the shard's bytes are hashed: may find kOtherBytes.
 ShardState hashed_shard_state(const std::filesystem::path& folder, const ShardOutline& shard,
+                              const std::string& plan_hash);
+
+/// The same, and then what the marker says of the rows is compared with the shard: may find
+/// kOtherCounts. HDF5 opens the shard only if its bytes are the marker's: it does not promise to
+/// survive others. Nothing else may use HDF5 meanwhile but this and ShardReaders.
+ShardState proven_shard_state(const std::filesystem::path& folder, const ShardOutline& shard,
                               const std::string& plan_hash);
 
 }  // namespace eventgan

@@ -15,4 +15,8 @@ inline constexpr int kLooksAtOnce = 16;
 std::vector<ShardState> shard_states(const std::filesystem::path& folder,
                                      const FrozenOutline& frozen);
 
+/// The same by proven_shard_state, on all cores: every shard is read.
+std::vector<ShardState> proven_shard_states(const std::filesystem::path& folder,
+                                            const FrozenOutline& frozen);
+
 }  // namespace eventgan

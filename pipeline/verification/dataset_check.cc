@@ -5,6 +5,7 @@
 #include <exception>
 #include <sstream>
 #include <string_view>
+#include <utility>
 
 #include "pipeline/finalization/dataset_description.h"
 #include "pipeline/finalization/dataset_parts.h"
@@ -46,7 +47,9 @@ std::string first_difference(const std::string& expected, const std::string& got
 
 }  // namespace
 
-std::vector<std::string> dataset_faults(const fs::path& folder) {
+std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline frozen,
+                                        std::vector<ShardState> states,
+                                        const std::vector<bool>& sound) {
   const fs::path description = folder / kDescriptionName;
   const fs::path view = folder / kViewName;
   const bool has_view = fs::exists(view);
@@ -58,9 +61,15 @@ std::vector<std::string> dataset_faults(const fs::path& folder) {
   }
   if (!has_view) return {};
   try {
-    const DatasetParts parts = read_dataset_parts(folder);
+    const DatasetParts parts =
+        read_dataset_parts(folder, std::move(frozen), std::move(states), sound);
     if (parts.shards.empty()) {
       return {description.string() + ": expected committed shards beside it, got none" + kMendedBy};
+    }
+    for (const FinishedShard& shard : parts.shards) {
+      if (parts.headers.contains(shard.outline.source)) continue;
+      return {description.string() +
+              ": expected a sound shard of each source to compare it with, got damaged ones"};
     }
     const ViewReceipt receipt{sha256_of_file(view), static_cast<std::int64_t>(fs::file_size(view))};
     const std::string expected = describe_dataset(parts, views_of(parts), receipt);

@@ -4,11 +4,14 @@
 #include <memory>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/recorded_manifest.h"
 #include "pipeline/output/shard_state.h"
+#include "pipeline/threads/for_each_index.h"
+#include "pipeline/threads/thread_count.h"
 #include "pipeline/verification/dataset_check.h"
 #include "pipeline/verification/fault_line.h"
 #include "pipeline/verification/source_comparison.h"
@@ -53,12 +56,9 @@ class Verification {
                                        " that all markers name, got " + frozen.hash +
                                        " (altered, or of another manifest)");
     }
-    for (std::size_t i = 0; i < frozen.plan.shards.size(); ++i) {
-      ++check_.shards;
-      check_planned(i, frozen.plan.shards[i], frozen.hash);
-    }
+    check_shards(frozen);
     append(stray_files(folder_, frozen.plan));
-    append(dataset_faults(folder_));
+    append(dataset_faults(folder_, frozen, std::move(states_), sound_));
     check_amendments(frozen.hash);
     note_temporaries();
     if (sources_) check_.compared = sources_->compared();
@@ -97,9 +97,26 @@ class Verification {
     check_.notes.insert(check_.notes.end(), notes.begin(), notes.end());
   }
 
-  void check_planned(std::size_t index, const ShardOutline& shard, const std::string& plan_hash) {
+  /// Shards side by side; what is found is told in their order.
+  void check_shards(const FrozenOutline& frozen) {
+    const std::vector<ShardOutline>& shards = frozen.plan.shards;
+    states_.resize(shards.size());
+    std::vector<std::vector<std::string>> faults(shards.size());
+    for_each_index(shards.size(), thread_count(0), [&](std::size_t i) {
+      states_[i] = shard_state(folder_, shards[i], frozen.hash);  // check_shard hashes
+      if (states_[i].done()) faults[i] = check_shard(folder_ / shards[i].name, *states_[i].marker);
+    });
+    for (std::size_t i = 0; i < shards.size(); ++i) {
+      ++check_.shards;
+      sound_.push_back(states_[i].done() && faults[i].empty());
+      tell_shard(i, shards[i], faults[i]);
+    }
+  }
+
+  void tell_shard(std::size_t index, const ShardOutline& shard,
+                  const std::vector<std::string>& faults) {
     const fs::path file = folder_ / shard.name;
-    const ShardState state = shard_state(folder_, shard, plan_hash);  // check_shard hashes
+    const ShardState& state = states_[index];
     if (state.condition == ShardCondition::kMissing) {
       return fault(folder_ / marker_name(shard.name),
                    "expected the shard and its marker, got neither (not made yet)");
@@ -110,7 +127,6 @@ class Verification {
     }
     check_.samples += state.marker->samples;
     check_.valid += state.marker->valid;
-    const std::vector<std::string> faults = check_shard(file, *state.marker);
     append(faults);
     if (!sources_ || !faults.empty()) return;
     for (const std::string& what : sources_->faults(plan_.shards.at(index), ShardReader(file))) {
@@ -137,7 +153,9 @@ class Verification {
   const fs::path& folder_;
   const VerifyOptions& options_;
   FolderCheck check_;
-  Plan plan_;  // deep only: it can be huge
+  std::vector<ShardState> states_;  // of the plan's shards
+  std::vector<bool> sound_;         // whether HDF5 may open them
+  Plan plan_;                       // deep only: it can be huge
   std::unique_ptr<SourceComparison> sources_;
 };
 

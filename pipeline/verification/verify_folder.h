@@ -24,10 +24,10 @@ struct FolderCheck {
 };
 
 /// Checks a whole output folder: the plan, a marker for every shard of it, each shard's bytes,
-/// structure, counts, checksums and values; that nothing else looks like a part of it; that
-/// dataset.json and dataset.h5, if there, are what the markers give. Temporaries of other processes
-/// are noted. With `deep`, labels are compared with the sources, where these are there (see
-/// SourceComparison). Changes nothing. Throws InputError if the folder has no plan,
+/// structure, counts, checksums and values, on all cores; that nothing else looks like a part of
+/// it; that dataset.json and dataset.h5, if there, are what the markers give. Temporaries of other
+/// processes are noted. With `deep`, labels are compared with the sources, where these are there
+/// (see SourceComparison). Changes nothing. Throws InputError if the folder has no plan,
 /// std::runtime_error if that is damaged.
 FolderCheck verify_folder(const std::filesystem::path& folder, const VerifyOptions& options = {});
 

@@ -3,17 +3,27 @@
 #include <algorithm>
 #include <exception>
 #include <sstream>
+#include <stdexcept>
 #include <system_error>
 #include <type_traits>
+#include <utility>
 
 #include "stages/files/sha256.h"
 #include "stages/shards/contents_check.h"
 #include "stages/shards/label_check.h"
+#include "stages/shards/shard_file_internal.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/volume_check.h"
 
 namespace eventgan {
 namespace {
+
+/// Whether the marker lists just these samples, whose reasons only it has.
+bool are_quarantined(const ShardMarker& marker, const std::vector<QuarantinedSample>& invalid) {
+  std::vector<QuarantinedSample> recorded = marker.quarantined;
+  for (QuarantinedSample& sample : recorded) sample.reason.clear();
+  return std::is_permutation(recorded.begin(), recorded.end(), invalid.begin(), invalid.end());
+}
 
 class Check {
  public:
@@ -98,9 +108,7 @@ class Check {
   void check_quarantined(const std::vector<QuarantinedSample>& invalid) {
     const int samples = marker_.samples;
     expect("number of valid samples", marker_.valid, samples - static_cast<int>(invalid.size()));
-    std::vector<QuarantinedSample> recorded = marker_.quarantined;
-    for (QuarantinedSample& sample : recorded) sample.reason.clear();
-    if (!std::is_permutation(recorded.begin(), recorded.end(), invalid.begin(), invalid.end())) {
+    if (!are_quarantined(marker_, invalid)) {
       fault("expected the samples with valid = 0 to be those that the marker lists, got others");
     }
   }
@@ -120,6 +128,33 @@ std::vector<std::string> check_shard(const std::filesystem::path& shard,
   } catch (const std::exception& error) {
     return check.stopped_by(error);
   }
+}
+
+std::vector<std::string> count_faults(const std::filesystem::path& shard,
+                                      const ShardMarker& marker) {
+  std::vector<std::string> faults;
+  ShardTables tables;
+  LabelSchema schema;
+  {
+    const auto turn = hdf5_turn();
+    ShardFile file = open_shard(shard, faults, Columns::kCounted);
+    tables = std::move(file.tables);
+    schema = std::move(file.header.label_schema);
+  }
+  if (!faults.empty()) throw std::runtime_error(faults.front());
+  std::vector<QuarantinedSample> invalid;
+  for (std::size_t slot = 0; slot < tables.valid.size(); ++slot) {
+    if (tables.valid[slot] != 0) continue;
+    invalid.push_back({static_cast<int>(slot), tables.pairs.sample_id[slot], ""});
+  }
+  if (!are_quarantined(marker, invalid)) {
+    faults.push_back("expected the " + std::to_string(invalid.size()) +
+                     " samples with valid = 0 as quarantined, got others");
+  }
+  for (std::string& fault : contents_faults(contents_of(tables, schema), contents_of(marker))) {
+    faults.push_back(std::move(fault));
+  }
+  return faults;
 }
 
 }  // namespace eventgan

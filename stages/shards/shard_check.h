@@ -12,7 +12,15 @@ namespace eventgan {
 /// the marker's size and SHA-256 are the file's; that every dataset of the format is there with its
 /// type and shape; that ragged offsets ascend to the number of rows; that all chunks decode
 /// (fletcher32), hold finite values ≥ 0, and agree with the stored statistics; that all the marker
-/// says of the rows (see shard_contents.h) is so. Never throws for a bad file.
+/// says of the rows (see shard_contents.h) is so. Never throws for a bad file. Thread safe, as
+/// ShardReader is.
 std::vector<std::string> check_shard(const std::filesystem::path& shard, const ShardMarker& marker);
+
+/// What a marker says of its shard's rows that is not so: counts, samples in quarantine. Texts
+/// "expected X, got Y" with X the shard's, without the file's name. Quick, since only the columns
+/// that are counted are read. The shard's bytes must be known to be the marker's. Throws
+/// std::exception if the shard cannot be read. Thread safe, as ShardReader is.
+std::vector<std::string> count_faults(const std::filesystem::path& shard,
+                                      const ShardMarker& marker);
 
 }  // namespace eventgan

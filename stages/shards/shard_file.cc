@@ -4,6 +4,7 @@
 #include <exception>
 #include <optional>
 #include <stdexcept>
+#include <string_view>
 #include <type_traits>
 #include <utility>
 
@@ -33,14 +34,42 @@ std::string shape_text(const Dims& dims) {
   return "[" + text + "]";
 }
 
+/// Shuffle, deflate (at level 0 none), fletcher32.
+bool has_own_filters(hid_t volume, int deflate_level) {
+  const Hdf5Handle creation(H5Dget_create_plist(volume), H5Pclose, "read", kVolumePath);
+  std::vector<H5Z_filter_t> found;
+  const int count = checked(H5Pget_nfilters(creation), "read", kVolumePath);
+  for (int i = 0; i < count; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    unsigned config = 0;
+    found.push_back(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags, &values, nullptr, 0,
+                                   nullptr, &config));
+  }
+  return deflate_level == 0
+             ? found == std::vector<H5Z_filter_t>{H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32}
+             : found == std::vector<H5Z_filter_t>{H5Z_FILTER_SHUFFLE, H5Z_FILTER_DEFLATE,
+                                                  H5Z_FILTER_FLETCHER32};
+}
+
+bool is_counted(const ColumnSpec& spec) {
+  constexpr const char* kCounted[] = {"/pairs/sample_id",      "/pairs/gap_frames",
+                                      "/labels/boxes/offsets", "/labels/boxes/class_id",
+                                      "/labels/poses/offsets", "/valid"};
+  return spec.optional ||
+         std::ranges::find(kCounted, std::string_view(spec.path)) != std::end(kCounted);
+}
+
 /// Reads column after column and notes what is wrong.
 class ColumnReader {
  public:
-  ColumnReader(ShardFile& shard, std::string path, std::vector<std::string>& faults)
-      : shard_(shard), path_(std::move(path)), faults_(faults) {}
+  ColumnReader(ShardFile& shard, std::string path, std::vector<std::string>& faults,
+               Columns columns)
+      : shard_(shard), path_(std::move(path)), faults_(faults), columns_(columns) {}
 
   template <class Element>
   void operator()(const ColumnSpec& spec, std::vector<Element>& column) {
+    if (columns_ == Columns::kCounted && !is_counted(spec)) return;
     if (spec.optional && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
     Dims dims;
     try {
@@ -90,13 +119,20 @@ class ColumnReader {
   ShardFile& shard_;
   std::string path_;
   std::vector<std::string>& faults_;
+  Columns columns_;
   std::optional<hsize_t> boxes_;
   std::optional<hsize_t> persons_;
 };
 
 }  // namespace
 
-ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults) {
+std::unique_lock<std::mutex> hdf5_turn() {
+  static std::mutex mutex;
+  return std::unique_lock(mutex);
+}
+
+ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults,
+                     Columns columns) {
   quiet_hdf5_errors();
   if (std::error_code ignored; !std::filesystem::exists(path, ignored)) {
     throw InputError("expected a shard, got no file, in " + path.string());
@@ -108,11 +144,12 @@ ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>
     shard.volume =
         Hdf5Handle(H5Dopen2(shard.file, kVolumePath, H5P_DEFAULT), H5Dclose, "open", kVolumePath);
     stored_volume_size(shard.header);
+    shard.has_own_filters = has_own_filters(shard.volume, shard.header.deflate_level);
   } catch (const std::exception& error) {
     throw std::runtime_error(path.string() + ": " + error.what());
   }
   visit_columns(shard.tables, shard.header.label_schema.joint_names.size(),
-                ColumnReader(shard, path.string(), faults));
+                ColumnReader(shard, path.string(), faults, columns));
   return shard;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -10,19 +11,31 @@
 
 namespace eventgan {
 
+/// HDF5 takes one thread at a time: those that read shards side by side hold this lock for every
+/// call of it, closing included, and do the rest (hashing, inflating, checking) without it.
+std::unique_lock<std::mutex> hdf5_turn();
+
 /// A shard open for reading, with everything in memory but the volumes.
 struct ShardFile {
   Hdf5Handle file;
   Hdf5Handle volume;
+  bool has_own_filters = false;  ///< the volumes' are those that decode_chunk undoes
   ShardHeader header;
   ShardTables tables;
 };
 
-/// Opens a shard and reads all columns. Every dataset that is missing, or has another type or shape
+/// Which columns to read.
+enum class Columns {
+  kAll,
+  kCounted  ///< those that a marker's numbers are counts of, and the ids of samples
+};
+
+/// Opens a shard and reads its columns. Every dataset that is missing, or has another type or shape
 /// than the format says, adds a line "PATH: fault" to `faults`; so do offsets that do not ascend
 /// from 0. Only if there is no fault the tables are consistent. Throws std::runtime_error naming
 /// the file if it cannot be opened, or has no header that makes sense.
-ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults);
+ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults,
+                     Columns columns = Columns::kAll);
 
 /// The volume in `slot` as stored: the numbers' bytes, zeros where nothing was written. Throws
 /// Hdf5Error, also if a checksum is wrong.

@@ -4,7 +4,9 @@
 #include <string>
 
 #include "stages/shards/codec/quantization.h"
+#include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_file_internal.h"
+#include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/shard_rows.h"
 
 namespace eventgan {
@@ -13,18 +15,35 @@ struct ShardReader::State {
   std::string path;
   ShardFile shard;
 
+  ~State() {
+    const auto turn = hdf5_turn();
+    shard.volume = {};
+    shard.file = {};
+  }
+
   void check_slot(int slot) const {
     if (slot >= 0 && slot < shard.header.sample_count) return;
     throw std::out_of_range("expected a sample 0.." +
                             std::to_string(shard.header.sample_count - 1) + ", got " +
                             std::to_string(slot) + ", in " + path);
   }
+
+  /// Empty if there is none, or it went through other filters.
+  std::vector<std::byte> chunk_if_own(int slot) const {
+    if (!shard.has_own_filters) return {};
+    const auto turn = hdf5_turn();
+    quiet_hdf5_errors();
+    return read_stored_chunk(shard, slot);
+  }
 };
 
 ShardReader::ShardReader(const std::filesystem::path& file) : state_(std::make_unique<State>()) {
   state_->path = file.string();
   std::vector<std::string> faults;
-  state_->shard = open_shard(file, faults);
+  {
+    const auto turn = hdf5_turn();
+    state_->shard = open_shard(file, faults);
+  }
   if (faults.empty()) return;
   std::string message;
   for (const std::string& fault : faults) message += (message.empty() ? "" : "\n") + fault;
@@ -46,20 +65,32 @@ ShardSample ShardReader::sample(int slot) const {
 }
 
 std::vector<float> ShardReader::volume(int slot) const {
-  quiet_hdf5_errors();
   state_->check_slot(slot);
   const ShardFile& shard = state_->shard;
+  const float scale = shard.tables.events.scale[static_cast<std::size_t>(slot)];
+  // Inflated here, which threads can do side by side. Where no chunk was written, or it is not as
+  // it should be, HDF5 has the word.
   try {
-    return dequantize(read_stored_volume(shard, slot), shard.header.dtype,
-                      shard.tables.events.scale[static_cast<std::size_t>(slot)]);
+    const std::vector<std::byte> chunk = state_->chunk_if_own(slot);
+    if (const auto numbers = decode_chunk(chunk, shard.header.dtype, shard.header.deflate_level,
+                                          stored_volume_size(shard.header))) {
+      return dequantize(*numbers, shard.header.dtype, scale);
+    }
+  } catch (const Hdf5Error&) {  // the same again, in HDF5's words
+  }
+  const auto turn = hdf5_turn();
+  quiet_hdf5_errors();
+  try {
+    return dequantize(read_stored_volume(shard, slot), shard.header.dtype, scale);
   } catch (const Hdf5Error& error) {
     throw std::runtime_error(state_->path + ": " + error.what());
   }
 }
 
 std::vector<std::byte> ShardReader::stored_chunk(int slot) const {
-  quiet_hdf5_errors();
   state_->check_slot(slot);
+  const auto turn = hdf5_turn();
+  quiet_hdf5_errors();
   try {
     return read_stored_chunk(state_->shard, slot);
   } catch (const Hdf5Error& error) {

@@ -121,6 +121,31 @@ class Crash(program.InFolder):
 
         failing_files.for_each(killed_then_again, failing_files.thinned(calls))
 
+    def test_finalize_after_a_retry_killed_between_shard_and_marker(self):
+        self.undisturbed(cars=4, people=1, errors=LENIENT)
+        broken = self.folder / "broken"
+        with broken_cars(self.folder / "job", [1]):
+            self.convert(broken)
+        before = content(broken)
+        spoiled, = (shard for shard, marker in markers(broken).items() if marker["quarantined"])
+        whole = self.folder / "whole"
+        shutil.copytree(broken, whole)
+        calls = failing_files.changes(failing_files.run(whole, "", "retry", whole, "--threads", "1").calls)
+        replaced = next(n for n, call in enumerate(calls, 1) if call.kind == "rename" and call.path.name == spoiled)
+
+        for more in [], ["--partial"]:
+            out = self.folder / f"finalized{len(more)}"
+            shutil.copytree(broken, out)
+            killed = failing_files.run(out, f"kill-after any {replaced}", "retry", out, "--threads", "1")
+            self.assertEqual(killed.code, -9, killed.err)
+            self.assertNotEqual(content(out)[spoiled], before[spoiled])
+            self.assertEqual(len(temporaries(out)), 1)  # the shard's former self
+            run("finalize", out, *more)
+            now = content(out)
+            self.assertEqual({name: now[name] for name in before}, before)
+            self.assertEqual(temporaries(out), [])
+            run("verify", out)
+
     def test_retry_killed_at_every_call(self):
         self.undisturbed(cars=4, people=1, errors=LENIENT)  # three shards
         broken = self.folder / "broken"

@@ -2,8 +2,10 @@
 
 Only two shards are converted; the others are links to the first, with markers as convert would have written them."""
 
+import hashlib
 import json
 import os
+import shutil
 import struct
 import subprocess
 import tempfile
@@ -112,12 +114,14 @@ class Scale(program.InFolder):
         self.assertEqual((marker["samples"], marker["valid"]), (SHARD, SHARD))
         self.quarantined = 0
         kept = {}
+        spoiled, sha256 = self.shard_without_a_sample(7)
         for shard in range(1, SHARDS - 1):
-            os.link(self.name(0, "h5"), self.name(shard, "h5"))
+            os.link(spoiled if shard % 100 == 0 else self.name(0, "h5"), self.name(shard, "h5"))
             mine = dict(marker, shard=self.name(shard, "h5").name)
             if shard % 100 == 0:
                 mine["valid"] -= 1
-                mine["quarantined"] = [{"slot": 7, "sample_id": f"clip/{shard}", "reason": "expected a PNG, got 0 bytes, in x"}]
+                mine.update(sha256=sha256, size_bytes=spoiled.stat().st_size)
+                mine["quarantined"] = [{"slot": 7, "sample_id": self.spoiled_id, "reason": "expected a PNG, got 0 bytes, in x"}]
                 self.quarantined += 1
             text = json.dumps(mine, indent=2, sort_keys=True) + "\n"
             if shard in [1, 1999, SHARDS - 2]:
@@ -126,6 +130,16 @@ class Scale(program.InFolder):
             else:
                 self.name(shard, "json").write_text(text)
         return kept
+
+    def shard_without_a_sample(self, slot):
+        """A copy of the first shard with a sample in quarantine; its path and SHA-256."""
+        import h5py
+        path = self.folder / "spoiled.h5"
+        shutil.copy(self.name(0, "h5"), path)
+        with h5py.File(path, "r+") as file:
+            file["valid"][slot] = 0
+            self.spoiled_id = program.text(file["pairs/sample_id"][slot])
+        return path, hashlib.sha256(path.read_bytes()).hexdigest()
 
     def quick(self, *arguments, expect=0):
         done = Measured(*arguments, expect=expect)

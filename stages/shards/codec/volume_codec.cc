@@ -1,8 +1,11 @@
 #include "stages/shards/codec/volume_codec.h"
 
+#include <libdeflate.h>
+
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <new>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -13,6 +16,8 @@
 
 namespace eventgan {
 namespace {
+
+constexpr std::size_t kChecksumBytes = 4;
 
 float largest_sound_value(std::span<const float> values) {
   float largest = 0;
@@ -103,7 +108,6 @@ VolumeCodec::~VolumeCodec() = default;
 
 template <class WritePlanes>
 std::vector<std::byte> VolumeCodec::chunk(std::size_t count, WritePlanes write_planes) const {
-  constexpr std::size_t kChecksumBytes = 4;
   const std::size_t size = count * stored_size(type_);
   std::vector<std::byte> chunk;
   if (deflate_level_ == 0) {
@@ -144,6 +148,35 @@ EncodedVolume VolumeCodec::encode(std::span<const float> values, const VolumeWin
     });
   };
   return {chunk(count, write_planes), how.scale, how.saturated};
+}
+
+std::optional<std::vector<std::byte>> decode_chunk(std::span<const std::byte> chunk,
+                                                   StoredType type, int deflate_level,
+                                                   std::size_t size_bytes) {
+  if (!ends_in_fletcher32(chunk)) return std::nullopt;
+  const std::span<const std::byte> stored = chunk.first(chunk.size() - kChecksumBytes);
+  std::vector<std::byte> planes(size_bytes);
+  if (deflate_level == 0) {
+    if (stored.size() != size_bytes) return std::nullopt;
+    std::ranges::copy(stored, planes.begin());
+  } else {
+    const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)>
+        inflater(libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
+    if (!inflater) throw std::bad_alloc();
+    // Without room for its answer it takes nothing but the expected size.
+    if (libdeflate_zlib_decompress(inflater.get(), stored.data(), stored.size(), planes.data(),
+                                   size_bytes, nullptr) != LIBDEFLATE_SUCCESS) {
+      return std::nullopt;
+    }
+  }
+  const std::size_t width = stored_size(type);
+  if (width == 1) return planes;
+  std::vector<std::byte> numbers(size_bytes);
+  const std::size_t count = size_bytes / width;
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t b = 0; b < width; ++b) numbers[i * width + b] = planes[b * count + i];
+  }
+  return numbers;
 }
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -57,5 +58,12 @@ class VolumeCodec {
   int deflate_level_;
   std::unique_ptr<Workspaces> workspaces_;
 };
+
+/// The stored numbers of a chunk that went through those filters, little endian and in their order
+/// (as `dequantize` takes them): `size_bytes` of them. Nothing if it is no such chunk: another
+/// checksum, damaged or of another size. Thread safe.
+std::optional<std::vector<std::byte>> decode_chunk(std::span<const std::byte> chunk,
+                                                   StoredType type, int deflate_level,
+                                                   std::size_t size_bytes);
 
 }  // namespace eventgan

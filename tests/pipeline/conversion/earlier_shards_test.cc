@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/pipeline/conversion/small_conversion.h"
 
 namespace eventgan {
@@ -70,7 +72,8 @@ TEST_F(EarlierShardsTest, AnyDamageIsLeftAndNamed) {
   EXPECT_THAT(earlier.faults,
               ElementsAre(HasSubstr(shard(0).string()), HasSubstr(shard(1).stem().string()),
                           HasSubstr(shard(2).string())));
-  EXPECT_THAT(earlier.distrusted, ElementsAre(all_[0]->name));  // only its bytes tell
+  // Only its bytes tell.
+  EXPECT_THAT(earlier.distrusted, ElementsAre(::testing::Pair(all_[0]->name, "")));
 }
 
 TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
@@ -88,6 +91,24 @@ TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
   EXPECT_EQ(report.damaged.size(), 3u);
   EXPECT_TRUE(report.complete());
   EXPECT_EQ(report.shards_done_before, 0);
+  EXPECT_EQ(shards(), whole);
+  EXPECT_THAT(check().left, IsEmpty());
+}
+
+TEST_F(EarlierShardsTest, AMarkerWithCountsThatAreNotTheShardsIsNamedAndMadeAgain) {
+  const auto whole = shards();
+  ShardMarker wrong = parse_marker(testing::read_file(marker(0)), "");
+  std::swap(wrong.gaps.begin()->second, wrong.gaps[6]);  // as many samples, all of another gap
+  wrong.gaps.erase(wrong.gaps.begin());
+  testing::write_file(marker(0), to_json(wrong));
+  const EarlierShards earlier = check();
+  EXPECT_THAT(earlier.left, ElementsAre(all_[0]));
+  EXPECT_THAT(earlier.faults, ElementsAre(::testing::AllOf(HasSubstr(marker(0).string()),
+                                                           HasSubstr("expected samples by gap "),
+                                                           HasSubstr("got 6: "))));
+  const ConversionReport report = run();
+  EXPECT_TRUE(report.complete());
+  EXPECT_EQ(report.shards_done_before, 2);
   EXPECT_EQ(shards(), whole);
   EXPECT_THAT(check().left, IsEmpty());
 }

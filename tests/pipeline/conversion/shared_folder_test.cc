@@ -83,7 +83,7 @@ TEST_F(SharedFolderOfARun, ACommittedShardIsDone) {
   const FrozenPlan frozen = read_frozen_plan(folder_ / "out");
   const PlannedShard& shard = frozen.plan.shards[1];
   SharedFolder trusting(folder_ / "out", frozen.hash, {});
-  SharedFolder distrusting(folder_ / "out", frozen.hash, {shard.name});
+  SharedFolder distrusting(folder_ / "out", frozen.hash, {{shard.name, ""}});
   EXPECT_EQ(trusting.look_at(shard), ShardActivity::kDone);
   EXPECT_EQ(distrusting.look_at(shard), ShardActivity::kDone);  // hashed, and whole
   std::string bytes = testing::read_file(out(shard.name));

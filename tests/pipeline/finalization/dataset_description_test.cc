@@ -15,7 +15,7 @@ using nlohmann::json;
 using testing::ConvertedFolder;
 
 json description_of(const ConvertedFolder& folder) {
-  const DatasetParts parts = read_dataset_parts(folder.path());
+  const DatasetParts parts = read_dataset_parts(folder.path(), read_frozen_outline(folder.path()));
   return json::parse(describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
 }
 
@@ -105,7 +105,7 @@ TEST(DatasetDescription, AmendmentsAreTold) {
 
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {
   const ConvertedFolder folder;
-  DatasetParts parts = read_dataset_parts(folder.path());
+  DatasetParts parts = read_dataset_parts(folder.path(), read_frozen_outline(folder.path()));
   parts.shards[0].marker.quarantined[0].reason = "cannot read \xff.png";
   EXPECT_NO_THROW(describe_dataset(parts, views_of(parts), {}));
 }

@@ -5,7 +5,6 @@
 
 #include <stdexcept>
 
-#include "manifests/faults.h"
 #include "tests/pipeline/finalization/converted_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -19,9 +18,13 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
+DatasetParts parts_of(const ConvertedFolder& folder) {
+  return read_dataset_parts(folder.path(), read_frozen_outline(folder.path()));
+}
+
 TEST(DatasetParts, AreThePlansShardsAndAHeaderOfEachSource) {
   const ConvertedFolder folder;
-  const DatasetParts parts = read_dataset_parts(folder.path());
+  const DatasetParts parts = parts_of(folder);
   EXPECT_THAT(parts.missing, IsEmpty());
   ASSERT_EQ(parts.shards.size(), 4u);
   for (int i = 0; i < 4; ++i) {
@@ -39,7 +42,7 @@ TEST(DatasetParts, WhatIsNotDoneIsNamedWithTheReason) {
   const ConvertedFolder folder(3);
   std::filesystem::remove(folder.marker_file(0));
   testing::write_file(folder.shard(1), "short");
-  const DatasetParts parts = read_dataset_parts(folder.path());
+  const DatasetParts parts = parts_of(folder);
   EXPECT_EQ(parts.shards.size(), 1u);
   ASSERT_EQ(parts.missing.size(), 3u);
   EXPECT_EQ(parts.missing[0].name, "demo-train-00000-of-00003.h5");
@@ -48,16 +51,11 @@ TEST(DatasetParts, WhatIsNotDoneIsNamedWithTheReason) {
   EXPECT_EQ(parts.missing[2].why, "missing");
 }
 
-TEST(DatasetParts, AFolderWithoutAPlan) {
-  const testing::TemporaryFolder folder;
-  EXPECT_THROW(read_dataset_parts(folder.path()), InputError);
-}
-
 TEST(DatasetParts, AShardThatIsNotWhatThePlanSaysIsRefused) {
   const auto expect_refusal = [](void (*change)(ExampleShard&), const char* what) {
     ConvertedFolder folder;
     folder.add(1, change);
-    EXPECT_THAT([&] { read_dataset_parts(folder.path()); },
+    EXPECT_THAT([&] { parts_of(folder); },
                 ThrowsMessage<std::runtime_error>(
                     AllOf(HasSubstr(what), HasSubstr("demo-val-00000-of-00001.h5"))));
   };
@@ -69,12 +67,27 @@ TEST(DatasetParts, AShardThatIsNotWhatThePlanSaysIsRefused) {
       "size of volumes");
 }
 
-TEST(DatasetParts, AFileThatIsNoShardIsNamed) {
+TEST(DatasetParts, AShardWithOtherBytesIsMissingAndIsNotOpened) {
   const ConvertedFolder folder;
-  const auto size = std::filesystem::file_size(folder.shard(0));
-  testing::write_file(folder.shard(0), std::string(size, 'x'));
-  EXPECT_THAT([&] { read_dataset_parts(folder.path()); },
-              ThrowsMessage<std::runtime_error>(HasSubstr(folder.shard(0).string())));
+  const auto size = std::filesystem::file_size(folder.shard(2));
+  testing::write_file(folder.shard(2), std::string(size, 'x'));
+  const DatasetParts parts = parts_of(folder);
+  EXPECT_EQ(parts.shards.size(), 3u);
+  ASSERT_EQ(parts.missing.size(), 1u);
+  EXPECT_THAT(parts.missing[0].why,
+              AllOf(HasSubstr(folder.shard(2).string()), HasSubstr("expected SHA-256")));
+  EXPECT_EQ(parts.headers.at(2).name, "demo-train-00002-of-00003.h5");  // its source's next
+}
+
+TEST(DatasetParts, AMarkerWithOtherCountsThanItsShardIsNamed) {
+  const ConvertedFolder folder;
+  ShardMarker marker = folder.marker(0);
+  ++marker.persons[0];
+  testing::write_file(folder.marker_file(0), to_json(marker));
+  const DatasetParts parts = parts_of(folder);
+  ASSERT_EQ(parts.missing.size(), 1u);
+  EXPECT_THAT(parts.missing[0].why, AllOf(HasSubstr(folder.marker_file(0).string()),
+                                          HasSubstr("expected number of persons in slot 0: ")));
 }
 
 }  // namespace

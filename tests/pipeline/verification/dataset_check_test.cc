@@ -5,6 +5,7 @@
 
 #include "pipeline/conversion/convert.h"
 #include "pipeline/finalization/finalize.h"
+#include "pipeline/output/shard_states.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/text_file.h"
@@ -34,7 +35,10 @@ class DatasetFaults : public ::testing::Test {
     testing::write_file(file, bytes);
   }
 
-  std::vector<std::string> faults() const { return dataset_faults(out_); }
+  std::vector<std::string> faults(bool sound = true) const {
+    const FrozenOutline frozen = read_frozen_outline(out_);
+    return dataset_faults(out_, frozen, shard_states(out_, frozen), {sound, sound});
+  }
 
   testing::TemporaryFolder folder_;
   const std::filesystem::path out_ = folder_ / "out";
@@ -85,6 +89,12 @@ TEST_F(DatasetFaults, AShardThatHasChangedSinceIsNamed) {
   EXPECT_THAT(faults(), ElementsAre(HasSubstr(description_.string())));
   std::filesystem::remove(out_ / "job-train-00000-of-00002.json");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected committed shards beside it, got none")));
+}
+
+TEST_F(DatasetFaults, WithoutASoundShardThereIsNothingToCompareWith) {
+  EXPECT_THAT(faults(false),
+              ElementsAre(AllOf(HasSubstr(description_.string()),
+                                HasSubstr("expected a sound shard of each source"))));
 }
 
 }  // namespace

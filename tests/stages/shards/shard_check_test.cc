@@ -7,6 +7,7 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <thread>
 #include <utility>
 
 #include "stages/files/sha256.h"
@@ -103,6 +104,51 @@ TEST_F(ShardCheck, AFlippedBitAnywhereIsFound) {
     testing::write_file(shard_, flipped);
     ASSERT_THAT(faults(), ElementsAre(HasSubstr("expected SHA-256 " + marker_.sha256))) << i;
   }
+}
+
+TEST_F(ShardCheck, CountsOfTheMarkerAreComparedWithTheRows) {
+  write(testing::example_shard());
+  EXPECT_THAT(count_faults(shard_, marker_), IsEmpty());
+  const ShardMarker sound = marker_;
+  const auto found = [&](const std::function<void(ShardMarker&)>& change) {
+    marker_ = sound;
+    change(marker_);
+    return count_faults(shard_, marker_);
+  };
+  // Rows of the example's five samples: boxes 2 0 0 1 0, persons 2 0 0 0 1; slot 2 in quarantine.
+  EXPECT_THAT(found([](auto& marker) { marker.persons[4] = 2; }),
+              ElementsAre("expected number of persons in slot 4: 1, got 2"));
+  EXPECT_THAT(found([](auto& marker) { std::swap(marker.boxes[0], marker.boxes[1]); }),
+              ElementsAre("expected number of boxes in slot 0: 2, got 0"));
+  EXPECT_THAT(found([](auto& marker) {
+                marker.gaps = {{3, 5}};
+              }),
+              ElementsAre("expected samples by gap 2: 5, got 3: 5"));
+  EXPECT_THAT(found([](auto& marker) { marker.quarantined[0].slot = 1; }),
+              ElementsAre("expected the 1 samples with valid = 0 as quarantined, got others"));
+  EXPECT_THAT(found([](auto& marker) { marker.quarantined[0].sample_id = "x"; }),
+              ElementsAre("expected the 1 samples with valid = 0 as quarantined, got others"));
+}
+
+TEST_F(ShardCheck, SeveralAtATimeFindTheSame) {
+  write(testing::example_shard());
+  change([](hid_t file) {
+    const hid_t dataset = H5Dopen2(file, "/events/statistics/max", H5P_DEFAULT);
+    const float wrong[] = {9, 9, 9, 9, 9};
+    H5Dwrite(dataset, H5T_NATIVE_FLOAT, H5S_ALL, H5S_ALL, H5P_DEFAULT, wrong);
+    H5Dclose(dataset);
+  });
+  const std::vector<std::string> alone = faults();
+  EXPECT_EQ(alone.size(), 4u);
+  std::vector<std::vector<std::string>> found(4);
+  std::vector<std::thread> threads;
+  for (auto& mine : found) {
+    threads.emplace_back([&] {
+      for (int i = 0; i < 20; ++i) mine = check_shard(shard_, marker_);
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_THAT(found, Each(alone));
 }
 
 TEST_F(ShardCheck, ATruncatedOrMissingFileIsFound) {

@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 
+#include "stages/shards/codec/fletcher32.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
@@ -71,6 +72,38 @@ TEST_P(VolumeCodecLevels, Hdf5ReadsEveryType) {
       ASSERT_NEAR(codes[i] * bytes.scale, values[i], bytes.scale * 0.50001);
       ASSERT_EQ(halves[i] == 0, values[i] == 0);
     }
+  }
+}
+
+TEST_P(VolumeCodecLevels, AChunkIsDecodedToTheNumbersThatHdf5Reads) {
+  const int level = GetParam();
+  const std::vector<float> values = some_volume(5000);
+  for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    const std::vector<std::byte> chunk = VolumeCodec(type, level).encode(values).chunk;
+    const std::size_t size = values.size() * stored_size(type);
+    const auto numbers = decode_chunk(chunk, type, level, size);
+    ASSERT_TRUE(numbers);
+    std::vector<std::byte> expected(size);
+    const auto keep = [&](const auto& read) { std::memcpy(expected.data(), read.data(), size); };
+    if (type == StoredType::kFloat32) {
+      keep(decoded_by_hdf5<float>(chunk, values.size(), H5T_IEEE_F32LE, level));
+    } else if (type == StoredType::kFloat16) {
+      keep(decoded_by_hdf5<std::uint16_t>(chunk, values.size(), H5T_STD_U16LE, level));
+    } else {
+      keep(decoded_by_hdf5<std::uint8_t>(chunk, values.size(), H5T_STD_U8LE, level));
+    }
+    EXPECT_EQ(*numbers, expected);
+
+    // Another size; a flipped bit; a sound checksum over what does not inflate, or to less.
+    EXPECT_FALSE(decode_chunk(chunk, type, level, size - stored_size(type)));
+    EXPECT_FALSE(decode_chunk(chunk, type, level, size + stored_size(type)));
+    std::vector<std::byte> damaged = chunk;
+    damaged[damaged.size() / 2] ^= std::byte{8};
+    EXPECT_FALSE(decode_chunk(damaged, type, level, size));
+    damaged = {std::byte{7}, std::byte{9}};
+    append_fletcher32(damaged);
+    EXPECT_FALSE(decode_chunk(damaged, type, level, size));
+    EXPECT_FALSE(decode_chunk({}, type, level, size));
   }
 }
 
