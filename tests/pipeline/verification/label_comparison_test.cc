@@ -34,6 +34,9 @@ TEST_F(LabelDifferences, AreNoneIfAllIsTheSame) {
   EXPECT_THAT(found(), IsEmpty());
   mapped_.boxes[0].clipped.left += 1e-9;  // another compiler's last bits
   EXPECT_THAT(found(), IsEmpty());
+  stored_.labels.boxes[0].unclipped.right = 1e300;
+  mapped_.boxes[0].unclipped.right = 1e300 * (1 + 1e-15);
+  EXPECT_THAT(found(), IsEmpty());
 }
 
 TEST_F(LabelDifferences, OtherBytesAreToldAlone) {
