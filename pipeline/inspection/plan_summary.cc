@@ -39,7 +39,7 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary, st
   text += summary.without_partner_ids.empty() ? "\n" : ")\n";
   if (summary.faults > 0) {
     text += "  to quarantine    " + std::to_string(summary.faults) +
-            "  (a frame is missing inside the sequence)\n";
+            "  (a frame is missing inside the sequence, or a note says why)\n";
   }
   for (const std::string& note : summary.notes) text += "  note: " + note + "\n";
   return text + "  shards           " + std::to_string(shards) + "\n";

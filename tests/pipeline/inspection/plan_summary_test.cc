@@ -38,7 +38,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "  labelled frames  12\n"
       "  pairs            3  (gap 1: 2, 3: 1)\n"
       "  without partner  9  (a, b, c, d, e, ...)\n"
-      "  to quarantine    1  (a frame is missing inside the sequence)\n"
+      "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 pictures without labels\n"
       "  shards           1\n"
       "in all 3 pairs in 1 shards, about 4.0 MB and 90 s with 2 threads (0.500 s a pair on one "
