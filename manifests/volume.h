@@ -25,6 +25,7 @@ enum VolumeFlag : std::uint32_t {
   kFlagEmpty = 1u << 0,         ///< no value is different from zero
   kFlagExtrapolated = 1u << 1,  ///< a gap that the generator never saw in training
   kFlagSaturated = 1u << 2,     ///< values beyond the stored type's range were clipped to it
+  kFlagVanished = 1u << 3,      ///< all values became zeros in the stored type, too small for it
 };
 
 /// Numbers about one volume as generated, before it is quantised for storage.

@@ -135,3 +135,4 @@ void SampleStages::finish(SampleMessage& message) const {
 }
 
 }  // namespace eventgan
+  if (encoded.vanished) statistics.flags |= kFlagVanished;

@@ -112,7 +112,7 @@ void describe_columns(hid_t location, const ShardHeader& header) {
   write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
   write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
   write_attribute(open_object(location, "events/statistics/flags"), "bits",
-                  std::vector<std::string>{"empty", "extrapolated", "saturated"});
+                  std::vector<std::string>{"empty", "extrapolated", "saturated", "vanished"});
   write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
                   std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
                               "picture to one in the volume; pixel centres are whole numbers"));

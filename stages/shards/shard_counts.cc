@@ -27,6 +27,7 @@ std::vector<std::string> flag_names(std::uint32_t flags) {
   if (flags & kFlagEmpty) names.emplace_back("empty");
   if (flags & kFlagExtrapolated) names.emplace_back("extrapolated");
   if (flags & kFlagSaturated) names.emplace_back("saturated");
+  if (flags & kFlagVanished) names.emplace_back("vanished");
   return names;
 }
 

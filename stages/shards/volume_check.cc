@@ -83,6 +83,14 @@ std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSa
   if (saturated) max = std::min<double>(max, kLargestHalf);
   if (!near(max, found.max, 1)) return text("largest value", max, found.max);
 
+  const bool vanished = found.nonzero == 0 && recorded.max > 0;
+  if (((recorded.flags & kFlagVanished) != 0) != vanished) {
+    return std::string(
+               "expected the flag \"vanished\" of a volume of zeros alone that was not "
+               "generated so, and of no other, got it ") +
+           (vanished ? "not set" : "set");
+  }
+
   const auto size = static_cast<double>(volume.size());
   const double nonzero_fraction = static_cast<double>(found.nonzero) / size;
   const double recorded_fraction = recorded.nonzero_fraction;

@@ -69,6 +69,11 @@ Quantization quantization(StoredType type, float largest) {
   Quantization result{type};
   if (type == StoredType::kUint8) result.scale = uint8_scale(largest);
   result.saturated = type == StoredType::kFloat16 && largest > kLargestHalf;
+  // A larger value never gets a smaller number, so the largest tells of all.
+  std::array<std::byte, sizeof(float)> number{};
+  quantize({&largest, 1}, result, number.data(), 1);
+  result.vanished = largest > 0 && std::ranges::all_of(
+                                       number, [](std::byte byte) { return byte == std::byte{0}; });
   return result;
 }
 

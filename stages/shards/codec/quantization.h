@@ -13,6 +13,7 @@ struct Quantization {
   StoredType type = StoredType::kFloat32;
   float scale = 1;         ///< value = code x scale (uint8); 1 for floats
   bool saturated = false;  ///< some value is beyond the type's range and gets clipped to it
+  bool vanished = false;   ///< every value becomes zero, and not every one is
 };
 
 /// For a volume whose largest value is `largest`, finite and >= 0: uint8 codes as VolumeCodec

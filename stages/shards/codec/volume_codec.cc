@@ -132,7 +132,7 @@ EncodedVolume VolumeCodec::encode(std::span<const float> volume) const {
   const auto write_planes = [&](std::span<std::byte> planes) {
     quantize(volume, how, planes.data(), volume.size());
   };
-  return {chunk(volume.size(), write_planes), how.scale, how.saturated};
+  return {chunk(volume.size(), write_planes), how.scale, how.saturated, how.vanished};
 }
 
 EncodedVolume VolumeCodec::encode(std::span<const float> values, const VolumeWindow& window,
@@ -147,7 +147,7 @@ EncodedVolume VolumeCodec::encode(std::span<const float> values, const VolumeWin
       quantize(values.subspan(value, run), how, planes.data() + place, count);
     });
   };
-  return {chunk(count, write_planes), how.scale, how.saturated};
+  return {chunk(count, write_planes), how.scale, how.saturated, how.vanished};
 }
 
 std::optional<std::vector<std::byte>> decode_chunk(std::span<const std::byte> chunk,

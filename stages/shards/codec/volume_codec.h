@@ -18,6 +18,9 @@ struct EncodedVolume {
   /// Some value was beyond the type's range (float16: 65504) and clipped to it: the caller sets
   /// kFlagSaturated.
   bool saturated = false;
+  /// There were values above zero, all too small for the type: zeros are stored. The caller sets
+  /// kFlagVanished.
+  bool vanished = false;
 };
 
 /// Quantises and compresses volumes: type, then HDF5's filters shuffle, deflate (with libdeflate,

@@ -190,6 +190,7 @@ ShardMarker write_shard(const std::filesystem::path& folder, const ExampleShard&
     if (sample.valid) {
       encoded = codec.encode(example.volumes[slot]);
       if (encoded.saturated) sample.statistics.flags |= kFlagSaturated;
+      if (encoded.vanished) sample.statistics.flags |= kFlagVanished;
       sample.scale = encoded.scale;
       ++marker.valid;
     } else {

@@ -82,6 +82,18 @@ TEST_F(ShardCheck, VolumesThatDoNotFitFloat16AreSoundIfMarked) {
   EXPECT_THAT(faults(), IsEmpty());
 }
 
+TEST_F(ShardCheck, AVolumeThatVanishedInFloat16IsSoundIfMarked) {
+  testing::ExampleShard example = testing::example_shard(StoredType::kFloat16);
+  VolumeStatistics& statistics = example.samples[0].statistics;
+  example.volumes[0].assign(example.volumes[0].size(), 1e-9f);
+  const double half = static_cast<double>(example.volumes[0].size()) / 2;
+  statistics = {1e-9f, 1e-9f, 1, half * 1e-9, half * 1e-9, 0};
+  write(example);  // marks it
+  EXPECT_THAT(faults(), IsEmpty());
+  overwrite<std::uint32_t>("/events/statistics/flags", H5T_NATIVE_UINT32, {0, 1, 0, 0, 0});
+  EXPECT_THAT(faults(), Contains(HasSubstr("the flag \"vanished\"")));
+}
+
 TEST_F(ShardCheck, NormalizedVolumesAreSound) {
   testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
   example.header.normalization = Normalization::kEta98;

@@ -39,8 +39,8 @@ TEST_F(ShardSummary, Counts) {
 
 TEST_F(ShardSummary, FlagsHaveNames) {
   EXPECT_TRUE(flag_names(0).empty());
-  EXPECT_THAT(flag_names(kFlagEmpty | kFlagExtrapolated | kFlagSaturated),
-              ElementsAre("empty", "extrapolated", "saturated"));
+  EXPECT_THAT(flag_names(kFlagEmpty | kFlagExtrapolated | kFlagSaturated | kFlagVanished),
+              ElementsAre("empty", "extrapolated", "saturated", "vanished"));
 }
 
 TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {

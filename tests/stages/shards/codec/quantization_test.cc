@@ -73,6 +73,20 @@ TEST(Quantization, Uint8IsWithinHalfAStep) {
   }
 }
 
+TEST(Quantization, SaysWhenNothingIsLeftOfTheValues) {
+  // The smallest half is 2^-24; half of it goes to even, zero.
+  EXPECT_TRUE(quantization(StoredType::kFloat16, 0x1p-25f).vanished);
+  EXPECT_FALSE(quantization(StoredType::kFloat16, std::nextafter(0x1p-25f, 1.0f)).vanished);
+  // The smallest step of uint8 is the smallest normal float, 2^-126.
+  EXPECT_TRUE(quantization(StoredType::kUint8, std::nextafter(0x1p-127f, 0.0f)).vanished);
+  EXPECT_FALSE(quantization(StoredType::kUint8, 0x1p-127f).vanished);
+  EXPECT_FALSE(quantization(StoredType::kFloat32, 0x1p-149f).vanished);
+  for (const StoredType type : {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    EXPECT_FALSE(quantization(type, 0).vanished) << "there were none";
+    EXPECT_FALSE(quantization(type, 1e30f).vanished);
+  }
+}
+
 TEST(Quantization, Uint8OfNothingAndOfNextToNothing) {
   EXPECT_EQ(quantization(StoredType::kUint8, 0).scale, 1);
   // A step of 1e-40 / 255 does not exist; the values become zero, not NaN and not 255.
