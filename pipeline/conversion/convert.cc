@@ -12,11 +12,13 @@
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/part_of_plan.h"
 #include "pipeline/conversion/shard_maker.h"
+#include "pipeline/memory/memory_limit.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/shard_backup.h"
 #include "pipeline/output/shard_state.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
+#include "pipeline/samples/graph_limits.h"
 #include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
 
@@ -165,6 +167,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   ConversionReport report = empty_report(folder, frozen.plan, split, options.part);
   say_part(report, options);
   EarlierShards earlier = look_back(job, split, report);
+  check_pairs_fit(earlier.left, generator, memory_limit_bytes());
   ShardMaker maker(job, std::move(earlier), report.quarantined_in_plan());
   maker.make();
   add_made(job, maker, report);

@@ -8,6 +8,7 @@
 
 #include "manifests/counter_random.h"
 #include "manifests/grey_image.h"
+#include "pipeline/memory/memory_limit.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/files/sha256.h"
@@ -39,15 +40,22 @@ std::string content_key(const GreyImage& previous, const GreyImage& next) {
 class SimulatedGenerator final : public Generator {
  public:
   SimulatedGenerator(const GeneratorSpec& spec, int bins, std::uint64_t seed)
-      : spec_(spec), bins_(bins), random_(seed) {}
+      : spec_(spec), bins_(bins), random_(seed), memory_bytes_(memory_limit_bytes()) {}
 
   int bins() const override { return bins_; }
+
+  /// At most half of the memory, which leaves one call at a time; `generate` says what is too much.
+  std::size_t working_bytes(ImageSize size) const override {
+    const double needed = idle_event_bytes(spec_.sensor, size.pixel_count(), spec_.duration_s);
+    return static_cast<std::size_t>(std::min(needed, static_cast<double>(memory_bytes_) / 2));
+  }
 
   void generate(std::span<const float> frames, ImageSize size,
                 std::span<float> volume) const override {
     const VolumeShape shape{bins_, size};
     const std::size_t pixels = size.pixel_count();
     check_generator_spans(frames, size, volume, bins_);
+    check_events_fit(spec_.sensor, size, spec_.duration_s, memory_bytes_);
     const GreyImage previous = grey_image(frames.first(pixels), size);
     const GreyImage next = grey_image(frames.last(pixels), size);
     const std::vector<float> values = event_volume(events(previous, next), shape);
@@ -77,6 +85,7 @@ class SimulatedGenerator final : public Generator {
   GeneratorSpec spec_;
   int bins_;
   CounterRandom random_;
+  std::size_t memory_bytes_;
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include "pipeline/memory/memory_limit.h"
 
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -36,7 +37,12 @@ std::size_t group_memory_limit_bytes(const fs::path& root, const fs::path& group
 std::size_t memory_limit_bytes() {
   const auto pages = static_cast<std::size_t>(std::max(sysconf(_SC_PHYS_PAGES), 1L));
   const auto page_bytes = static_cast<std::size_t>(std::max(sysconf(_SC_PAGESIZE), 1L));
-  return group_memory_limit_bytes("/sys/fs/cgroup", own_group(), pages * page_bytes);
+  std::size_t most = pages * page_bytes;
+  rlimit address_space{};
+  if (getrlimit(RLIMIT_AS, &address_space) == 0) {
+    most = std::min<std::size_t>(most, address_space.rlim_cur);  // RLIM_INFINITY is the largest
+  }
+  return group_memory_limit_bytes("/sys/fs/cgroup", own_group(), most);
 }
 
 }  // namespace eventgan

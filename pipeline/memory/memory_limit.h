@@ -6,7 +6,8 @@
 namespace eventgan {
 
 /// Memory that this process may use, in bytes: the machine's, or what its control group of version
-/// 2 (a container, a batch job) is granted if that is less. Thread safe.
+/// 2 (a container, a batch job) or its own limit of address space (ulimit -v) grants if that is
+/// less. Thread safe.
 std::size_t memory_limit_bytes();
 
 /// The least limit among a control group of version 2 and those above it: `group`, a path below

@@ -88,6 +88,7 @@ void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob&
     samples.push_back(&shard.samples);
     to_do += std::ssize(shard.slots);
   }
+  check_pairs_fit(samples, generator, memory_limit_bytes());
   const GraphLimits limits =
       graph_limits(samples, generator, thread_count(options.threads), memory_limit_bytes());
   const SampleStages stages(manifest, job.datasets, generator, static_cast<int>(limits.in_flight));

@@ -1,6 +1,8 @@
 #include "pipeline/samples/graph_limits.h"
 
 #include <algorithm>
+#include <stdexcept>
+#include <string>
 
 #include "manifests/volume.h"
 
@@ -25,9 +27,30 @@ GraphLimits graph_limits(const std::vector<const PlannedShard*>& shards, const G
     generator_bytes = std::max(generator_bytes, generator.working_bytes(shard->volume_size));
   }
   const std::size_t generators = memory_bytes / 4 * 3 / generator_bytes;
+  const std::size_t most = std::max<std::size_t>(memory_bytes / 2 / sample_bytes, 1);
   return {
-      threads, samples_in_flight(threads, sample_bytes, kInFlightBytes),
+      threads, std::min(samples_in_flight(threads, sample_bytes, kInFlightBytes), most),
       static_cast<int>(std::clamp<std::size_t>(generators, 1, static_cast<std::size_t>(threads)))};
+}
+
+void check_pairs_fit(const std::vector<const PlannedShard*>& shards, const Generator& generator,
+                     std::size_t memory_bytes) {
+  for (const PlannedShard* shard : shards) {
+    if (shard->samples.empty()) continue;
+    const ImageSize size = shard->volume_size;
+    const std::size_t volume_bytes =
+        VolumeShape{generator.bins(), size}.value_count() * sizeof(float);
+    const std::size_t needed =
+        volume_bytes + std::max(generator.working_bytes(size), (kVolumeCopies - 1) * volume_bytes);
+    if (needed <= memory_bytes) continue;
+    const PlannedSample& sample = shard->samples.front();
+    throw std::runtime_error(
+        "expected pairs that fit into memory, " + std::to_string(memory_bytes) + " bytes, got " +
+        std::to_string(size.width) + "x" + std::to_string(size.height) + ", which take about " +
+        std::to_string(needed) + ", in " + sample.pair.previous.path + " and " +
+        sample.pair.next.path + " (" + sample.sample_id +
+        "): smaller $.image.width and height, or a machine with more memory");
+  }
 }
 
 }  // namespace eventgan

@@ -1,7 +1,10 @@
 #include "pipeline/samples/sample_stages.h"
 
 #include <limits>
+#include <new>
 #include <optional>
+#include <stdexcept>
+#include <string>
 
 #include "pipeline/profile/processor_time.h"
 #include "stages/events/normalization.h"
@@ -33,6 +36,14 @@ std::string size_text(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
+/// Rethrows the current exception as one that says at which sample it was.
+[[noreturn]] void name_sample(const SampleMessage& message, const char* work) {
+  const PlannedSample& planned = message.planned();
+  std::throw_with_nested(std::runtime_error(
+      std::string("cannot ") + work + " a pair of " + size_text(message.shard->volume_size) +
+      ", in " + frame_names(planned.pair) + " (" + planned.sample_id + ")"));
+}
+
 }  // namespace
 
 SampleStages::SampleStages(const JobManifest& manifest,
@@ -44,7 +55,7 @@ SampleStages::SampleStages(const JobManifest& manifest,
       reader_(manifest.directory, manifest.image, in_flight),
       codec_(manifest.output.dtype, manifest.output.deflate_level) {}
 
-void SampleStages::read(SampleMessage& message) const {
+void SampleStages::read(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kRead);
   const PlannedSample& planned = message.planned();
   message.sample.sample_id = planned.sample_id;
@@ -69,6 +80,8 @@ void SampleStages::read(SampleMessage& message) const {
     }
   }
   read_labels(message, *datasets_[static_cast<std::size_t>(message.shard->source)]);
+} catch (const std::bad_alloc&) {
+  name_sample(message, "read");
 }
 
 void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {
@@ -93,16 +106,18 @@ void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) c
   message.sample.annotation.persons.clear();
 }
 
-void SampleStages::generate(SampleMessage& message) const {
+void SampleStages::generate(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
   message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
   generator_.generate(prepared.input, prepared.content, message.volume);
   message.prepared.input = {};
+} catch (const std::exception&) {
+  name_sample(message, "generate the volume of");
 }
 
-void SampleStages::finish(SampleMessage& message) const {
+void SampleStages::finish(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kFinish);
   const PreparedPair& prepared = message.prepared;
@@ -128,11 +143,13 @@ void SampleStages::finish(SampleMessage& message) const {
   EncodedVolume encoded = codec_.encode(
       message.volume, {shape, prepared.content, prepared.content_x, prepared.content_y}, largest);
   if (encoded.saturated) statistics.flags |= kFlagSaturated;
+  if (encoded.vanished) statistics.flags |= kFlagVanished;
   message.sample.scale = encoded.scale;
   message.chunk = std::move(encoded.chunk);
   message.volume = {};
   message.prepared = {};
+} catch (const std::bad_alloc&) {
+  name_sample(message, "store the volume of");
 }
 
 }  // namespace eventgan
-  if (encoded.vanished) statistics.flags |= kFlagVanished;

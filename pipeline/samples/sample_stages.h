@@ -13,8 +13,9 @@
 namespace eventgan {
 
 /// The work on one sample, stage by stage, as plain functions without a graph. Each adds its busy
-/// time to the message and turns what goes wrong with the sample into its fault. Thread safety: all
-/// may run in parallel on different messages.
+/// time to the message and turns what goes wrong with the sample into its fault. What goes wrong
+/// with the run (memory is short, the generator fails) is thrown as std::runtime_error that names
+/// the sample and its frames. Thread safety: all may run in parallel on different messages.
 class SampleStages {
  public:
   /// All references must outlive the stages; `datasets` has one entry for each source of the

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/memory/memory_limit.h"
 #include "stages/events/simulation/sensor.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/recordings/mvsec_writer.h"
@@ -48,6 +49,7 @@ RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom rand
   double from_s = scene.time_s();
   while (const auto interval = scene.advance()) {
     if (summary.frames == 1) sensor.step(interval->render(0), from_s);
+    check_events_fit(spec, size, scene.time_s() - from_s, memory_limit_bytes());
     std::vector<Event> events;
     feed_interval(sensor, *interval, from_s, scene.time_s(), events);
     writer.add_events(events);

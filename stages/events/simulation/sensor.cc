@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -21,6 +22,15 @@ double until_crossing(double difference, double change, double positive_threshol
   return std::numeric_limits<double>::infinity();
 }
 
+/// Events that a resting pixel gives a second. Noise resets the level that leaks away, so it is not
+/// the sum of both.
+double idle_rate_hz(const SensorSpec& spec) {
+  const double noise_hz =
+      spec.shot_noise_rate_hz + spec.hot_pixel_fraction * spec.hot_pixel_rate_hz;
+  const double rate_hz = std::max(noise_hz, spec.leak_rate_hz);
+  return rate_hz / (1 + rate_hz * spec.refractory_s);
+}
+
 bool comes_before(const Event& left, const Event& right) {
   return std::tie(left.t_s, left.y, left.x, left.positive) <
          std::tie(right.t_s, right.y, right.x, right.positive);
@@ -31,6 +41,28 @@ bool is_intensity(float value) {
 }
 
 }  // namespace
+
+double idle_event_bytes(const SensorSpec& spec, std::size_t pixel_count, double duration_s) {
+  // A vector that grows holds its events twice for a moment.
+  constexpr double kEventBytes = 2 * sizeof(Event);
+  return idle_rate_hz(spec) * duration_s * static_cast<double>(pixel_count) * kEventBytes;
+}
+
+void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
+                      std::size_t memory_bytes) {
+  const double needed = idle_event_bytes(spec, size.pixel_count(), duration_s);
+  if (needed <= static_cast<double>(memory_bytes)) return;
+  char text[320];
+  std::snprintf(
+      text, sizeof text,
+      "expected a sensor whose events fit into memory (%.3g bytes), got about %.3g events "
+      "(%.3g bytes) without any motion from %dx%d pixels in %g s: shot_noise_rate_hz %g, "
+      "hot_pixel_rate_hz %g of a share of %g, leak_rate_hz %g, refractory_s %g",
+      static_cast<double>(memory_bytes), needed / (2 * sizeof(Event)), needed, size.width,
+      size.height, duration_s, spec.shot_noise_rate_hz, spec.hot_pixel_rate_hz,
+      spec.hot_pixel_fraction, spec.leak_rate_hz, spec.refractory_s);
+  throw std::runtime_error(text);
+}
 
 /// The time from one picture to the next. Times within are parts of it, 0..1, so that neither a
 /// recording's absolute time nor a tiny step costs precision.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <vector>
@@ -11,6 +12,15 @@
 #include "stages/events/simulation/pixel_noise.h"
 
 namespace eventgan {
+
+/// Memory for the events that a sensor gives without any motion, by leak and noise, about and
+/// rather too little: pixels in an interval of `duration_s` > 0.
+double idle_event_bytes(const SensorSpec& spec, std::size_t pixel_count, double duration_s);
+
+/// Throws std::runtime_error naming the settings and the number of events where these do not fit
+/// into `memory_bytes`.
+void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
+                      std::size_t memory_bytes);
 
 /// The pixels of a simulated event camera, fed with intensity pictures at rising times. A pixel
 /// remembers a level ℓ and compares with it the log intensity L = ln(I + ε), which moves on a

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <stdexcept>
 
 #include "manifests/volume.h"
 
@@ -101,6 +102,17 @@ TEST(SimulatedGenerator, RefusesSpansOfAnotherSizeAndTheNetwork) {
   std::vector<float> frames(2 * kSize.pixel_count()), volume(7);
   EXPECT_THROW(generator->generate(frames, kSize, volume), std::invalid_argument);
   EXPECT_THROW(make_simulated_generator({}, 9, 1), std::invalid_argument);
+}
+
+TEST(SimulatedGenerator, RefusesNoiseThatDoesNotFitIntoMemory) {
+  GeneratorSpec spec = quiet(GeneratorKind::kDifference);
+  spec.sensor.shot_noise_rate_hz = 1e6;
+  spec.duration_s = 1e9;  // 2e17 events of 12 x 16 pixels
+  const auto generator = make_simulated_generator(spec, 9, 1);
+  EXPECT_GT(generator->working_bytes(kSize), 0u);
+  EXPECT_THAT([&] { volume_of(*generator, halves(0, 0), halves(0, 0)); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("got about 1.92e+17 events")));
 }
 
 TEST(SimulatedGenerator, TakesWhatIsNoNumberForBlack) {

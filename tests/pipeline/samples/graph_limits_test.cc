@@ -1,6 +1,9 @@
 #include "pipeline/samples/graph_limits.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <stdexcept>
 
 #include "tests/testing/fake_generator.h"
 
@@ -46,6 +49,32 @@ TEST(GraphLimits, RunNoMoreGeneratorsAtOnceThanFitIntoThreeQuartersOfTheMemory) 
   EXPECT_EQ(graph_limits({&large}, generator, 64, gibibyte).generators, 1);  // one always
   EXPECT_EQ(graph_limits({&large}, kGenerator, 64, gibibyte).generators, 64);
   EXPECT_EQ(graph_limits({}, generator, 64, 0).generators, 1);
+}
+
+TEST(GraphLimits, HoldFewerSamplesWhereTheyTakeMoreThanHalfOfTheMemory) {
+  // 144 MiB each (see above): seven in a gibibyte.
+  const PlannedShard large{"l.h5", 0, {1024, 1024}, {}};
+  const std::size_t gibibyte = std::size_t{1} << 30;
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 2 * gibibyte).in_flight, 7u);
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 1000).in_flight, 1u);
+}
+
+TEST(CheckPairsFit, NamesThePairThatDoesNot) {
+  const PlannedSample sample{"id7", "", "", {{"a.png"}, {"b.png"}}, ""};
+  const PlannedShard small{"s.h5", 0, {32, 32}, {sample}};
+  const PlannedShard large{"l.h5", 0, {1024, 512}, {sample}};
+  const LargeGenerator generator;
+  // 1024 x 512 pixels with a kilobyte of working memory and a volume of 18 x 4 bytes each.
+  const std::size_t needed = std::size_t{1024} * 512 * (1024 + 18 * 4);
+  check_pairs_fit({&small, &large}, generator, needed);
+  EXPECT_THAT(
+      [&] {
+        check_pairs_fit({&small, &large}, generator, needed - 1);
+      },
+      ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+          ::testing::HasSubstr(std::to_string(needed - 1) + " bytes, got 512x1024"),
+          ::testing::HasSubstr("about " + std::to_string(needed)),
+          ::testing::HasSubstr("in a.png and b.png (id7)"))));
 }
 
 }  // namespace

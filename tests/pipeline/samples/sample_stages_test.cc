@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <new>
+#include <stdexcept>
 
 #include "stages/events/normalization.h"
 #include "stages/shards/codec/volume_codec.h"
@@ -136,6 +139,53 @@ TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
   ASSERT_FALSE(message.failed());
   EXPECT_EQ(message.sample.statistics.flags, kFlagEmpty);
   EXPECT_EQ(message.sample.statistics.eta98, 0.0f);
+}
+
+/// Gives the same value everywhere, or no memory.
+class FlatGenerator final : public Generator {
+ public:
+  explicit FlatGenerator(float value) : value_(value) {}
+  int bins() const override { return 9; }
+  void generate(std::span<const float>, ImageSize, std::span<float> volume) const override {
+    if (value_ < 0) throw std::bad_alloc();
+    std::ranges::fill(volume, value_);
+  }
+  std::string description() const override { return "flat"; }
+
+ private:
+  float value_;
+};
+
+TEST_F(SampleStagesTest, AVolumeThatIsTooFaintForItsTypeIsMarked) {
+  // Half steps of 2^-24, halves' smallest number, are 2^-25 = 2.98e-8.
+  const auto flags = [&](float value, StoredType type) {
+    const FlatGenerator generator(value);
+    manifest_.output.dtype = type;
+    const SampleStages stages(manifest_, datasets_, generator, 1);
+    SampleMessage message;
+    message.shard = &shard_;
+    stages.read(message);
+    stages.generate(message);
+    stages.finish(message);
+    return message.sample.statistics.flags;
+  };
+  EXPECT_EQ(flags(2.9e-8f, StoredType::kFloat16), kFlagVanished);
+  EXPECT_EQ(flags(3.0e-8f, StoredType::kFloat16), 0u);
+  EXPECT_EQ(flags(0, StoredType::kFloat16), kFlagEmpty);
+  EXPECT_EQ(flags(2.9e-8f, StoredType::kUint8), 0u);
+  EXPECT_EQ(flags(1e-40f, StoredType::kUint8), kFlagVanished);
+  EXPECT_EQ(flags(1e-40f, StoredType::kFloat32), 0u);
+}
+
+TEST_F(SampleStagesTest, WhereMemoryIsShortTheSampleAndItsFramesAreNamed) {
+  const FlatGenerator generator(-1);
+  const SampleStages stages(manifest_, datasets_, generator, 1);
+  SampleMessage message;
+  message.shard = &shard_;
+  stages.read(message);
+  EXPECT_THAT([&] { stages.generate(message); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("of 6x4, in clip/0000.png and clip/0001.png (0001)")));
 }
 
 TEST_F(SampleStagesTest, AFrameThatCannotBeReadKeepsTheOriginalLabel) {

@@ -1,5 +1,6 @@
 #include "pipeline/simulation/record.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
@@ -60,6 +61,17 @@ TEST(Record, WritesFramesEventsAndFlows) {
     EXPECT_LE(event.t_s, 0.1);
   }
   EXPECT_NEAR(recording->flow(1).value().x_px.at(0), 2, 1e-5);
+}
+
+TEST(Record, RefusesNoiseThatDoesNotFitIntoMemory) {
+  const testing::TemporaryFolder folder;
+  AffineScene scene(GreyImage{{2, 2}, {1, 2, 3, 4}}, {}, 2, 1e9);  // 1e9 s between its frames
+  SensorSpec spec = quiet_sensor();
+  spec.shot_noise_rate_hz = 1e6;
+  EXPECT_THAT(
+      [&] { record(scene, spec, CounterRandom(1), folder / "a.hdf5", "{}", [] {}); },
+      ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr("about 4e+15 events")));
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
 TEST(Record, LeavesNothingIfTheSceneFails) {

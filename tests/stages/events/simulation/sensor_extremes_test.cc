@@ -33,6 +33,30 @@ TEST(SensorExtremes, BlackToWhiteAndBackIsFinite) {
   EXPECT_NEAR(static_cast<double>(down.size()), static_cast<double>(up.size()), 15);
 }
 
+TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
+  SensorSpec spec;
+  check_events_fit(spec, {1000, 1000}, 1e6, 1);  // at rest it is silent
+  spec.shot_noise_rate_hz = 1e6;
+  // 15 pixels, 10 s: 1.5e8 events.
+  const double bytes = idle_event_bytes(spec, 15, 10);
+  EXPECT_DOUBLE_EQ(bytes, 1.5e8 * 2 * sizeof(Event));
+  check_events_fit(spec, kSize, 10, static_cast<std::size_t>(bytes));
+  EXPECT_THAT([&] { check_events_fit(spec, kSize, 10, 1000); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+                  ::testing::HasSubstr("(1e+03 bytes), got about 1.5e+08 events"),
+                  ::testing::HasSubstr("5x3 pixels in 10 s: shot_noise_rate_hz 1e+06"))));
+  // A pixel that is held for a millisecond after each event gives 1000 a second at most.
+  spec.refractory_s = 1e-3;
+  EXPECT_NEAR(idle_event_bytes(spec, 15, 10), 15 * 10 * 1000 * 2 * sizeof(Event), 2e4);
+  // The bound is one of what really comes.
+  spec = {};
+  spec.shot_noise_rate_hz = 200;
+  Sensor sensor(spec, kSize, CounterRandom(1));
+  sensor.step(std::vector<float>(15, 0.5f), 0);
+  EXPECT_NEAR(static_cast<double>(sensor.step(std::vector<float>(15, 0.5f), 10).size()), 30000,
+              5 * std::sqrt(30000));
+}
+
 TEST(SensorExtremes, BlackAndSaturatedPicturesStaySilent) {
   for (const float value : {0.0f, 1.0f, std::numeric_limits<float>::max()}) {
     Sensor sensor(SensorSpec{}, kSize, CounterRandom(1));
