@@ -41,8 +41,15 @@ struct SourceSummary {
   std::int64_t without_partner = 0;
   std::vector<std::string> without_partner_ids;  ///< in the order of the source
   std::int64_t faults = 0;                       ///< planned samples with a fault
-  std::vector<std::string> notes;                ///< Dataset::notes()
+  std::vector<std::string> notes;  ///< Dataset::notes(), and what planning found out besides
 };
+
+/// The notes of all sources, in their order.
+std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources);
+
+/// For a person, at the end of a report: how many notes there are, and the first few, a line each.
+/// Empty if there are none.
+std::string notes_text(const std::vector<std::string>& notes);
 
 /// The frozen plan (DESIGN section 6): which pair becomes which slot of which shard, and the
 /// fingerprint of everything that changes bytes. The same manifest and inputs give the same plan on

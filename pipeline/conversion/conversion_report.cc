@@ -72,7 +72,7 @@ std::string to_text(const ConversionReport& report) {
         format("\n... and %zu more (in the shards' markers)", report.quarantined.size() - listed);
   }
   if (report.stopped) text += "\nstopped on request; the same command goes on from here";
-  return text + "\n" + report.folder + "\n";
+  return text + "\n" + notes_text(report.notes) + report.folder + "\n";
 }
 
 std::string to_json(const ConversionReport& report) {
@@ -87,6 +87,7 @@ std::string to_json(const ConversionReport& report) {
                                {"written", report.written},
                                {"quarantined", quarantined},
                                {"without_partner", report.without_partner},
+                               {"notes", report.notes},
                                {"shards_planned", report.shards_planned},
                                {"shards_done", report.shards_done},
                                {"shards_done_before", report.shards_done_before},

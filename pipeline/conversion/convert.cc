@@ -83,6 +83,7 @@ ConversionReport empty_report(const fs::path& folder, const Plan& plan, const Pa
   report.planned = count_samples(split.part);
   report.shards_planned = static_cast<int>(split.part.size());
   for (const SourceSummary& source : plan.sources) report.without_partner += source.without_partner;
+  report.notes = notes_of(plan.sources);
   return report;
 }
 

@@ -63,6 +63,7 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
                  {"split", spec.split},
                  {"labelled_frames", summary.labelled_frames},
                  {"without_partner", summary.without_partner},
+                 {"notes", summary.notes},
                  {"class_names", nullptr},
                  {"joint_names", nullptr}};
   // Names stand in the shards; a source of which no shard is done yet keeps them to itself.

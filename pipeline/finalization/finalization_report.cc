@@ -31,6 +31,7 @@ std::string to_text(const FinalizationReport& report) {
           " shards: " + std::to_string(counts.samples) + " samples, " +
           std::to_string(counts.quarantined()) + " of them quarantined, " +
           std::to_string(counts.boxes) + " boxes, " + std::to_string(counts.persons) + " persons\n";
+  text += notes_text(report.notes);
   if (!report.written) {
     return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
                                       : "not finalized: incomplete (--partial to allow it)\n");
@@ -55,6 +56,7 @@ std::string to_json(const FinalizationReport& report) {
                                {"quarantined", report.counts.quarantined()},
                                {"boxes", report.counts.boxes},
                                {"persons", report.counts.persons},
+                               {"notes", report.notes},
                                {"views", report.views},
                                {"too_many_faults", report.too_many_faults}};
   return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";

@@ -20,6 +20,7 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   report.folder = folder.string();
   report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
   report.missing = parts.missing;
+  report.notes = notes_of(parts.frozen.plan.sources);
   for (const FinishedShard& shard : parts.shards) add(shard.marker, report.counts);
   report.too_many_faults =
       beyond_limits(options.errors.value_or(parts.manifest.errors), report.counts.quarantined(),

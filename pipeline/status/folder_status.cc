@@ -74,6 +74,7 @@ class Observer {
     status.plan_hash = frozen_.hash;
     status.shards_planned = static_cast<int>(views_.size());
     status.samples_planned = frozen_.plan.sample_count();
+    status.notes = notes_of(frozen_.plan.sources);
     add_files(status);
     std::vector<CommitRecord> commits;
     for (std::size_t i = 0; i < views_.size(); ++i) {

@@ -37,7 +37,8 @@ struct FolderStatus {
   std::vector<UnfinishedFile> left_over;  ///< temporaries of dead writers
   std::vector<std::string> damaged;       ///< a line for each shard that is there and not done
   std::vector<QuarantinedSlot> quarantined;
-  int writers = 0;  ///< processes at work
+  std::vector<std::string> notes;  ///< on the inputs (see notes_of)
+  int writers = 0;                 ///< processes at work
   /// Of one worker, from the last commits; none before the first.
   std::optional<double> pairs_per_second_of_one;
 

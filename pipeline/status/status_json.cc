@@ -69,6 +69,7 @@ std::string status_json(const FolderStatus& status) {
                          {"damaged", status.damaged},
                          {"quarantined_by_reason", reasons},
                          {"quarantined", quarantined_json(status)},
+                         {"notes", status.notes},
                          {"workers", status.writers},
                          {"pairs_per_second", number(status.pairs_per_second())},
                          {"seconds_left", number(status.seconds_left())}};

@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/plan.h"
 #include "pipeline/status/fault_kind.h"
 
 namespace eventgan {
@@ -154,7 +155,8 @@ std::string status_text(const FolderStatus& status) {
                  left_over_rows(status)) +
          section("damaged (made again by the next convert)", damaged_rows(status)) +
          section("quarantined (eventgan retry makes them once their inputs are mended)",
-                 reason_rows(status));
+                 reason_rows(status)) +
+         notes_text(status.notes);
 }
 
 }  // namespace eventgan

@@ -33,6 +33,18 @@ TEST(PlanJson, RoundTripsByteForByte) {
   EXPECT_EQ(back.sources[0].pairs_by_gap, (std::map<int, std::int64_t>{{1, 1}, {6, 1}}));
 }
 
+TEST(Notes, OfAllSourcesAndOfVeryManyTheFirst) {
+  Plan plan = small_plan();
+  EXPECT_EQ(notes_text({}), "");
+  plan.sources[1].notes = {"another"};
+  EXPECT_EQ(notes_of(plan.sources), (std::vector<std::string>{"a \"note\"", "another"}));
+  EXPECT_EQ(notes_text(notes_of(plan.sources)),
+            "2 notes on the inputs:\n  note: a \"note\"\n  note: another\n");
+  const std::string many = notes_text(std::vector<std::string>(1000, "x"));
+  EXPECT_THAT(many, HasSubstr("1000 notes on the inputs:\n  note: x\n"));
+  EXPECT_THAT(many, HasSubstr("... and 995 more"));
+}
+
 TEST(PlanJson, OfNoShardsRoundTrips) {
   const std::string text = to_json(Plan{});
   EXPECT_EQ(to_json(parse_plan(text, "plan.json")), text);

@@ -46,6 +46,15 @@ TEST(ReportText, SaysWhichPartAndWhoseWork) {
   EXPECT_THAT(to_text(part), ::testing::HasSubstr("\nstopped on request"));
 }
 
+TEST(ReportText, HasTheNotesOnTheInputs) {
+  EXPECT_THAT(to_text(report()), ::testing::Not(::testing::HasSubstr("note")));
+  ConversionReport noted = report();
+  noted.notes = {"clip.mp4: 60 of 100 frames"};
+  EXPECT_THAT(to_text(noted), ::testing::HasSubstr(
+                                  "\n1 note on the inputs:\n  note: clip.mp4: 60 of 100 frames\n"));
+  EXPECT_THAT(to_json(noted), ::testing::HasSubstr(R"("notes":["clip.mp4: 60 of 100 frames"])"));
+}
+
 TEST(AddShard, CountsItsMarker) {
   ConversionReport sum = report();
   ShardMarker marker;

@@ -46,6 +46,7 @@ Plan make_demo_plan() {
   plan.sources.resize(3);
   plan.sources[0].labelled_frames = 6;
   plan.sources[0].without_partner = 1;
+  plan.sources[1].notes = {"clip.mp4: 60 of 100 frames"};
   plan.shards = {planned("demo-train-00000-of-00003.h5", 0, example_shard()),
                  planned("demo-val-00000-of-00001.h5", 1, example_shard()),
                  planned("demo-train-00001-of-00003.h5", 2, example_shard()),

@@ -15,6 +15,7 @@ namespace {
 
 using ::testing::Contains;
 using testing::ConvertedFolder;
+using ::testing::HasSubstr;
 using testing::names_in;
 using ::testing::Not;
 using testing::read_file;
@@ -35,6 +36,16 @@ TEST(Finalize, ACompleteFolder) {
   EXPECT_EQ(report.views, 1);
   EXPECT_EQ(names_in(folder.path()).size(), before.size() + 2);
   EXPECT_EQ(nlohmann::json::parse(description(folder))["view"]["sha256"], sha256_hex(view(folder)));
+}
+
+TEST(Finalize, TheNotesOnTheInputsAreKept) {
+  const ConvertedFolder folder;
+  const FinalizationReport report = finalize(folder.path(), {});
+  EXPECT_EQ(report.notes, std::vector<std::string>{"clip.mp4: 60 of 100 frames"});
+  EXPECT_THAT(to_text(report), HasSubstr("1 note on the inputs:\n  note: clip.mp4: 60 of 100"));
+  const auto json = nlohmann::json::parse(description(folder));
+  EXPECT_EQ(json["sources"][0]["notes"], nlohmann::json::array());
+  EXPECT_EQ(json["sources"][1]["notes"], nlohmann::json{"clip.mp4: 60 of 100 frames"});
 }
 
 TEST(Finalize, TheSameBytesHoweverOftenAndWhereverTheFolderIs) {

@@ -39,6 +39,14 @@ FolderStatus half_done() {
   return status;
 }
 
+TEST(StatusText, HasTheNotesOnTheInputs) {
+  FolderStatus status = half_done();
+  status.notes = {"clip.mp4: 60 of 100 frames"};
+  EXPECT_THAT(status_text(status),
+              HasSubstr("1 note on the inputs:\n  note: clip.mp4: 60 of 100 frames\n"));
+  EXPECT_EQ(nlohmann::json::parse(status_json(status))["notes"][0], status.notes[0]);
+}
+
 TEST(StatusText, TellsWhereARunStands) {
   EXPECT_EQ(status_text(half_done()),
             "folder   /data/out\n"
