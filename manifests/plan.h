@@ -30,6 +30,10 @@ struct PlannedShard {
   int source = 0;    ///< index into the manifest's sources
   ImageSize volume_size;
   std::vector<PlannedSample> samples;
+  /// No picture of its samples could be read when it was planned: volume_size is a guess. The shard
+  /// takes the size that the pictures have once they were mended (see settle_sizes), and the file
+  /// itself says which.
+  bool size_unknown = false;
 };
 
 /// What planning found out about one source.

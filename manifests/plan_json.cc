@@ -53,7 +53,8 @@ void write_shard(const PlannedShard& shard, Pieces& pieces) {
     pieces << between << dump(to_json_value(sample));
     between = ",\n";
   }
-  pieces << "\n],\"source\":" << std::to_string(shard.source)
+  pieces << "\n]," << (shard.size_unknown ? "\"size_unknown\":true," : "")
+         << "\"source\":" << std::to_string(shard.source)
          << ",\"width\":" << std::to_string(shard.volume_size.width) << "}";
 }
 
@@ -97,8 +98,8 @@ Plan read_plan(std::istream& stream, const std::string& name) {
             {}};
   for (std::size_t i = 0; i < outline.shards.size(); ++i) {
     ShardOutline& shard = outline.shards[i];
-    plan.shards.push_back(
-        {std::move(shard.name), shard.source, shard.volume_size, std::move(samples[i])});
+    plan.shards.push_back({std::move(shard.name), shard.source, shard.volume_size,
+                           std::move(samples[i]), shard.size_unknown});
   }
   return plan;
 }

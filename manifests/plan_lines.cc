@@ -111,6 +111,7 @@ ShardOutline read_shard_outline(const StrictValue& value) {
   shard.source = object.at("source").integer(0, INT32_MAX);
   shard.volume_size.height = object.at("height").integer(1, kLargestSide);
   shard.volume_size.width = object.at("width").integer(1, kLargestSide);
+  if (const auto unknown = object.find("size_unknown")) shard.size_unknown = unknown->boolean();
   object.finish();
   return shard;
 }

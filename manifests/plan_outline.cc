@@ -11,7 +11,8 @@ std::int64_t PlanOutline::sample_count() const {
 }
 
 ShardOutline outline_of(const PlannedShard& shard) {
-  return {shard.name, shard.source, shard.volume_size, static_cast<int>(shard.samples.size())};
+  return {shard.name, shard.source, shard.volume_size, static_cast<int>(shard.samples.size()),
+          shard.size_unknown};
 }
 
 PlanOutline outline_of(const Plan& plan) {

@@ -17,6 +17,7 @@ struct ShardOutline {
   int source = 0;  ///< index into the manifest's sources
   ImageSize volume_size;
   int samples = 0;
+  bool size_unknown = false;  ///< see PlannedShard
   bool operator==(const ShardOutline&) const = default;
 };
 

@@ -43,20 +43,20 @@ int finish(const RetryArguments& arguments, const RetryReport& report, const Err
 
 int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder* trace) {
   const FrozenOutline frozen = read_frozen_outline(arguments.folder);
-  if (const auto report = nothing_to_retry(arguments.folder, frozen)) {
-    return finish(arguments, *report, {});
-  }
   const JobManifest manifest = recorded_manifest(arguments.folder, frozen.plan, arguments.manifest);
-  const LoadedGenerator loaded = [&] {
-    const TraceSpan span(trace, "load generator", "job");
-    return load_generator(manifest);
-  }();
-  tell_generator(loaded, arguments.as_json());
   RetryOptions options;
   options.threads = arguments.threads;
   options.grace_s = arguments.grace_s;
   options.trace = trace;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };
+  if (const auto report = nothing_to_retry(arguments.folder, frozen, manifest, options)) {
+    return finish(arguments, *report, {});
+  }
+  const LoadedGenerator loaded = [&] {
+    const TraceSpan span(trace, "load generator", "job");
+    return load_generator(manifest);
+  }();
+  tell_generator(loaded, arguments.as_json());
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total);
   };

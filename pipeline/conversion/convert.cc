@@ -160,7 +160,8 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   PlannedJob planned = make_plan(
       manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
       options.trace);
-  const FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
+  FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
+  settle_sizes(manifest, frozen.plan);
   const ConversionJob job{manifest,         options,   folder,       frozen,
                           planned.datasets, generator, weights_hash, thread_count(options.threads)};
 

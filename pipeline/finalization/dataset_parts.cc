@@ -34,7 +34,8 @@ ShardHeader read_shard_header(const fs::path& folder, const FinishedShard& shard
   if (header.name != shard.outline.name) refuse(file, "name");
   if (header.plan_hash != plan_hash) refuse(file, "plan hash");
   if (header.sample_count != shard.outline.samples) refuse(file, "number of samples");
-  if (header.volume.size != shard.outline.volume_size) refuse(file, "size of volumes");
+  if (header.volume.size != shard.outline.volume_size && !shard.outline.size_unknown)
+    refuse(file, "size of volumes");
   return header;
 }
 
@@ -55,10 +56,11 @@ DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
       continue;
     }
     parts.shards.push_back({outline, std::move(*state.marker)});
-    if (sound[i] && !parts.headers.contains(outline.source)) {
-      parts.headers[outline.source] =
-          read_shard_header(folder, parts.shards.back(), parts.frozen.hash);
-    }
+    const bool is_first = !parts.headers.contains(outline.source);
+    if (!sound[i] || (!is_first && !outline.size_unknown)) continue;
+    ShardHeader header = read_shard_header(folder, parts.shards.back(), parts.frozen.hash);
+    parts.shards.back().outline.volume_size = header.volume.size;
+    if (is_first) parts.headers[outline.source] = std::move(header);
   }
   return parts;
 }

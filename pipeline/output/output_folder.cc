@@ -1,5 +1,6 @@
 #include "pipeline/output/output_folder.h"
 
+#include <algorithm>
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -110,8 +111,12 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan) {
     plan = {};  // a large plan need not stand in memory twice
     return read_frozen_plan(folder);
   }
-  // The manifest may differ in what does not change bytes; nothing else may.
+  // The manifest may differ in what does not change bytes, and what was noteworthy beside the
+  // inputs may (a file that belongs to nothing); nothing else may.
   plan.manifest_text = std::move(frozen.plan.manifest_text);
+  for (std::size_t i = 0; i < std::min(plan.sources.size(), frozen.plan.sources.size()); ++i) {
+    plan.sources[i].notes = std::move(frozen.plan.sources[i].notes);
+  }
   if (hash_of(plan) == frozen.hash) return {std::move(plan), frozen.hash};
   throw UsageError(
       "expected the plan that this manifest and these inputs give, got an altered one, in " +

@@ -51,12 +51,19 @@ std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedSh
       paths.push_back(sample.pair.next.path);
     }
   }
-  return listing_hash(std::move(paths), [&](const std::string& path) {
+  const std::string hash = listing_hash(std::move(paths), [&](const std::string& path) {
     before_file();
     std::error_code absent;
     const auto size = std::filesystem::file_size(resolve(manifest, path), absent);
     return absent ? "absent" : std::to_string(size);
   });
+  // A picture that is mended within its size changes where its sample belongs.
+  std::string unknown;
+  for (const PlannedShard& shard : shards) {
+    if (!shard.size_unknown) continue;
+    for (const PlannedSample& sample : shard.samples) unknown += sample.sample_id + "\n";
+  }
+  return unknown.empty() ? hash : sha256_hex(hash + "\n" + unknown);
 }
 
 bool any_video(const std::vector<PlannedShard>& shards) {

@@ -74,6 +74,39 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
   return summary;
 }
 
+/// Says of each source which samples' size is unknown: what becomes of them is worth a look before
+/// anything is converted.
+void note_unknown_sizes(Plan& plan) {
+  constexpr std::size_t kNamed = 5;
+  struct Unknown {
+    std::size_t samples = 0;
+    std::size_t shards = 0;
+    std::string names;
+  };
+  std::vector<Unknown> sources(plan.sources.size());
+  for (const PlannedShard& shard : plan.shards) {
+    if (!shard.size_unknown) continue;
+    Unknown& unknown = sources[static_cast<std::size_t>(shard.source)];
+    ++unknown.shards;
+    for (const PlannedSample& sample : shard.samples) {
+      if (++unknown.samples <= kNamed) {
+        unknown.names += (unknown.names.empty() ? "" : ", ") + sample.sample_id;
+      }
+    }
+  }
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const Unknown& unknown = sources[i];
+    if (unknown.samples == 0) continue;
+    plan.sources[i].notes.push_back(
+        "planned without knowing the size of " + std::to_string(unknown.samples) +
+        (unknown.samples == 1 ? " sample" : " samples") + ", no picture of which can be read (" +
+        unknown.names + (unknown.samples > kNamed ? ", ..." : "") + "): quarantined in " +
+        std::to_string(unknown.shards) +
+        (unknown.shards == 1 ? " shard of its own" : " shards of their own") +
+        " until the pictures are mended and eventgan retry has run");
+  }
+}
+
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
@@ -100,11 +133,25 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
   }
   job.plan.shards = layout.finish();
+  note_unknown_sizes(job.plan);
   whole.note("pairs", job.plan.sample_count());
   const TraceSpan span(trace, "fingerprint", "job");
   job.plan.fingerprint = make_fingerprint(manifest, job.plan.shards, annotation_files, weights_hash,
                                           engine, stop_if_asked);
   return job;
+}
+
+void settle_sizes(const JobManifest& manifest, Plan& plan) {
+  SizeProbe probe(manifest);
+  for (PlannedShard& shard : plan.shards) {
+    if (!shard.size_unknown) continue;
+    for (const PlannedSample& sample : shard.samples) {
+      const ImageSize size = probe.volume_size(sample);
+      if (size == ImageSize{}) continue;
+      shard.volume_size = size;
+      break;
+    }
+  }
 }
 
 }  // namespace eventgan

@@ -29,4 +29,8 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
                      const std::string& engine, const std::function<bool()>& stop = {},
                      TraceRecorder* trace = nullptr);
 
+/// Gives every shard of a frozen plan whose size was unknown then the size of its first picture
+/// that can be read now; where none can be, the guess stays. Nothing else in the plan changes.
+void settle_sizes(const JobManifest& manifest, Plan& plan);
+
 }  // namespace eventgan

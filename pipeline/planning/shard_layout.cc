@@ -27,8 +27,11 @@ void ShardLayout::begin_source(int source, const std::string& split) {
 }
 
 void ShardLayout::add(PlannedSample sample, ImageSize volume_size) {
-  append(volume_size == ImageSize{} ? unknown_ : group(volume_size), next_place_++,
-         std::move(sample));
+  if (volume_size == ImageSize{}) {
+    append_unknown(std::move(sample));
+  } else {
+    append(group(volume_size), std::move(sample));
+  }
 }
 
 std::vector<PlannedShard> ShardLayout::finish() {
@@ -49,46 +52,37 @@ ShardLayout::Group& ShardLayout::group(ImageSize size) {
   return groups_[entry->second];
 }
 
-void ShardLayout::append(Group& group, std::size_t place, PlannedSample sample) {
-  if (group.shards.empty() || group.shards.back().samples.size() == samples_per_shard_) {
+void ShardLayout::append(Group& group, PlannedSample sample) {
+  if (group.samples++ % samples_per_shard_ == 0) {
     group.shards.push_back({"", source_, group.size, {}});
   }
   group.shards.back().samples.push_back(std::move(sample));
-  group.places.push_back(place);
 }
 
-void ShardLayout::place_unknown() {
-  if (unknown_.places.empty()) return;
-  if (groups_.empty()) group({1, 1});
-  const auto count = [](const Group& group) { return group.places.size(); };
-  Group& largest = *std::ranges::max_element(groups_, {}, count);
-
-  using Placed = std::pair<std::size_t, PlannedSample>;
-  std::vector<Placed> merged;
-  const auto take = [&merged](Group& group) {
-    std::size_t taken = 0;
-    for (PlannedShard& shard : group.shards) {
-      for (PlannedSample& sample : shard.samples)
-        merged.emplace_back(group.places[taken++], std::move(sample));
-    }
-    group.shards.clear();
-    group.places.clear();
+void ShardLayout::append_unknown(PlannedSample sample) {
+  const auto takes = [&](const PlannedShard& shard) {
+    return shard.samples.size() < samples_per_shard_ &&
+           shard.samples.back().pair.next.path == sample.pair.next.path;
   };
-  take(largest);
-  take(unknown_);
-  std::ranges::sort(merged, {}, &Placed::first);
-  for (Placed& placed : merged) append(largest, placed.first, std::move(placed.second));
+  if (unknown_.empty() || !takes(unknown_.back())) {
+    unknown_.push_back({"", source_, {}, {}, /*size_unknown=*/true});
+  }
+  unknown_.back().samples.push_back(std::move(sample));
+}
+
+ImageSize ShardLayout::most_common_size() const {
+  if (groups_.empty()) return {1, 1};
+  return std::ranges::max_element(groups_, {}, &Group::samples)->size;
 }
 
 void ShardLayout::end_source() {
-  place_unknown();
-  for (Group& group : groups_) {
-    std::ranges::move(group.shards, std::back_inserter(shards_));
-    splits_.resize(shards_.size(), split_);
-  }
+  for (PlannedShard& shard : unknown_) shard.volume_size = most_common_size();
+  for (Group& group : groups_) std::ranges::move(group.shards, std::back_inserter(shards_));
+  std::ranges::move(unknown_, std::back_inserter(shards_));
+  splits_.resize(shards_.size(), split_);
   groups_.clear();
   group_index_.clear();
-  next_place_ = 0;
+  unknown_.clear();
 }
 
 }  // namespace eventgan

@@ -21,6 +21,7 @@
 #include "pipeline/stopping/shard_pace.h"
 #include "pipeline/stopping/stop_monitor.h"
 #include "pipeline/threads/thread_count.h"
+#include "stages/shards/shard_reader.h"
 
 namespace eventgan {
 namespace {
@@ -54,8 +55,36 @@ Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const F
   throw UsageError(message);
 }
 
+/// Records which inputs have changed, before the samples `ids` are redone, and where the inputs are
+/// now.
+void accept_inputs(const fs::path& folder, const std::string& plan_hash, const Fingerprint& frozen,
+                   const Fingerprint& now, const JobManifest& manifest,
+                   const std::vector<std::string>& ids, RetryReport& report) {
+  const Fingerprint changed =
+      changed_inputs(folder, amended(frozen, read_amendments(folder, plan_hash)), now);
+  if (!changed.empty()) record_amendment(folder, plan_hash, {changed, ids});
+  for (const auto& [field, value] : changed) report.changed_inputs.push_back(field);
+  if (recorded_manifest_folder(folder) != manifest.directory) {
+    record_manifest_folder(folder, manifest);
+  }
+}
+
 bool stop_requested(const RetryOptions& options) {
   return options.since_stop_request && options.since_stop_request().has_value();
+}
+
+PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_hash,
+                      const std::string& engine, const RetryOptions& options) {
+  return make_plan(
+      manifest, weights_hash, engine, [&] { return stop_requested(options); }, options.trace);
+}
+
+/// A shard that has good samples already has the size of these.
+void keep_sizes(const fs::path& folder, std::vector<RetriedShard>& shards) {
+  for (RetriedShard& shard : shards) {
+    if (!shard.samples.size_unknown || shard.marker.valid == 0) continue;
+    shard.samples.volume_size = ShardReader(folder / shard.marker.shard).header().volume.size;
+  }
 }
 
 /// The shards with quarantined samples that prove whole; the others are reported. After a request
@@ -120,36 +149,41 @@ void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob&
 
 }  // namespace
 
-std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen) {
+std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen,
+                                            const JobManifest& manifest,
+                                            const RetryOptions& options) {
   restore_shards(folder, frozen);
   const QuarantinedSamples found = find_quarantined(folder, frozen);
   if (found.count > 0) return std::nullopt;
-  return new_report(folder, found, frozen.plan.sample_count());
+  RetryReport report = new_report(folder, found, frozen.plan.sample_count());
+  const Fingerprint& before = frozen.plan.fingerprint;
+  Fingerprint now = plan_again(manifest, "", "", options).plan.fingerprint;
+  for (auto& [field, value] : now) {
+    const auto known = before.find(field);
+    if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
+    value = known->second;  // weights, processor, libraries: for `convert` to compare
+  }
+  accept_inputs(folder, frozen.hash, before, now, manifest, {}, report);
+  return report;
 }
 
 RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Generator& generator,
                   const std::string& weights_hash, const RetryOptions& options) {
   const auto start = std::chrono::steady_clock::now();
-  const FrozenPlan frozen = read_frozen_plan(folder);
+  FrozenPlan frozen = read_frozen_plan(folder);
   const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
   restore_shards(folder, outline);
   const QuarantinedSamples found = find_quarantined(folder, outline);
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
-  if (found.count == 0) return report;
 
-  const PlannedJob job = make_plan(
-      manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
-      options.trace);
-  const Fingerprint changed =
-      changed_inputs(folder, amended(frozen.plan.fingerprint, read_amendments(folder, frozen.hash)),
-                     job.plan.fingerprint);
-  const std::vector<RetriedShard> shards =
+  const PlannedJob job = plan_again(manifest, weights_hash, generator.description(), options);
+  accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
+                found.ids, report);
+  settle_sizes(manifest, frozen.plan);
+  std::vector<RetriedShard> shards =
       plan_retry(trusted_shards(folder, frozen, found, options, report), job.plan);
+  keep_sizes(folder, shards);
   const std::int64_t to_do = report.quarantined;
-  if (!changed.empty()) record_amendment(folder, frozen.hash, {changed, found.ids});
-  if (recorded_manifest_folder(folder) != manifest.directory) {
-    record_manifest_folder(folder, manifest);
-  }
   redo(folder, manifest, job, generator, shards, options, report);
   report.stopped = stop_requested(options) && report.tried < to_do;
   report.dataset_outdated = report.shards_rewritten > 0 && fs::exists(folder / "dataset.json");

@@ -23,6 +23,13 @@ std::string to_text(const RetryReport& report) {
   if (report.shards_missing > 0) {
     text += count(report.shards_missing, "shard") + " not made yet: left to convert\n";
   }
+  if (!report.changed_inputs.empty()) {
+    text += "inputs changed since the plan was frozen (";
+    for (const std::string& field : report.changed_inputs) {
+      text += (field == report.changed_inputs.front() ? "" : ", ") + field;
+    }
+    text += "): recorded, convert goes on with them\n";
+  }
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
@@ -64,6 +71,7 @@ std::string to_json(const RetryReport& report) {
                                {"shards_rewritten", report.shards_rewritten},
                                {"damaged_shards", report.damaged_shards},
                                {"shards_missing", report.shards_missing},
+                               {"changed_inputs", report.changed_inputs},
                                {"stopped", report.stopped},
                                {"too_many_faults", report.too_many_faults},
                                {"dataset_outdated", report.dataset_outdated},

@@ -25,8 +25,11 @@ struct RetryReport {
   int shards_rewritten = 0;
   std::vector<std::string> damaged_shards;  ///< "PATH: expected X, got Y": left to `convert`
   int shards_missing = 0;                   ///< not made yet: left to `convert`
-  bool stopped = false;                     ///< a request to stop came before all were tried
-  bool too_many_faults = false;             ///< the manifest's limits are passed still
+  /// Fields of the fingerprint in which the inputs have changed since the plan was frozen, or since
+  /// the last retry: recorded, so that `convert` goes on.
+  std::vector<std::string> changed_inputs;
+  bool stopped = false;           ///< a request to stop came before all were tried
+  bool too_many_faults = false;   ///< the manifest's limits are passed still
   bool dataset_outdated = false;  ///< dataset.json tells of the shards as they were before
   double wall_seconds = 0;
 };

@@ -1,6 +1,7 @@
 #include "pipeline/retry/retry_sink.h"
 
 #include <cstddef>
+#include <optional>
 
 #include "pipeline/profile/trace_span.h"
 
@@ -35,7 +36,10 @@ void RetrySink::abandon() {
 
 void RetrySink::open() {
   shard_ = next_++;
-  rewrite_ = std::make_unique<ShardRewrite>(folder_, shard_->marker);
+  const bool size_unknown = shard_->samples.size_unknown;
+  rewrite_ = std::make_unique<ShardRewrite>(
+      folder_, shard_->marker,
+      size_unknown ? std::optional(shard_->samples.volume_size) : std::nullopt);
   pace_.open(static_cast<int>(shard_->slots.size()));
 }
 

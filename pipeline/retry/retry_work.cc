@@ -63,7 +63,9 @@ std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards, 
   for (const CommittedShard& committed : shards) {
     const PlannedShard& planned = *committed.shard;
     RetriedShard shard{
-        committed.marker, {planned.name, planned.source, planned.volume_size, {}}, {}};
+        committed.marker,
+        {planned.name, planned.source, planned.volume_size, {}, planned.size_unknown},
+        {}};
     for (const QuarantinedSample& quarantined : committed.marker.quarantined) {
       const PlannedSample* sample = &planned_sample(committed, quarantined);
       if (is_hole(*sample)) {

@@ -21,8 +21,13 @@ std::string reason_of(const ShardMarker& marker, int slot) {
 
 }  // namespace
 
-ShardRewrite::ShardRewrite(std::filesystem::path folder, ShardMarker marker)
-    : folder_(std::move(folder)), before_(std::move(marker)), reader_(folder_ / before_.shard) {
+ShardRewrite::ShardRewrite(std::filesystem::path folder, ShardMarker marker,
+                           std::optional<ImageSize> volume_size)
+    : folder_(std::move(folder)),
+      before_(std::move(marker)),
+      reader_(folder_ / before_.shard),
+      header_(reader_.header()) {
+  if (volume_size) header_.volume.size = *volume_size;
   marker_.shard = before_.shard;
   marker_.plan_hash = before_.plan_hash;
   // What the shard has cost so far; the work of a retry comes on top.
@@ -35,7 +40,7 @@ void ShardRewrite::redo(int slot, const SampleMessage& message) {
     marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
   if (!is_news(slot, message.sample)) return;  // copied with the rest, if at all
-  if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, reader_.header());
+  if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, header_);
   copy_before(slot);
   append(message.sample, message.chunk);
 }

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <span>
 
 #include "manifests/marker.h"
@@ -20,9 +21,11 @@ namespace eventgan {
 /// one thread at a time.
 class ShardRewrite {
  public:
-  /// `marker` is that of the shard in `folder`, whose bytes are known to be the marker's. Throws as
-  /// ShardReader does.
-  ShardRewrite(std::filesystem::path folder, ShardMarker marker);
+  /// `marker` is that of the shard in `folder`, whose bytes are known to be the marker's.
+  /// `volume_size`: what its volumes get instead of their size; only of a shard without a good
+  /// sample, and so without volumes. Throws as ShardReader does.
+  ShardRewrite(std::filesystem::path folder, ShardMarker marker,
+               std::optional<ImageSize> volume_size = std::nullopt);
 
   /// A sample redone, good or failed again; slots ascend. Throws std::runtime_error if the disk
   /// fails.
@@ -41,6 +44,7 @@ class ShardRewrite {
   std::filesystem::path folder_;
   ShardMarker before_;
   ShardReader reader_;
+  ShardHeader header_;                   // of what is written
   std::unique_ptr<ShardWriter> writer_;  // from the first difference on
   ShardMarker marker_;                   // of what is written
 };

@@ -5,6 +5,7 @@ import shutil
 
 import h5py
 import numpy as np
+import PIL.Image
 
 import program
 from folders import content, markers, same_content, temporaries
@@ -163,6 +164,97 @@ class Retry(program.InFolder):
         self.assertIn("cars/label_2/000004.txt", faults)
         self.assertIn("000004)", faults)
         self.assertIn("1 faults", faults)
+
+
+class ChangedInputs(program.InFolder):
+    """A folder in which nothing is quarantined goes on with inputs that have changed, once `retry` has seen them."""
+
+    def start(self, **settings):
+        self.manifest = small_job(self.folder, **settings)
+        self.out = self.folder / "out"
+        self.picture = self.folder / "cars" / "image_2" / "000001.png"
+        self.sound = self.picture.read_bytes()
+
+    def test_policy_fail(self):
+        self.start(errors={"policy": "fail"})
+        self.picture.write_bytes(self.sound[:200])
+        run("convert", self.manifest, "--output", self.out, expect=65)
+        self.goes_on_once_mended()
+
+    def test_a_plan_that_was_only_frozen(self):
+        self.start()
+        self.picture.write_bytes(self.sound[:200])
+        run("plan", self.manifest, "--freeze", "--output", self.out)
+        self.goes_on_once_mended()
+
+    def test_a_part_of_the_shards(self):
+        self.start(errors={"policy": "fail"})
+        self.picture.write_bytes(self.sound[:200])
+        run("convert", self.manifest, "--output", self.out, "--shards", "4/5")
+        self.goes_on_once_mended()
+
+    def test_a_label_that_changed_in_a_complete_folder(self):
+        self.start()
+        run("convert", self.manifest, "--output", self.out)
+        label = self.folder / "cars" / "label_2" / "000004.txt"
+        label.write_bytes(label.read_bytes() + b"\n")
+        run("convert", self.manifest, "--output", self.out, expect=64)
+        out, _ = run("retry", self.out)
+        self.assertIn("annotations): recorded", out)
+        run("convert", self.manifest, "--output", self.out)
+
+    def goes_on_once_mended(self):
+        self.picture.write_bytes(self.sound)
+        _, err = run("convert", self.manifest, "--output", self.out, expect=64)
+        self.assertIn("eventgan retry", err)
+        out, _ = run("retry", self.out)
+        self.assertIn("inputs changed since the plan was frozen (frames): recorded", out)
+        out, _ = run("retry", self.out)
+        self.assertNotIn("inputs changed", out)
+        run("convert", self.manifest, "--output", self.out)
+        run("verify", self.out, "--deep")
+
+
+class UnknownSizes(program.InFolder):
+    """Pictures none of which could be read at planning; mended, they are of another size than the others."""
+
+    def test_they_are_converted_in_the_end(self):
+        manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1},
+                             image={"preset": "kitti"})
+        out = self.folder / "out"
+        bad = sorted((self.folder / "cars").glob("*/00000[1-3]*.png"))
+        for path in bad:
+            path.write_bytes(b"version https://git-lfs.github.com/spec/v1\n")
+        text, _ = run("plan", manifest)
+        self.assertIn("without knowing the size of 3 samples", text)
+        text, _ = run("convert", manifest, "--output", out)
+        self.assertIn("1 note on the inputs", text)
+        self.assertIn("without knowing the size of 3 samples", text)
+        self.assertIn("without knowing the size of 3 samples", run("status", out)[0])
+        text, _ = run("finalize", out)
+        self.assertIn("without knowing the size of 3 samples", text)
+        notes = json.loads((out / "dataset.json").read_text())["sources"][0]["notes"]
+        self.assertEqual(len(notes), 1)
+        run("verify", out, "--deep")
+
+        random = np.random.default_rng(8)
+        for path in bad:
+            size = (60, 80) if path.name.startswith("000002") else (48, 64)
+            PIL.Image.fromarray(random.integers(0, 256, size, dtype=np.uint8)).save(path)
+        plan = (out / "plan.json").read_bytes()
+        text, _ = run("retry", out)
+        self.assertIn("3 of 3 quarantined samples mended", text)
+        self.assertEqual((out / "plan.json").read_bytes(), plan)
+        run("convert", manifest, "--output", out)
+        run("finalize", out)
+        run("verify", out, "--deep")
+        sizes = {}
+        for name in markers(out):
+            with h5py.File(out / name) as file:
+                for sample, valid in zip(file["pairs/sample_id"].asstr()[:], file["valid"][:]):
+                    self.assertTrue(valid, sample)
+                    sizes[sample] = file["events/volume"].shape[2:]
+        self.assertEqual((sizes["000001"], sizes["000002"], sizes["000003"]), ((48, 64), (60, 80), (48, 64)))
 
 
 def shard(path):

@@ -33,6 +33,17 @@ TEST(PlanJson, RoundTripsByteForByte) {
   EXPECT_EQ(back.sources[0].pairs_by_gap, (std::map<int, std::int64_t>{{1, 1}, {6, 1}}));
 }
 
+TEST(PlanJson, AShardOfUnknownSizeSaysSo) {
+  Plan plan = small_plan();
+  plan.shards[1].size_unknown = true;
+  const std::string text = to_json(plan);
+  EXPECT_THAT(text, HasSubstr("\n],\"size_unknown\":true,\"source\":1,\"width\":6}\n"));
+  const Plan back = parse_plan(text, "plan.json");
+  EXPECT_FALSE(back.shards[0].size_unknown);
+  EXPECT_TRUE(back.shards[1].size_unknown);
+  EXPECT_EQ(to_json(back), text);
+}
+
 TEST(Notes, OfAllSourcesAndOfVeryManyTheFirst) {
   Plan plan = small_plan();
   EXPECT_EQ(notes_text({}), "");

@@ -113,6 +113,18 @@ TEST(FreezePlan, RefusesAnAlteredPlan) {
                   HasSubstr("got an altered one, in " + (folder / "plan.json").string())));
 }
 
+TEST(FreezePlan, WhatWasNoteworthyBesideTheInputsMayChange) {
+  const TemporaryFolder folder;
+  Plan first = plan("w");
+  first.sources.resize(1);
+  Plan later = first;
+  first.sources[0].notes = {"a file that belongs to nothing"};
+  const FrozenPlan frozen = freeze_plan(folder.path(), first);
+  const FrozenPlan taken = freeze_plan(folder.path(), later);
+  EXPECT_EQ(taken.hash, frozen.hash);
+  EXPECT_EQ(taken.plan.sources[0].notes, first.sources[0].notes);
+}
+
 TEST(FreezePlan, SaysThatTheFrozenOneIsDamagedAndLeavesIt) {
   const TemporaryFolder folder;
   const std::string half = to_json(plan("w")).substr(0, 200);

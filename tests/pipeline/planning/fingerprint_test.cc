@@ -84,6 +84,14 @@ TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
   EXPECT_TRUE(differences[0].starts_with("frames: "));
 }
 
+TEST_F(Fingerprint, NoticesAPictureOfUnknownSizeThatWasMendedWithinItsBytes) {
+  const auto whole = make();
+  shards_[0].size_unknown = true;
+  const auto differences = fingerprint_differences(make(), whole);
+  ASSERT_EQ(differences.size(), 1u);
+  EXPECT_TRUE(differences[0].starts_with("frames: "));
+}
+
 TEST_F(Fingerprint, NoticesAnAnnotationOfTheSameSize) {
   const auto before = make();
   testing::write_file(folder_ / "labels.txt", "Van 1");

@@ -7,6 +7,7 @@
 #include "pipeline/stopping/stopped.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -54,6 +55,27 @@ TEST_F(MakePlan, GroupsPicturesBySize) {
   const Plan plan = make_plan(manifest_, "w", "e").plan;
   ASSERT_EQ(plan.shards.size(), 2u);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 6}));
+}
+
+TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
+  for (const char* name : {"f_02.png", "f_03.png"}) {
+    testing::write_file(folder_ / "clip" / name, "not a picture");
+  }
+  Plan plan = make_plan(manifest_, "w", "e").plan;
+  ASSERT_EQ(plan.shards.size(), 2u);  // of the pairs 0-1 and 1-2, and of 2-3
+  EXPECT_TRUE(plan.shards[1].size_unknown);
+  EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6}));
+  const std::string& id = plan.shards[1].samples.at(0).sample_id;
+  EXPECT_THAT(plan.sources[0].notes,
+              ::testing::ElementsAre(::testing::AllOf(::testing::HasSubstr("size of 1 sample,"),
+                                                      ::testing::HasSubstr("(" + id + ")"),
+                                                      ::testing::HasSubstr("eventgan retry"))));
+  settle_sizes(manifest_, plan);
+  EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6})) << "the guess stays";
+  testing::write_flat_picture(folder_ / "clip" / "f_03.png", {8, 10}, 100);
+  settle_sizes(manifest_, plan);
+  EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 10}));
+  EXPECT_EQ(plan.shards[0].volume_size, (ImageSize{4, 6}));
 }
 
 TEST_F(MakePlan, StopsAtAnyFrameOrFile) {

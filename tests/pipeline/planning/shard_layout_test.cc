@@ -16,7 +16,8 @@ std::vector<PlannedShard> lay_out(const std::vector<Source>& sources, int sample
   for (std::size_t i = 0; i < sources.size(); ++i) {
     layout.begin_source(static_cast<int>(i), sources[i].split);
     for (std::size_t k = 0; k < sources[i].sizes.size(); ++k) {
-      layout.add({"s" + std::to_string(k), "", "", {}, ""}, sources[i].sizes[k]);
+      const std::string id = "s" + std::to_string(k);
+      layout.add({id, "", "", {{"0.png"}, {id + ".png"}}, ""}, sources[i].sizes[k]);
     }
   }
   return layout.finish();
@@ -52,35 +53,47 @@ TEST(ShardLayout, AShardHoldsOneSize) {
   EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("s1", "s3", "s4"));
 }
 
-TEST(ShardLayout, UnreadablePicturesKeepASlotAmongTheMostCommonSize) {
-  const auto shards = lay_out({{"train", {kSmall, {}, kLarge, kLarge}}}, 8);
-  ASSERT_EQ(shards.size(), 2u);
-  EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("s1", "s2", "s3"));
-}
-
-TEST(ShardLayout, UnreadablePicturesStandInTheirOrderAndFillShards) {
+TEST(ShardLayout, AnUnreadablePictureHasAShardOfItsOwnThatGuessesTheMostCommonSize) {
   const auto shards =
-      lay_out({{"train", {kSmall, {}, kSmall, kLarge, kSmall, {}}}, {"val", {{}}}}, 2);
-  ASSERT_EQ(shards.size(), 5u);
-  EXPECT_THAT(ids(shards[0]), ::testing::ElementsAre("s0", "s1"));
+      lay_out({{"train", {kSmall, {}, kLarge, {}, kLarge}}, {"train", {{}, kSmall}}}, 8);
+  ASSERT_EQ(shards.size(), 6u);
+  EXPECT_THAT(ids(shards[0]), ::testing::ElementsAre("s0"));
   EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("s2", "s4"));
-  EXPECT_THAT(ids(shards[2]), ::testing::ElementsAre("s5"));
-  EXPECT_EQ(shards[2].volume_size, kSmall);
-  EXPECT_EQ(shards[3].volume_size, kLarge);
-  EXPECT_THAT(ids(shards[4]), ::testing::ElementsAre("s0")) << "of the next source";
+  EXPECT_FALSE(shards[1].size_unknown);
+  for (const int own : {2, 3}) {
+    EXPECT_TRUE(shards[own].size_unknown);
+    EXPECT_EQ(shards[own].volume_size, kLarge);
+    EXPECT_EQ(shards[own].source, 0);
+  }
+  EXPECT_THAT(ids(shards[2]), ::testing::ElementsAre("s1"));
+  EXPECT_THAT(ids(shards[3]), ::testing::ElementsAre("s3"));
+  EXPECT_EQ(shards[5].name, "job-train-00005-of-00006.h5");
+  EXPECT_THAT(ids(shards[5]), ::testing::ElementsAre("s0")) << "of the next source";
+  EXPECT_EQ(shards[5].volume_size, kSmall);
 }
 
 TEST(ShardLayout, WhereNoPictureCanBeReadVolumesAreOnePixel) {
   const auto shards = lay_out({{"train", {{}, {}}}}, 8);
-  ASSERT_EQ(shards.size(), 1u);
+  ASSERT_EQ(shards.size(), 2u);
   EXPECT_EQ(shards[0].volume_size, (ImageSize{1, 1}));
-  EXPECT_EQ(shards[0].samples.size(), 2u);
+  EXPECT_TRUE(shards[0].size_unknown);
 }
 
-TEST(ShardLayout, OfSizesThatAreEquallyCommonTheFirstTakesTheUnreadable) {
-  EXPECT_EQ(lay_out({{"train", {{}, kLarge, kSmall}}}, 8)[0].volume_size, kLarge);
-  EXPECT_THAT(ids(lay_out({{"train", {{}, kLarge, kSmall}}}, 8)[0]),
-              ::testing::ElementsAre("s0", "s1"));
+TEST(ShardLayout, OfSizesThatAreEquallyCommonTheFirstIsTheGuess) {
+  EXPECT_EQ(lay_out({{"train", {{}, kLarge, kSmall}}}, 8).back().volume_size, kLarge);
+}
+
+TEST(ShardLayout, SamplesOfOneUnreadableVideoShareShards) {
+  ShardLayout layout("job", 2);
+  layout.begin_source(0, "train");
+  for (const char* video : {"a.mp4", "a.mp4", "a.mp4", "b.mp4"}) {
+    layout.add({video, "", "", {{video}, {video}}, ""}, {});
+  }
+  const auto shards = layout.finish();
+  ASSERT_EQ(shards.size(), 3u);
+  EXPECT_THAT(ids(shards[0]), ::testing::ElementsAre("a.mp4", "a.mp4"));
+  EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("a.mp4"));
+  EXPECT_THAT(ids(shards[2]), ::testing::ElementsAre("b.mp4"));
 }
 
 TEST(ShardLayout, OfNothingIsNothing) {

@@ -42,6 +42,15 @@ TEST(RetryText, SaysThatThereIsNothingToDo) {
             "nothing to retry: no sample of a committed shard is quarantined\n/out\n");
 }
 
+TEST(RetryText, SaysThatChangedInputsWereRecorded) {
+  RetryReport report;
+  report.changed_inputs = {"annotations", "frames"};
+  EXPECT_THAT(
+      to_text(report),
+      HasSubstr("inputs changed since the plan was frozen (annotations, frames): recorded"));
+  EXPECT_EQ(nlohmann::json::parse(to_json(report))["changed_inputs"].size(), 2u);
+}
+
 TEST(RetryText, SaysThatItWasStoppedAndThatTheDatasetIsOutdated) {
   RetryReport report = example();
   EXPECT_THAT(to_text(report), Not(HasSubstr("stopped")));

@@ -12,7 +12,10 @@
 
 #include "manifests/faults.h"
 #include "pipeline/conversion/convert.h"
+#include "pipeline/finalization/dataset_parts.h"
+#include "pipeline/finalization/finalize.h"
 #include "pipeline/output/amendments.h"
+#include "pipeline/planning/make_plan.h"
 #include "pipeline/stopping/stopped.h"
 #include "pipeline/verification/verify_folder.h"
 #include "stages/files/temporary_name.h"
@@ -49,6 +52,9 @@ class Retry : public ::testing::Test {
     options.threads = 2;
     return convert(manifest_, generator_, "weights", options);
   }
+  std::optional<RetryReport> look() {
+    return nothing_to_retry(out_, read_frozen_outline(out_), manifest_, options_);
+  }
   RetryReport again() { return retry(out_, manifest_, generator_, "weights", options_); }
 
   std::map<std::string, std::string> shards(const std::string& output) const {
@@ -64,6 +70,11 @@ class Retry : public ::testing::Test {
   /// sizes.
   void expect_sound() const {
     EXPECT_THAT(verify_folder(out_, {.deep = true, .manifest = {}}).faults, IsEmpty());
+  }
+
+  void expect_sound_after_finalize() const {
+    EXPECT_TRUE(finalize(out_, {}).written);
+    expect_sound();
   }
 
   testing::TemporaryFolder folder_;
@@ -185,13 +196,93 @@ TEST_F(Retry, SomeMendedAndSomeNot) {
 
 TEST_F(Retry, NothingToDoIsSaid) {
   run();
-  const auto nothing = nothing_to_retry(out_, read_frozen_outline(out_));
+  const auto nothing = look();
   ASSERT_TRUE(nothing);
+  EXPECT_THAT(nothing->changed_inputs, IsEmpty());
   EXPECT_EQ(nothing->planned, 11);
   EXPECT_EQ(nothing->quarantined, 0);
   const RetryReport report = again();
   EXPECT_EQ(report.tried, 0);
   EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+}
+
+TEST_F(Retry, ChangedInputsAreRecordedWhereNothingIsQuarantined) {
+  manifest_.errors = {ErrorPolicy::kFail, 0, 0};
+  spoil(5);
+  EXPECT_THROW(run(), TooManyFaults);
+  mend(5);
+  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  const auto nothing = look();
+  ASSERT_TRUE(nothing);
+  EXPECT_THAT(nothing->changed_inputs, ElementsAre("frames"));
+  EXPECT_EQ(nothing->tried, 0);
+  EXPECT_TRUE(run().complete());
+  expect_sound();
+  EXPECT_THAT(look()->changed_inputs, IsEmpty()) << "once";
+}
+
+TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
+  fs::create_directories(out_);
+  freeze_plan(out_, make_plan(manifest_, "weights", generator_.description()).plan);
+  record_manifest_folder(out_, manifest_);
+  spoil(5);
+  EXPECT_THROW(run(), UsageError);
+  ASSERT_TRUE(look());
+  EXPECT_EQ(run().quarantined.size(), 2u);
+  EXPECT_FALSE(look()) << "samples to redo";
+}
+
+TEST_F(Retry, NothingIsRecordedForAnotherJob) {
+  run();
+  spoil(5);
+  manifest_.text.replace(manifest_.text.find("untrained:1"), 11, "untrained:2");
+  EXPECT_THROW(look(), UsageError);
+  EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+}
+
+TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
+  for (int frame = 0; frame < 12; ++frame) spoil(frame);
+  const ConversionReport first = run();
+  EXPECT_EQ(first.quarantined.size(), 11u);
+  EXPECT_THAT(first.notes, ElementsAre(HasSubstr("size of 11 samples")));
+  finalize(out_, {});
+  for (int frame = 0; frame < 6; ++frame) mend(frame);
+  for (int frame = 6; frame < 12; ++frame) {
+    testing::write_flat_picture(picture(frame), {40, 50}, 20 * frame);
+  }
+  RetryReport report = again();
+  // The pair of the frames 5 and 6 is of two sizes, and never a pair.
+  EXPECT_EQ(report.mended, 10);
+  EXPECT_EQ(report.quarantined, 1);
+  expect_sound_after_finalize();
+  const DatasetParts parts = read_dataset_parts(out_, read_frozen_outline(out_));
+  std::map<int, int> heights;
+  for (const FinishedShard& shard : parts.shards) {
+    heights[shard.outline.volume_size.height] += shard.marker.valid;
+  }
+  EXPECT_EQ(heights, (std::map<int, int>{{20, 5}, {40, 5}}));
+
+  // Made again by convert, a shard has the same bytes.
+  fs::remove(out_ / "dataset.h5");
+  const auto mended = shards("out");
+  for (const auto& [name, bytes] : mended) fs::remove(out_ / name);
+  EXPECT_TRUE(run().complete());
+  EXPECT_TRUE(shards("out") == mended);
+}
+
+TEST_F(Retry, APictureOfUnknownSizeMendedWithinItsBytesIsTaken) {
+  const std::string sound = testing::read_file(picture(5));
+  const std::string next = testing::read_file(picture(6));
+  testing::write_file(picture(5), std::string(sound.size(), '?'));
+  testing::write_file(picture(6), std::string(next.size(), '?'));
+  ASSERT_EQ(run().quarantined.size(), 3u);  // pairs 4, 5 and 6
+  testing::write_file(picture(5), sound);
+  testing::write_file(picture(6), next);
+  EXPECT_THAT([&] { run(); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` takes them")));
+  EXPECT_EQ(again().mended, 3);
+  EXPECT_TRUE(run().complete());
+  expect_sound_after_finalize();
 }
 
 TEST_F(Retry, IsRefusedForAnotherJobWithoutTouchingAnything) {
