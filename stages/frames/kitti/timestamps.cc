@@ -52,9 +52,8 @@ std::optional<nanoseconds> parse_timestamp(std::string_view line) {
          std::chrono::minutes(*minute) + std::chrono::seconds(*second) + *fraction;
 }
 
-/// "2011-09-26 13:02:25.5\n" has 21.
-std::size_t length_without_end(std::string_view line) {
-  return line.find_last_not_of(" \t\r\n") + 1;
+std::string_view without_end(std::string_view line) {
+  return line.substr(0, line.find_last_not_of(" \t\r\n") + 1);
 }
 
 }  // namespace
@@ -63,30 +62,28 @@ Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::
   std::vector<double> seconds;
   std::optional<nanoseconds> first, latest;
   std::string_view first_line, latest_line;
-  const auto refuse = [&](const std::string& expected, const TextLine& line) {
-    return SampleFault{"expected " + expected + ", got " + in_quotes(line.bytes) + ", in " +
-                       place_in_file(path, line.number)};
-  };
   for (const TextLine& line : split_lines(text)) {
-    if (split_columns(line.bytes).empty()) {
+    const std::string_view stamp = without_end(line.bytes);
+    if (stamp.empty()) {
       seconds.push_back(std::numeric_limits<double>::quiet_NaN());
       continue;
     }
-    const auto time = parse_timestamp(line.bytes);
-    if (!time) return refuse("a time such as 2011-09-26 13:02:25.594360375", line);
+    const auto refuse = [&](const std::string& expected) {
+      return SampleFault{"expected " + expected + ", got " + in_quotes(stamp) + ", in " +
+                         place_in_file(path, line.number)};
+    };
+    const auto time = parse_timestamp(stamp);
+    if (!time) return refuse("a time such as 2011-09-26 13:02:25.594360375");
     if (!first) {
       first = time;
-      first_line = line.bytes;
+      first_line = stamp;
     }
-    if (!line.bytes.ends_with('\n') &&
-        length_without_end(line.bytes) < length_without_end(first_line)) {
-      return refuse("a whole line", line);
+    if (!line.bytes.ends_with('\n') && stamp.size() < first_line.size()) {
+      return refuse("a whole line");
     }
-    if (latest && *time <= *latest) {
-      return refuse("a time after " + in_quotes(latest_line), line);
-    }
+    if (latest && *time <= *latest) return refuse("a time after " + in_quotes(latest_line));
     latest = time;
-    latest_line = line.bytes.substr(0, length_without_end(line.bytes));
+    latest_line = stamp;
     seconds.push_back(std::chrono::duration<double>(*time - *first).count());
   }
   return seconds;

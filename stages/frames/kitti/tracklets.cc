@@ -38,6 +38,15 @@ double size(const pugi::xml_node& tracklet, const char* name) {
                  in_quotes(tracklet.child_value(name)));
 }
 
+/// The writers' "unset" is -1 kept in eight bits.
+int occlusion(const pugi::xml_node& pose) {
+  constexpr int kUnset = 255;
+  const int level = number<int>(pose, "occlusion");
+  if (level == kUnset) return -1;
+  if (level >= -1 && level <= 3) return level;
+  throw BadField("expected a number from -1 to 3 for occlusion, got " + std::to_string(level));
+}
+
 /// boost writes beside the items how many there are.
 void check_count(const pugi::xml_node& list, std::string_view what) {
   const auto count = number<std::int64_t>(list, "count");
@@ -78,7 +87,7 @@ TrackletPose read_pose(const pugi::xml_node& tracklet, const pugi::xml_node& pos
   read.y = number<double>(pose, "ty");
   read.z = number<double>(pose, "tz");
   read.rotation_z = number<double>(pose, "rz");
-  read.occlusion = number<int>(pose, "occlusion");
+  read.occlusion = occlusion(pose);
   read.truncation = number<int>(pose, "truncation");
   return read;
 }

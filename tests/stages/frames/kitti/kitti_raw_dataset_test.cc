@@ -156,7 +156,7 @@ TEST_F(KittiRawDatasetTest, DamagedTimestampsAreAFaultOfTheirDrivesFrames) {
         "2011-09-26 13:00:01\n2011-09-26 13:00:00\n2011-09-26 13:00:02\n");
   const auto dataset = open();
   const std::string fault =
-      "expected a time after '2011-09-26 13:00:01', got '2011-09-26 13:00:00?', in raw/" + kFirst +
+      "expected a time after '2011-09-26 13:00:01', got '2011-09-26 13:00:00', in raw/" + kFirst +
       "/image_02/timestamps.txt:2";
   ASSERT_THAT(dataset->labelled_frames(), SizeIs(6));
   for (std::size_t i = 0; i < 6; ++i) {

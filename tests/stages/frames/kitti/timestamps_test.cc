@@ -71,7 +71,7 @@ TEST(Timestamps, AnythingElseIsAFaultThatNamesTheLine) {
 TEST(Timestamps, ATimeThatIsNotAfterTheOneBeforeIsAFault) {
   EXPECT_EQ(
       fault("2011-09-26 13:02:25.6\n\n2011-09-26 13:02:25.5\n2011-09-26 13:02:26.0\n"),
-      "expected a time after '2011-09-26 13:02:25.6', got '2011-09-26 13:02:25.5?', in t.txt:3");
+      "expected a time after '2011-09-26 13:02:25.6', got '2011-09-26 13:02:25.5', in t.txt:3");
   EXPECT_THAT(fault("2011-09-26 13:02:25.6\n2011-09-26 13:02:25.6\n"), HasSubstr("in t.txt:2"));
 }
 

@@ -93,6 +93,22 @@ TEST(Tracklets, ASizeThatIsNotAboveZeroIsAFault) {
   }
 }
 
+TEST(Tracklets, OcclusionHasItsRange) {
+  const auto with_occlusion = [](const std::string& level) {
+    std::string xml = tracklets_xml(tracklet_xml("Car", "0", pose_xml("10")));
+    xml.replace(xml.find("<occlusion>1<"), 13, "<occlusion>" + level + "<");
+    return Tracklets(xml, "t.xml").frame(0);
+  };
+  for (const auto& [written, read] : {std::pair("0", 0), {"2", 2}, {"-1", -1}, {"255", -1}}) {
+    EXPECT_EQ(std::get<TrackletFrame>(with_occlusion(written)).poses.at(0).occlusion, read);
+  }
+  for (const char* level : {"4", "-2", "99"}) {
+    EXPECT_EQ(std::get<SampleFault>(with_occlusion(level)).reason,
+              std::string("expected a number from -1 to 3 for occlusion, got ") + level +
+                  ", in t.xml (tracklet 0)");
+  }
+}
+
 TEST(Tracklets, ACountThatIsNotThatOfTheItemsIsAnError) {
   const std::string xml =
       tracklets_xml(tracklet_xml("Car", "0", pose_xml("10") + pose_xml("11")) +
