@@ -2,6 +2,15 @@
 
 #include <gtest/gtest.h>
 
+extern "C" {
+#include <libavcodec/packet.h>
+#include <libavformat/avformat.h>
+}
+
+#include <algorithm>
+#include <opencv2/core.hpp>
+#include <opencv2/videoio.hpp>
+
 #include "manifests/faults.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/temporary_folder.h"
@@ -50,6 +59,75 @@ TEST(VideoClip, TimesThatDoNotAscendAreNotTaken) {
   const VideoClip clip = measure_video(folder / "clip.mkv");
   EXPECT_TRUE(clip.uneven_times_s.empty());
   EXPECT_FALSE(clip.times_ascend);
+}
+
+/// Copies a video's packets to a Matroska file in which its i-th frame is shown at times_ms[i].
+void copy_retimed(const std::filesystem::path& from, const std::filesystem::path& to,
+                  const std::vector<int>& times_ms) {
+  AVFormatContext* in = nullptr;
+  AVFormatContext* out = nullptr;
+  ASSERT_EQ(avformat_open_input(&in, from.c_str(), nullptr, nullptr), 0);
+  ASSERT_GE(avformat_alloc_output_context2(&out, nullptr, "matroska", to.c_str()), 0);
+  AVStream* const stream = avformat_new_stream(out, nullptr);
+  avcodec_parameters_copy(stream->codecpar, in->streams[0]->codecpar);
+  stream->codecpar->codec_tag = 0;
+  ASSERT_GE(avio_open(&out->pb, to.c_str(), AVIO_FLAG_WRITE), 0);
+  ASSERT_GE(avformat_write_header(out, nullptr), 0);
+  std::vector<AVPacket*> packets;
+  std::vector<std::int64_t> order;
+  for (;;) {
+    AVPacket* packet = av_packet_alloc();
+    if (av_read_frame(in, packet) < 0) {
+      av_packet_free(&packet);
+      break;
+    }
+    order.push_back(packet->pts);
+    packets.push_back(packet);
+  }
+  EXPECT_FALSE(std::ranges::is_sorted(order)) << "frames in the order in which they are shown";
+  std::ranges::sort(order);
+  ASSERT_EQ(order.size(), times_ms.size());
+  std::int64_t decoded_ms = -1000;  // each before it is shown
+  for (AVPacket* packet : packets) {
+    const auto shown_as = std::ranges::lower_bound(order, packet->pts) - order.begin();
+    packet->pts = times_ms[static_cast<std::size_t>(shown_as)];
+    packet->dts = decoded_ms++;
+    ASSERT_GE(av_write_frame(out, packet), 0);
+    av_packet_free(&packet);
+  }
+  av_write_trailer(out);
+  avio_closep(&out->pb);
+  avformat_free_context(out);
+  avformat_close_input(&in);
+}
+
+// H.264 stores frames in another order than they are shown in; the decoder gives the last ones
+// when the file has ended.
+TEST(VideoClip, FramesStoredInAnotherOrderHaveTheirOwnTimes) {
+  const testing::TemporaryFolder folder;
+  constexpr int kFrames = 30;
+  {
+    cv::VideoWriter writer((folder / "even.mp4").string(), cv::CAP_FFMPEG,
+                           cv::VideoWriter::fourcc('a', 'v', 'c', '1'), 25, cv::Size(64, 48));
+    if (!writer.isOpened()) GTEST_SKIP() << "skipped: no H.264 encoder";
+    for (int i = 0; i < kFrames; ++i)
+      writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(2 * i)));
+  }
+  const VideoClip even = measure_video(folder / "even.mp4");
+  EXPECT_EQ(even.frame_count, kFrames);
+  EXPECT_TRUE(even.times_ascend);
+  EXPECT_TRUE(even.uneven_times_s.empty());
+
+  std::vector<int> times_ms;  // steps of 20, 40 and 100 ms by turns
+  for (int i = 0; i < kFrames; ++i) {
+    const int steps_ms[] = {0, 20, 60};
+    times_ms.push_back(i / 3 * 160 + steps_ms[i % 3]);
+  }
+  copy_retimed(folder / "even.mp4", folder / "uneven.mkv", times_ms);
+  const VideoClip uneven = measure_video(folder / "uneven.mkv");
+  ASSERT_EQ(uneven.frame_count, kFrames);
+  ASSERT_EQ(uneven.uneven_times_s.size(), static_cast<std::size_t>(kFrames));
+  for (int i = 0; i < kFrames; ++i) EXPECT_NEAR(uneven.time_s(i), times_ms[i] / 1000.0, 1e-9) << i;
 }
 
 TEST(VideoClip, RefusesWhatIsNoVideo) {

@@ -143,6 +143,7 @@ TEST(VideoDatasetOnSharedData, CountsTheFramesOfAClip) {
   ASSERT_EQ(dataset->labelled_frames().size(), 289u);
   EXPECT_EQ(dataset->labelled_frames().back().sample_id, "01_dog/000288");
   EXPECT_NEAR(dataset->labelled_frames()[30].frame.time_s, 30 * 1001.0 / 30000, 1e-9);  // 29.97 Hz
+  EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
 }  // namespace
