@@ -1,22 +1,21 @@
-#include <stdlib.h>
-
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/core/utils/logger.hpp>
+#include <sstream>
 
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/errors/error_text.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/memory/big_buffers.h"
 #include "pipeline/planning/fingerprint.h"
+#include "stages/frames/decoding/picture_file.h"
 
 int main(int argc, char** argv) {
+  const eventgan::StandardStreams streams(argc, argv);
   eventgan::keep_big_buffers();
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", /*overwrite=*/0);  // quiet
+  eventgan::silence_decoders();
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
-  // Decoding errors are reported by us, with the sample they belong to.
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
 
   CLI::App app(
       "Turns labelled frame datasets (KITTI, MPII, Human3.6M) into event-camera training data");
@@ -45,10 +44,14 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? eventgan::kComplete : eventgan::kUsage;
+    std::ostringstream message;
+    const bool asked_for = app.exit(error, std::cout, message) == 0;  // --help, --version
+    exit_code = asked_for ? eventgan::kComplete : eventgan::kUsage;
+    if (!asked_for)
+      streams.tell_error(message.str().substr(0, message.str().find_last_not_of('\n') + 1));
   } catch (const std::exception& error) {
-    std::cerr << "error: " << eventgan::error_text(error) << std::endl;
-    return eventgan::exit_code_of(error);
+    exit_code = eventgan::exit_code_of(error);
+    streams.tell_error(eventgan::error_text(error));
   }
-  return exit_code;
+  return streams.finish(exit_code);
 }

@@ -75,6 +75,8 @@ std::string progress_json(const ProgressState& state) {
   return json.dump();
 }
 
+std::string error_json(const std::string& text) { return event_json("error", text); }
+
 std::string warning_json(const std::string& text) { return event_json("warning", text); }
 
 std::string note_json(const std::string& text) { return event_json("note", text); }

@@ -43,6 +43,9 @@ std::string progress_bar(const ProgressState& state, int width);
 /// The same as JSON: {"event": "progress", "done": ..., ...}.
 std::string progress_json(const ProgressState& state);
 
+/// What ended the run, as JSON: {"event": "error", "text": ...}.
+std::string error_json(const std::string& text);
+
 /// A warning as JSON: {"event": "warning", "text": ...}.
 std::string warning_json(const std::string& text);
 

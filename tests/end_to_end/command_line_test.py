@@ -1,12 +1,19 @@
 """Exit codes, help and messages of the command line."""
 
 import collections
+import json
 import pathlib
+import shlex
 import struct
+import subprocess
 import sys
+
+import numpy as np
+import PIL.Image
 
 import program
 from program import run
+from small_job import LENIENT, small_job
 from safetensors_rules import read_safetensors
 
 sys.path.append(str(pathlib.Path(__file__).parents[1] / "fuzz"))
@@ -118,6 +125,94 @@ class CommandLine(program.InFolder):
         self.assertIn("head.conv2d.weight", err)
         run("import-weights", old, self.folder / "w.pt", expect=64)
         self.assertFalse(weights.exists())
+
+    def write_damaged_pictures(self, folder):
+        """A good and a damaged picture of each format in turn, as frames 0, 1, ... of one folder."""
+        folder.mkdir()
+        picture = PIL.Image.fromarray(np.random.default_rng(3).integers(0, 256, (24, 32, 3), dtype=np.uint8))
+        formats = [("bmp", {}), ("jpg", {}), ("png", {}), ("tif", {}), ("tif", {"compression": "tiff_lzw"}),
+                   ("tif", {"compression": "jpeg"})]
+        for index, (extension, options) in enumerate(formats):
+            good, bad = [folder / f"{2 * index + k:04d}.{extension}" for k in range(2)]
+            picture.save(good, **options)
+            data = good.read_bytes()
+            bad.write_bytes(data[:len(data) // 2])
+        # A header that claims more pixels than there can be.
+        large = bytearray((folder / "0000.bmp").read_bytes())
+        struct.pack_into("<i", large, 18, 1 << 27)
+        (folder / f"{2 * len(formats):04d}.bmp").write_bytes(large)
+        return len(formats) + 1
+
+    def test_damaged_pictures_are_told_by_us_alone(self):
+        damaged = self.write_damaged_pictures(self.folder / "frames")
+        manifest = program.manifest(
+            [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}], errors=LENIENT,
+            generator={"kind": "difference"}, image={"width": 32, "height": 24, "preset": "mpii"})
+        path = self.write_manifest(manifest)
+        for style in ["lines", "json"]:
+            out, err = run("convert", path, "--progress", style, "--output", self.folder / style)
+            self.assertNotRegex(out + err, r"(?i)opencv|imread|libpng|libtiff|\bwarn")
+            if style == "json":
+                for line in err.splitlines():
+                    self.assertIn(json.loads(line)["event"], {"progress", "note", "warning"})
+                self.assertGreaterEqual(len(json.loads(out)["quarantined"]), damaged)
+
+    def test_every_line_of_json_progress_is_json(self):
+        def events(*arguments, expect):
+            _, err = run(*arguments, expect=expect)
+            return [json.loads(line) for line in err.splitlines()]
+
+        def only_error(*arguments, expect):
+            (event,) = events(*arguments, expect=expect)
+            self.assertEqual(set(event), {"event", "text"})
+            self.assertEqual(event["event"], "error")
+            return event["text"]
+
+        self.assertIn("MANIFEST", only_error("convert", "--progress", "json", expect=64))
+        self.assertIn("--threads", only_error("convert", "a.json", "--threads", "0", "--progress=json", expect=64))
+        for command in ["convert", "calibrate", "train", "simulate"]:
+            self.assertIn("none.json", only_error(command, self.folder / "none.json", "--progress", "json", expect=66))
+        self.assertIn("none.h5", only_error("realism", self.folder / "none.h5", "--progress", "json", expect=66))
+        self.assertIn("none", only_error("retry", self.folder / "none", "--progress", "json", expect=66))
+        bad = self.write_manifest(program.manifest([], seed="x", colour=1), "bad.json")
+        self.assertIn("\n", only_error("convert", bad, "--progress", "json", expect=64))  # all faults in one event
+
+        (self.folder / "clip.mp4").write_bytes(bytes(range(256)) * 40)  # no video, although it is named so
+        clip = self.write_manifest(program.manifest(
+            [{"dataset": "frames", "root": "clip.mp4", "pairs": program.pairs([1])}]), "clip.json")
+        self.assertIn("clip.mp4", events("convert", clip, "--progress", "json", expect=66)[-1]["text"])
+
+        path = small_job(self.folder / "small", errors={"policy": "quarantine", "max_count": 0, "max_fraction": 0})
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        self.assertEqual(events("convert", path, "--progress", "json", expect=65)[-1]["event"], "error")
+        self.assertEqual(events("retry", path.parent / "out", "--progress", "json", expect=65)[-1]["event"], "error")
+
+    def run_with_output_to(self, redirection, *arguments):
+        command = shlex.join(map(str, (program.PROGRAM, *arguments)))
+        return subprocess.run(["sh", "-c", f"exec {command} {redirection}"], stderr=subprocess.PIPE, text=True)
+
+    def test_output_that_cannot_be_written_is_1(self):
+        path = small_job(self.folder / "small")
+        folder = path.parent / "out"
+        run("convert", path)
+        shard = sorted(folder.glob("*.h5"))[0]
+        before = program.shard_bytes(folder)
+        for redirection in [">/dev/full", ">&-"]:
+            for arguments in [["--help"], ["--version"], ["plan", "--help"], ["plan", path], ["plan", path, "--json"],
+                              ["convert", path], ["retry", folder], ["status", folder], ["verify", folder],
+                              ["inspect", shard], ["finalize", folder], ["preview", shard, "--out", self.folder / "p"]]:
+                with self.subTest(redirection=redirection, arguments=arguments):
+                    done = self.run_with_output_to(redirection, *arguments)
+                    self.assertEqual(done.returncode, 1, done.stderr)
+                    self.assertIn("standard output", done.stderr)
+        self.assertEqual(self.run_with_output_to(">/dev/full", "convert").returncode, 64)  # nothing was to be written
+        self.assertEqual(self.run_with_output_to(">/dev/null", "status", folder).returncode, 0)
+        # No shard has been opened in the place of the standard output.
+        done = self.run_with_output_to(">&- <&-", "convert", path, "--output", self.folder / "anew")
+        self.assertEqual(done.returncode, 1)
+        anew = program.shard_bytes(self.folder / "anew")
+        self.assertEqual(anew, {name: before[name] for name in anew})
+        self.assertEqual(len(anew), len(list(folder.glob("small-*.h5"))))
 
     def test_a_damaged_shard_is_an_error_that_names_it(self):
         (self.folder / "x.h5").write_bytes(b"no HDF5")

@@ -5,8 +5,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "stages/events/pictures/time_panel_internal.h"
+#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {
@@ -73,15 +75,15 @@ void write_comparison_png(std::span<const ComparedPair> pairs, const std::filesy
   for (cv::Mat& row : rows) {  // pairs may differ in size
     cv::copyMakeBorder(row, row, 0, 0, 0, width - row.cols, cv::BORDER_CONSTANT, kPaper);
   }
-  bool written = false;
+  std::vector<unsigned char> png;
   try {
     cv::Mat picture;
     cv::vconcat(rows, picture);
-    written = cv::imwrite(path.string(), picture);
+    cv::imencode(".png", picture, png);
   } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot write " + path.string() + ": " + exception.err);
+    throw std::runtime_error("cannot draw " + path.string() + ": " + exception.err);
   }
-  if (!written) throw std::runtime_error("cannot write " + path.string());
+  write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 
 }  // namespace eventgan

@@ -4,10 +4,12 @@
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <vector>
 
 #include "stages/events/pictures/label_drawing_internal.h"
 #include "stages/events/pictures/panel_scale.h"
 #include "stages/events/pictures/time_panel_internal.h"
+#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {
@@ -116,13 +118,13 @@ cv::Mat compose(const PreviewContent& content) {
 
 void write_preview_png(const PreviewContent& content, const std::filesystem::path& path) {
   check(content);
-  bool written = false;
+  std::vector<unsigned char> png;
   try {
-    written = cv::imwrite(path.string(), compose(content));
+    cv::imencode(".png", compose(content), png);
   } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot write " + path.string() + ": " + exception.err);
+    throw std::runtime_error("cannot draw " + path.string() + ": " + exception.err);
   }
-  if (!written) throw std::runtime_error("cannot write " + path.string());
+  write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
 }
 
 }  // namespace eventgan

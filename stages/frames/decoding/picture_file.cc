@@ -1,10 +1,15 @@
 #include "stages/frames/decoding/picture_file.h"
 
+#include <stdlib.h>
+
 #include <array>
 #include <cstdio>
+#include <iostream>
 #include <memory>
+#include <opencv2/core/utils/logger.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+#include <streambuf>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -35,6 +40,34 @@ OpenFile open_file(const std::filesystem::path& path) {
   return file;
 }
 
+thread_local bool in_opencv = false;
+
+/// OpenCV tells std::cerr itself, past its own log, what it could not decode. Stands before
+/// std::cerr's buffer and drops what a thread writes while it is in OpenCV.
+class WithoutOpencv final : public std::streambuf {
+ public:
+  explicit WithoutOpencv(std::streambuf* target) : target_(target) {}
+
+ protected:
+  int_type overflow(int_type character) override {
+    if (in_opencv || character == traits_type::eof()) return traits_type::not_eof(character);
+    return target_->sputc(traits_type::to_char_type(character));
+  }
+  std::streamsize xsputn(const char* text, std::streamsize length) override {
+    return in_opencv ? length : target_->sputn(text, length);
+  }
+  int sync() override { return in_opencv ? 0 : target_->pubsync(); }
+
+ private:
+  std::streambuf* target_;
+};
+
+/// In its scope the calling thread is in OpenCV.
+struct OpencvScope {
+  OpencvScope() { in_opencv = true; }
+  ~OpencvScope() { in_opencv = false; }
+};
+
 bool opencv_knows(const std::filesystem::path& file) {
   try {
     return cv::haveImageReader(file.string());
@@ -57,6 +90,7 @@ Format format_of(std::FILE* file, const std::filesystem::path& path) {
 
 ColourFrame decode_with_opencv(const std::filesystem::path& file) {
   cv::Mat picture;
+  const OpencvScope scope;
   try {
     picture = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
   } catch (const cv::Exception& exception) {
@@ -89,6 +123,15 @@ auto read_by_format(const std::filesystem::path& path, Jpeg jpeg, Png png, Other
 }
 
 }  // namespace
+
+void silence_decoders() {
+  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", /*overwrite=*/0);  // quiet
+  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+  cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
+  // Never deleted, since std::cerr is in use to the program's end.
+  static auto* const without_opencv = new WithoutOpencv(std::cerr.rdbuf());
+  std::cerr.rdbuf(without_opencv);
+}
 
 bool is_picture_file(const std::filesystem::path& file) {
   return format_of(open_file(file).get(), file) != Format::kNone;

@@ -7,6 +7,11 @@
 
 namespace eventgan {
 
+/// What OpenCV and FFmpeg would write to the standard error stream about a damaged file, which
+/// the functions here and VideoFile report as exceptions, is dropped from now on. (FFmpeg's is not
+/// if OPENCV_FFMPEG_LOGLEVEL is set.) To be called before there are other threads.
+void silence_decoders();
+
 /// True if the file is a picture by its first bytes, whatever its name. Throws std::runtime_error
 /// saying what is wrong ("expected a picture, got an empty file") if it is missing, empty or a
 /// folder.

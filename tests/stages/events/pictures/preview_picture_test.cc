@@ -176,7 +176,8 @@ TEST(PreviewPicture, ErrorsNameThePath) {
     write_preview_png(content_with(90), folder / "none/preview.png");
     FAIL() << "expected an exception";
   } catch (const std::runtime_error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr((folder / "none/preview.png").string()));
+    // Of the temporary file that it is first.
+    EXPECT_THAT(error.what(), ::testing::HasSubstr((folder / "none/.preview.png").string()));
   }
 }
 

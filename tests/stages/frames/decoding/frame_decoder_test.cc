@@ -3,11 +3,13 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <iostream>
 #include <opencv2/imgproc.hpp>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include "stages/frames/decoding/picture_file.h"
 #include "tests/stages/frames/decoding/test_pictures.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/temporary_folder.h"
@@ -89,6 +91,18 @@ TEST(FrameDecoder, FaultsSayWhatIsWrongAndNameTheFile) {
               AllOf(HasSubstr("expected a whole JPEG, got "), HasSubstr(", in short.jpg")));
   EXPECT_EQ(fault(decoder.decode(picture_ref("cut.bmp"))),
             "expected a whole picture, got a damaged one, in cut.bmp");
+}
+
+TEST(FrameDecoder, OpencvTellsNobodyElseWhatIsWrong) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "cut.bmp").string(), gradient_picture({12, 20}));
+  std::filesystem::resize_file(folder / "cut.bmp", 300);
+  silence_decoders();
+  ::testing::internal::CaptureStderr();
+  const std::string reason = fault(FrameDecoder(folder.path()).decode(picture_ref("cut.bmp")));
+  std::cerr << "from us\n";
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "from us\n");
+  EXPECT_THAT(reason, HasSubstr("got a damaged one"));
 }
 
 TEST(FrameDecoder, VideoFramesAreFoundByCountingInAnyOrder) {

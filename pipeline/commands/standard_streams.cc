@@ -1,0 +1,104 @@
+#include "pipeline/commands/standard_streams.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <cstdio>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <streambuf>
+#include <string_view>
+
+#include "pipeline/errors/exit_codes.h"
+#include "pipeline/progress/progress.h"
+
+namespace eventgan {
+namespace {
+
+/// A closed one becomes /dev/null, in ascending order since an opened file takes the lowest free
+/// number; the output for reading only, so that writing to it still fails.
+void open_closed_streams() {
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    if (fcntl(stream, F_GETFD) != -1) continue;
+    if (open("/dev/null", stream == STDERR_FILENO ? O_WRONLY : O_RDONLY) != stream) return;
+  }
+}
+
+bool asks_for_json(int argc, const char* const* argv) {
+  using namespace std::string_view_literals;
+  for (int i = 1; i < argc; ++i) {
+    if (argv[i] == "--progress=json"sv) return true;
+    if (argv[i] == "--progress"sv && i + 1 < argc && argv[i + 1] == "json"sv) return true;
+  }
+  return false;
+}
+
+std::string json_line(const std::string& line) {
+  if (line.starts_with('{') && nlohmann::json::accept(line)) return line;
+  struct Kind {
+    std::string_view start;
+    std::string (*as_json)(const std::string&);
+  };
+  for (const auto& [start, as_json] :
+       {Kind{"error: ", error_json}, {"warning: ", warning_json}, {"note: ", note_json}}) {
+    if (line.starts_with(start)) return as_json(line.substr(start.size()));
+  }
+  return note_json(line);
+}
+
+}  // namespace
+
+/// Stands in std::cerr's place before the buffer that was there. A line of one thread stays whole.
+class StandardStreams::JsonLines final : public std::streambuf {
+ public:
+  JsonLines() : target_(std::cerr.rdbuf(this)) {}
+
+  ~JsonLines() override {
+    if (!line_.empty()) overflow('\n');
+    std::cerr.rdbuf(target_);
+  }
+  JsonLines(const JsonLines&) = delete;
+  JsonLines& operator=(const JsonLines&) = delete;
+
+ protected:
+  int_type overflow(int_type character) override {
+    if (character == traits_type::eof()) return traits_type::not_eof(character);
+    if (character != '\n') {
+      line_ += traits_type::to_char_type(character);
+    } else if (!line_.empty()) {
+      const std::string text = json_line(line_) + "\n";
+      line_.clear();
+      target_->sputn(text.data(), static_cast<std::streamsize>(text.size()));
+      target_->pubsync();
+    }
+    return character;
+  }
+
+ private:
+  static thread_local std::string line_;  ///< what a thread has written of a line so far
+  std::streambuf* target_;
+};
+
+thread_local std::string StandardStreams::JsonLines::line_;
+
+StandardStreams::StandardStreams(int argc, const char* const* argv) {
+  open_closed_streams();
+  if (asks_for_json(argc, argv)) json_lines_ = std::make_unique<JsonLines>();
+}
+
+StandardStreams::~StandardStreams() = default;
+
+void StandardStreams::tell_error(const std::string& text) const {
+  std::cerr << (json_lines_ ? error_json(text) : "error: " + text) << std::endl;
+}
+
+int StandardStreams::finish(int exit_code) const {
+  std::cout.flush();
+  if (std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
+  tell_error(
+      "expected a standard output that takes what is written, got one that does not (closed, "
+      "or a full disk)");
+  return exit_code == kComplete ? static_cast<int>(kFailed) : exit_code;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+namespace eventgan {
+
+/// What the program's three standard streams keep to, from the first line of main to its last:
+///
+/// 1. None is closed: else the next file that is opened, such as a shard, would take its place.
+/// 2. With `--progress json` every line on the standard error stream is a JSON object; what is not
+///    written as one, by us or a library, becomes {"event": "error", "warning" or "note", "text":
+///    ...}.
+/// 3. What could not be written to the standard output is not passed over (finish()).
+///
+/// For one object in the program, made before there are other threads.
+class StandardStreams {
+ public:
+  /// The command line is only searched for --progress json: it may be wrong, and that is told too.
+  StandardStreams(int argc, const char* const* argv);
+  ~StandardStreams();
+  StandardStreams(const StandardStreams&) = delete;
+  StandardStreams& operator=(const StandardStreams&) = delete;
+
+  /// "error: TEXT", or one JSON line however many lines the text has.
+  void tell_error(const std::string& text) const;
+
+  /// The exit code of a program that would end with `exit_code`: the same, but kFailed instead of
+  /// kComplete, and an error is told, if the standard output did not take all that was written.
+  int finish(int exit_code) const;
+
+ private:
+  class JsonLines;
+  std::unique_ptr<JsonLines> json_lines_;  ///< null: lines are for people
+};
+
+}  // namespace eventgan
