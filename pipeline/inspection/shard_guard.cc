@@ -94,6 +94,8 @@ void set_time_limit(int seconds) {
 [[noreturn]] void live(const fs::path& shard, const std::function<int()>& read, int errors) {
   ::dup2(errors, STDERR_FILENO);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
+  // Whoever handles crashes (a sanitizer, a library) would turn them into ends of another kind.
+  for (const int crash : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) std::signal(crash, SIG_DFL);
   is_limited = true;
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
@@ -102,7 +104,8 @@ void set_time_limit(int seconds) {
   int code = kFailed;
   try {
     code = read();
-    std::cout.flush();
+    // The parent cannot see what the child has failed to print.
+    if (!std::cout.flush()) throw std::runtime_error("cannot write to standard output");
   } catch (const std::bad_alloc&) {
     tell_of_memory(shard);
   } catch (const std::length_error&) {

@@ -298,6 +298,8 @@ class Flips(program.InFolder):
         self.assertEqual(json.loads(told), json.loads(run("inspect", self.shard, "--json")[0]))
         run("inspect", lone, "--sample", "7", expect=64)
         run("inspect", self.folder / "none.h5", expect=66)
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full, stderr=subprocess.PIPE).returncode, 1)
         pictures, _ = run("preview", lone, "--out", self.folder / "pictures", "--frames", self.folder / "job", "--count", "2")
         self.assertEqual([pathlib.Path(line).exists() for line in pictures.splitlines()], [True, True])
 
