@@ -31,7 +31,7 @@ struct PlannedShard {
   ImageSize volume_size;
   std::vector<PlannedSample> samples;
   /// No picture of its samples could be read when it was planned: volume_size is a guess. The shard
-  /// takes the size that the pictures have once they were mended (see settle_sizes), and the file
+  /// takes the size that the pictures have once they were mended (see complete_plan), and the file
   /// itself says which.
   bool size_unknown = false;
 };

@@ -161,7 +161,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
       manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
       options.trace);
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
-  settle_sizes(manifest, frozen.plan);
+  complete_plan(manifest, planned.datasets, frozen.plan);
   const ConversionJob job{manifest,         options,   folder,       frozen,
                           planned.datasets, generator, weights_hash, thread_count(options.threads)};
 

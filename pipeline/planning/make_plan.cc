@@ -1,5 +1,6 @@
 #include "pipeline/planning/make_plan.h"
 
+#include <map>
 #include <unordered_map>
 
 #include "manifests/faults.h"
@@ -107,6 +108,46 @@ void note_unknown_sizes(Plan& plan) {
   }
 }
 
+using Holes = std::map<std::string, PlannedSample*>;  // by sample id
+
+/// The samples of each source that were planned with a fault.
+std::vector<Holes> find_holes(Plan& plan) {
+  std::vector<Holes> holes(plan.sources.size());
+  for (PlannedShard& shard : plan.shards) {
+    for (PlannedSample& sample : shard.samples) {
+      if (sample.fault.empty()) continue;
+      holes[static_cast<std::size_t>(shard.source)][sample.sample_id] = &sample;
+    }
+  }
+  return holes;
+}
+
+/// Chooses the holes' pairs again. The ids of a frame's samples are or begin with its own.
+void fill_holes(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
+                const Holes& holes) {
+  for (const LabelledFrame& frame : dataset.labelled_frames()) {
+    const auto candidate = holes.lower_bound(frame.sample_id);
+    if (candidate == holes.end() || !candidate->first.starts_with(frame.sample_id)) continue;
+    for (PlannedSample& sample : choose_pairs(dataset, frame, spec, seed).samples) {
+      const auto hole = holes.find(sample.sample_id);
+      if (hole != holes.end()) *hole->second = std::move(sample);
+    }
+  }
+}
+
+void settle_sizes(const JobManifest& manifest, Plan& plan) {
+  SizeProbe probe(manifest);
+  for (PlannedShard& shard : plan.shards) {
+    if (!shard.size_unknown) continue;
+    for (const PlannedSample& sample : shard.samples) {
+      const ImageSize size = probe.volume_size(sample);
+      if (size == ImageSize{}) continue;
+      shard.volume_size = size;
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
@@ -141,17 +182,14 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   return job;
 }
 
-void settle_sizes(const JobManifest& manifest, Plan& plan) {
-  SizeProbe probe(manifest);
-  for (PlannedShard& shard : plan.shards) {
-    if (!shard.size_unknown) continue;
-    for (const PlannedSample& sample : shard.samples) {
-      const ImageSize size = probe.volume_size(sample);
-      if (size == ImageSize{}) continue;
-      shard.volume_size = size;
-      break;
-    }
+void complete_plan(const JobManifest& manifest,
+                   const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan) {
+  const std::vector<Holes> holes = find_holes(plan);
+  for (std::size_t source = 0; source < holes.size(); ++source) {
+    if (holes[source].empty()) continue;
+    fill_holes(*datasets[source], manifest.sources[source], manifest.seed, holes[source]);
   }
+  settle_sizes(manifest, plan);
 }
 
 }  // namespace eventgan

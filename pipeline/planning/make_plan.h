@@ -29,8 +29,12 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
                      const std::string& engine, const std::function<bool()>& stop = {},
                      TraceRecorder* trace = nullptr);
 
-/// Gives every shard of a frozen plan whose size was unknown then the size of its first picture
-/// that can be read now; where none can be, the guess stays. Nothing else in the plan changes.
-void settle_sizes(const JobManifest& manifest, Plan& plan);
+/// Puts into a frozen plan what could not be known when it was frozen, as far as the inputs tell
+/// now: samples that were planned with a fault (a hole in their sequence) become what they would be
+/// planned as today, by source and id; shards of unknown size get that of their first picture that
+/// can be read. What is unknown still stays as it is, and so do all slots. `datasets`: one for each
+/// source, opened now.
+void complete_plan(const JobManifest& manifest,
+                   const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan);
 
 }  // namespace eventgan

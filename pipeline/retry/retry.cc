@@ -176,12 +176,13 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   const QuarantinedSamples found = find_quarantined(folder, outline);
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
 
-  const PlannedJob job = plan_again(manifest, weights_hash, generator.description(), options);
+  PlannedJob job = plan_again(manifest, weights_hash, generator.description(), options);
   accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
                 found.ids, report);
-  settle_sizes(manifest, frozen.plan);
+  job.plan = {};  // the frozen one counts, and it can be huge
+  complete_plan(manifest, job.datasets, frozen.plan);
   std::vector<RetriedShard> shards =
-      plan_retry(trusted_shards(folder, frozen, found, options, report), job.plan);
+      plan_retry(trusted_shards(folder, frozen, found, options, report));
   keep_sizes(folder, shards);
   const std::int64_t to_do = report.quarantined;
   redo(folder, manifest, job, generator, shards, options, report);

@@ -41,7 +41,7 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
 /// mended; every other byte of the shards stays, and plan.json does. A shard is written again only
 /// if a sample of it is mended now or fails for another reason. Shards that are damaged, or not
 /// made yet, are left to `convert`. A shard whose size was unknown at planning gets that of its
-/// mended pictures with its first good sample (see settle_sizes).
+/// mended pictures with its first good sample (see complete_plan).
 ///
 /// The job must be the frozen one in all but its inputs: where the fingerprint differs in fields
 /// that may change, that is recorded first (amendments.json), so that later runs accept the folder.

@@ -32,9 +32,7 @@ struct RetriedShard {
   std::vector<int> slots;  ///< of each of them in the shard
 };
 
-/// What to redo of each shard: samples as they were planned; but one that was planned with a fault
-/// (a hole in its sequence) as `today`'s plan has it, if that knows of it: its frames, too, are
-/// only known now.
-std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards, const Plan& today);
+/// What to redo of each shard.
+std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards);
 
 }  // namespace eventgan

@@ -61,7 +61,7 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   for (const char* name : {"f_02.png", "f_03.png"}) {
     testing::write_file(folder_ / "clip" / name, "not a picture");
   }
-  Plan plan = make_plan(manifest_, "w", "e").plan;
+  auto [plan, datasets] = make_plan(manifest_, "w", "e");
   ASSERT_EQ(plan.shards.size(), 2u);  // of the pairs 0-1 and 1-2, and of 2-3
   EXPECT_TRUE(plan.shards[1].size_unknown);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6}));
@@ -70,12 +70,36 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
               ::testing::ElementsAre(::testing::AllOf(::testing::HasSubstr("size of 1 sample,"),
                                                       ::testing::HasSubstr("(" + id + ")"),
                                                       ::testing::HasSubstr("eventgan retry"))));
-  settle_sizes(manifest_, plan);
+  complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6})) << "the guess stays";
   testing::write_flat_picture(folder_ / "clip" / "f_03.png", {8, 10}, 100);
-  settle_sizes(manifest_, plan);
+  complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 10}));
   EXPECT_EQ(plan.shards[0].volume_size, (ImageSize{4, 6}));
+}
+
+TEST_F(MakePlan, AHoleThatWasFilledBecomesWhatItWouldBePlannedAsToday) {
+  for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
+    manifest_.sources[0].pairs.choose = choice;
+    const Plan whole = make_plan(manifest_, "w", "e").plan;
+    const PlannedSample& meant = whole.shards[0].samples.at(1);  // of f_01 and f_02
+    const std::string picture = testing::read_file(folder_ / "clip" / "f_01.png");
+    std::filesystem::remove(folder_ / "clip" / "f_01.png");
+    auto [plan, datasets] = make_plan(manifest_, "w", "e");
+    const PlannedSample& hole = plan.shards.at(0).samples.at(0);
+    ASSERT_EQ(hole.sample_id, meant.sample_id);
+    const std::string before = to_json(plan);
+    complete_plan(manifest_, datasets, plan);
+    EXPECT_EQ(to_json(plan), before) << "a hole still";
+    EXPECT_THAT(hole.fault, ::testing::HasSubstr("got no file"));
+
+    testing::write_file(folder_ / "clip" / "f_01.png", picture);
+    complete_plan(manifest_, make_plan(manifest_, "w", "e").datasets, plan);
+    EXPECT_EQ(hole.fault, "");
+    EXPECT_EQ(hole.pair.previous.path, meant.pair.previous.path);
+    EXPECT_EQ(hole.pair.next.path, meant.pair.next.path);
+    EXPECT_EQ(plan.sample_count(), 2);
+  }
 }
 
 TEST_F(MakePlan, StopsAtAnyFrameOrFile) {

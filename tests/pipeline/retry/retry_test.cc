@@ -138,6 +138,12 @@ TEST_F(Retry, AHoleThatWasFilledIsMended) {
   EXPECT_EQ(report.mended, 1);
   EXPECT_EQ(report.quarantined, 0);
   expect_sound();
+
+  // Made again by convert, the shards have the same bytes.
+  const auto mended = shards("out");
+  for (const auto& [name, bytes] : mended) fs::remove(out_ / name);
+  EXPECT_TRUE(run().complete());
+  EXPECT_TRUE(shards("out") == mended);
 }
 
 TEST_F(Retry, LaterRunsAcceptTheMendedInputs) {
@@ -230,6 +236,19 @@ TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
   ASSERT_TRUE(look());
   EXPECT_EQ(run().quarantined.size(), 2u);
   EXPECT_FALSE(look()) << "samples to redo";
+}
+
+TEST_F(Retry, AHoleThatWasFilledBeforeItsShardWasMadeIsConverted) {
+  manifest_.errors = {ErrorPolicy::kFail, 0, 0};
+  fs::remove(picture(5));
+  EXPECT_THROW(run(), TooManyFaults);
+  mend(5);
+  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  ASSERT_TRUE(look());
+  const ConversionReport report = run();
+  EXPECT_TRUE(report.complete());
+  EXPECT_THAT(report.quarantined, IsEmpty());
+  expect_sound();
 }
 
 TEST_F(Retry, NothingIsRecordedForAnotherJob) {

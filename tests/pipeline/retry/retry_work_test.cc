@@ -67,44 +67,23 @@ TEST(FindQuarantined, LooksAtCommittedShardsAlone) {
   EXPECT_THAT(found.damaged, ElementsAre(HasSubstr("job-train-00002-of-00003.h5")));
 }
 
-TEST(PlanRetry, TakesQuarantinedSamplesAsTheyWerePlanned) {
-  const Plan frozen = plan();
-  Plan today = plan();
-  today.shards[1].samples[1] = sample("d", "other", "");
-  const auto retried = plan_retry({{&frozen.shards[1], marker(frozen.shards[1], {1})}}, today);
-  ASSERT_EQ(retried.size(), 1u);
+TEST(PlanRetry, TakesQuarantinedSamplesAsTheyArePlanned) {
+  Plan frozen = plan();
+  frozen.shards[1].size_unknown = true;
+  const auto retried = plan_retry({{&frozen.shards[1], marker(frozen.shards[1], {1})},
+                                   {&frozen.shards[2], marker(frozen.shards[2], {0, 1})}});
+  ASSERT_EQ(retried.size(), 2u);
   EXPECT_THAT(retried[0].slots, ElementsAre(1));
   EXPECT_EQ(retried[0].marker.shard, frozen.shards[1].name);
   EXPECT_EQ(retried[0].samples.name, frozen.shards[1].name);
   EXPECT_EQ(retried[0].samples.volume_size, (ImageSize{2, 2}));
+  EXPECT_TRUE(retried[0].samples.size_unknown);
   ASSERT_EQ(retried[0].samples.samples.size(), 1u);
-  EXPECT_EQ(retried[0].samples.samples[0].pair.next.path, "n");
-}
-
-TEST(PlanRetry, TakesAHoleAsItIsPlannedToday) {
-  const Plan frozen = plan();
-  Plan today = plan();
-  std::swap(today.shards[0], today.shards[1]);  // wherever it stands
-  today.shards[1].samples[1] = sample("b", "found", "");
-  const auto retried = plan_retry({{&frozen.shards[0], marker(frozen.shards[0], {1})},
-                                   {&frozen.shards[2], marker(frozen.shards[2], {0, 1})}},
-                                  today);
-  ASSERT_EQ(retried.size(), 2u);
-  EXPECT_EQ(retried[0].samples.samples[0].pair.next.path, "found");
-  EXPECT_EQ(retried[0].samples.samples[0].fault, "");
-  // Still a hole; and the "b" of another source is another sample.
-  EXPECT_EQ(retried[1].samples.samples[0].fault, "hole");
-  EXPECT_EQ(retried[1].samples.samples[1].pair.next.path, "n");
+  EXPECT_EQ(retried[0].samples.samples[0].sample_id, "d");
+  EXPECT_THAT(retried[1].slots, ElementsAre(0, 1));
   EXPECT_EQ(retried[1].samples.source, 1);
-}
-
-TEST(PlanRetry, KeepsAHoleThatTodaysPlanDoesNotKnow) {
-  const Plan frozen = plan();
-  Plan today = plan();
-  today.shards.clear();
-  const auto retried = plan_retry({{&frozen.shards[0], marker(frozen.shards[0], {1})}}, today);
-  EXPECT_EQ(retried[0].samples.samples[0].fault, "hole");
-  EXPECT_THAT(plan_retry({}, today), IsEmpty());
+  EXPECT_FALSE(retried[1].samples.size_unknown);
+  EXPECT_THAT(plan_retry({}), IsEmpty());
 }
 
 }  // namespace
