@@ -13,7 +13,12 @@ std::string read_manifest_text(const std::filesystem::path& file) {
     throw InputError("expected a manifest, got \"" + why + "\", in " + file.string());
   };
   std::error_code ignored;
-  if (std::filesystem::is_directory(file, ignored)) fail("a folder");
+  const auto status = std::filesystem::status(file, ignored);
+  if (std::filesystem::is_directory(status)) fail("a folder");
+  // A FIFO would wait for its writer, for ever perhaps.
+  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
+    fail("not a regular file");
+  }
   errno = 0;
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;

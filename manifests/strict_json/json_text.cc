@@ -1,4 +1,8 @@
+#include <cstdint>
+#include <stdexcept>
 #include <string>
+#include <type_traits>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
@@ -7,8 +11,6 @@
 
 namespace eventgan {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::size_t kDeepest = 32;
 
@@ -38,6 +40,7 @@ std::size_t first_unsound_byte(std::string_view text) {
 
 /// Builds the document from the parser's events, since the parser's own builder lets a second key
 /// overwrite the first without a word.
+template <class Json>
 class Builder : public nlohmann::json_sax<Json> {
  public:
   Builder(std::string_view text, FaultList& faults) : text_(text), faults_(faults) {}
@@ -46,26 +49,25 @@ class Builder : public nlohmann::json_sax<Json> {
 
   bool null() override { return add(nullptr); }
   bool boolean(bool value) override { return add(value); }
-  bool number_integer(number_integer_t value) override { return add(value); }
-  bool number_unsigned(number_unsigned_t value) override { return add(value); }
-  bool number_float(number_float_t value, const string_t&) override { return add(value); }
-  bool string(string_t& value) override { return add(std::move(value)); }
-  bool binary(binary_t&) override { return false; }  // no such thing in JSON text
+  bool number_integer(std::int64_t value) override { return add(value); }
+  bool number_unsigned(std::uint64_t value) override { return add(value); }
+  bool number_float(double value, const std::string&) override { return add(value); }
+  bool string(std::string& value) override { return add(std::move(value)); }
+  bool binary(typename Json::binary_t&) override { return false; }  // no such thing in JSON text
   bool start_object(std::size_t) override { return open(Json::object()); }
   bool start_array(std::size_t) override { return open(Json::array()); }
   bool end_object() override { return close(); }
   bool end_array() override { return close(); }
 
-  bool key(string_t& value) override {
-    Json& object = *open_.back().node;
-    const bool is_new = !object.contains(value);
+  bool key(std::string& value) override {
+    const bool is_new = open_.back().keys.insert(value).second;
     open_.back().key = std::move(value);
     if (!is_new) faults_.add(path(), "the key once", "it a second time");
     return true;
   }
 
   bool parse_error(std::size_t position, const std::string&,
-                   const Json::exception& error) override {
+                   const nlohmann::detail::exception& error) override {
     // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error while ...":
     // what is of use to the reader follows the last of the introductions.
     std::string reason = error.what();
@@ -88,6 +90,7 @@ class Builder : public nlohmann::json_sax<Json> {
   struct Level {
     Json* node;
     std::string key;
+    std::unordered_set<std::string> keys = {};  ///< of an object
   };
 
   /// The place of the next value.
@@ -105,7 +108,18 @@ class Builder : public nlohmann::json_sax<Json> {
   Json* place(Json value) {
     if (open_.empty()) return &(document_ = std::move(value));
     Json& parent = *open_.back().node;
-    if (parent.is_object()) return &(parent[open_.back().key] = std::move(value));
+    if (parent.is_object()) {
+      auto& members = parent.template get_ref<typename Json::object_t&>();
+      if constexpr (std::is_same_v<Json, nlohmann::ordered_json>) {
+        // Its own insertion looks at all earlier keys first: they are known to be others.
+        return &members
+                    .std::vector<typename Json::object_t::value_type>::emplace_back(
+                        open_.back().key, std::move(value))
+                    .second;
+      } else {
+        return &(members[open_.back().key] = std::move(value));
+      }
+    }
     parent.push_back(std::move(value));
     return &parent.back();
   }
@@ -135,13 +149,8 @@ class Builder : public nlohmann::json_sax<Json> {
   std::vector<Level> open_;  // the values that are not closed yet, outermost first
 };
 
-}  // namespace
-
-std::optional<Json> parse_json_text(std::string_view text, FaultList& faults) {
-  if (text.starts_with("\xef\xbb\xbf")) {
-    faults.add_at(text, 0, "UTF-8 without a byte order mark", "a byte order mark");
-    return std::nullopt;
-  }
+template <class Json>
+std::optional<Json> parse_text(std::string_view text, FaultList& faults, bool ignore_comments) {
   if (const std::size_t at = first_unsound_byte(text); at < text.size()) {
     constexpr char kHex[] = "0123456789abcdef";
     const auto byte = static_cast<unsigned char>(text[at]);
@@ -149,12 +158,36 @@ std::optional<Json> parse_json_text(std::string_view text, FaultList& faults) {
                   std::string("the byte 0x") + kHex[byte >> 4] + kHex[byte & 15]);
     return std::nullopt;
   }
-  Builder builder(text, faults);
-  const bool strict = true, ignore_comments = true;
+  Builder<Json> builder(text, faults);
+  const bool strict = true;
   if (!Json::sax_parse(text, &builder, Json::input_format_t::json, strict, ignore_comments)) {
     return std::nullopt;
   }
   return std::move(builder.document());
+}
+
+}  // namespace
+
+std::optional<nlohmann::json> parse_json_text(std::string_view text, FaultList& faults) {
+  if (text.starts_with("\xef\xbb\xbf")) {
+    faults.add_at(text, 0, "UTF-8 without a byte order mark", "a byte order mark");
+    return std::nullopt;
+  }
+  return parse_text<nlohmann::json>(text, faults, /*ignore_comments=*/true);
+}
+
+nlohmann::ordered_json parse_json_data(std::string_view text, const std::string& name,
+                                       JsonComments comments) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  if (text.starts_with(kByteOrderMark)) text.remove_prefix(kByteOrderMark.size());
+  FaultList faults(name);
+  auto document =
+      parse_text<nlohmann::ordered_json>(text, faults, comments == JsonComments::kPassedOver);
+  if (!faults.empty()) {
+    const std::string all = faults.text();
+    throw std::runtime_error(all.substr(0, all.find('\n')));
+  }
+  return *std::move(document);
 }
 
 }  // namespace eventgan

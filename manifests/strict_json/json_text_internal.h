@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "manifests/strict_json/fault_list_internal.h"
@@ -16,5 +17,13 @@ namespace eventgan {
 /// None, and one fault with line and column, if the text cannot be read. A key that is there twice
 /// is a fault too, but leaves a document, so that its other faults are found as well.
 std::optional<nlohmann::json> parse_json_text(std::string_view text, FaultList& faults);
+
+enum class JsonComments { kRefused, kPassedOver };
+
+/// Parses data of users, labels and lists of them, keys in the order of the text: as strictly, but
+/// that a byte order mark is passed over. Throws std::runtime_error with the first fault, which
+/// begins with `name`, the data's place: "NAME: $.a: expected the key once, got it a second time".
+nlohmann::ordered_json parse_json_data(std::string_view text, const std::string& name,
+                                       JsonComments comments = JsonComments::kRefused);
 
 }  // namespace eventgan

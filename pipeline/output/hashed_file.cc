@@ -6,7 +6,11 @@
 namespace eventgan {
 
 HashedFile::HashedFile(const std::filesystem::path& file)
-    : path_(file), file_(file, std::ios::binary), block_(std::size_t{1} << 20) {}
+    : path_(file), block_(std::size_t{1} << 20) {
+  std::error_code unknown;
+  // Opening a FIFO would wait for its writer, for ever perhaps.
+  if (!std::filesystem::is_other(file, unknown)) file_.open(file, std::ios::binary);
+}
 
 HashedFile::int_type HashedFile::underflow() {
   file_.read(block_.data(), static_cast<std::streamsize>(block_.size()));

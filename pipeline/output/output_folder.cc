@@ -5,9 +5,11 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "manifests/faults.h"
 #include "manifests/marker.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/hashed_file.h"
 #include "stages/files/atomic_file.h"
@@ -21,6 +23,8 @@ namespace fs = std::filesystem;
 
 constexpr char kPlanName[] = "plan.json";
 constexpr char kRunName[] = "run.json";
+constexpr char kManifestFolder[] = "manifest_folder";
+constexpr char kManifestFolderBytes[] = "manifest_folder_bytes";  // of a name that is not UTF-8
 
 /// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
 template <class Frozen, class Read>
@@ -143,8 +147,16 @@ void discard_output(const fs::path& folder) {
 }
 
 void record_manifest_folder(const fs::path& folder, const JobManifest& manifest) {
-  const nlohmann::json json = {{"manifest_folder", manifest.directory.string()}};
-  write_file_atomically(folder / kRunName, json.dump(2) + "\n");
+  const std::string where = manifest.directory.string();
+  std::string text;
+  try {
+    text = nlohmann::json{{kManifestFolder, where}}.dump(2);
+  } catch (const nlohmann::json::type_error&) {  // a name that is not UTF-8, as JSON must be
+    text = nlohmann::json{{kManifestFolderBytes,
+                           std::vector<unsigned char>(where.begin(), where.end())}}
+               .dump();
+  }
+  write_file_atomically(folder / kRunName, text + "\n");
 }
 
 std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
@@ -154,10 +166,17 @@ std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
   } catch (const std::runtime_error&) {  // there is none, as a rule
     return std::nullopt;
   }
-  const auto json = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
-  if (!json.is_object() || !json.contains("manifest_folder")) return std::nullopt;
-  const auto& value = json["manifest_folder"];
-  return value.is_string() ? std::optional<fs::path>(value.get<std::string>()) : std::nullopt;
+  FaultList faults(kRunName);
+  const auto json = parse_json_text(text, faults);
+  if (!json || !json->is_object()) return std::nullopt;
+  try {
+    if (json->contains(kManifestFolder)) return json->at(kManifestFolder).get<std::string>();
+    if (!json->contains(kManifestFolderBytes)) return std::nullopt;
+    const auto bytes = json->at(kManifestFolderBytes).get<std::vector<unsigned char>>();
+    return std::string(bytes.begin(), bytes.end());
+  } catch (const nlohmann::json::type_error&) {  // other values
+    return std::nullopt;
+  }
 }
 
 }  // namespace eventgan

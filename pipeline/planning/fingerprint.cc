@@ -37,8 +37,13 @@ std::string annotations_hash(const JobManifest& manifest, const std::vector<std:
   return listing_hash({files.begin(), files.end()}, [&](const std::string& path) {
     before_file();
     const auto file = resolve(manifest, path);
-    const bool there = std::filesystem::is_regular_file(file);
-    return there ? sha256_of_file(file) : "absent";
+    std::error_code unknown;
+    if (!std::filesystem::exists(file, unknown) && !unknown) return std::string("absent");
+    try {
+      return sha256_of_file(file);
+    } catch (const std::runtime_error&) {  // its samples are quarantined, with the reason
+      return std::string("unreadable");
+    }
   });
 }
 

@@ -7,6 +7,7 @@
 #include "manifests/manifest_fields.h"
 #include "manifests/plan.h"
 #include "pipeline/planning/fingerprint.h"
+#include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_attribute_internal.h"
 #include "stages/hdf5/hdf5_handle_internal.h"
 
@@ -51,6 +52,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
 
 std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return std::nullopt;
+  require_regular_file(file);
   quiet_hdf5_errors();
   try {
     const Hdf5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open",

@@ -1,11 +1,13 @@
 #include "pipeline/verification/stray_files.h"
 
 #include <algorithm>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 
 #include "manifests/marker.h"
+#include "manifests/strict_json/json_text_internal.h"
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -14,11 +16,12 @@ namespace fs = std::filesystem;
 
 /// Jobs may keep their manifest in their output folder.
 bool is_manifest(const fs::path& file) {
-  if (!fs::is_regular_file(file)) return false;
-  std::ifstream stream(file, std::ios::binary);
-  const auto json = nlohmann::json::parse(stream, nullptr, /*allow_exceptions=*/false,
-                                          /*ignore_comments=*/true);
-  return json.is_object() && json.value("format", nlohmann::json()) == "eventgan-manifest";
+  std::string reason;
+  const auto text = try_read_file(file, reason);
+  FaultList faults("");
+  const auto json = text ? parse_json_text(*text, faults) : std::nullopt;
+  return json && json->is_object() &&
+         json->value("format", nlohmann::json()) == "eventgan-manifest";
 }
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "stages/archives/utf8_internal.h"
+#include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_handle_internal.h"
 
 namespace eventgan {
@@ -138,6 +139,7 @@ herr_t collect_name(hid_t, const char* name, const H5L_info_t* link, void* names
 }  // namespace
 
 Hdf5Arrays read_hdf5_arrays(const std::filesystem::path& path) {
+  require_regular_file(path);
   quiet_hdf5_errors();
   const Hdf5Handle file(H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose);
   if (file < 0) {

@@ -5,11 +5,12 @@
 #include <array>
 #include <cerrno>
 #include <cstring>
-#include <fstream>
 #include <memory>
 #include <new>
 #include <stdexcept>
 #include <vector>
+
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -73,17 +74,18 @@ std::string sha256_hex(std::string_view text) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::vector<char> block(std::size_t{1} << 20);
-  Sha256 hash;
-  while (stream) {
-    stream.read(block.data(), static_cast<std::streamsize>(block.size()));
-    hash.update(std::string_view(block.data(), static_cast<std::size_t>(stream.gcount())));
+  std::string reason;
+  if (const InputFile opened = open_input(file, reason)) {
+    std::vector<char> block(std::size_t{1} << 20);
+    Sha256 hash;
+    std::size_t count = 0;
+    while ((count = std::fread(block.data(), 1, block.size(), opened.get())) > 0) {
+      hash.update(std::string_view(block.data(), count));
+    }
+    if (!std::ferror(opened.get())) return hash.hex();
+    reason = std::strerror(errno);
   }
-  if (!stream.eof()) {
-    throw std::runtime_error("cannot read " + file.string() + ": " + std::strerror(errno));
-  }
-  return hash.hex();
+  throw std::runtime_error("cannot read " + file.string() + ": " + reason);
 }
 
 }  // namespace eventgan

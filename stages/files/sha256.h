@@ -32,7 +32,7 @@ class Sha256 {
 std::string sha256_hex(std::span<const std::byte> bytes);
 std::string sha256_hex(std::string_view text);
 
-/// Of a file's content, read in blocks. Throws std::runtime_error naming the path.
+/// Of a regular file's content, read in blocks. Throws std::runtime_error naming the path.
 std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace eventgan

@@ -1,12 +1,35 @@
 #pragma once
 
+#include <cstdio>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 
 namespace eventgan {
 
-/// A whole file as it stands. Throws std::runtime_error naming the path if there is none, or it
-/// cannot be read. Thread safe.
+// Every input is opened through these, or checked by require_regular_file before a library opens it
+// by name: only regular files and links to them are read, and opening never waits. A FIFO would
+// wait for its writer, for ever perhaps, and a device need not end.
+
+struct CloseInput {
+  void operator()(std::FILE* file) const { std::fclose(file); }
+};
+/// One of C's streams, since they tell why reading fails.
+using InputFile = std::unique_ptr<std::FILE, CloseInput>;
+
+/// The file, open at its start; null if it cannot be opened or is no regular file, and then
+/// `reason` says why ("Permission denied", "Not a regular file"). Thread safe.
+InputFile open_input(const std::filesystem::path& file, std::string& reason);
+
+/// Throws std::runtime_error naming the path unless open_input would open it. Thread safe.
+void require_regular_file(const std::filesystem::path& file);
+
+/// The whole file as it stands; none if it cannot be read, and then `reason` says why. Thread safe.
+std::optional<std::string> try_read_file(const std::filesystem::path& file, std::string& reason);
+
+/// The same. Throws std::runtime_error naming the path if there is none, it is no
+/// regular file, or it cannot be read. Thread safe.
 std::string read_text_file(const std::filesystem::path& file);
 
 }  // namespace eventgan

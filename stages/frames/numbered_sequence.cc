@@ -69,7 +69,11 @@ NumberedSequence NumberedSequence::list(const std::filesystem::path& folder,
   };
   std::map<std::int64_t, Listed> found;
   std::vector<std::string> left_out;
-  for (std::string& name : list_folder(folder).files) {
+  auto [folders, names] = list_folder(folder);
+  // A folder named as a frame is one that cannot be read, not one that is not there.
+  std::erase_if(folders, [&](const auto& name) { return !parse_name(name, prefix, extensions); });
+  names.insert(names.end(), folders.begin(), folders.end());
+  for (std::string& name : names) {
     const auto parsed = parse_name(name, prefix, extensions);
     if (!parsed) {
       if (!name.starts_with('.')) left_out.push_back(std::move(name));

@@ -43,8 +43,9 @@ class NumberedSequence {
 
   /// Lists the files of `folder` named `prefix` (not ending in a digit), digits (18 at most), one
   /// of `extensions` (lower case, with the dot; the file's may be in capitals); others are left
-  /// out. An absent folder gives an empty sequence. Throws InputError if the folder cannot be read
-  /// or two files of one extension have the same number ("1.png", "01.png").
+  /// out. A folder so named counts as a file, which cannot be read. An absent folder gives an
+  /// empty sequence. Throws InputError if the folder cannot be read or two files of one extension
+  /// have the same number ("1.png", "01.png").
   static NumberedSequence list(const std::filesystem::path& folder, std::string_view prefix = "",
                                const std::vector<std::string_view>& extensions = kPictureExtensions,
                                Stride stride = Stride::kOne);

@@ -1,11 +1,8 @@
 #include "stages/frames/source_root.h"
 
-#include <array>
-#include <cerrno>
-#include <cstdio>
-#include <memory>
 #include <system_error>
 
+#include "stages/files/text_file.h"
 #include "stages/frames/folder_listing.h"
 
 namespace eventgan {
@@ -36,8 +33,10 @@ void SourceRoot::require_folder(std::string_view relative) const {
 }
 
 bool SourceRoot::has_file(std::string_view relative) const {
+  namespace fs = std::filesystem;
   std::error_code error;
-  return std::filesystem::is_regular_file(on_disk(relative), error);
+  if (fs::symlink_status(on_disk(relative), error).type() == fs::file_type::not_found) return false;
+  return !fs::is_directory(fs::status(on_disk(relative), error));
 }
 
 std::vector<std::string> SourceRoot::folders_in(std::string_view relative) const {
@@ -49,21 +48,9 @@ std::vector<std::string> SourceRoot::files_in(std::string_view relative) const {
 }
 
 Outcome<std::string> SourceRoot::read(std::string_view relative) const {
-  // C's streams, since they tell why reading failed.
-  const auto close = [](std::FILE* file) { std::fclose(file); };
-  const std::unique_ptr<std::FILE, decltype(close)> file(
-      std::fopen(on_disk(relative).c_str(), "rb"), close);
-  std::string bytes;
-  if (file) {
-    std::array<char, 1 << 14> block;
-    std::size_t count = 0;
-    while ((count = std::fread(block.data(), 1, block.size(), file.get())) > 0) {
-      bytes.append(block.data(), count);
-    }
-    if (!std::ferror(file.get())) return bytes;
-  }
-  return SampleFault{"expected a readable file, got '" + std::generic_category().message(errno) +
-                     "', in " + written(relative)};
+  std::string reason;
+  if (auto bytes = try_read_file(on_disk(relative), reason)) return *std::move(bytes);
+  return SampleFault{"expected a readable file, got '" + reason + "', in " + written(relative)};
 }
 
 std::string SourceRoot::read_or_throw(std::string_view relative) const {

@@ -21,6 +21,8 @@ class SourceRoot {
 
   /// Throws InputError if there is no such folder.
   void require_folder(std::string_view relative) const;
+  /// True if there is something of that name that is no folder. Whether it can be read shows in
+  /// reading it: a file that is there and unreadable must not pass for one that is absent.
   bool has_file(std::string_view relative) const;
 
   /// Names of the folders, or of the other files, in a folder; sorted. None if it is absent.
@@ -28,7 +30,7 @@ class SourceRoot {
   std::vector<std::string> folders_in(std::string_view relative) const;
   std::vector<std::string> files_in(std::string_view relative) const;
 
-  /// A whole file, byte for byte. A fault names the file and the reason.
+  /// A whole regular file, byte for byte. A fault names the file and the reason.
   Outcome<std::string> read(std::string_view relative) const;
   /// The same, for files without which the source cannot be opened: throws InputError.
   std::string read_or_throw(std::string_view relative) const;

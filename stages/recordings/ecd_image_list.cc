@@ -1,9 +1,10 @@
 #include <charconv>
-#include <fstream>
+#include <sstream>
+#include <string>
 #include <string_view>
-#include <system_error>
 
 #include "manifests/faults.h"
+#include "stages/files/text_file.h"
 #include "stages/recordings/ecd_image_list_internal.h"
 #include "stages/recordings/frame_times_internal.h"
 
@@ -45,16 +46,18 @@ bool add_line(std::string_view line, EcdImageList& list) {
 }  // namespace
 
 EcdImageList read_ecd_image_list(const std::filesystem::path& file) {
-  std::error_code ignored;
-  std::ifstream stream(file);
-  if (!std::filesystem::is_regular_file(file, ignored) || !stream) {
-    throw InputError("expected a list of frames, got no readable file, in " + file.string());
+  std::string reason;
+  const auto text_of_file = try_read_file(file, reason);
+  if (!text_of_file) {
+    throw InputError("expected a list of frames, got no readable file (" + reason + "), in " +
+                     file.string());
   }
+  std::istringstream stream(*text_of_file);
   EcdImageList list;
   std::string line;
   for (int number = 1; std::getline(stream, line); ++number) {
     const std::string_view text = trimmed(line);
-    if (text.empty() && stream.peek() == std::ifstream::traits_type::eof()) break;
+    if (text.empty() && stream.peek() == std::istringstream::traits_type::eof()) break;
     if (!add_line(text, list)) {
       throw InputError(
           "expected a time in seconds and a path inside the folder, got another line, in " +

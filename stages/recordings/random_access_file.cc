@@ -11,7 +11,7 @@
 namespace eventgan {
 
 RandomAccessFile::RandomAccessFile(const std::filesystem::path& path)
-    : name_(path.string()), descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    : name_(path.string()), descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   if (descriptor_ < 0) {
     throw InputError("expected a readable file, got " + std::string(std::strerror(errno)) +
                      ", in " + name_);

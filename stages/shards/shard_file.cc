@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/faults.h"
+#include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/codec/fletcher32.h"
@@ -138,6 +139,7 @@ ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>
     throw InputError("expected a shard, got no file, in " + path.string());
   }
   ShardFile shard;
+  require_regular_file(path);
   try {
     shard.file = open_file(path);
     shard.header = read_header(shard.file);

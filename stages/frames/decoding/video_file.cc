@@ -2,22 +2,21 @@
 
 #include <algorithm>
 #include <array>
-#include <fstream>
 #include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
+#include "stages/files/text_file.h"
 #include "stages/frames/decoding/picture_limits.h"
 
 namespace eventgan {
 namespace {
 
 /// FFmpeg takes plain text for a video (it draws the letters), so text is kept from it.
-bool is_text(const std::filesystem::path& path) {
+bool is_text(std::FILE* file) {
   std::array<char, 512> start{};
-  std::ifstream stream(path, std::ios::binary);
-  stream.read(start.data(), start.size());
-  const auto end = start.begin() + stream.gcount();
+  const auto end = start.begin() + std::fread(start.data(), 1, start.size(), file);
   return std::find(start.begin(), end, '\0') == end;
 }
 
@@ -29,10 +28,15 @@ struct VideoFile::Capture {
 };
 
 VideoFile::VideoFile(const std::filesystem::path& path) : capture_(std::make_unique<Capture>()) {
-  if (!std::filesystem::exists(path)) throw std::runtime_error("expected a file, got none");
+  std::error_code unknown;
+  if (!std::filesystem::exists(path, unknown))
+    throw std::runtime_error("expected a file, got none");
+  std::string reason;
+  const InputFile file = open_input(path, reason);
+  if (!file) throw std::runtime_error("expected a readable file, got '" + reason + "'");
   bool opened = false;
   try {
-    opened = !is_text(path) && capture_->video.open(path.string(), cv::CAP_FFMPEG);
+    opened = !is_text(file.get()) && capture_->video.open(path.string(), cv::CAP_FFMPEG);
   } catch (const cv::Exception&) {
     opened = false;
   }

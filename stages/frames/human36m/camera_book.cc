@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <limits>
 #include <span>
 #include <sstream>
@@ -12,6 +10,7 @@
 #include "stages/archives/pickle/pickle.h"
 #include "stages/archives/pickled_array.h"
 #include "stages/archives/typed_array_json_internal.h"
+#include "stages/files/text_file.h"
 #include "stages/frames/human36m/camera_book_internal.h"
 #include "stages/frames/human36m/table_columns_internal.h"
 
@@ -84,9 +83,7 @@ Point project(const Intrinsics& camera, const LensDistortion& lens,
 }
 
 std::vector<std::byte> read_bytes(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  const std::vector<char> bytes{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) throw InputError("expected a readable file, got none, in " + file.string());
+  const std::string bytes = read_text_file(file);
   const auto view = std::as_bytes(std::span(bytes));
   return {view.begin(), view.end()};
 }

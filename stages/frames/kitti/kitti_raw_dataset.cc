@@ -34,6 +34,7 @@ struct Drive {
   RawDrive frames;
   std::optional<Tracklets> tracklets;
   const RawCalibration* calibration = nullptr;  ///< null if the date has none
+  std::optional<SampleFault> unreadable;        ///< why the tracklets, which are there, are unknown
 };
 
 class KittiRawDataset : public Dataset {
@@ -88,6 +89,7 @@ class KittiRawDataset : public Dataset {
 
  private:
   static Outcome<Annotation> annotate(const Drive& drive, std::int64_t number) {
+    if (drive.unreadable) return *drive.unreadable;
     Annotation annotation;
     if (!drive.tracklets) return annotation;
     auto outcome = drive.tracklets->frame(number);
@@ -130,15 +132,20 @@ class KittiRawDataset : public Dataset {
   bool add_drive(const std::string& date, const std::string& name,
                  const RawCalibration* calibration) {
     const std::string folder = date + "/" + name;
-    Drive drive{RawDrive(root_, folder), std::nullopt, calibration};
+    Drive drive{RawDrive(root_, folder), std::nullopt, calibration, std::nullopt};
     if (const auto& path = drive.frames.timestamps_path(); !path.empty()) {
       annotation_files_.push_back(path);
     }
     const std::string labels = folder + kTrackletFile;
     if (root_.has_file(labels)) {
       annotation_files_.push_back(root_.written(labels));
-      drive.tracklets.emplace(root_.read_or_throw(labels), root_.written(labels));
-      note_labels_beyond_pictures(drive, root_.written(labels));
+      auto xml = root_.read(labels);
+      if (auto* fault = std::get_if<SampleFault>(&xml)) {
+        drive.unreadable = std::move(*fault);
+      } else {
+        drive.tracklets.emplace(std::get<std::string>(xml), root_.written(labels));
+        note_labels_beyond_pictures(drive, root_.written(labels));
+      }
     }
     for (const std::int64_t number : labelled_numbers(drive)) {
       LabelledFrame frame;

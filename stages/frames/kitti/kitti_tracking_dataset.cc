@@ -77,12 +77,18 @@ class KittiTrackingDataset : public Dataset {
   }
 
  private:
+  TrackingLabels read_labels(const std::string& label) const {
+    auto text = root_.read(label);
+    if (auto* fault = std::get_if<SampleFault>(&text)) return TrackingLabels(std::move(*fault));
+    return {std::get<std::string>(std::move(text)), root_.written(label)};
+  }
+
   void add_sequence(const std::string& name) {
     const std::string label = "label_02/" + name + ".txt";
     annotation_files_.push_back(root_.written(label));
     const auto [place, is_new] = sequences_.emplace(
         name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
-                       TrackingLabels(root_.read_or_throw(label), root_.written(label))});
+                       read_labels(label)});
     const Sequence& sequence = place->second;
     note_left_out(sequence.pictures.left_out(), "image_02/" + name);
 

@@ -4,6 +4,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "manifests/faults.h"
@@ -18,6 +19,8 @@ class TrackingLabels {
   /// `path` is for messages. A line whose frame number cannot be read may belong to any frame, so
   /// every annotation is then the fault that names it.
   TrackingLabels(std::string text, std::string path);
+  /// A file that cannot be read: every annotation is the fault that says so.
+  explicit TrackingLabels(SampleFault unreadable) : fault_(std::move(unreadable)) {}
 
   /// Frames that some line names, ascending.
   std::vector<std::int64_t> frames() const;

@@ -1,9 +1,10 @@
-#include <array>
-#include <fstream>
+#include <stdexcept>
 #include <string>
 #include <string_view>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
+#include "stages/files/text_file.h"
 #include "stages/frames/mpii/mpii_list_file_internal.h"
 #include "stages/frames/mpii/mpii_table_internal.h"
 
@@ -12,13 +13,13 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-MpiiList read_json_list(std::ifstream& stream, const std::filesystem::path& file) {
+MpiiList read_json_list(const std::string& text, const std::filesystem::path& file) {
   Json rows;
   try {
-    rows = Json::parse(stream);
-  } catch (const Json::exception& error) {
-    throw InputError("expected a JSON list of people or an HDF5 table, got " +
-                     std::string(error.what()) + ", in " + file.string());
+    rows = parse_json_data(text, file.filename().string());
+  } catch (const std::runtime_error& error) {
+    throw InputError("expected a JSON list of people or an HDF5 table, got \"" +
+                     std::string(error.what()) + "\", in " + file.string());
   }
   if (!rows.is_array()) {
     throw InputError(std::string("expected a JSON list of people, got one ") + rows.type_name() +
@@ -30,22 +31,14 @@ MpiiList read_json_list(std::ifstream& stream, const std::filesystem::path& file
 }  // namespace
 
 MpiiList read_mpii_list(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
   constexpr std::string_view kHdf5 = "\x89HDF\r\n\x1a\n";
-  std::array<char, 8> start{};
-  if (!stream.read(start.data(), start.size()) && stream.gcount() == 0) {
-    throw InputError("expected a JSON list or an HDF5 table, got nothing readable, in " +
-                     file.string());
+  std::string reason = "an empty file";
+  const auto bytes = try_read_file(file, reason);
+  if (!bytes || bytes->empty()) {
+    throw InputError("expected a JSON list or an HDF5 table, got nothing readable (" + reason +
+                     "), in " + file.string());
   }
-  MpiiList list;
-  if (std::string_view(start.data(), start.size()) == kHdf5) {
-    stream.close();
-    list = read_mpii_table(file);
-  } else {
-    stream.clear();
-    stream.seekg(0);
-    list = read_json_list(stream, file);
-  }
+  MpiiList list = bytes->starts_with(kHdf5) ? read_mpii_table(file) : read_json_list(*bytes, file);
   const char* const name = image_field(list.form);
   for (std::size_t i = 0; i < list.rows.size(); ++i) {
     const Json& row = list.rows[i];

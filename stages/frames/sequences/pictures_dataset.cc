@@ -5,11 +5,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/frames/folder_listing.h"
 #include "stages/frames/sequences/lower_extension.h"
 #include "stages/frames/sequences/picture_folder.h"
@@ -68,8 +70,11 @@ class PicturesDataset final : public Dataset {
     Outcome<std::string> text = root_.read(label_key);
     if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
     Annotation annotation{std::get<std::string>(std::move(text)), {}, {}};
-    if (!nlohmann::json::accept(annotation.original)) {
-      return SampleFault{"expected valid JSON, got something else, in " + label_place(label_key)};
+    try {
+      parse_json_data(annotation.original, "it");
+    } catch (const std::runtime_error& error) {
+      return SampleFault{"expected valid JSON, got \"" + std::string(error.what()) + "\", in " +
+                         label_place(label_key)};
     }
     return annotation;
   }

@@ -15,6 +15,7 @@ extern "C" {
 #include <utility>
 
 #include "manifests/faults.h"
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -88,6 +89,9 @@ double VideoClip::time_s(std::int64_t number) const {
 }
 
 VideoClip measure_video(const std::filesystem::path& file, std::int64_t enough) try {
+  if (std::string reason; !open_input(file, reason)) {
+    throw InputError("expected a video, got '" + reason + "', in " + file.string());
+  }
   cv::VideoCapture capture(file.string(), cv::CAP_FFMPEG);
   VideoClip clip;
   std::vector<double> times_s;

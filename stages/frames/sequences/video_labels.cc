@@ -1,10 +1,12 @@
 #include "stages/frames/sequences/video_labels.h"
 
 #include <charconv>
-#include <fstream>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
+#include "stages/files/text_file.h"
 
 namespace eventgan {
 
@@ -14,13 +16,12 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
     throw InputError("expected " + expected + ", got " + got + ", in " + file.string() +
                      " (taken as the labels of " + video + ")");
   };
-  std::ifstream stream(file, std::ios::binary);
   nlohmann::ordered_json labels;
   try {
-    labels = nlohmann::ordered_json::parse(stream, nullptr, /*allow_exceptions=*/true,
-                                           /*ignore_comments=*/true);
-  } catch (const nlohmann::ordered_json::exception& error) {
-    refuse("a JSON object from frame number to label", error.what());
+    labels =
+        parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
+  } catch (const std::runtime_error& error) {
+    refuse("a JSON object from frame number to label", "\"" + std::string(error.what()) + "\"");
   }
   if (!labels.is_object()) refuse("a JSON object from frame number to label", labels.type_name());
   if (const auto format = labels.find("format");

@@ -130,5 +130,23 @@ TEST(JsonText, NestingWithoutEndDoesNoHarm) {
   EXPECT_THAT(faults_of(objects), ::testing::HasSubstr("$.a.a.a"));
 }
 
+TEST(JsonData, KeepsTheOrderOfKeysAndRefusesWhatADocumentMayNotHave) {
+  EXPECT_EQ(
+      parse_json_data("\xef\xbb\xbf{\"b\": [1, {\"z\": 2.5, \"y\": null}], \"a\": \"x\"}", "d")
+          .dump(),
+      R"({"b":[1,{"z":2.5,"y":null}],"a":"x"})");
+  EXPECT_EQ(parse_json_data("[1] // one", "d", JsonComments::kPassedOver).dump(), "[1]");
+  const auto refused = [](const std::string& text, const std::string& fault) {
+    EXPECT_THAT([&] { parse_json_data(text, "d"); },
+                ::testing::ThrowsMessage<std::runtime_error>(StartsWith(fault)))
+        << text;
+  };
+  refused(R"({"a": {"b": 1, "b": 2}, "a": 3})",
+          "d: $.a.b: expected the key once, got it a second time");
+  refused("[1] // one", "d:1:5: expected JSON, got an error");
+  refused(nested(33), "d: $[0][0]");
+  refused(std::string("[]\0", 3), "d:1:3: expected UTF-8 text, got the byte 0x00");
+}
+
 }  // namespace
 }  // namespace eventgan

@@ -109,5 +109,19 @@ TEST_F(Fingerprint, NoticesTheManifestAndThePreprocessing) {
                                      ::testing::StartsWith("preprocessing: ")));
 }
 
+/// Its samples are quarantined; the run goes on, and knows the file once it is mended.
+TEST_F(Fingerprint, AnAnnotationThatCannotBeReadIsStatedAsSuch) {
+  const auto before = make();
+  std::filesystem::remove(folder_ / "labels.txt");
+  std::filesystem::create_symlink("labels.txt", folder_ / "labels.txt");  // a loop
+  EXPECT_EQ(make().at("annotations"), sha256_hex("labels.txt\tunreadable\n"));
+  std::filesystem::remove(folder_ / "labels.txt");
+  std::filesystem::create_directory(folder_ / "labels.txt");
+  EXPECT_EQ(make().at("annotations"), sha256_hex("labels.txt\tunreadable\n"));
+  std::filesystem::remove(folder_ / "labels.txt");
+  testing::write_file(folder_ / "labels.txt", "Car 1");
+  EXPECT_EQ(make(), before);
+}
+
 }  // namespace
 }  // namespace eventgan

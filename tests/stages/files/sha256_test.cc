@@ -1,6 +1,7 @@
 #include "stages/files/sha256.h"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -43,7 +44,8 @@ TEST(Sha256, OfAFileIsThatOfItsBytes) {
 
 TEST(Sha256, NamesAFileThatCannotBeRead) {
   const testing::TemporaryFolder folder;
-  for (const auto& path : {folder / "absent", folder.path()}) {
+  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
+  for (const auto& path : {folder / "absent", folder.path(), folder / "fifo"}) {
     try {
       sha256_of_file(path);
       FAIL() << "no error for " << path;

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <stdexcept>
 
@@ -32,7 +33,28 @@ TEST(ReadTextFile, NamesWhatItCannotRead) {
   };
   EXPECT_EQ(fault_of(folder / "none"),
             "cannot read " + (folder / "none").string() + ": No such file or directory");
+  std::filesystem::create_symlink("loop", folder / "loop");
+  EXPECT_EQ(fault_of(folder / "loop"),
+            "cannot read " + (folder / "loop").string() + ": Too many levels of symbolic links");
   EXPECT_EQ(fault_of(folder.path()), "cannot read " + folder.path().string() + ": Is a directory");
+}
+
+/// Opening a FIFO waits for its writer, and a device need not end.
+TEST(OpenInput, TakesRegularFilesOnlyAndNeverWaits) {
+  const testing::TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
+  std::filesystem::create_symlink("/dev/zero", folder / "device");
+  std::string reason;
+  for (const char* name : {"fifo", "device"}) {
+    EXPECT_EQ(open_input(folder / name, reason), nullptr) << name;
+    EXPECT_EQ(reason, "Not a regular file") << name;
+    EXPECT_THROW(read_text_file(folder / name), std::runtime_error) << name;
+    EXPECT_THROW(require_regular_file(folder / name), std::runtime_error) << name;
+  }
+  testing::write_file(folder / "file", "text");
+  std::filesystem::create_symlink("file", folder / "link");
+  EXPECT_EQ(read_text_file(folder / "link"), "text");
+  require_regular_file(folder / "link");
 }
 
 }  // namespace

@@ -49,6 +49,14 @@ TEST(NumberedSequence, PrefersTheFirstExtension) {
   EXPECT_THAT(sequence.left_out(), ElementsAre("7.jpg", "7.webp"));
 }
 
+TEST(NumberedSequence, AFolderNamedAsAFrameIsThere) {
+  const TemporaryFolder folder;
+  write_file(folder / "7.png/inside", "");
+  write_file(folder / "8.png", "");
+  EXPECT_THAT(NumberedSequence::list(folder.path()).frames(),
+              ElementsAre(Pair(7, "7.png"), Pair(8, "8.png")));
+}
+
 TEST(NumberedSequence, RefusesTwoFilesForOneNumber) {
   const TemporaryFolder folder;
   for (const char* name : {"7.png", "007.png"}) write_file(folder / name, "");

@@ -2,8 +2,10 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <string>
+#include <utility>
 
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -78,6 +80,23 @@ TEST(SourceRoot, ListsNamesInOrder) {
   EXPECT_TRUE(root.has_file("a"));
   EXPECT_FALSE(root.has_file("none"));
   EXPECT_FALSE(root.has_file(""));
+}
+
+/// A label that is there and cannot be read must not pass for one that is not there.
+TEST(SourceRoot, WhatCannotBeReadIsThereAllTheSame) {
+  const TemporaryFolder folder;
+  write_file(folder / "root/file", "");
+  ASSERT_EQ(::mkfifo((folder / "root/fifo").c_str(), 0600), 0);
+  std::filesystem::create_symlink("loop", folder / "root/loop");
+  std::filesystem::create_symlink("nowhere", folder / "root/dangling");
+  const SourceRoot root("root", folder.path());
+  for (const auto& [name, reason] : {std::pair("fifo", "Not a regular file"),
+                                     std::pair("loop", "Too many levels of symbolic links"),
+                                     std::pair("dangling", "No such file or directory")}) {
+    EXPECT_TRUE(root.has_file(name)) << name;
+    EXPECT_EQ(std::get<SampleFault>(root.read(name)).reason,
+              "expected a readable file, got '" + std::string(reason) + "', in root/" + name);
+  }
 }
 
 }  // namespace

@@ -216,5 +216,17 @@ TEST(KittiRawData, RealDriveHasTwentyOneFrames) {
   EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[7], -6).frame.index, 1);
 }
 
+TEST_F(KittiRawDatasetTest, UnreadableTrackletsAreAFaultOfTheirDriveAloneAndNotNone) {
+  std::filesystem::create_symlink("tracklet_labels.xml",
+                                  folder_ / ("raw/" + kFirst + "/tracklet_labels.xml"));
+  const auto dataset = open();
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    EXPECT_EQ(is_fault(dataset->annotation(frame.label_key)), frame.label_key.starts_with(kFirst))
+        << frame.sample_id;
+  }
+  EXPECT_THAT(std::get<SampleFault>(dataset->annotation(kFirst + "#1")).reason,
+              HasSubstr("'Too many levels of symbolic links', in raw/" + kFirst));
+}
+
 }  // namespace
 }  // namespace eventgan

@@ -143,5 +143,22 @@ TEST_F(KittiTrackingDatasetTest, NeedsItsFolders) {
   EXPECT_THAT(open()->labelled_frames(), IsEmpty());
 }
 
+TEST_F(KittiTrackingDatasetTest, AnUnreadableLabelFileIsAFaultOfItsSequenceAlone) {
+  std::filesystem::remove(folder_ / "tracking/label_02/0001.txt");
+  std::filesystem::create_symlink("0001.txt", folder_ / "tracking/label_02/0001.txt");
+  const auto dataset = open();
+  std::size_t faults = 0;
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    const auto annotation = dataset->annotation(frame.label_key);
+    EXPECT_EQ(is_fault(annotation), frame.sequence == "0001") << frame.sample_id;
+    if (!is_fault(annotation)) continue;
+    EXPECT_EQ(std::get<SampleFault>(annotation).reason,
+              "expected a readable file, got 'Too many levels of symbolic links', in "
+              "tracking/label_02/0001.txt");
+    ++faults;
+  }
+  EXPECT_EQ(faults, 4u);  // its pictures
+}
+
 }  // namespace
 }  // namespace eventgan

@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "manifests/faults.h"
 #include "stages/frames/mpii/mpii_list_file_internal.h"
@@ -50,6 +51,20 @@ TEST_F(MpiiListFileTest, RefusesWhatIsNeither) {
   expect_refused(R"([{"image": "a.jpg"}, {"image": ""}])", "(row 1)");
   expect_refused(R"([{"imgname": "a.jpg"}])", "expected an image's name under \"image\"");
   expect_refused("[3]", "(row 0)");
+}
+
+TEST_F(MpiiListFileTest, RefusesDoubleKeysAndNestingWithoutEnd) {
+  expect_refused(R"([{"image": "a.jpg", "scale": 1, "scale": 2}])",
+                 "$[0].scale: expected the key once, got it a second time");
+  expect_refused("[{\"image\": \"a.jpg\", \"center\": " + std::string(100'000, '[') +
+                     std::string(100'000, ']') + "}]",
+                 "expected at most 32 levels of nesting, got more");
+}
+
+TEST_F(MpiiListFileTest, TakesRegularFilesOnlyAndNeverWaits) {
+  ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
+  EXPECT_THAT([&] { read_mpii_list(file_); },
+              ThrowsMessage<InputError>(HasSubstr("nothing readable (Not a regular file)")));
 }
 
 }  // namespace

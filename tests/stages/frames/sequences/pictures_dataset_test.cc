@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 
@@ -10,6 +11,8 @@
 
 namespace eventgan {
 namespace {
+
+namespace fs = std::filesystem;
 
 using State = Neighbour::State;
 using ::testing::ElementsAre;
@@ -93,7 +96,7 @@ TEST_F(PicturesDatasetTest, WhatIsLeftOutIsCountedAndNamed) {
 
 TEST_F(PicturesDatasetTest, PassesSidecarsThroughByteForByte) {
   touch({"a/1.png", "a/2.png", "a/3.png"});
-  const std::string label = "{ \"k\" : 1.50,\n \"k\": [] }\r\n";
+  const std::string label = "{ \"k\" : 1.50,\n \"l\": [] }\r\n";
   testing::write_file(folder_ / "clip/a/1.json", label);
   testing::write_file(folder_ / "clip/a/2.json", "{");
   const auto dataset = open();
@@ -123,6 +126,31 @@ TEST_F(PicturesDatasetTest, ASidecarsExtensionMayBeInCapitals) {
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(dataset->labelled_frames()[0].label_key)),
             (Annotation{"[7]", {}, {}}));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("clip/1.JSON"));
+}
+
+TEST_F(PicturesDatasetTest, ALabelThatIsNoSoundJsonFileIsAFault) {
+  touch({"1.png"});
+  const fs::path label = folder_ / "clip/1.json";
+  const auto reason = [&] {
+    const auto dataset = open();
+    const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
+    return is_fault(annotation) ? std::get<SampleFault>(annotation).reason : "none";
+  };
+  const std::string deep = std::string(100'000, '[') + std::string(100'000, ']');
+  testing::write_file(label, deep);
+  EXPECT_THAT(reason(), HasSubstr("expected at most 32 levels of nesting, got more"));
+  testing::write_file(label, R"({"a": 1, "a": 2})");
+  EXPECT_EQ(reason(),
+            "expected valid JSON, got \"it: $.a: expected the key once, got it a second time\", in "
+            "clip/1.json");
+  testing::write_file(label, "{} // a comment is no JSON");
+  EXPECT_THAT(reason(), HasSubstr("expected valid JSON"));
+  testing::write_file(label, "\xef\xbb\xbf{}");
+  EXPECT_EQ(reason(), "none");
+
+  fs::remove(label);
+  ASSERT_EQ(::mkfifo(label.c_str(), 0600), 0);
+  EXPECT_EQ(reason(), "expected a readable file, got 'Not a regular file', in clip/1.json");
 }
 
 TEST_F(PicturesDatasetTest, RefusesAFolderWithoutPictures) {
