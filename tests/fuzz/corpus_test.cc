@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 
+#include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/weights_files/safetensors.h"
 #include "tests/fuzz/readers.h"
@@ -22,7 +23,8 @@ class FuzzCorpus : public ::testing::TestWithParam<Reader> {};
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus,
                          ::testing::Values(testing::read_checkpoint_input,
                                            testing::read_zip_pickle_input,
-                                           testing::read_safetensors_input));
+                                           testing::read_safetensors_input,
+                                           testing::read_mat_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const testing::TemporaryFolder folder;
@@ -48,6 +50,13 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   }
   const std::string bytes = testing::read_file(corpus / "safetensors" / "two");
   EXPECT_FALSE(parse_safetensors(bytes, "two").tensors.empty());
+  for (const char* name : {"plain", "big_endian", "compressed"}) {
+    const MatVariable release = read_mat_variable(corpus / "mat" / name, "RELEASE");
+    EXPECT_EQ(
+        mat_to_json(release.array).dump(),
+        R"({"annolist":[{"name":"a.jpg","x":[1,2.5]},{"name":"b","x":[]}],"img_train":[true,false]})")
+        << name;
+  }
 }
 
 }  // namespace

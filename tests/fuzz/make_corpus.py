@@ -1,4 +1,4 @@
-"""Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, and small weights files.
+"""Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, small weights files, small MATLAB files.
 
     python3 tests/fuzz/make_corpus.py tests/fuzz/corpus
 
@@ -15,6 +15,7 @@ import struct
 import sys
 import types
 import zipfile
+import zlib
 
 MAGIC = 0x1950A86A20F9469CFC6C
 
@@ -122,7 +123,48 @@ def safetensors(header, data=b""):
     return struct.pack("<Q", len(text)) + text + data
 
 
+class Mat:
+    """MATLAB files, level 5: elements of type, size and data, in one of the byte orders."""
+
+    def __init__(self, order="<"):
+        self.order = order
+
+    def numbers(self, *values):
+        return struct.pack(f"{self.order}{len(values)}I", *values)
+
+    def element(self, kind, data):
+        return self.numbers(kind, len(data)) + data + bytes(-len(data) % 8)
+
+    def array(self, kind, dims, content, name=b"", flags=0):
+        header = self.element(6, self.numbers(kind | flags, 0)) + self.element(5, self.numbers(*dims)) + self.element(1, name)
+        return self.element(14, header + content)
+
+    def text(self, value):
+        return self.array(4, [1, len(value)], self.element(16, value.encode()))
+
+    def doubles(self, *values):
+        return self.array(6, [len(values) and 1, len(values)], self.element(9, struct.pack(f"{self.order}{len(values)}d", *values)))
+
+    def structs(self, names, rows, name=b""):
+        fields = self.element(5, self.numbers(16)) + self.element(1, b"".join(field.encode().ljust(16, b"\0") for field in names))
+        return self.array(2, [1, len(rows)], fields + b"".join(b"".join(row) for row in rows), name)
+
+    def file(self, *arrays):
+        version = struct.pack(f"{self.order}H", 0x100) + (b"IM" if self.order == "<" else b"MI")
+        return b"MATLAB 5.0 MAT-file".ljust(124) + version + b"".join(arrays)
+
+    def release(self):
+        images = self.structs(["name", "x"], [[self.text("a.jpg"), self.doubles(1, 2.5)], [self.text("b"), self.doubles()]])
+        train = self.array(9, [1, 2], self.element(2, b"\1\0"), flags=0x200)
+        return self.structs(["annolist", "img_train"], [[images, train]], b"RELEASE")
+
+    def compressed(self, array):
+        stream = zlib.compress(array)
+        return self.numbers(15, len(stream)) + stream
+
+
 def main(folder):
+    mat = Mat()
     values = checkpoint()
     bare = collections.OrderedDict([("head.conv2d.weight", Tensor(Storage("0", "f", [1.0] * 4), [2, 2]))])
     tensor = {"dtype": "F32", "shape": [2], "data_offsets": [0, 8]}
@@ -145,6 +187,15 @@ def main(folder):
         "safetensors/empty": safetensors({}),
         "safetensors/hole": safetensors({"a": {**tensor, "data_offsets": [4, 12]}}, bytes(12)),
         "safetensors/deep": safetensors(b'{"a":' + b"[" * 64),
+        "mat/plain": mat.file(mat.release()),
+        "mat/big_endian": Mat(">").file(Mat(">").release()),
+        "mat/compressed": mat.file(mat.compressed(mat.release())),
+        "mat/cells": mat.file(mat.array(1, [2, 2], 3 * mat.text("x") + mat.element(14, b""), b"annolist_keyframes")),
+        "mat/types": mat.file(mat.array(1, [1, 5], mat.array(10, [1, 1], mat.element(3, b"\1\2")) + mat.array(
+            7, [1, 1], mat.element(7, bytes(4))) + mat.array(15, [1, 1], mat.element(13, b"\xff" * 8)) + mat.array(
+                4, [2, 2], mat.element(17, "abcd".encode("utf-16-le"))) + mat.array(5, [1, 1], b""), b"annolist_keyframes")),
+        "mat/huge": mat.file(mat.array(6, [0x7fffffff, 1], mat.numbers(9, 0xfffffff8), b"RELEASE")),
+        "mat/bomb": mat.file(mat.compressed(mat.numbers(14, 1 << 20) + bytes(1 << 20))),
     }
     for name, content in seeds.items():
         path = pathlib.Path(folder) / name

@@ -2,8 +2,10 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <stdexcept>
 
 #include "manifests/faults.h"
+#include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/weights_files/safetensors.h"
@@ -68,6 +70,18 @@ void read_safetensors_input(std::span<const std::uint8_t> input, const std::file
   try {
     parse_weights(bytes, "input");
   } catch (const InputError&) {
+  }
+}
+
+void read_mat_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  for (const char* name : {"RELEASE", "annolist_keyframes"}) {
+    try {
+      const MatVariable variable = read_mat_variable(scratch, name);
+      mat_to_json(variable.array).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+    } catch (const InputError&) {
+    } catch (const std::invalid_argument&) {  // of what lies below the variable's own header
+    }
   }
 }
 

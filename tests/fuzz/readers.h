@@ -25,4 +25,7 @@ void read_zip_pickle_input(std::span<const std::uint8_t> input,
 void read_safetensors_input(std::span<const std::uint8_t> input,
                             const std::filesystem::path& scratch);
 
+/// A MATLAB file: its variables "RELEASE" and "annolist_keyframes", with all that is in them.
+void read_mat_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
 }  // namespace eventgan::testing

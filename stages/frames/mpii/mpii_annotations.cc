@@ -20,11 +20,14 @@ std::string image_name(const Json& element) {
   return element.at(kName).get<std::string>();
 }
 
-/// Element `index` of RELEASE's array `name`, if it has one. (single_person may be shorter than
-/// annolist.)
-void copy_element(matvar_t* release, const char* name, std::size_t index, Json& entry) {
-  matvar_t* array = mat_field(release, name);
-  if (index < mat_size(array)) entry[name] = mat_element_to_json(array, index);
+/// A field of RELEASE, empty if it has none of that name.
+MatArray array_of(const MatArray& release, const char* name) {
+  return mat_field(release, name).value_or(MatArray{});
+}
+
+/// Element `index` of `array`, if it has one. (single_person may be shorter than annolist.)
+void copy_element(const MatArray& array, const char* name, std::size_t index, Json& entry) {
+  if (index < array.size) entry[name] = mat_element_to_json(array, index);
 }
 
 std::string dump(const Json& json) {
@@ -43,8 +46,8 @@ std::vector<Json> read_keyframe_elements(const std::filesystem::path& file) {
   const MatVariable variable = read_mat_variable(file, "annolist_keyframes");
   return reading(file, [&] {
     std::vector<Json> elements;
-    for (std::size_t i = 0; i < mat_size(variable.get()); ++i) {
-      elements.push_back(mat_element_to_json(variable.get(), i));
+    for (std::size_t i = 0; i < variable.array.size; ++i) {
+      elements.push_back(mat_element_to_json(variable.array, i));
     }
     return elements;
   });
@@ -63,9 +66,12 @@ std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annota
                                              const std::filesystem::path& keyframes) {
   std::vector<Json> keyframe_elements = read_keyframe_elements(keyframes);
   const MatVariable release = read_mat_variable(annotations, "RELEASE");
-  matvar_t* annolist = mat_field(release.get(), "annolist");
-  matvar_t* img_train = mat_field(release.get(), "img_train");
-  const std::size_t count = mat_size(annolist);
+  const auto field = [&](const char* name) {
+    return reading(annotations, [&] { return array_of(release.array, name); });
+  };
+  const MatArray annolist = field("annolist"), img_train = field("img_train");
+  const MatArray single_person = field("single_person"), act = field("act");
+  const std::size_t count = annolist.size;
   const auto expect_count = [count](const char* name, std::size_t got,
                                     const std::filesystem::path& file) {
     if (got == count) return;
@@ -76,7 +82,7 @@ std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annota
   if (count == 0) {
     throw InputError("expected images in RELEASE.annolist, got none, in " + annotations.string());
   }
-  expect_count("img_train", mat_size(img_train), annotations);
+  expect_count("img_train", img_train.size, annotations);
   expect_count("annolist_keyframes", keyframe_elements.size(), keyframes);
 
   return reading(annotations, [&] {
@@ -91,10 +97,10 @@ std::vector<MpiiEntry> read_mpii_annotations(const std::filesystem::path& annota
                                     "], got none");
       }
       read.has_persons = has_mpii_persons(entry);
-      copy_element(release.get(), "img_train", i, entry);
+      copy_element(img_train, "img_train", i, entry);
       read.is_train = entry["img_train"] == 1 || entry["img_train"] == true;
-      copy_element(release.get(), "single_person", i, entry);
-      copy_element(release.get(), "act", i, entry);
+      copy_element(single_person, "single_person", i, entry);
+      copy_element(act, "act", i, entry);
       read.keyframe = image_name(keyframe_elements[i]);
       entry["annolist_keyframes"] = std::move(keyframe_elements[i]);
       read.json = dump(entry);

@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "manifests/faults.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -75,6 +78,42 @@ TEST_F(MpiiAnnotationsTest, RefusesWhatIsNoAnnotation) {
   mat::write_mat(annotations_, "RELEASE", mat::number(1));
   EXPECT_THAT([&] { read(); },
               ThrowsMessage<InputError>(HasSubstr("expected images in RELEASE.annolist")));
+}
+
+/// Without compression there is no checksum: some changes give other labels, but none may end the
+/// program, take memory without bound, or let bytes from elsewhere in the file into the labels.
+TEST_F(MpiiAnnotationsTest, DamageAnywhereIsRefusedByNameOrStaysWhereItIs) {
+  mat::write_mpii(folder_.path(), {{"a.jpg", mat::two_persons(), true, "a/00000007.jpg"}},
+                  MAT_COMPRESSION_NONE);
+  const std::string sound = read().at(0).json;
+  for (const auto& file : {annotations_, keyframes_}) {
+    const std::string whole = testing::read_file(file);
+    int refused = 0;
+    const auto attempt = [&](const std::string& bytes) {
+      testing::write_file(file, bytes);
+      try {
+        for (const MpiiEntry& entry : read()) {
+          EXPECT_LE(entry.json.size(), sound.size() + 64);
+        }
+      } catch (const InputError& error) {
+        EXPECT_THAT(error.what(), HasSubstr(file.filename().string()));
+        ++refused;
+      }
+    };
+    for (std::size_t at = 0; at < whole.size(); ++at) {
+      std::string bytes = whole;
+      bytes[at] = static_cast<char>(bytes[at] ^ std::array{0x01, 0x80, 0xff}[at % 3]);
+      attempt(bytes);
+    }
+    EXPECT_GT(refused, static_cast<int>(whole.size() / 3));
+    refused = 0;
+    int attempts = 0;
+    for (std::size_t size = 0; size < whole.size(); size += 7, ++attempts) {
+      attempt(whole.substr(0, size));
+    }
+    EXPECT_EQ(refused, attempts);
+    testing::write_file(file, whole);
+  }
 }
 
 }  // namespace

@@ -52,7 +52,8 @@ struct FixtureEntry {
 
 /// Writes both .mat files into `folder`.
 inline void write_mpii(const std::filesystem::path& folder,
-                       const std::vector<FixtureEntry>& entries) {
+                       const std::vector<FixtureEntry>& entries,
+                       matio_compression compression = MAT_COMPRESSION_ZLIB) {
   std::vector<Fields> annolist, keyframes, act;
   std::vector<matvar_t*> single;
   std::vector<std::uint8_t> train;
@@ -72,9 +73,10 @@ inline void write_mpii(const std::filesystem::path& folder,
                        {"img_train", img_train},
                        {"version", text("12")},
                        {"single_person", cells(single)},
-                       {"act", structs(act)}}));
+                       {"act", structs(act)}}),
+            compression);
   write_mat(folder / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
-            structs(keyframes));
+            structs(keyframes), compression);
 }
 
 }  // namespace eventgan::testing::mat
