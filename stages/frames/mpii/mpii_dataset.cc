@@ -48,6 +48,13 @@ class MpiiDataset final : public Dataset {
       Annotation annotation;
       annotation.persons = parse_mpii_persons(nlohmann::ordered_json::parse(entry->second.json));
       annotation.original = entry->second.json;
+      const MpiiEntry& read = entry->second;
+      const auto scale =
+          frames_.label_scale(read.image, frames_.labelled(read.image, read.keyframe).frame.path);
+      if (auto* fault = std::get_if<SampleFault>(&scale)) {
+        return SampleFault{fault->reason + " (sample " + without_extension(read.image) + ")"};
+      }
+      scale_labels(std::get<LabelScale>(scale), annotation.persons);
       return annotation;
     } catch (const std::invalid_argument& error) {
       return SampleFault{std::string(error.what()) + ", in " + label_place(label_key) +
@@ -61,7 +68,7 @@ class MpiiDataset final : public Dataset {
 
  private:
   void take(std::vector<MpiiEntry> entries, const std::string& split) {
-    std::size_t other_split = 0, unlabelled = 0, alone = 0, misnamed = 0;
+    std::size_t other_split = 0, unlabelled = 0, alone = 0, misnamed = 0, unsized = 0;
     std::string first_misnamed;
     for (std::size_t i = 0; i < entries.size(); ++i) {
       MpiiEntry& entry = entries[i];
@@ -76,6 +83,7 @@ class MpiiDataset final : public Dataset {
       LabelledFrame frame = frames_.labelled(entry.image, entry.keyframe);
       frame.label_key = "annolist[" + std::to_string(i) + "]";
       if (frame.sequence.empty()) ++alone;
+      if (frames_.is_without_picture(frame, entry.image)) ++unsized;
       if (!frame.sequence.empty() && frame.sequence != frame.sample_id && misnamed++ == 0) {
         first_misnamed = entry.image + " in " + entry.keyframe;
       }
@@ -88,6 +96,7 @@ class MpiiDataset final : public Dataset {
     note(unlabelled, "images without annotation in " + places_.annotations);
     note(other_split, "annotated images left out, not of split " + split);
     note(alone, "annotated images without a sequence folder: they have no neighbours");
+    note(unsized, kWithoutPicture);
     note(misnamed,
          "keyframes in a sequence not named as their image (first: " + first_misnamed + ")");
   }
@@ -105,8 +114,7 @@ std::unique_ptr<Dataset> open_mpii_dataset(const SourceSpec& spec,
                                            const std::filesystem::path& base) {
   auto dataset = std::make_unique<MpiiDataset>(find_mpii_places(spec, base), base, spec.split);
 #ifdef __GLIBC__
-  // For the real file matio takes some 700 MB in small pieces. Freed, they would stay with the
-  // process; given back, some 50 MB do.
+  // The real file is read in many small pieces. Freed, they would stay with the process.
   malloc_trim(0);
 #endif
   return dataset;

@@ -19,8 +19,10 @@ namespace eventgan {
 /// extension. `split` train takes only img_train 1, test only img_train 0, any other name both.
 /// Persons are those of annorect, in its order, also such as have no joints. Annotation::original
 /// is MpiiEntry::json.
+/// Where the frame of a sequence is stored in another size than images/NAME, which was annotated,
+/// persons are in pixels of the frame (MpiiFrames::label_scale).
 ///
-/// Relative paths start at `base`. Everything is read at opening (matio is not thread safe). Throws
+/// Relative paths start at `base`. The .mat files are read at opening. Throws
 /// InputError if a .mat file or the root is missing or damaged, or two images have one name.
 std::unique_ptr<Dataset> open_mpii_dataset(const SourceSpec& spec,
                                            const std::filesystem::path& base);

@@ -2,10 +2,13 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/faults.h"
+#include "stages/frames/decoding/picture_file.h"
 #include "stages/frames/folder_listing.h"
 #include "stages/frames/mpii/same_bytes.h"
 
@@ -33,6 +36,25 @@ std::optional<Keyframe> parse_keyframe(const std::string& keyframe) {
   const auto [stop, error] = std::from_chars(digits.data(), end, parsed.number);
   if (error != std::errc() || stop != end || parsed.number < 0) return std::nullopt;
   return parsed;
+}
+
+Outcome<ImageSize> size_of(const fs::path& base, const std::string& picture) {
+  try {
+    return picture_file_size(base / picture);
+  } catch (const std::runtime_error& error) {
+    return SampleFault{std::string(error.what()) + ", in " + picture};
+  }
+}
+
+std::string size_text(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+bool have_one_shape(ImageSize a, ImageSize b) {
+  const auto [small, large] = a.width <= b.width ? std::pair(a, b) : std::pair(b, a);
+  const double width = large.width * static_cast<double>(small.height) / large.height;
+  const double height = large.height * static_cast<double>(small.width) / large.width;
+  return std::abs(width - small.width) <= 1 || std::abs(height - small.height) <= 1;
 }
 
 }  // namespace
@@ -100,6 +122,29 @@ Neighbour MpiiFrames::neighbour(const LabelledFrame& labelled, int steps) const 
   return neighbour;
 }
 
+Outcome<LabelScale> MpiiFrames::label_scale(const std::string& image,
+                                            const std::string& frame) const {
+  const auto picture = images_.find(image);
+  if (picture == images_.end() || picture->second == frame) return LabelScale{};
+  const Outcome<ImageSize> annotated = size_of(base_, picture->second);
+  if (is_fault(annotated)) return std::get<SampleFault>(annotated);
+  const Outcome<ImageSize> stored = size_of(base_, frame);
+  if (is_fault(stored)) return LabelScale{};
+  const auto& from = std::get<ImageSize>(annotated);
+  const auto& to = std::get<ImageSize>(stored);
+  if (!have_one_shape(from, to)) {
+    return SampleFault{"expected a frame of the shape of " + picture->second + ", " +
+                       size_text(from) + ", where it was annotated, got " + size_text(to) +
+                       ", in " + frame};
+  }
+  return LabelScale{static_cast<double>(to.width) / from.width,
+                    static_cast<double>(to.height) / from.height};
+}
+
+bool MpiiFrames::is_without_picture(const LabelledFrame& labelled, const std::string& image) const {
+  return !labelled.sequence.empty() && !images_.contains(image);
+}
+
 std::string MpiiFrames::find_keyframe(const std::string& image) const {
   const auto sequence = sequences_.find(without_extension(image));
   const auto picture = images_.find(image);
@@ -110,6 +155,22 @@ std::string MpiiFrames::find_keyframe(const std::string& image) const {
     }
   }
   return {};
+}
+
+void scale_labels(const LabelScale& scale, std::vector<Person>& persons) {
+  if (scale.x == 1 && scale.y == 1) return;
+  const auto move = [&scale](Point& point) {
+    if (point == kMissingPoint) return;
+    point = {(point.x + 0.5) * scale.x - 0.5, (point.y + 0.5) * scale.y - 0.5};
+  };
+  for (Person& person : persons) {
+    for (Joint& joint : person.joints) move(joint.at);
+    move(person.center);
+    if (person.scale != -1) person.scale *= std::sqrt(scale.x * scale.y);
+    if (!person.head_box) continue;
+    Rectangle& head = *person.head_box;
+    head = {head.left * scale.x, head.top * scale.y, head.right * scale.x, head.bottom * scale.y};
+  }
 }
 
 std::string without_extension(std::string_view name) {

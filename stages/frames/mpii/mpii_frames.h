@@ -17,6 +17,17 @@ namespace eventgan {
 /// How the folders that MPII's sequences are downloaded as begin; each holds many sequences.
 inline constexpr std::string_view kMpiiBatchPrefix = "mpii_human_pose_v1_sequences";
 
+/// The note for the labelled frames of which is_without_picture is true.
+inline constexpr const char* kWithoutPicture =
+    "labelled frames of a sequence whose picture is not in images: their labels are taken to be in "
+    "pixels of the frame";
+
+/// How many pixels of the labelled frame one of the annotated picture is.
+struct LabelScale {
+  double x = 1;
+  double y = 1;
+};
+
 /// Where MPII's pictures lie: single ones in folders of images, and the videos around them as one
 /// folder of numbered frames each. All paths are as the manifest writes them; relative ones start
 /// at `base`.
@@ -43,6 +54,16 @@ class MpiiFrames {
   /// As Dataset::neighbour. InputError if the sequence's folder cannot be read.
   Neighbour neighbour(const LabelledFrame& frame, int steps) const;
 
+  /// MPII was annotated on the pictures in `images`; a frame of its video may be stored in another
+  /// size. The ratio of the sizes of `frame` and of the picture `image`: 1 where they are one file,
+  /// or no picture of that name is there to tell. A fault if the sizes are not of one shape (with
+  /// one side made equal, the other differs by more than one pixel of the smaller of the two), or
+  /// the picture is there and cannot be read. A frame that cannot be read is left to its decoder.
+  Outcome<LabelScale> label_scale(const std::string& image, const std::string& frame) const;
+
+  /// True if `labelled` is a frame of a video, and the picture `image` is not there to compare.
+  bool is_without_picture(const LabelledFrame& labelled, const std::string& image) const;
+
   /// "NAME/00000053.jpg": the frame of sequence NAME whose file is byte for byte that of `image`;
   /// empty if there is none. For lists that do not say which frame was labelled. Reads files.
   std::string find_keyframe(const std::string& image) const;
@@ -62,6 +83,10 @@ class MpiiFrames {
   std::unordered_map<std::string, std::string> images_;  ///< name to path as written
   std::map<std::string, Sequence, std::less<>> sequences_;
 };
+
+/// Moves labels from the annotated picture into the frame: a point as x' = (x + 0.5) s - 0.5, an
+/// edge as x' = x s, Person::scale with the root of the two factors' product.
+void scale_labels(const LabelScale& scale, std::vector<Person>& persons);
 
 /// `name` without its last extension.
 std::string without_extension(std::string_view name);

@@ -68,11 +68,13 @@ class MpiiListDataset final : public Dataset {
       const auto image = row[image_field(form_)].get<std::string>();
       rows_by_image.try_emplace(image, Json::array()).first->second.push_back(std::move(row));
     }
-    std::size_t alone = 0;
+    std::size_t alone = 0, unsized = 0;
     for (const auto& [image, rows] : rows_by_image) {
-      rows_.emplace(image, rows.dump(-1, ' ', false, Json::error_handler_t::replace));
       labelled_.push_back(frames_.labelled(image, keyframes.of(image, frames_)));
       labelled_.back().label_key = image;
+      rows_.emplace(image, Rows{rows.dump(-1, ' ', false, Json::error_handler_t::replace),
+                                labelled_.back().frame.path});
+      if (frames_.is_without_picture(labelled_.back(), image)) ++unsized;
       if (spec.sequences && labelled_.back().sequence.empty()) ++alone;
     }
     sort_samples(labelled_, file_);
@@ -80,6 +82,7 @@ class MpiiListDataset final : public Dataset {
       notes_.push_back(std::to_string(alone) +
                        " images whose frame is in no sequence: they have no neighbours");
     }
+    if (unsized > 0) notes_.push_back(std::to_string(unsized) + " " + kWithoutPicture);
   }
 
   const LabelSchema& label_schema() const override { return mpii_label_schema(); }
@@ -102,9 +105,13 @@ class MpiiListDataset final : public Dataset {
       return SampleFault{"expected people in an image, got none under " + label_key + ", in " +
                          file_};
     }
-    Annotation annotation{rows->second, {}, {}};
+    Annotation annotation{rows->second.json, {}, {}};
+    const auto scale = frames_.label_scale(label_key, rows->second.frame);
+    if (auto* fault = std::get_if<SampleFault>(&scale)) {
+      return SampleFault{fault->reason + " (sample " + without_extension(label_key) + ")"};
+    }
     try {
-      for (const Json& row : Json::parse(rows->second)) {
+      for (const Json& row : Json::parse(rows->second.json)) {
         annotation.persons.push_back(parse_mpii_list_row(row, form_));
       }
     } catch (const std::invalid_argument& error) {
@@ -112,6 +119,7 @@ class MpiiListDataset final : public Dataset {
                          std::to_string(annotation.persons.size()) + ", in " +
                          label_place(label_key) + " (sample " + without_extension(label_key) + ")"};
     }
+    scale_labels(std::get<LabelScale>(scale), annotation.persons);
     return annotation;
   }
 
@@ -120,11 +128,16 @@ class MpiiListDataset final : public Dataset {
   }
 
  private:
+  struct Rows {
+    std::string json;   ///< a list
+    std::string frame;  ///< path of the labelled frame
+  };
+
   std::string file_;
   std::string keyframes_file_;
   MpiiFrames frames_;
   MpiiListForm form_ = MpiiListForm::kJsonList;
-  std::unordered_map<std::string, std::string> rows_;  ///< by image, a JSON list as text
+  std::unordered_map<std::string, Rows> rows_;  ///< by image
   std::vector<LabelledFrame> labelled_;
   std::vector<std::string> notes_;
 };

@@ -16,6 +16,7 @@ namespace eventgan {
 /// Joints and centre become 0-based; centre and scale are otherwise as the file has them: those of
 /// a table are already moved and multiplied by 1.25 (see parse_mpii_list_row). There are no head
 /// boxes. Annotation::original is a JSON list of the image's rows with all their fields.
+/// Persons are in pixels of the labelled frame, as those of open_mpii_dataset.
 ///
 /// A list does not say which frame of a video was labelled. If the manifest gives `sequences`
 /// (SEQUENCES/NAME/00000053.jpg, NAME being the image's), it is taken from
@@ -24,7 +25,7 @@ namespace eventgan {
 /// reads all of the sequences' file sizes. Images without such a frame, and all without
 /// `sequences`, have no neighbours.
 ///
-/// Relative paths start at `base`. Everything is read at opening (HDF5 and matio are not thread
+/// Relative paths start at `base`. Everything is read at opening (HDF5 is not thread
 /// safe). Throws UsageError without `annotations`; InputError if a file or folder is missing or
 /// damaged.
 std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec,

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "stages/frames/mpii/mpii_joints.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
+#include "tests/testing/picture_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -32,8 +34,8 @@ class MpiiDatasetTest : public ::testing::Test {
   MpiiDatasetTest() {
     spec_.dataset = DatasetKind::kMpii;
     spec_.root = "m";
-    testing::write_file(folder_ / "m/images/b.jpg", "b");
-    testing::write_file(folder_ / "m/sequences/b/00000007.jpg", "b7");
+    testing::write_flat_picture(folder_ / "m/images/b.jpg", {48, 64}, 100);
+    testing::write_flat_picture(folder_ / "m/sequences/b/00000007.jpg", {48, 64}, 100);
     testing::write_file(folder_ / "m/sequences/b/00000008.jpg", "b8");
   }
   void write_four() {
@@ -115,9 +117,72 @@ TEST_F(MpiiDatasetTest, RefusesTwoImagesOfOneName) {
 
 TEST_F(MpiiDatasetTest, NotesKeyframesInASequenceOfAnotherName) {
   mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, "b/00000008.jpg"}});
+  testing::write_flat_picture(folder_ / "m/images/a.jpg", {48, 64}, 100);
   EXPECT_THAT(open()->notes(),
               ElementsAre("1 keyframes in a sequence not named as their image (first: a.jpg in "
                           "b/00000008.jpg)"));
+}
+
+/// images/b.jpg of 64x48, which was annotated, and its frame in another size.
+class MpiiFrameOfAnotherSize : public MpiiDatasetTest {
+ protected:
+  MpiiFrameOfAnotherSize() { write_four(); }
+  Outcome<Annotation> annotation_at(ImageSize frame) {
+    testing::write_flat_picture(folder_ / "m/sequences/b/00000007.jpg", frame, 100);
+    return open()->annotation("annolist[1]");
+  }
+};
+
+TEST_F(MpiiFrameOfAnotherSize, LabelsAreInPixelsOfTheFrame) {
+  const auto annotation = std::get<Annotation>(annotation_at({96, 128}));
+  const Person& person = annotation.persons.at(0);
+  // Twice as large: 711, 621 counted from 1 are 710, 620; (710 + 0.5) 2 - 0.5 = 1420.5.
+  EXPECT_EQ(person.joints[0], (Joint{{1420.5, 1240.5}, 1}));
+  EXPECT_EQ(person.joints[3], (Joint{kMissingPoint, 0}));
+  EXPECT_EQ(person.center, (Point{1482.5, 698.5}));               // 742, 350
+  EXPECT_EQ(person.head_box, (Rectangle{1410, 102, 1550, 326}));  // edges 705, 51, 775, 163
+  EXPECT_DOUBLE_EQ(person.scale, 2 * 3.05);
+  EXPECT_EQ(nlohmann::json::parse(annotation.original)["annorect"][0]["scale"], 3.05);
+  EXPECT_EQ(annotation.persons.at(1).joints[0].at, kMissingPoint);
+  EXPECT_FALSE(annotation.persons.at(1).head_box);
+}
+
+TEST_F(MpiiFrameOfAnotherSize, APixelOfRoundingIsNoOtherShape) {
+  // 64x48 at 2/3 is 42.7x32: stored as 43x32.
+  const auto down = std::get<Annotation>(annotation_at({32, 43}));
+  EXPECT_DOUBLE_EQ(down.persons.at(0).joints[0].at.x, 710.5 * 43 / 64 - 0.5);
+  EXPECT_DOUBLE_EQ(down.persons.at(0).joints[0].at.y, 620.5 * 32 / 48 - 0.5);
+  EXPECT_DOUBLE_EQ(down.persons.at(0).scale, 3.05 * std::sqrt(43.0 / 64 * 32 / 48));
+  EXPECT_FALSE(is_fault(annotation_at({480, 640})));
+}
+
+TEST_F(MpiiFrameOfAnotherSize, AnotherShapeIsAFaultThatNamesBoth) {
+  for (const ImageSize size : {ImageSize{48, 80}, ImageSize{64, 48}, ImageSize{32, 46}}) {
+    const auto annotation = annotation_at(size);
+    ASSERT_TRUE(is_fault(annotation));
+    EXPECT_EQ(
+        std::get<SampleFault>(annotation).reason,
+        "expected a frame of the shape of m/images/b.jpg, 64x48, where it was annotated, got " +
+            std::to_string(size.width) + "x" + std::to_string(size.height) +
+            ", in m/sequences/b/00000007.jpg (sample b)");
+  }
+}
+
+TEST_F(MpiiFrameOfAnotherSize, WithoutThePictureNothingTells) {
+  std::filesystem::remove(folder_ / "m/images/b.jpg");
+  const auto annotation = std::get<Annotation>(annotation_at({96, 128}));
+  EXPECT_EQ(annotation.persons.at(0).joints[0].at, (Point{710, 620}));
+  spec_.split = "train";
+  EXPECT_THAT(open()->notes(),
+              ::testing::Contains(::testing::StartsWith(
+                  "1 labelled frames of a sequence whose picture is not in images")));
+}
+
+TEST_F(MpiiFrameOfAnotherSize, APictureThatCannotBeReadIsAFault) {
+  testing::write_file(folder_ / "m/images/b.jpg", "no picture");
+  const auto annotation = annotation_at({48, 64});
+  ASSERT_TRUE(is_fault(annotation));
+  EXPECT_THAT(std::get<SampleFault>(annotation).reason, HasSubstr("in m/images/b.jpg (sample b)"));
 }
 
 TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/stages/frames/mpii/mpii_fixture.h"
+#include "tests/testing/picture_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -83,6 +84,24 @@ TEST_F(MpiiListDatasetTest, WithoutTheKeyframesFileTheBytesTell) {
   spec_.sequences = "v";
   testing::write_file(folder_ / "m/images/b.jpg", "v/b/00000005.jpg");
   EXPECT_EQ(open()->labelled_frames()[1].frame, (FrameRef{"v/b/00000005.jpg", 5}));
+}
+
+TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
+  spec_.sequences = "v";
+  mat::write_mat(folder_ / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
+                 mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
+  testing::write_flat_picture(folder_ / "m/images/b.jpg", {48, 64}, 100);
+  testing::write_flat_picture(folder_ / "v/b/00000004.jpg", {24, 32}, 100);
+  const auto half = std::get<Annotation>(open()->annotation("b.jpg"));
+  // 11, 21 counted from 1 are 10, 20; half as large: (10 + 0.5) / 2 - 0.5.
+  EXPECT_EQ(half.persons.at(1).center, (Point{4.75, 9.75}));
+  EXPECT_DOUBLE_EQ(half.persons.at(1).scale, 1.5);
+  EXPECT_THAT(half.original, HasSubstr(R"("scale":3,"center":[11,21])"));
+
+  testing::write_flat_picture(folder_ / "v/b/00000004.jpg", {32, 32}, 100);
+  const auto square = open()->annotation("b.jpg");
+  ASSERT_TRUE(is_fault(square));
+  EXPECT_THAT(std::get<SampleFault>(square).reason, HasSubstr("got 32x32, in v/b/00000004.jpg"));
 }
 
 TEST_F(MpiiListDatasetTest, AMalformedRowIsAFaultOfItsSampleOnly) {
