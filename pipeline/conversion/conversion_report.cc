@@ -62,8 +62,13 @@ std::string to_text(const ConversionReport& report) {
     }
   }
   if (report.without_partner > 0) {
-    text += format("\n%lld labelled frames without a partner frame (listed in plan.json)",
-                   static_cast<long long>(report.without_partner));
+    text += format("\n%lld labelled frames without a partner frame",
+                   static_cast<long long>(report.frames_without_partner));
+    if (report.frames_without_partner != report.without_partner) {
+      text += format(" for one of their gaps or more, %lld pairs in all",
+                     static_cast<long long>(report.without_partner));
+    }
+    text += " (listed in plan.json)";
   }
   const std::size_t listed = std::min(report.quarantined.size(), kListedFaults);
   for (std::size_t i = 0; i < listed; ++i) text += "\nquarantined: " + report.quarantined[i].reason;
@@ -87,6 +92,7 @@ std::string to_json(const ConversionReport& report) {
                                {"written", report.written},
                                {"quarantined", quarantined},
                                {"without_partner", report.without_partner},
+                               {"frames_without_partner", report.frames_without_partner},
                                {"notes", report.notes},
                                {"shards_planned", report.shards_planned},
                                {"shards_done", report.shards_done},

@@ -31,7 +31,9 @@ struct ConversionReport {
 
   std::int64_t plan_pairs = 0;  ///< of the whole plan
   int plan_shards = 0;
-  std::int64_t without_partner = 0;        ///< labelled frames whose sequence ends too early
+  /// Pairs that cannot be, since a sequence ends too early (SourceSummary), and their frames.
+  std::int64_t without_partner = 0;
+  std::int64_t frames_without_partner = 0;
   std::vector<std::string> notes;          ///< on the inputs, of the whole plan (see notes_of)
   std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed

@@ -82,7 +82,10 @@ ConversionReport empty_report(const fs::path& folder, const Plan& plan, const Pa
   report.part = to_text(part, report.plan_shards);
   report.planned = count_samples(split.part);
   report.shards_planned = static_cast<int>(split.part.size());
-  for (const SourceSummary& source : plan.sources) report.without_partner += source.without_partner;
+  for (const SourceSummary& source : plan.sources) {
+    report.without_partner += source.without_partner;
+    report.frames_without_partner += static_cast<std::int64_t>(source.without_partner_ids.size());
+  }
   report.notes = notes_of(plan.sources);
   return report;
 }

@@ -63,6 +63,7 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
                  {"split", spec.split},
                  {"labelled_frames", summary.labelled_frames},
                  {"without_partner", summary.without_partner},
+                 {"frames_without_partner", summary.without_partner_ids.size()},
                  {"notes", summary.notes},
                  {"class_names", nullptr},
                  {"joint_names", nullptr}};

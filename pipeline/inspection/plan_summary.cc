@@ -32,6 +32,11 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary, st
   }
   text += summary.pairs_by_gap.empty() ? "\n" : ")\n";
   text += "  without partner  " + std::to_string(summary.without_partner);
+  // With choose = all a frame may lack the partner of several gaps, and have that of others.
+  if (const auto frames = static_cast<std::int64_t>(summary.without_partner_ids.size());
+      frames != summary.without_partner) {
+    text += " pairs of " + std::to_string(frames) + " labelled frames";
+  }
   for (std::size_t i = 0; i < std::min(kListedIds, summary.without_partner_ids.size()); ++i) {
     text += (i == 0 ? "  (" : ", ") + summary.without_partner_ids[i];
   }
@@ -84,6 +89,7 @@ std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
                        {"pairs", pairs_of(summary)},
                        {"pairs_by_gap", gaps},
                        {"without_partner", summary.without_partner},
+                       {"frames_without_partner", summary.without_partner_ids.size()},
                        {"without_partner_ids", summary.without_partner_ids},
                        {"missing_frames", summary.faults},
                        {"notes", summary.notes},

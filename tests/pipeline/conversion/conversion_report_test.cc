@@ -12,7 +12,7 @@ ConversionReport report() {
   result.planned = 10;
   result.written = 9;
   result.quarantined = {{3, "id", "expected a picture, got rubbish, in a.png (id)"}};
-  result.without_partner = 2;
+  result.without_partner = result.frames_without_partner = 2;
   result.shards_planned = result.shards_done = result.plan_shards = 2;
   result.stored_bytes = 2'000'000;
   result.volume_bytes = 9'000'000;
@@ -30,6 +30,19 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
   EXPECT_THAT(text, ::testing::HasSubstr("2 labelled frames without a partner"));
   EXPECT_THAT(text,
               ::testing::HasSubstr("quarantined: expected a picture, got rubbish, in a.png (id)"));
+}
+
+TEST(ReportText, TellsPairsWithoutPartnerFromTheirFrames) {
+  ConversionReport all = report();
+  EXPECT_THAT(
+      to_text(all),
+      ::testing::HasSubstr("\n2 labelled frames without a partner frame (listed in plan.json)"));
+  all.without_partner = 7;
+  EXPECT_THAT(to_text(all), ::testing::HasSubstr(
+                                "\n2 labelled frames without a partner frame for one of their gaps "
+                                "or more, 7 pairs in all (listed in plan.json)"));
+  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"without_partner\":7"));
+  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"frames_without_partner\":2"));
 }
 
 TEST(ReportText, SaysWhichPartAndWhoseWork) {

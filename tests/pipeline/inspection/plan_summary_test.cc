@@ -37,7 +37,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "kitti_object kitti/training (train)\n"
       "  labelled frames  12\n"
       "  pairs            3  (gap 1: 2, 3: 1)\n"
-      "  without partner  9  (a, b, c, d, e, ...)\n"
+      "  without partner  9 pairs of 6 labelled frames  (a, b, c, d, e, ...)\n"
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 pictures without labels\n"
       "  shards           1\n"
@@ -54,7 +54,15 @@ TEST_F(PlanSummary, JsonHasTheSameNumbers) {
   EXPECT_EQ(json["pairs"], 3);
   EXPECT_EQ(json["estimated_bytes"], 4e6);
   EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
+  EXPECT_EQ(json["sources"][0]["without_partner"], 9);
+  EXPECT_EQ(json["sources"][0]["frames_without_partner"], 6);
   EXPECT_EQ(json["sources"][0]["without_partner_ids"].size(), 6u);
+}
+
+TEST_F(PlanSummary, WhereEachFrameLacksOnePairOneNumberSaysIt) {
+  plan_.sources[0].without_partner = 6;
+  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1),
+              ::testing::HasSubstr("  without partner  6  (a, b, c, d, e, ...)\n"));
 }
 
 }  // namespace
