@@ -35,10 +35,12 @@ Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::pa
     if (!reason.empty()) candidates += " (not usable: " + reason + ")";
   }
   if (fitting.size() == 1) return {root.written(fitting[0]), root.on_disk(fitting[0])};
-  throw UsageError(
+  const std::string message =
       "expected one .npz with imgname, center, scale, part [N, 17, 3] and S [N, 17, 4], got " +
       std::to_string(fitting.size()) + ", in " + root.written("") +
-      ": name one under \"annotations\"" + candidates);
+      ": name one under \"annotations\"" + candidates;
+  if (fitting.empty()) throw InputError(message);  // absent or damaged
+  throw UsageError(message);
 }
 
 /// A video by the names of its labelled pictures.

@@ -195,15 +195,15 @@ TEST_F(ExtractedLayoutTest, ChoosesTheOnlyFileThatFits) {
 }
 
 TEST_F(ExtractedLayoutTest, AsksForAnnotationsWhereNoneFit) {
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr("\"annotations\"")));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"annotations\"")));
   testing::write_file(folder_ / "h36m/c.npz", "no zip file");
   EXPECT_THAT([&] { open(); },
-              ThrowsMessage<UsageError>(HasSubstr("there is c.npz (not usable: expected ")));
+              ThrowsMessage<InputError>(HasSubstr("there is c.npz (not usable: expected ")));
   std::filesystem::remove(folder_ / "h36m/c.npz");
   auto without_scale = members({kVideo + "_000001.jpg"});
   without_scale.erase("scale");
   add_npz(without_scale);
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<UsageError>(HasSubstr(
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr(
                                    "a.npz (not usable: expected an array scale, got none)")));
   spec_.annotations = "absent.npz";
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent.npz")));

@@ -1,0 +1,176 @@
+"""Inputs that are there and cannot be read, or are not what they seem: each ends in a quarantined sample or one clear line, in no
+time and never in a crash."""
+
+import json
+import os
+import pathlib
+import shutil
+import subprocess
+import zipfile
+
+import numpy as np
+
+import program
+from program import run
+from small_job import LENIENT, save_picture, small_job
+
+NOBODY = 65534
+
+
+def run_as_nobody(folder, *arguments, expect=0):
+    """Permissions mean nothing to root, so as somebody else; `folder` is made readable to all, what it holds stays as it is."""
+    if os.geteuid() == 0:
+        os.chown(folder, NOBODY, NOBODY)
+    folder.chmod(0o755)
+    user = {"user": NOBODY} if os.geteuid() == 0 else {}
+    done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120, **user)
+    if done.returncode != expect:
+        raise AssertionError(f"expected exit code {expect}, got {done.returncode}\n{done.stdout}\n{done.stderr}")
+    return done.stdout, done.stderr
+
+
+def in_time(*arguments, expect):
+    """Both outputs; fails if the program waits for a writer or a device's end."""
+    done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True, timeout=120)
+    if done.returncode != expect:
+        raise AssertionError(f"expected exit code {expect}, got {done.returncode} of {arguments}\n{done.stdout}\n{done.stderr}")
+    return done.stdout + done.stderr
+
+
+def replace(path, how):
+    path.unlink()
+    if how == "fifo":
+        os.mkfifo(path)
+    elif how == "device":
+        path.symlink_to("/dev/zero")
+    elif how == "loop":
+        path.symlink_to(path.name)
+    else:
+        path.mkdir()
+
+
+class Labels(program.InFolder):
+    def quarantined(self, out):
+        return {entry["sample_id"]: entry["reason"] for marker in pathlib.Path(out).glob("small-*.json")
+                for entry in json.loads(marker.read_text())["quarantined"]}
+
+    def test_one_that_cannot_be_read_is_quarantined_and_mended_by_retry(self):
+        for how, reason in {"loop": "Too many levels of symbolic links", "fifo": "Not a regular file",
+                            "device": "Not a regular file", "folder": "Is a directory"}.items():
+            with self.subTest(how):
+                job = self.folder / how
+                manifest = small_job(job, people=0, errors=LENIENT)
+                label = job / "cars" / "label_2" / "000003.txt"
+                text = label.read_bytes()
+                replace(label, how)
+                in_time("plan", manifest, expect=0)
+                in_time("convert", manifest, expect=0)
+                out = job / "out"
+                self.assertEqual(list(self.quarantined(out)), ["000003"])
+                self.assertIn(f"'{reason}', in cars/label_2/000003.txt", self.quarantined(out)["000003"])
+                label.rmdir() if how == "folder" else label.unlink()
+                label.write_bytes(text)
+                run("retry", out)
+                self.assertEqual(self.quarantined(out), {})
+
+    def test_one_without_permission_is_quarantined(self):
+        manifest = small_job(self.folder / "job", people=0, errors=LENIENT)
+        label = self.folder / "job" / "cars" / "label_2" / "000003.txt"
+        label.chmod(0)
+        out = self.folder / "out"
+        run_as_nobody(self.folder, "convert", manifest, "--output", out)
+        self.assertIn("'Permission denied', in cars/label_2/000003.txt", self.quarantined(out)["000003"])
+        self.assertEqual(len(self.quarantined(out)), 1)
+
+    def frames(self, label):
+        folder = self.folder / "clip"
+        shutil.rmtree(folder, ignore_errors=True)
+        for k in range(3):
+            save_picture(folder / f"{k}.png", np.random.default_rng(k))
+        (folder / "1.json").write_text(label)
+        source = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
+        out = self.folder / "out"
+        shutil.rmtree(out, ignore_errors=True)
+        in_time("convert", self.write_manifest(program.manifest(
+            [source], name="small", generator={"kind": "difference"}, errors=LENIENT)), expect=0)
+        return self.quarantined(out)
+
+    def test_deep_nesting_and_double_keys_in_a_sidecar_are_faults_of_its_sample(self):
+        self.assertEqual(self.frames('{"a": {"b": [1]}}'), {})
+        self.assertIn("at most 32 levels", self.frames('{"a": ' + "[" * 100_000 + "]" * 100_000 + "}")["1"])
+        self.assertIn("$.a: expected the key once", self.frames('{"a": 1, "a": 2}')["1"])
+
+    def test_deep_nesting_and_double_keys_in_a_list_are_errors_that_name_it(self):
+        manifest = small_job(self.folder / "job", cars=0)
+        people = self.folder / "job" / "people" / "people.json"
+        rows = people.read_text()
+        for bad, told in [(rows.replace('"scale": 0.1', '"scale": ' + "[" * 100_000 + "]" * 100_000), "at most 32 levels"),
+                          (rows.replace('"scale": 0.1', '"scale": 0.1, "scale": 0.2'), "[0].scale: expected the key once")]:
+            people.write_text(bad)
+            for command in ["plan", "convert"]:
+                err = in_time(command, manifest, expect=66)
+                self.assertIn(told, err)
+                self.assertIn("people.json", err)
+
+
+class Files(program.InFolder):
+    """Those that the command line or the manifest name: a FIFO in their place is told, not waited for."""
+
+    def refused(self, path, *arguments):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if not path.exists():
+            os.mkfifo(path)
+        self.assertIn(path.name, in_time(*arguments, expect=66))
+
+    def of_source(self, **source):
+        return self.write_manifest(program.manifest([{"pairs": program.pairs([1]), **source}], generator={"kind": "difference"}))
+
+    def test_a_fifo_is_never_waited_for(self):
+        self.refused(self.folder / "job.json", "plan", self.folder / "job.json")
+        self.refused(self.folder / "old.pt", "import-weights", self.folder / "old.pt", self.folder / "w.safetensors")
+        self.refused(self.folder / "clip.mp4", "plan", self.of_source(dataset="frames", root="clip.mp4"))
+        self.refused(self.folder / "m" / "list.json",
+                     "plan", self.of_source(dataset="mpii_list", root="m", annotations="m/list.json"))
+        self.refused(self.folder / "h" / "S1" / "Walking-1" / "annot.h5",
+                     "plan", self.of_source(dataset="human36m", layout="fetch", root="h"))
+        self.refused(self.folder / "x" / "list.npz", "plan", self.of_source(
+            dataset="human36m", layout="extracted", root="x", annotations="x/list.npz"))
+        weights = self.write_manifest(program.manifest([{"dataset": "frames", "root": "m", "pairs": program.pairs([1])}],
+                                                       generator={"weights": "w.safetensors"}))
+        save_picture(self.folder / "m" / "0.png", np.random.default_rng(0))
+        save_picture(self.folder / "m" / "1.png", np.random.default_rng(1))
+        self.refused(self.folder / "w.safetensors", "plan", weights)
+        self.refused(self.folder / "r.hdf5", "realism", self.folder / "r.hdf5", "--with", "difference")
+
+    def test_a_fifo_for_the_annotations_of_mpii(self):
+        root = self.folder / "m"
+        root.mkdir()
+        os.mkfifo(root / "mpii_human_pose_v1_u12_1.mat")
+        self.refused(root / "mpii_human_pose_v1_sequences_keyframes.mat", "plan", self.of_source(dataset="mpii", root="m"))
+
+    def test_a_truncated_npz_that_was_found_is_a_missing_input(self):
+        root = self.folder / "x"
+        root.mkdir()
+        with zipfile.ZipFile(root / "list.npz", "w") as archive:
+            for name in ["imgname", "center", "scale", "part", "S"]:
+                archive.writestr(name + ".npy", b"x" * 1000)
+        path = root / "list.npz"
+        path.write_bytes(path.read_bytes()[:-40])
+        self.assertIn("list.npz", in_time("plan", self.of_source(dataset="human36m", layout="extracted", root="x"), expect=66))
+
+
+class Names(program.InFolder):
+    def test_a_manifest_in_a_folder_whose_name_is_not_utf_8_works(self):
+        folder = os.fsencode(self.folder / "job") + b"-\xff\xe9"
+        manifest = small_job(pathlib.Path(os.fsdecode(folder)), people=0)
+        out = os.path.join(folder, b"out")
+        for arguments in [["convert", manifest], ["retry", out], ["finalize", out], ["verify", out, "--deep"], ["status", out]]:
+            done = subprocess.run([program.PROGRAM, *arguments], capture_output=True, timeout=120)
+            self.assertEqual(done.returncode, 0, (arguments, done.stdout, done.stderr))
+            self.assertNotIn(b"json.exception", done.stderr)
+        recorded = json.loads((pathlib.Path(os.fsdecode(out)) / "run.json").read_text())
+        self.assertEqual(bytes(recorded["manifest_folder_bytes"]), folder)
+
+
+if __name__ == "__main__":
+    program.main()
