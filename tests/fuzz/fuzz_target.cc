@@ -1,6 +1,6 @@
 // One of the readers as a libFuzzer target; EVENTGAN_FUZZ_READER names it. Beside what the
-// sanitizers find, an input that makes the reader hold more memory than checkpoint_limits.h allows
-// ends the run.
+// sanitizers find, an input that makes the reader hold more memory than it may
+// (EVENTGAN_FUZZ_MEMORY, a function of the input's size) ends the run.
 
 #include <sanitizer/allocator_interface.h>
 #include <unistd.h>
@@ -49,7 +49,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   eventgan::testing::EVENTGAN_FUZZ_READER({data, size}, file);
   // The input's own copies: here, in the text, and in the zip file that is made of it.
   const std::size_t copies = 8 * size;
-  if (peak_bytes - before > eventgan::most_checkpoint_memory(size) + copies) {
+  if (peak_bytes - before > eventgan::EVENTGAN_FUZZ_MEMORY(size) + copies) {
     std::fprintf(stderr, "%zu bytes held for an input of %zu\n", peak_bytes - before, size);
     std::abort();
   }

@@ -25,6 +25,12 @@ void read_zip_pickle_input(std::span<const std::uint8_t> input,
 void read_safetensors_input(std::span<const std::uint8_t> input,
                             const std::filesystem::path& scratch);
 
+/// What reading a MATLAB file may take: no deflate stream grows by more than the first factor, and
+/// eight bytes, an array without values, become a field of a name in JSON, as value and as text.
+constexpr std::uint64_t most_mat_memory(std::uint64_t file_size) {
+  return file_size * 1032 * 64 + (std::uint64_t{32} << 20);
+}
+
 /// A MATLAB file: its variables "RELEASE" and "annolist_keyframes", with all that is in them.
 void read_mat_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 

@@ -29,11 +29,14 @@ class KittiTrackingDataset : public Dataset {
     root_.require_folder("label_02");
     root_.require_folder("image_02");
     std::vector<std::string> left_out;
-    for (const std::string& name : root_.files_in("label_02")) {
-      if (name.ends_with(".txt")) {
-        add_sequence(name.substr(0, name.size() - 4));
-      } else if (!name.starts_with('.')) {
-        left_out.push_back(name);
+    // A folder in a label file's place is one that cannot be read, not one that is not there.
+    for (const auto& names : {root_.files_in("label_02"), root_.folders_in("label_02")}) {
+      for (const std::string& name : names) {
+        if (name.ends_with(".txt")) {
+          add_sequence(name.substr(0, name.size() - 4));
+        } else if (!name.starts_with('.')) {
+          left_out.push_back(name);
+        }
       }
     }
     note_left_out(left_out, "label_02");
@@ -87,8 +90,8 @@ class KittiTrackingDataset : public Dataset {
     const std::string label = "label_02/" + name + ".txt";
     annotation_files_.push_back(root_.written(label));
     const auto [place, is_new] = sequences_.emplace(
-        name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
-                       read_labels(label)});
+        name,
+        Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)), read_labels(label)});
     const Sequence& sequence = place->second;
     note_left_out(sequence.pictures.left_out(), "image_02/" + name);
 

@@ -158,6 +158,11 @@ TEST_F(KittiTrackingDatasetTest, AnUnreadableLabelFileIsAFaultOfItsSequenceAlone
     ++faults;
   }
   EXPECT_EQ(faults, 4u);  // its pictures
+
+  std::filesystem::remove(folder_ / "tracking/label_02/0001.txt");
+  std::filesystem::create_directory(folder_ / "tracking/label_02/0001.txt");
+  EXPECT_THAT(std::get<SampleFault>(open()->annotation("label_02/0001.txt#2")).reason,
+              HasSubstr("'Is a directory', in tracking/label_02/0001.txt"));
 }
 
 }  // namespace

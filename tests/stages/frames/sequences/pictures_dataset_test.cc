@@ -151,6 +151,9 @@ TEST_F(PicturesDatasetTest, ALabelThatIsNoSoundJsonFileIsAFault) {
   fs::remove(label);
   ASSERT_EQ(::mkfifo(label.c_str(), 0600), 0);
   EXPECT_EQ(reason(), "expected a readable file, got 'Not a regular file', in clip/1.json");
+  fs::remove(label);
+  fs::create_directory(label);
+  EXPECT_EQ(reason(), "expected a readable file, got 'Is a directory', in clip/1.json");
 }
 
 TEST_F(PicturesDatasetTest, RefusesAFolderWithoutPictures) {
