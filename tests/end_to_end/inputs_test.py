@@ -10,6 +10,7 @@ import zipfile
 
 import numpy as np
 
+import failing_files
 import program
 from program import run
 from small_job import LENIENT, save_picture, small_job
@@ -81,6 +82,14 @@ class Labels(program.InFolder):
         run_as_nobody(self.folder, "convert", manifest, "--output", out)
         self.assertIn("'Permission denied', in cars/label_2/000003.txt", self.quarantined(out)["000003"])
         self.assertEqual(len(self.quarantined(out)), 1)
+
+    def test_one_with_an_io_error_is_quarantined(self):
+        manifest = small_job(self.folder / "job", people=0, errors=LENIENT)
+        done = failing_files.run(self.folder / "job" / "cars" / "label_2" / "000003.txt", "EIO open 1+", "convert", manifest)
+        self.assertEqual((done.code, done.struck), (0, True), done.err)
+        quarantined = self.quarantined(self.folder / "job" / "out")
+        self.assertEqual(list(quarantined), ["000003"])
+        self.assertIn("'Input/output error', in cars/label_2/000003.txt", quarantined["000003"])
 
     def frames(self, label):
         folder = self.folder / "clip"

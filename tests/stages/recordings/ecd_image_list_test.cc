@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include "manifests/faults.h"
 #include "stages/recordings/ecd_image_list_internal.h"
@@ -53,6 +54,9 @@ TEST_F(EcdImageListTest, RefusesAListWithoutFramesAndNone) {
               ThrowsMessage<InputError>(HasSubstr("absent.txt")));
   EXPECT_THAT([&] { read_ecd_image_list(folder_.path()); },
               ThrowsMessage<InputError>(HasSubstr("no readable file")));
+  ASSERT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+  EXPECT_THAT([&] { read_ecd_image_list(folder_ / "fifo"); },
+              ThrowsMessage<InputError>(HasSubstr("Not a regular file")));
 }
 
 }  // namespace
