@@ -1,6 +1,7 @@
 #include "pipeline/planning/make_plan.h"
 
-#include <map>
+#include <algorithm>
+#include <string_view>
 #include <unordered_map>
 
 #include "manifests/faults.h"
@@ -108,30 +109,24 @@ void note_unknown_sizes(Plan& plan) {
   }
 }
 
-using Holes = std::map<std::string, PlannedSample*>;  // by sample id
-
-/// The samples of each source that were planned with a fault.
-std::vector<Holes> find_holes(Plan& plan) {
-  std::vector<Holes> holes(plan.sources.size());
-  for (PlannedShard& shard : plan.shards) {
-    for (PlannedSample& sample : shard.samples) {
-      if (sample.fault.empty()) continue;
-      holes[static_cast<std::size_t>(shard.source)][sample.sample_id] = &sample;
-    }
-  }
-  return holes;
+/// The labelled frame of a sample as the source has it today; null if it has none.
+const LabelledFrame* frame_of(const Dataset& dataset, const SourceSpec& spec,
+                              const PlannedSample& sample) {
+  std::string_view id = sample.sample_id;
+  if (spec.pairs.choose == PairChoice::kAll) id = id.substr(0, id.rfind('@'));
+  const std::vector<LabelledFrame>& frames = dataset.labelled_frames();
+  const auto found = std::ranges::lower_bound(frames, id, {}, &LabelledFrame::sample_id);
+  return found != frames.end() && found->sample_id == id ? &*found : nullptr;
 }
 
-/// Chooses the holes' pairs again. The ids of a frame's samples are or begin with its own.
-void fill_holes(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
-                const Holes& holes) {
-  for (const LabelledFrame& frame : dataset.labelled_frames()) {
-    const auto candidate = holes.lower_bound(frame.sample_id);
-    if (candidate == holes.end() || !candidate->first.starts_with(frame.sample_id)) continue;
-    for (PlannedSample& sample : choose_pairs(dataset, frame, spec, seed).samples) {
-      const auto hole = holes.find(sample.sample_id);
-      if (hole != holes.end()) *hole->second = std::move(sample);
-    }
+void fill_hole(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
+               PlannedSample& hole) {
+  const LabelledFrame* frame = frame_of(dataset, spec, hole);
+  if (frame == nullptr) return;
+  for (PlannedSample& sample : choose_pairs(dataset, *frame, spec, seed).samples) {
+    if (sample.sample_id != hole.sample_id) continue;
+    hole = std::move(sample);
+    return;
   }
 }
 
@@ -182,13 +177,33 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   return job;
 }
 
+void find_labels(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
+                 Plan& plan) {
+  for (PlannedShard& shard : plan.shards) {
+    const auto source = static_cast<std::size_t>(shard.source);
+    if (!datasets[source]) continue;
+    for (PlannedSample& sample : shard.samples) {
+      const LabelledFrame* frame = frame_of(*datasets[source], manifest.sources[source], sample);
+      if (frame != nullptr) {
+        sample.label_key = frame->label_key;
+      } else if (sample.fault.empty()) {
+        sample.fault = "expected the labelled frame that was planned, got none any more, in " +
+                       sample.pair.next.path + " (" + sample.sample_id + ")";
+      }
+    }
+  }
+}
+
 void complete_plan(const JobManifest& manifest,
                    const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan) {
-  const std::vector<Holes> holes = find_holes(plan);
-  for (std::size_t source = 0; source < holes.size(); ++source) {
-    if (holes[source].empty()) continue;
-    fill_holes(*datasets[source], manifest.sources[source], manifest.seed, holes[source]);
+  for (PlannedShard& shard : plan.shards) {
+    const auto source = static_cast<std::size_t>(shard.source);
+    for (PlannedSample& sample : shard.samples) {
+      if (sample.fault.empty()) continue;
+      fill_hole(*datasets[source], manifest.sources[source], manifest.seed, sample);
+    }
   }
+  find_labels(manifest, datasets, plan);
   settle_sizes(manifest, plan);
 }
 

@@ -8,6 +8,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
+#include "pipeline/planning/make_plan.h"
 #include "pipeline/verification/fault_line.h"
 #include "pipeline/verification/label_comparison.h"
 #include "stages/frames/decoding/image_size_probe.h"
@@ -54,6 +55,10 @@ SourceComparison::SourceComparison(JobManifest manifest) : manifest_(std::move(m
       notes_.push_back("labels of source " + source.root + " not compared: " + fault_line(error));
     }
   }
+}
+
+void SourceComparison::find_labels(Plan& plan) const {
+  eventgan::find_labels(manifest_, datasets_, plan);
 }
 
 std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,

@@ -102,6 +102,28 @@ TEST_F(MakePlan, AHoleThatWasFilledBecomesWhatItWouldBePlannedAsToday) {
   }
 }
 
+TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
+  for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
+    manifest_.sources[0].pairs.choose = choice;
+    testing::write_file(folder_ / "clip" / "f_01.json", "{}");
+    auto [plan, datasets] = make_plan(manifest_, "w", "e");
+    const std::string whole = to_json(plan);
+    PlannedSample& sample = plan.shards.at(0).samples.at(0);
+    ASSERT_NE(sample.label_key, "");
+    sample.label_key = "another's";
+    find_labels(manifest_, datasets, plan);
+    EXPECT_EQ(to_json(plan), whole);
+
+    sample.sample_id.replace(0, 4, "gone");
+    find_labels(manifest_, datasets, plan);
+    EXPECT_THAT(sample.fault, ::testing::HasSubstr("got none any more, in clip/f_01.png (gone"));
+    datasets[0].reset();
+    sample.fault.clear();
+    find_labels(manifest_, datasets, plan);
+    EXPECT_EQ(sample.fault, "") << "nobody knows";
+  }
+}
+
 TEST_F(MakePlan, StopsAtAnyFrameOrFile) {
   int asked = 0;
   make_plan(manifest_, "w", "e", [&] {
