@@ -135,7 +135,9 @@ void read_numbers(Elements& elements, MatArray& array) {
           std::to_string(array.size) + " numbers",
           std::to_string(element.data.size()) + " bytes of type " + std::to_string(element.type));
     }
-    if (part == 0) array.stored = element.type, array.data = element.data;
+    if (part > 0) continue;  // imaginary parts are looked at by nobody
+    array.stored = element.type;
+    array.data = element.data;
   }
 }
 
@@ -194,7 +196,8 @@ void read_arrays(Elements& elements, std::size_t count, MatArray& array) {
 }
 
 /// The inflated bytes of a zlib stream, which zlib compares with the checksum at its end: an array
-/// with its tag. None if stream, sum or size is wrong.
+/// with its tag. None if stream, sum or size is wrong. Throws std::invalid_argument if the array is
+/// too large.
 std::optional<std::string> inflated(std::string_view stream, bool little) {
   z_stream state{};
   if (inflateInit(&state) != Z_OK) return std::nullopt;
@@ -202,19 +205,23 @@ std::optional<std::string> inflated(std::string_view stream, bool little) {
   state.avail_in = static_cast<uInt>(stream.size());
   std::string bytes;
   std::vector<char> block(1 << 18);
-  std::size_t most = kTagBytes + kMostInflated;
+  std::size_t told = kMostInflated;  // the array says first how long it is
   int status = Z_OK;
-  while (status == Z_OK && bytes.size() <= most) {
+  while (status == Z_OK && told <= kMostInflated && bytes.size() <= kTagBytes + told) {
     state.next_out = reinterpret_cast<Bytef*>(block.data());
     state.avail_out = static_cast<uInt>(block.size());
     status = inflate(&state, Z_NO_FLUSH);
     bytes.append(block.data(), block.size() - state.avail_out);
-    if (bytes.size() < kTagBytes) continue;
-    // The array says first how long it is.
-    most = std::min(most, kTagBytes + number_at(bytes, 4, little));
+    if (bytes.size() >= kTagBytes) told = number_at(bytes, 4, little);
   }
   inflateEnd(&state);
-  if (status != Z_STREAM_END || state.avail_in > 0 || bytes.size() != most) return std::nullopt;
+  if (told > kMostInflated) {
+    refuse("at most " + std::to_string(kMostInflated) + " bytes in a compressed array",
+           std::to_string(told));
+  }
+  if (status != Z_STREAM_END || state.avail_in > 0 || bytes.size() != kTagBytes + told) {
+    return std::nullopt;
+  }
   return bytes;
 }
 

@@ -220,6 +220,18 @@ TEST_F(MatBytes, NoSizeCountOrTypeIsBelieved) {
   EXPECT_EQ(outcome(element(2, "abc")), "refused");
 }
 
+TEST_F(MatBytes, ACompressedArrayOfMoreThanAGibibyteIsRefusedAtItsTag) {
+  // RFC 1950 and 1951: a header, and one stored block of eight bytes; what follows is never read.
+  const std::string stream =
+      std::string("\x78\x01\x01\x08\x00\xf7\xff", 7) + u32(14) + u32(0x40000001);
+  write_file(file_, file_of(u32(15) + u32(static_cast<std::uint32_t>(stream.size())) + stream));
+  EXPECT_THAT(
+      [&] { read_mat_variable(file_, "v"); },
+      ThrowsMessage<InputError>(AllOf(
+          HasSubstr("expected at most 1073741824 bytes in a compressed array, got 1073741825"),
+          HasSubstr("f.mat"))));
+}
+
 TEST_F(MatBytes, NestingEndsAt32) {
   std::string content = array(kDouble, {1, 1}, element(2, "\x07"));
   for (int depth = 0; depth < 32; ++depth)
