@@ -16,9 +16,8 @@ std::string dump(const json& value) {
   try {
     return value.dump();
   } catch (const json::type_error&) {
-    std::throw_with_nested(
-        std::runtime_error("expected names in UTF-8, got other bytes, in " +
-                           value.dump(-1, ' ', false, json::error_handler_t::replace)));
+    throw std::runtime_error("expected names in UTF-8, got other bytes, in " +
+                             value.dump(-1, ' ', false, json::error_handler_t::replace));
   }
 }
 

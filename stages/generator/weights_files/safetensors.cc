@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/archives/file_bytes.h"
 
 namespace eventgan {
@@ -20,9 +21,6 @@ constexpr std::size_t kAlignment = 8;
 
 /// Tensors' names and one text or two: far less is needed, and JSON grows when it is parsed.
 constexpr std::uint64_t kLargestHeader = 1 << 20;
-
-/// {tensor: {"shape": [...]}}: nothing stands deeper.
-constexpr int kDeepest = 3;
 
 [[noreturn]] void fail(const std::string& what, const std::string& name) {
   throw std::runtime_error("expected " + what + ", in " + name);
@@ -53,15 +51,9 @@ std::vector<std::int64_t> sizes(const json& list, const std::string& key, const 
 }
 
 json parse_header(std::string_view text, const std::string& name) {
-  const auto watch = [&](int depth, json::parse_event_t event, json&) {
-    const bool opens =
-        event == json::parse_event_t::object_start || event == json::parse_event_t::array_start;
-    if (opens && depth >= kDeepest) fail("a safetensors header, got deeply nested JSON", name);
-    return true;
-  };
-  // As the format's own reader: no white space before the object.
+  // As the format's own reader: no white space before the object, each key once.
   if (!text.starts_with('{')) fail("a header that begins with {, got another one", name);
-  return json::parse(text, watch);
+  return parse_json_data(text, name);
 }
 
 }  // namespace
