@@ -1,10 +1,12 @@
 #include <algorithm>
 #include <map>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "manifests/faults.h"
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/human36m/indexed_dataset_internal.h"
 #include "stages/frames/human36m/layouts_internal.h"
 #include "stages/frames/human36m/npz_table_internal.h"
@@ -63,18 +65,26 @@ std::map<std::string, Video> videos_of(const NpzTable& table, const std::string&
   return videos;
 }
 
-/// Stored frames by sequence, from one listing of a folder, which may hold several sequences.
-std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root,
-                                                  const std::string& folder) {
+/// Stored frames by sequence, from one listing of a folder, which may hold several sequences. A
+/// picture that is no frame, and the lesser of two of one frame, is noted.
+std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const std::string& folder,
+                                                  IndexedDataset& dataset) {
   std::map<std::string, std::map<std::int64_t, std::string>> names;
+  std::vector<std::string> left_out;
   for (const std::string& file : root.files_in(folder)) {
-    if (!file.ends_with(".jpg") && !file.ends_with(".png")) continue;
+    const auto ends_file = [&](std::string_view extension) { return file.ends_with(extension); };
+    if (std::ranges::none_of(kPictureExtensions, ends_file)) continue;
+    const bool may_be_frame = file.ends_with(".jpg") || file.ends_with(".png");
     try {
       const ExtractedName name = parse_extracted_name(file);
       // Files come sorted, so a frame that is there as .jpg and .png counts once, as .jpg.
-      names[name.sequence].try_emplace(name.number, file);
+      if (may_be_frame && names[name.sequence].try_emplace(name.number, file).second) continue;
     } catch (const std::invalid_argument&) {  // another picture, a segmentation perhaps
     }
+    left_out.push_back(file);
+  }
+  if (!left_out.empty()) {
+    dataset.add_note(counted(left_out, "pictures left out in " + root.written(folder)));
   }
   std::map<std::string, NumberedSequence> sequences;
   for (const auto& [sequence, files] : names) {
@@ -90,7 +100,7 @@ void add_videos(const SourceRoot& root, const std::map<std::string, Video>& vide
     sequences_by_folder[video.folder].push_back(sequence);
   }
   for (const auto& [folder, sequences] : sequences_by_folder) {
-    auto stored = stored_in(root, folder);
+    auto stored = stored_in(root, folder, dataset);
     for (const std::string& sequence : sequences) {
       dataset.add_video(
           sequence, FrameFolder(root.written(folder), sequence + "_", std::move(stored[sequence]),

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "manifests/faults.h"
+#include "stages/frames/folder_listing.h"
 #include "stages/frames/human36m/fetch_table_internal.h"
 #include "stages/frames/human36m/indexed_dataset_internal.h"
 #include "stages/frames/human36m/layouts_internal.h"
@@ -33,10 +34,12 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
   }
   for (const auto& [camera, labelled_numbers] : numbers) {
     const std::string folder = pictures + "/" + camera;
-    dataset.add_video(
-        action + "/" + camera,
-        FrameFolder(root.written(folder), kPrefix,
-                    NumberedSequence::list(root.on_disk(folder), kPrefix), labelled_numbers));
+    auto stored = NumberedSequence::list(root.on_disk(folder), kPrefix);
+    if (const auto& others = stored.left_out(); !others.empty()) {
+      dataset.add_note(counted(others, "files left out in " + root.written(folder)));
+    }
+    dataset.add_video(action + "/" + camera, FrameFolder(root.written(folder), kPrefix,
+                                                         std::move(stored), labelled_numbers));
   }
   for (std::size_t row = 0; labelled && row < table->row_count(); ++row) {
     const std::string sequence = action + "/" + std::to_string(table->camera(row));

@@ -280,6 +280,15 @@ TEST_F(ExtractedLayoutTest, TellsOfPicturesWithoutLabels) {
                                   "h36m/S1/S1_Eating.7"));
 }
 
+TEST_F(ExtractedLayoutTest, PicturesLeftOutAreCountedAndNamed) {
+  add_pictures({"all/S1_A.7_000001.jpg", "all/S1_A.7_000001.png", "all/S1_A.7_000006.webp",
+                "all/S1_A.7_000006_mask.png", "all/readme.txt"});
+  add_npz(members({"all/S1_A.7_000001.jpg"}));
+  EXPECT_THAT(open()->notes(),
+              ::testing::Contains("3 pictures left out in h36m/all: S1_A.7_000001.png, "
+                                  "S1_A.7_000006.webp, S1_A.7_000006_mask.png"));
+}
+
 TEST_F(ExtractedLayoutTest, ReadsSharedData) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   SourceSpec spec = extracted_spec("human36m_lists");

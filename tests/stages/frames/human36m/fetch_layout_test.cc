@@ -273,6 +273,16 @@ TEST_F(FetchLayoutTest, TellsOfPicturesWithoutLabelsAndCamerasWithoutIntrinsics)
   EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
 }
 
+TEST_F(FetchLayoutTest, FilesLeftOutAreCountedAndNamed) {
+  add_pictures("7", {1, 6});
+  const auto camera = folder_ / "h36m/S1/Walking-1/imageSequence/7";
+  testing::write_file(camera / "img_000006.png", "");
+  testing::write_file(camera / "frame_000011.jpg", "");
+  add_annotations(fetch_annotations({{7, 1}}));
+  EXPECT_THAT(open()->notes(), ElementsAre("2 files left out in h36m/S1/Walking-1/imageSequence/7: "
+                                           "frame_000011.jpg, img_000006.jpg"));
+}
+
 TEST_F(FetchLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
   for (const char* name : {"pose/2d", "pose/3d-univ", "intrinsics/7"}) {
     auto datasets = fetch_annotations({{7, 1}, {7, 6}});
