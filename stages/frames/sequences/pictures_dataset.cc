@@ -71,10 +71,9 @@ class PicturesDataset final : public Dataset {
     if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
     Annotation annotation{std::get<std::string>(std::move(text)), {}, {}};
     try {
-      parse_json_data(annotation.original, "it");
+      parse_json_data(annotation.original, label_place(label_key));
     } catch (const std::runtime_error& error) {
-      return SampleFault{"expected valid JSON, got \"" + std::string(error.what()) + "\", in " +
-                         label_place(label_key)};
+      return SampleFault{error.what()};
     }
     return annotation;
   }
