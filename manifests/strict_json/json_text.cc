@@ -112,10 +112,8 @@ class Builder : public nlohmann::json_sax<Json> {
       auto& members = parent.template get_ref<typename Json::object_t&>();
       if constexpr (std::is_same_v<Json, nlohmann::ordered_json>) {
         // Its own insertion looks at all earlier keys first: they are known to be others.
-        return &members
-                    .std::vector<typename Json::object_t::value_type>::emplace_back(
-                        open_.back().key, std::move(value))
-                    .second;
+        auto& entries = static_cast<std::vector<typename Json::object_t::value_type>&>(members);
+        return &entries.emplace_back(open_.back().key, std::move(value)).second;
       } else {
         return &(members[open_.back().key] = std::move(value));
       }
