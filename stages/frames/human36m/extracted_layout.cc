@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cctype>
 #include <map>
 #include <stdexcept>
 #include <string_view>
@@ -72,7 +73,9 @@ std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const 
   std::map<std::string, std::map<std::int64_t, std::string>> names;
   std::vector<std::string> left_out;
   for (const std::string& file : root.files_in(folder)) {
-    const auto ends_file = [&](std::string_view extension) { return file.ends_with(extension); };
+    std::string lower = file;
+    std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
+    const auto ends_file = [&](std::string_view extension) { return lower.ends_with(extension); };
     if (std::ranges::none_of(kPictureExtensions, ends_file)) continue;
     const bool may_be_frame = file.ends_with(".jpg") || file.ends_with(".png");
     try {

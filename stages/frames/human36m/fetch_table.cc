@@ -110,7 +110,9 @@ Outcome<Annotation> FetchTable::annotation(std::size_t row) const {
     const auto found = columns_.arrays().find(cameras + std::to_string(camera(row)));
     if (found != columns_.arrays().end()) original[found->first] = to_json(found->second);
   }
-  annotation.original = original.dump();
+  // Names in the file may be in any encoding.
+  annotation.original =
+      original.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
   return annotation;
 }
 

@@ -142,8 +142,9 @@ class KittiObjectDataset : public Dataset {
     note(without_drive, "labelled frames whose raw drive is missing in " + raw.written(""));
   }
 
-  /// Tells the frames of drives that are at fault so. A wrong mapping leads to pictures of any
-  /// other drive, so that one picture shows it; which of a drive's pictures does not matter.
+  /// Tells the frames of drives that are at fault so. Another list than the devkit's leads
+  /// every picture elsewhere, so that one of a drive shows it; a list wrong in single places does
+  /// not show unless the first of a drive is among them.
   void check_mapping(const SourceRoot& base, const std::string& mapping_path) {
     std::map<std::string, std::optional<std::string>> faults;  // by drive; empty: compared, equal
     for (const LabelledFrame& frame : frames_) {

@@ -90,10 +90,10 @@ PictureFolder list_picture_folder(const fs::path& folder) {
   }
   std::ranges::sort(listed.left_out);
   // A folder in a label's place is a label that cannot be read, not one that is not there.
-  for (const fs::path name : listed.folders) {
-    if (lower_extension(name) != ".json" || !pictures.contains(name.stem().string())) continue;
-    listed.sidecars.try_emplace(name.stem().string(), name.string());
-  }
+  std::erase_if(listed.folders, [&](const fs::path name) {
+    return lower_extension(name) == ".json" && pictures.contains(name.stem().string()) &&
+           listed.sidecars.try_emplace(name.stem().string(), name.string()).second;
+  });
   listed.frames = number(pictures);
   return listed;
 }

@@ -96,7 +96,7 @@ TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
 }
 
 /// What h36m-fetch writes: joints as they are, and of a skeleton of universal size, here a tenth
-/// larger about the first joint; a camera fitted to each.
+/// larger about the camera, so that it projects alike: only the names tell which belong together.
 Datasets present_annotations() {
   Datasets datasets = fetch_annotations({{7, 1}});
   datasets["pose/3d"] = datasets["pose/3d-univ"];
