@@ -36,6 +36,11 @@ std::vector<std::string> read_texts(const StrictValue& value) {
   return texts;
 }
 
+/// A note may name files of any bytes, which are nobody's inputs: what is not UTF-8 is replaced.
+json notes_as_json(const std::vector<std::string>& notes) {
+  return json::parse(json(notes).dump(-1, ' ', false, json::error_handler_t::replace));
+}
+
 }  // namespace
 
 json to_json_value(const PlannedSample& sample) {
@@ -76,7 +81,7 @@ json to_json_value(const SourceSummary& source) {
           {"without_partner", source.without_partner},
           {"without_partner_ids", source.without_partner_ids},
           {"faults", source.faults},
-          {"notes", source.notes}};
+          {"notes", notes_as_json(source.notes)}};
 }
 
 SourceSummary read_source_summary(const StrictValue& value) {

@@ -34,7 +34,7 @@ struct ConversionReport {
   /// Pairs that cannot be, since a sequence ends too early (SourceSummary), and their frames.
   std::int64_t without_partner = 0;
   std::int64_t frames_without_partner = 0;
-  std::vector<std::string> notes;          ///< on the inputs, of the whole plan (see notes_of)
+  std::vector<std::string> notes;          ///< on the inputs as they are, of the whole plan
   std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed
 

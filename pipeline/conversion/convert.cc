@@ -86,7 +86,6 @@ ConversionReport empty_report(const fs::path& folder, const Plan& plan, const Pa
     report.without_partner += source.without_partner;
     report.frames_without_partner += static_cast<std::int64_t>(source.without_partner_ids.size());
   }
-  report.notes = notes_of(plan.sources);
   return report;
 }
 
@@ -163,6 +162,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   PlannedJob planned = make_plan(
       manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
       options.trace);
+  std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
   complete_plan(manifest, planned.datasets, frozen.plan);
   const ConversionJob job{manifest,         options,   folder,       frozen,
@@ -170,6 +170,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
 
   const PartOfPlan split = split_plan(frozen.plan, options.part);
   ConversionReport report = empty_report(folder, frozen.plan, split, options.part);
+  report.notes = std::move(notes);
   say_part(report, options);
   EarlierShards earlier = look_back(job, split, report);
   check_pairs_fit(earlier.left, generator, memory_limit_bytes());

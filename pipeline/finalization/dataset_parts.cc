@@ -57,6 +57,7 @@ DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
     }
     parts.shards.push_back({outline, std::move(*state.marker)});
     const bool is_first = !parts.headers.contains(outline.source);
+    if (!sound[i] && outline.size_unknown) parts.shards.back().outline.volume_size = {};
     if (!sound[i] || (!is_first && !outline.size_unknown)) continue;
     ShardHeader header = read_shard_header(folder, parts.shards.back(), parts.frozen.hash);
     parts.shards.back().outline.volume_size = header.volume.size;

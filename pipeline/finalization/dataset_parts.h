@@ -44,7 +44,8 @@ struct DatasetParts {
 /// Puts together what is known of an output folder whose plan is `frozen`. `states`: of each shard
 /// of the plan; those that are done are finished. Of one shard of each source the header is read:
 /// of the first that is finished and `sound`, that is, whose bytes were found to be its marker's;
-/// and of each sound one whose size was unknown at planning: its outline then has the file's.
+/// and of each sound one whose size was unknown at planning: its outline then has the file's,
+/// that of one that is not sound {0, 0}.
 /// Throws std::runtime_error naming the file if the plan's manifest or such a shard is not as it
 /// should be.
 DatasetParts read_dataset_parts(const std::filesystem::path& folder, FrozenOutline frozen,

@@ -105,6 +105,7 @@ void record_amendment(const fs::path& folder, const std::string& plan_hash,
   }
   const AmendmentLock lock(folder);
   std::vector<Amendment> all = read_amendments(folder, plan_hash);
+  if (!all.empty() && all.back() == amendment) return;  // by another who found the same
   all.push_back(amendment);
   nlohmann::json amendments = nlohmann::json::array();
   for (const auto& [fields, samples] : all) {

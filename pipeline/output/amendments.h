@@ -22,9 +22,9 @@ bool is_amendable(const std::string& fingerprint_field);
 std::vector<Amendment> read_amendments(const std::filesystem::path& folder,
                                        const std::string& plan_hash);
 
-/// Adds one, atomically, also beside others that do; before the first shard is touched. Throws
-/// std::invalid_argument for a field that may not change, std::runtime_error if the file is damaged
-/// or cannot be written.
+/// Adds one, unless the last is the same; atomically, also beside others that do; before the first
+/// shard is touched. Throws std::invalid_argument for a field that may not change,
+/// std::runtime_error if the file is damaged or cannot be written.
 void record_amendment(const std::filesystem::path& folder, const std::string& plan_hash,
                       const Amendment& amendment);
 

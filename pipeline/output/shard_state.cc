@@ -127,7 +127,8 @@ ShardState proven_shard_state(const fs::path& folder, const ShardOutline& shard,
     const std::vector<std::string> faults = count_faults(folder / shard.name, *state.marker);
     if (faults.empty()) return state;
     return faulty(ShardCondition::kOtherCounts, folder / marker_name(shard.name), faults.front());
-  } catch (const std::exception& error) {
+  } catch (
+      const std::runtime_error& error) {  // not std::bad_alloc, which says nothing of the shard
     return faulty(ShardCondition::kOtherCounts, folder / marker_name(shard.name),
                   "expected the marker of a shard that can be read, got one whose " +
                       first_line(error.what()));

@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
+#include <sstream>
 #include <string_view>
 
 #include "manifests/manifest_fields.h"
@@ -47,10 +48,39 @@ std::string annotations_hash(const JobManifest& manifest, const std::vector<std:
   });
 }
 
-std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedShard>& shards,
+/// What the inputs decide in a plan beside the frames: of each sample its id, times, size and
+/// fault, and of each source what was counted. With it, no change of the inputs gives another plan
+/// and the same fingerprint: there would be nothing then that `retry` could record.
+std::string decisions_hash(const JobManifest& manifest, const Plan& plan) {
+  Sha256 hash;
+  std::ostringstream line;
+  const auto take_line = [&] {
+    hash.update(line.str() + "\n");
+    line.str("");
+  };
+  line << std::hexfloat;
+  for (const PlannedShard& shard : plan.shards) {
+    const bool is_native = !manifest.image.size;  // else the size is the manifest's
+    for (const PlannedSample& sample : shard.samples) {
+      line << shard.source << '\t' << sample.sample_id << '\t' << sample.pair.previous.time_s
+           << '\t' << sample.pair.next.time_s << '\t' << sample.fault;
+      if (is_native) line << '\t' << shard.volume_size.height << '\t' << shard.volume_size.width;
+      if (shard.size_unknown) line << "\tunknown";
+      take_line();
+    }
+  }
+  for (const SourceSummary& source : plan.sources) {
+    line << source.labelled_frames << '\t' << source.without_partner;
+    for (const std::string& id : source.without_partner_ids) line << '\t' << id;
+    take_line();
+  }
+  return hash.hex();
+}
+
+std::string frames_hash(const JobManifest& manifest, const Plan& plan,
                         const std::function<void()>& before_file) {
   std::vector<std::string_view> paths;
-  for (const PlannedShard& shard : shards) {
+  for (const PlannedShard& shard : plan.shards) {
     for (const PlannedSample& sample : shard.samples) {
       paths.push_back(sample.pair.previous.path);
       paths.push_back(sample.pair.next.path);
@@ -62,13 +92,7 @@ std::string frames_hash(const JobManifest& manifest, const std::vector<PlannedSh
     const auto size = std::filesystem::file_size(resolve(manifest, path), absent);
     return absent ? "absent" : std::to_string(size);
   });
-  // A picture that is mended within its size changes where its sample belongs.
-  std::string unknown;
-  for (const PlannedShard& shard : shards) {
-    if (!shard.size_unknown) continue;
-    for (const PlannedSample& sample : shard.samples) unknown += sample.sample_id + "\n";
-  }
-  return unknown.empty() ? hash : sha256_hex(hash + "\n" + unknown);
+  return sha256_hex(hash + "\n" + decisions_hash(manifest, plan));
 }
 
 bool any_video(const std::vector<PlannedShard>& shards) {
@@ -108,9 +132,11 @@ std::string libraries(bool with_videos) {
   std::string text = "HDF5 " + std::to_string(major) + "." + std::to_string(minor) + "." +
                      std::to_string(release) + ", zlib " + zlibVersion() + ", OpenCV " +
                      cv::getVersionString() + ", libpng " + png_get_libpng_ver(nullptr) + ", " +
-                     loaded_library("libjpeg") + ", " + loaded_library("libdeflate");
-  // The one of FFmpeg's libraries that decodes; all come from one source.
-  if (with_videos) text += ", " + loaded_library("libavcodec");
+                     loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
+                     loaded_library("libwebp") + ", " + loaded_library("libtiff");
+  // Those of FFmpeg's libraries that decode, and make colours of it.
+  if (with_videos)
+    text += ", " + loaded_library("libavcodec") + ", " + loaded_library("libswscale");
   return text;
 }
 
@@ -142,17 +168,17 @@ std::string instruction_sets() {
 std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSION; }
 
 std::map<std::string, std::string> make_fingerprint(
-    const JobManifest& manifest, const std::vector<PlannedShard>& shards,
-    const std::vector<std::string>& annotation_files, const std::string& weights_hash,
-    const std::string& engine, const std::function<void()>& before_file) {
+    const JobManifest& manifest, const Plan& plan, const std::vector<std::string>& annotation_files,
+    const std::string& weights_hash, const std::string& engine,
+    const std::function<void()>& before_file) {
   std::map<std::string, std::string> fingerprint = {
       {"annotations", annotations_hash(manifest, annotation_files, before_file)},
-      {"frames", frames_hash(manifest, shards, before_file)},
+      {"frames", frames_hash(manifest, plan, before_file)},
       {"weights", weights_hash},
       {"engine", engine},
       {"preprocessing", preprocessing_json(manifest.image)},
       {"cpu", instruction_sets()},
-      {"libraries", libraries(any_video(shards))},
+      {"libraries", libraries(any_video(plan.shards))},
       {"program", program_version()}};
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;

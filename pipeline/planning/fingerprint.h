@@ -14,14 +14,14 @@ namespace eventgan {
 /// Everything that changes a shard's bytes (DESIGN section 6), field by field: each
 /// setting of the manifest (see manifest_fields), annotations, frames, weights, engine,
 /// preprocessing, cpu, libraries, program. Annotation files are hashed by content; frames by path
-/// and size only, since their content would mean reading everything twice, and by which of them do
-/// not tell the size of their picture. Libraries are those that are loaded (FFmpeg where frames
-/// come from videos), not those compiled against. `before_file` is called before each of these
-/// files is looked at; what it throws is passed on.
+/// and size only, since their content would mean reading everything twice, and by what the plan
+/// takes from the inputs: samples, times, sizes, faults, counts. Libraries are those that are
+/// loaded (FFmpeg where frames come from videos), not those compiled against. `before_file` is
+/// called before each of these files is looked at; what it throws is passed on.
 std::map<std::string, std::string> make_fingerprint(
-    const JobManifest& manifest, const std::vector<PlannedShard>& shards,
-    const std::vector<std::string>& annotation_files, const std::string& weights_hash,
-    const std::string& engine, const std::function<void()>& before_file = [] {});
+    const JobManifest& manifest, const Plan& plan, const std::vector<std::string>& annotation_files,
+    const std::string& weights_hash, const std::string& engine,
+    const std::function<void()>& before_file = [] {});
 
 /// How frames are prepared, as compact JSON; stands in the fingerprint and in every shard.
 std::string preprocessing_json(const ImageSpec& image);

@@ -172,20 +172,20 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   note_unknown_sizes(job.plan);
   whole.note("pairs", job.plan.sample_count());
   const TraceSpan span(trace, "fingerprint", "job");
-  job.plan.fingerprint = make_fingerprint(manifest, job.plan.shards, annotation_files, weights_hash,
-                                          engine, stop_if_asked);
+  job.plan.fingerprint =
+      make_fingerprint(manifest, job.plan, annotation_files, weights_hash, engine, stop_if_asked);
   return job;
 }
 
-void find_labels(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
-                 Plan& plan) {
+void renew_samples(const JobManifest& manifest,
+                   const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan) {
   for (PlannedShard& shard : plan.shards) {
     const auto source = static_cast<std::size_t>(shard.source);
     if (!datasets[source]) continue;
     for (PlannedSample& sample : shard.samples) {
       const LabelledFrame* frame = frame_of(*datasets[source], manifest.sources[source], sample);
       if (frame != nullptr) {
-        sample.label_key = frame->label_key;
+        renew_sample(*datasets[source], *frame, manifest.sources[source], sample);
       } else if (sample.fault.empty()) {
         sample.fault = "expected the labelled frame that was planned, got none any more, in " +
                        sample.pair.next.path + " (" + sample.sample_id + ")";
@@ -203,7 +203,7 @@ void complete_plan(const JobManifest& manifest,
       fill_hole(*datasets[source], manifest.sources[source], manifest.seed, sample);
     }
   }
-  find_labels(manifest, datasets, plan);
+  renew_samples(manifest, datasets, plan);
   settle_sizes(manifest, plan);
 }
 

@@ -29,18 +29,19 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
                      const std::string& engine, const std::function<bool()>& stop = {},
                      TraceRecorder* trace = nullptr);
 
-/// The key of a label may be its row in an annotation file, and rows move when the file is mended:
-/// gives every sample of a frozen plan the key that its frame has today. One whose frame is not
-/// labelled any more gets a fault, since another's label may stand in its row. `datasets`: one for
-/// each source, opened now; null where a source is not there, whose samples stay as they are.
-void find_labels(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
-                 Plan& plan);
+/// Gives every sample of a frozen plan what its labelled frame says today (renew_sample): times and
+/// faults may have been mended, and the key of a label may be its row in an annotation file, where
+/// rows move. A sample whose frame is not labelled any more gets a fault, since another's label may
+/// stand in its row. `datasets`: one for each source, opened now; null where a source is not there,
+/// whose samples stay as they are.
+void renew_samples(const JobManifest& manifest,
+                   const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan);
 
 /// Puts into a frozen plan what could not be known when it was frozen, as far as the inputs tell
 /// now: samples that were planned with a fault (a hole in their sequence) become what they would be
-/// planned as today, by source and id; labels are found again (find_labels); shards of unknown size
-/// get that of their first picture that can be read. What is unknown still stays as it is, and so
-/// do all slots. `datasets` as above, none null.
+/// planned as today, by source and id; all others are renewed (renew_samples); shards of unknown
+/// size get that of their first picture that can be read. What is unknown still stays as it is, and
+/// so do all slots. `datasets` as above, none null.
 void complete_plan(const JobManifest& manifest,
                    const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan);
 

@@ -105,4 +105,17 @@ PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame
                                                  : choose_all(dataset, frame, source);
 }
 
+void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
+                  PlannedSample& sample) {
+  const Window place = window(source.pairs.side, sample.pair.gap_frames);
+  const auto renew = [&](FrameRef& planned, int steps) {
+    const FrameRef today = dataset.neighbour(frame, steps).frame;
+    if (today == planned) planned.time_s = today.time_s;
+  };
+  renew(sample.pair.previous, place.first);
+  renew(sample.pair.next, place.last);
+  sample.label_key = frame.label_key;
+  if (sample.fault.empty()) sample.fault = frame.fault;
+}
+
 }  // namespace eventgan

@@ -27,4 +27,9 @@ struct PairChoiceResult {
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed);
 
+/// Gives a sample that was planned earlier what its labelled frame says today: the label's key, the
+/// frames' times, and the fault of the frame, if it has one. Its frames stay.
+void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
+                  PlannedSample& sample);
+
 }  // namespace eventgan

@@ -75,7 +75,9 @@ void SampleStages::read(SampleMessage& message) const try {
       message.sample.source_to_volume = placement.source_to_volume();
       if (placement.volume != message.shard->volume_size) {
         message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
-                     size_text(placement.volume) + ", in " + frame_names(planned.pair));
+                     size_text(placement.volume) + ", in " + frame_names(planned.pair) +
+                     " (a plan of today has it in another shard: convert into another folder, or "
+                     "with --overwrite)");
       }
     }
   }

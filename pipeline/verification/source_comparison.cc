@@ -57,8 +57,8 @@ SourceComparison::SourceComparison(JobManifest manifest) : manifest_(std::move(m
   }
 }
 
-void SourceComparison::find_labels(Plan& plan) const {
-  eventgan::find_labels(manifest_, datasets_, plan);
+void SourceComparison::renew_samples(Plan& plan) const {
+  eventgan::renew_samples(manifest_, datasets_, plan);
 }
 
 std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,

@@ -22,7 +22,7 @@ class SourceComparison {
   explicit SourceComparison(JobManifest manifest);
 
   /// Gives the samples of the frozen plan the keys that their labels have today (see make_plan.h).
-  void find_labels(Plan& plan) const;
+  void renew_samples(Plan& plan) const;
 
   /// Why labels of some sources are not compared; a line each.
   const std::vector<std::string>& notes() const { return notes_; }

@@ -87,7 +87,7 @@ class Verification {
     }
     try {
       plan_ = read_frozen_plan(folder_).plan;
-      sources_->find_labels(plan_);
+      sources_->renew_samples(plan_);
     } catch (const std::runtime_error& error) {  // samples that do not parse
       check_.faults.push_back(fault_line(error));
       sources_.reset();

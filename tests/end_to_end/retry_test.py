@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import subprocess
 
 import h5py
 import numpy as np
@@ -10,7 +11,7 @@ import PIL.Image
 import program
 from folders import content, markers, same_content, temporaries
 from program import run
-from small_job import small_job
+from small_job import save_picture, small_job
 
 BROKEN_CAR, MALFORMED_CAR, HOLE = "000001", "000002", "000000002"
 
@@ -202,6 +203,27 @@ class ChangedInputs(program.InFolder):
         out, _ = run("retry", self.out)
         self.assertIn("annotations): recorded", out)
         run("convert", self.manifest, "--output", self.out)
+
+    def test_what_changes_the_plan_but_none_of_its_files(self):
+        """A second folder, whose only picture has no partner: counted, and in no pair. A file that is no UTF-8 is noted."""
+        random = np.random.default_rng(9)
+        for k in range(4):
+            save_picture(self.folder / "clips" / "a" / f"{k:03d}.png", random)
+        foreign = self.folder / "clips" / "a" / "caf\udce9.txt"
+        foreign.write_bytes(b"")
+        manifest = self.folder / "manifest.json"
+        manifest.write_text(json.dumps(program.manifest([{"dataset": "frames", "root": "clips", "pairs": program.pairs([1])}])))
+        out = self.folder / "out"
+        subprocess.run([program.PROGRAM, "convert", manifest, "--output", out], check=True, capture_output=True)
+        self.assertIn("1 files left out in clips/a: caf\ufffd.txt", run("status", out)[0])
+        foreign.unlink()
+        save_picture(self.folder / "clips" / "b" / "000.png", random)
+        _, err = run("convert", manifest, "--output", out, expect=64)
+        self.assertIn("eventgan retry", err)
+        self.assertIn("(frames): recorded", run("retry", out)[0])
+        run("convert", manifest, "--output", out)
+        run("finalize", out)
+        run("verify", out, "--deep")
 
     def goes_on_once_mended(self):
         self.picture.write_bytes(self.sound)

@@ -24,30 +24,33 @@ class Fingerprint : public ::testing::Test {
     manifest_.text = R"({"seed": 1})";
     testing::write_file(folder_ / "labels.txt", "Car 1");
     testing::write_file(folder_ / "a.png", "12345");
-    shards_ = {{"s.h5", 0, {1, 1}, {{"id", "", "", {{"a.png"}, {"b.png"}, 1, 0, 1}, ""}}}};
+    plan_.shards = {{"s.h5", 0, {1, 1}, {{"id", "", "", {{"a.png"}, {"b.png"}, 1, 0, 1}, ""}}}};
   }
   std::map<std::string, std::string> make() {
-    return make_fingerprint(manifest_, shards_, {"labels.txt"}, "weights", "engine");
+    return make_fingerprint(manifest_, plan_, {"labels.txt"}, "weights", "engine");
   }
 
   testing::TemporaryFolder folder_;
   JobManifest manifest_;
-  std::vector<PlannedShard> shards_;
+  Plan plan_;
 };
 
 TEST_F(Fingerprint, IsTheSameForTheSameInputs) { EXPECT_EQ(make(), make()); }
 
 TEST_F(Fingerprint, ListsEachPathOnceSortedWithItsSizeOrHash) {
-  // Folders that were frozen by an earlier version must stay valid: these values never change.
-  const PlannedSample sample = shards_[0].samples[0];
-  shards_.push_back({"t.h5", 0, {1, 1}, {sample, sample}});
-  shards_[1].samples[0].pair.next.path = "B.png";
+  // Where these values change, folders that were frozen before are refused.
+  const PlannedSample sample = plan_.shards[0].samples[0];
+  plan_.shards.push_back({"t.h5", 0, {1, 1}, {sample, sample}});
+  plan_.shards[1].samples[0].pair.next.path = "B.png";
   const auto fields =
-      make_fingerprint(manifest_, shards_, {"z.txt", "labels.txt", "z.txt"}, "weights", "engine");
-  EXPECT_EQ(fields.at("frames"), sha256_hex("B.png\tabsent\na.png\t5\nb.png\tabsent\n"));
+      make_fingerprint(manifest_, plan_, {"z.txt", "labels.txt", "z.txt"}, "weights", "engine");
+  const std::string decided = "0\tid\tnan\tnan\t\t1\t1\n";
+  EXPECT_EQ(fields.at("frames"), sha256_hex(sha256_hex("B.png\tabsent\na.png\t5\nb.png\tabsent\n") +
+                                            "\n" + sha256_hex(decided + decided + decided)));
   EXPECT_EQ(fields.at("annotations"),
             sha256_hex("labels.txt\t" + sha256_hex("Car 1") + "\nz.txt\tabsent\n"));
-  EXPECT_EQ(make_fingerprint(manifest_, {}, {}, "", "").at("frames"), sha256_hex(""));
+  EXPECT_EQ(make_fingerprint(manifest_, {}, {}, "", "").at("frames"),
+            sha256_hex(sha256_hex("") + "\n" + sha256_hex("")));
 }
 
 /// "libjpeg.so.62 0123456789abcdef" of the file that a function of this process lies in.
@@ -71,7 +74,7 @@ TEST_F(Fingerprint, HasTheLibrariesThatAreLoaded) {
 
 TEST_F(Fingerprint, HasFfmpegWhereFramesComeFromVideos) {
   EXPECT_THAT(make().at("libraries"), ::testing::Not(::testing::HasSubstr("libavcodec")));
-  shards_[0].samples[0].pair.previous.video_frame = 0;
+  plan_.shards[0].samples[0].pair.previous.video_frame = 0;
   EXPECT_THAT(make().at("libraries"),
               ::testing::ContainsRegex(", libavcodec\\.so\\.[0-9.]+ [0-9a-f]{16}"));
 }
@@ -84,9 +87,31 @@ TEST_F(Fingerprint, NoticesAnInputOfAnotherSize) {
   EXPECT_TRUE(differences[0].starts_with("frames: "));
 }
 
+// Else the plan would be another one, and no field would say why: nothing that `retry` could
+// record.
+TEST_F(Fingerprint, NoticesWhateverTheInputsDecide) {
+  plan_.sources.resize(1);
+  const Plan before = plan_;
+  const auto fields = make();
+  const auto differs = [&](const auto& change) {
+    plan_ = before;
+    change(plan_);
+    const auto differences = fingerprint_differences(fields, make());
+    return differences.size() == 1 && differences[0].starts_with("frames: ");
+  };
+  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].labelled_frames = 1; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].without_partner = 1; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].without_partner_ids = {"x"}; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].volume_size = {2, 1}; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].samples[0].fault = "x"; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].samples[0].sample_id = "x"; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].samples[0].pair.next.time_s = 1; }));
+  EXPECT_FALSE(differs([](Plan& plan) { plan.sources[0].notes = {"x"}; }));
+}
+
 TEST_F(Fingerprint, NoticesAPictureOfUnknownSizeThatWasMendedWithinItsBytes) {
   const auto whole = make();
-  shards_[0].size_unknown = true;
+  plan_.shards[0].size_unknown = true;
   const auto differences = fingerprint_differences(make(), whole);
   ASSERT_EQ(differences.size(), 1u);
   EXPECT_TRUE(differences[0].starts_with("frames: "));

@@ -111,15 +111,16 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
     PlannedSample& sample = plan.shards.at(0).samples.at(0);
     ASSERT_NE(sample.label_key, "");
     sample.label_key = "another's";
-    find_labels(manifest_, datasets, plan);
+    sample.pair.next.time_s = 99;
+    renew_samples(manifest_, datasets, plan);
     EXPECT_EQ(to_json(plan), whole);
 
     sample.sample_id.replace(0, 4, "gone");
-    find_labels(manifest_, datasets, plan);
+    renew_samples(manifest_, datasets, plan);
     EXPECT_THAT(sample.fault, ::testing::HasSubstr("got none any more, in clip/f_01.png (gone"));
     datasets[0].reset();
     sample.fault.clear();
-    find_labels(manifest_, datasets, plan);
+    renew_samples(manifest_, datasets, plan);
     EXPECT_EQ(sample.fault, "") << "nobody knows";
   }
 }

@@ -144,5 +144,27 @@ TEST(ChoosePairs, AFrameAtFaultGivesThatFaultAndNoOtherDraw) {
   }
 }
 
+// The times of a drive, say, were damaged or mended after the plan was frozen.
+TEST(RenewSample, TakesKeyTimesAndFaultOfItsFrameAsTheyAre) {
+  const FakeDataset dataset("root", 20);
+  for (const PairSide side : {PairSide::kBefore, PairSide::kAfter, PairSide::kAround}) {
+    const SourceSpec spec = source({2}, side, PairChoice::kOne);
+    LabelledFrame frame = dataset.labelled_frames()[5];
+    const PlannedSample today = choose_pairs(dataset, frame, spec, 7).samples.at(0);
+    PlannedSample sample = today;
+    sample.label_key = "another's";
+    sample.pair.previous.time_s = sample.pair.next.time_s = 99;
+    renew_sample(dataset, frame, spec, sample);
+    EXPECT_EQ(sample.label_key, today.label_key);
+    EXPECT_EQ(sample.pair.previous.time_s, today.pair.previous.time_s);
+    EXPECT_EQ(sample.pair.next.time_s, today.pair.next.time_s);
+    EXPECT_EQ(sample.fault, "");
+
+    frame.fault = "expected a time, got none, in timestamps.txt";
+    renew_sample(dataset, frame, spec, sample);
+    EXPECT_EQ(sample.fault, frame.fault);
+  }
+}
+
 }  // namespace
 }  // namespace eventgan
