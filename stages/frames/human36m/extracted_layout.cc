@@ -23,21 +23,25 @@ constexpr char kCameras[] = "cameras.pkl";
 struct Annotations {
   std::string written;
   std::filesystem::path on_disk;
+  std::vector<std::string> left_out = {};  ///< others beside it, each with the reason
 };
 
 Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::path& base,
                                const SourceRoot& root) {
   if (spec.annotations) return {*spec.annotations, base / *spec.annotations};
   std::string candidates;
-  std::vector<std::string> fitting;
+  std::vector<std::string> fitting, left_out;
   for (const std::string& name : root.files_in("")) {
     if (!name.ends_with(".npz")) continue;
     const std::string reason = why_no_human36m_npz(root.on_disk(name));
     if (reason.empty()) fitting.push_back(name);
-    candidates += (candidates.empty() ? "; there is " : ", ") + name;
-    if (!reason.empty()) candidates += " (not usable: " + reason + ")";
+    const std::string shown = reason.empty() ? name : name + " (not usable: " + reason + ")";
+    candidates += (candidates.empty() ? "; there is " : ", ") + shown;
+    if (!reason.empty()) left_out.push_back(shown);
   }
-  if (fitting.size() == 1) return {root.written(fitting[0]), root.on_disk(fitting[0])};
+  if (fitting.size() == 1) {
+    return {root.written(fitting[0]), root.on_disk(fitting[0]), std::move(left_out)};
+  }
   const std::string message =
       "expected one .npz with imgname, center, scale, part [N, 17, 3] and S [N, 17, 4], got " +
       std::to_string(fitting.size()) + ", in " + root.written("") +
@@ -132,6 +136,10 @@ std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
   root.require_folder("");
   const Annotations annotations = choose_annotations(spec, base, root);
   auto dataset = std::make_unique<IndexedDataset>();
+  if (!annotations.left_out.empty()) {  // one that is damaged may be the one that was meant
+    dataset->add_note(
+        counted(annotations.left_out, "annotation files left out beside " + annotations.written));
+  }
 
   CameraBook cameras;
   const auto files = root.files_in("");

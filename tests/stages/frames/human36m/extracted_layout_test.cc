@@ -180,6 +180,10 @@ TEST_F(ExtractedLayoutTest, ChoosesTheOnlyFileThatFits) {
   add_npz(members({kVideo + "_000001.jpg"}, 24), "h36m/b.npz");
   testing::write_file(folder_ / "h36m/c.npz", "no zip file");
   EXPECT_EQ(open()->labelled_frames()[0].label_key, "a.npz#0");
+  EXPECT_THAT(open()->notes(),
+              ::testing::Contains(AllOf(
+                  HasSubstr("2 annotation files left out beside h36m/a.npz: b.npz (not usable: "),
+                  HasSubstr("), c.npz (not usable: expected "))));
 
   add_npz(members({kVideo + "_000001.jpg"}), "h36m/d.npz");
   EXPECT_THAT([&] { open(); },
@@ -282,11 +286,12 @@ TEST_F(ExtractedLayoutTest, TellsOfPicturesWithoutLabels) {
 
 TEST_F(ExtractedLayoutTest, PicturesLeftOutAreCountedAndNamed) {
   add_pictures({"all/S1_A.7_000001.jpg", "all/S1_A.7_000001.png", "all/S1_A.7_000006.webp",
-                "all/S1_A.7_000006_mask.png", "all/readme.txt"});
+                "all/S1_A.7_000006_mask.png", "all/S1_A.7_000011.JPG", "all/readme.txt"});
   add_npz(members({"all/S1_A.7_000001.jpg"}));
   EXPECT_THAT(open()->notes(),
-              ::testing::Contains("3 pictures left out in h36m/all: S1_A.7_000001.png, "
-                                  "S1_A.7_000006.webp, S1_A.7_000006_mask.png"));
+              ::testing::Contains("4 pictures left out in h36m/all: S1_A.7_000001.png, "
+                                  "S1_A.7_000006.webp, S1_A.7_000006_mask.png, "
+                                  "S1_A.7_000011.JPG"));
 }
 
 TEST_F(ExtractedLayoutTest, ReadsSharedData) {

@@ -152,6 +152,7 @@ TEST_F(PicturesDatasetTest, ALabelThatIsNoSoundJsonFileIsAFault) {
   fs::remove(label);
   fs::create_directory(label);
   EXPECT_EQ(reason(), "expected a readable file, got 'Is a directory', in clip/1.json");
+  EXPECT_THAT(open()->notes(), ::testing::IsEmpty()) << "it is taken, not left out";
 }
 
 TEST_F(PicturesDatasetTest, RefusesAFolderWithoutPictures) {
