@@ -163,8 +163,11 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
       manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
       options.trace);
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
+  const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);
-  complete_plan(manifest, planned.datasets, frozen.plan);
+  if (frozen.plan.fingerprint != fingerprint) {  // inputs were mended since
+    complete_plan(manifest, planned.datasets, frozen.plan);
+  }
   const ConversionJob job{manifest,         options,   folder,       frozen,
                           planned.datasets, generator, weights_hash, thread_count(options.threads)};
 
