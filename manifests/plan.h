@@ -41,7 +41,7 @@ struct SourceSummary {
   std::int64_t labelled_frames = 0;
   std::map<int, std::int64_t> pairs_by_gap;
   /// Labelled frames (with choose = all: frame and gap) without a partner, because their sequence
-  /// does not reach that far: not an error, but never silent.
+  /// does not reach that far, or not within pairs.max_gap_s: not an error, but never silent.
   std::int64_t without_partner = 0;
   std::vector<std::string> without_partner_ids;  ///< in the order of the source
   std::int64_t faults = 0;                       ///< planned samples with a fault
