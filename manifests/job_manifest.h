@@ -123,7 +123,7 @@ struct ErrorSpec {
   double max_fraction = 0.01;    ///< 0..1
 };
 
-/// A conversion job, as manifest.schema.json beside this file describes it.
+/// A conversion job, as manifests/schemas/manifest.schema.json describes it.
 struct JobManifest : ManifestOrigin {
   /// Part of file names: 1..64 of A-Z a-z 0-9 . _ - and neither "." nor "-" first.
   std::string name;

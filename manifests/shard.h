@@ -22,7 +22,7 @@ enum class VolumeUnit {
   kEvents    ///< a simulator's: a count of events, each spread over the two bins nearest in time
 };
 
-/// What is true of a whole shard; shard_format.md beside this file says where each field stands.
+/// What is true of a whole shard; manifests/guides/shard_format.md says where each field stands.
 struct ShardHeader {
   std::string name;  ///< file name: NAME-SPLIT-00012-of-01024.h5
   std::string dataset;

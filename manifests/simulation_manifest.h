@@ -35,7 +35,7 @@ struct SimulationSource {
   double max_displacement_px = 5;
 };
 
-/// A job of `eventgan simulate`, as simulation.schema.json describes it.
+/// A job of `eventgan simulate`, as manifests/schemas/simulation.schema.json describes it.
 struct SimulationManifest : ManifestOrigin {
   std::string name;
   std::uint64_t seed = 0;

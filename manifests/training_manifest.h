@@ -13,7 +13,7 @@
 
 namespace eventgan {
 
-/// How an event recording lies on disk (manifests/training.md).
+/// How an event recording lies on disk (manifests/guides/training.md).
 enum class RecordingFormat {
   kMvsec,     ///< HDF5: davis/left/{events [N,4] x y t p, image_raw, image_raw_ts, ...}
   kEventgan,  ///< HDF5 of the EventGAN authors: davis/{events/data, image_raw/...}
@@ -87,7 +87,7 @@ struct PhaseSteps {
   std::int64_t generator = 0;
 };
 
-/// A job of `eventgan train`, as training.schema.json describes it.
+/// A job of `eventgan train`, as manifests/schemas/training.schema.json describes it.
 struct TrainingManifest : ManifestOrigin {
   std::string name;
   std::uint64_t seed = 0;

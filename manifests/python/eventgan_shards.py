@@ -8,7 +8,7 @@
         sample["boxes"]["xyxy"]             # float64 [boxes, 4], volume pixels
         sample["persons"]["joints"]         # float64 [persons, J, 2], volume pixels
 
-shard_format.md in the folder above says what each field means; the keys here are its names.
+manifests/guides/shard_format.md says what each field means; the keys here are its names.
 """
 
 import bisect

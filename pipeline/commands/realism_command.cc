@@ -125,7 +125,7 @@ void add_realism_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "realism",
       "Compares volumes of the network and of two models with a camera's real events for the same "
-      "frames (manifests/realism.md)");
+      "frames (manifests/guides/realism.md)");
   const auto arguments = std::make_shared<RealismArguments>();
   add_choices(*command, *arguments);
   add_methods(*command, *arguments);

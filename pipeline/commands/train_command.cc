@@ -49,8 +49,8 @@ int run(const TrainArguments& arguments) {
 void add_train_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "train",
-      "Trains a generator on event recordings with frames (manifests/training.md). Stopped by "
-      "SIGINT, SIGTERM or SIGUSR1 it saves its state; run again, it goes on from there");
+      "Trains a generator on event recordings with frames (manifests/guides/training.md). Stopped "
+      "by SIGINT, SIGTERM or SIGUSR1 it saves its state; run again, it goes on from there");
   const auto arguments = std::make_shared<TrainArguments>();
   add_job_options(*command, arguments->job, "The training (manifests/examples has one)",
                   "Discard what an earlier run left in the folder");

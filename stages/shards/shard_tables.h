@@ -13,7 +13,7 @@ struct Bytes {
 
 // Everything in a shard but the volumes, column by column: a member for each dataset, of the same
 // name and element type; arrays with inner dimensions are flat, in C order. shard_columns.h says
-// which is where; manifests/shard_format.md says what each means.
+// which is where; manifests/guides/shard_format.md says what each means.
 
 /// `/events/*`, one row a sample.
 struct EventColumns {

@@ -7,8 +7,8 @@ import unittest
 import program
 from program import SOURCE, run
 
-PAGES = [SOURCE / "README.md", SOURCE / "docker" / "running.md", *sorted((SOURCE / "manifests").glob("*.md"))]
-GUARANTEES = SOURCE / "manifests" / "guarantees.md"
+PAGES = [SOURCE / "README.md", SOURCE / "docker" / "running.md", *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
+GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
 COMMAND = re.compile(r"\beventgan ([a-z][a-z-]*)([^#|;&]*)")
 
 

@@ -194,7 +194,7 @@ class Finalize(unittest.TestCase):
 
 
 class Reading(unittest.TestCase):
-    """What manifests/shard_format.md says about reading a finalized folder."""
+    """What manifests/guides/shard_format.md says about reading a finalized folder."""
 
     def setUp(self):
         self.out = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "out"
@@ -208,7 +208,7 @@ class Reading(unittest.TestCase):
                               capture_output=True, preexec_fn=prepare).stdout
 
     def test_the_lines_of_python_on_the_page_run(self):
-        page = (program.SOURCE / "manifests" / "shard_format.md").read_text(encoding="utf-8")
+        page = (program.SOURCE / "manifests" / "guides" / "shard_format.md").read_text(encoding="utf-8")
         code = "\n".join(line[4:] for line in re.findall(r"(?m)^    .*$", page.split("### dataset.h5")[1]))
         names = {}
         exec(code.replace("out/dataset.h5", str(self.out / "dataset.h5")), names)

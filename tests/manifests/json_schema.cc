@@ -47,8 +47,8 @@ const json& schema_document(const std::string& name) {
   static std::map<std::string, json> documents;
   const auto [found, is_new] = documents.try_emplace(name);
   if (is_new) {
-    found->second =
-        json::parse(read_file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / name));
+    found->second = json::parse(
+        read_file(std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "schemas" / name));
   }
   return found->second;
 }

@@ -1,4 +1,4 @@
-"""manifests/shard_format.md against a shard: each says what the other has."""
+"""manifests/guides/shard_format.md against a shard: each says what the other has."""
 
 import re
 import unittest
@@ -7,7 +7,7 @@ import h5py
 
 from example_shards import SOURCE, ExampleShards
 
-PAGE = SOURCE / "manifests" / "shard_format.md"
+PAGE = SOURCE / "manifests" / "guides" / "shard_format.md"
 # What a shard is; the parts after that are on the files beside it.
 TEXT = PAGE.read_text(encoding="utf-8").split("## The marker")[0]
 
