@@ -1,7 +1,3 @@
-// How a recording comes to be under its name whole or not at all: it is written to a temporary name
-// beside it, closed with every close checked, fsynced, renamed, and the folder fsynced. Whatever
-// goes wrong before the rename, the destructor deletes the temporary file.
-
 #include "stages/recordings/mvsec_writer.h"
 
 #include <cmath>
@@ -9,7 +5,6 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <system_error>
 #include <vector>
 
 #include "stages/files/atomic_file.h"
@@ -35,11 +30,9 @@ bool is_field(const FlowField& flow, ImageSize size) {
 }  // namespace
 
 struct MvsecWriter::File {
-  std::filesystem::path target;
-  std::filesystem::path temporary;
+  AtomicFile output;  ///< before its HDF5, which is closed first
   ImageSize size;
   std::optional<MvsecFile> hdf5;
-  bool created = false;
   bool committed = false;
   bool has_flow = false;
   std::int64_t event_count = 0;
@@ -47,6 +40,8 @@ struct MvsecWriter::File {
   std::vector<double> times_s;
   std::vector<std::int64_t> event_index;
 
+  File(const std::filesystem::path& target, ImageSize frame_size)
+      : output(target), size(frame_size) {}
   ~File();
 
   /// Runs HDF5 calls in this thread's turn; errors name the file.
@@ -61,14 +56,12 @@ struct MvsecWriter::File {
 MvsecWriter::File::~File() {
   const Hdf5Turn turn;
   hdf5.reset();
-  if (!created) return;
-  std::error_code ignored;  // after a commit there is nothing to delete
-  std::filesystem::remove(temporary, ignored);
 }
 
 template <class Work>
 void MvsecWriter::File::write(Work work) {
-  if (committed) throw std::logic_error("expected no more calls after commit: " + target.string());
+  if (committed)
+    throw std::logic_error("expected no more calls after commit: " + output.target().string());
   const Hdf5Turn turn;
   try {
     try {
@@ -79,7 +72,8 @@ void MvsecWriter::File::write(Work work) {
     }
     hdf5->check();
   } catch (const std::runtime_error&) {
-    std::throw_with_nested(std::runtime_error("cannot write the recording " + target.string()));
+    std::throw_with_nested(
+        std::runtime_error("cannot write the recording " + output.target().string()));
   }
 }
 
@@ -119,13 +113,9 @@ void MvsecWriter::File::check_frame(const GreyImage& frame, double time_s,
 
 MvsecWriter::MvsecWriter(const std::filesystem::path& file, ImageSize size,
                          const std::string& settings)
-    : file_(std::make_unique<File>()) {
+    : file_(std::make_unique<File>(file, size)) {
   require(size.height > 0 && size.width > 0, "expected a picture size of at least 1x1");
-  file_->target = file;
-  file_->size = size;
-  file_->temporary = temporary_beside(file);
-  file_->created = true;  // from here on the name is ours
-  file_->write([&] { file_->hdf5.emplace(file_->temporary, size, settings); });
+  file_->write([&] { file_->hdf5.emplace(file_->output.temporary(), size, settings); });
 }
 
 MvsecWriter::~MvsecWriter() = default;
@@ -153,15 +143,15 @@ void MvsecWriter::add_frame(const GreyImage& frame, double time_s,
 
 void MvsecWriter::commit() {
   if (file_->times_s.empty()) {
-    throw std::logic_error("expected at least one frame, got none, in " + file_->target.string());
+    throw std::logic_error("expected at least one frame, got none, in " +
+                           file_->output.target().string());
   }
   file_->write([&] { file_->hdf5->close(file_->times_s, file_->event_index); });
   try {
-    sync_to_disk(file_->temporary);
-    publish(file_->temporary, file_->target);
+    file_->output.publish();
   } catch (const std::runtime_error&) {
     std::throw_with_nested(
-        std::runtime_error("cannot write the recording " + file_->target.string()));
+        std::runtime_error("cannot write the recording " + file_->output.target().string()));
   }
   file_->committed = true;
 }

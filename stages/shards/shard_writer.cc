@@ -1,20 +1,3 @@
-// How a shard comes to be under its final name whole or not at all (DESIGN section 6). Steps 2 to 5
-// are `commit`; whatever goes wrong before step 4, the destructor deletes the temporary file.
-//
-//   1. Create FOLDER/.NAME.HOST.PID.ATTEMPT.tmp. The volumes are written to it as they come, in
-//   slot order; the rows
-//      of everything else are kept in memory.
-//   2. Write the rows. Close every object and then the file, checking each close: HDF5 writes
-//      most of its own data only then. The close degree SEMI makes a forgotten object an error.
-//   3. Reopen and fsync, so that the bytes are on disk before the name is; hash them as they are
-//   read back.
-//   4. rename() to FOLDER/NAME. It replaces: of two processes that write the same shard, each
-//   publishes a whole file,
-//      and both files hold the same bytes.
-//   5. fsync FOLDER, so that the name is on disk before the marker can say so.
-//
-// Not everything that a write can meet surfaces in an HDF5 call: see Hdf5OutputFile.
-
 #include "stages/shards/shard_writer.h"
 
 #include <cstdint>
@@ -35,16 +18,15 @@ namespace eventgan {
 
 struct ShardWriter::State {
   ShardHeader header;
-  std::filesystem::path target;
-  std::filesystem::path temporary;
-  bool created = false;
+  AtomicFile output;  ///< before its HDF5, which is closed first
   std::optional<Hdf5OutputFile> file;
   Hdf5Handle volume;
   ShardTables tables;
   int next_slot = 0;
   bool committed = false;
 
-  ~State();
+  State(const std::filesystem::path& folder, const ShardHeader& of)
+      : header(of), output(folder / of.name) {}
 
   /// Runs HDF5 calls; errors name the file.
   template <class Work>
@@ -53,7 +35,7 @@ struct ShardWriter::State {
       work();
     } catch (const Hdf5Error& error) {
       file->check();
-      throw std::runtime_error(target.string() + ": " + error.what());
+      throw std::runtime_error(output.target().string() + ": " + error.what());
     }
     file->check();
   }
@@ -62,14 +44,6 @@ struct ShardWriter::State {
   void write_columns();
   ShardReceipt flush();
 };
-
-ShardWriter::State::~State() {
-  volume = Hdf5Handle();
-  file.reset();
-  if (!created) return;
-  std::error_code ignored;  // after a commit there is nothing to delete
-  std::filesystem::remove(temporary, ignored);
-}
 
 void ShardWriter::State::write_chunk(std::span<const std::byte> chunk) {
   const hsize_t offset[4] = {static_cast<hsize_t>(next_slot), 0, 0, 0};
@@ -105,10 +79,11 @@ void ShardWriter::State::write_columns() {
   });
 }
 
-/// Step 3.
+/// Step 3, and the hash of what is read back.
 ShardReceipt ShardWriter::State::flush() {
+  const std::filesystem::path& temporary = output.temporary();
   try {
-    sync_to_disk(temporary);
+    output.sync();
     return {sha256_of_file(temporary),
             static_cast<std::int64_t>(std::filesystem::file_size(temporary)),
             contents_of(tables, header.label_schema)};
@@ -118,20 +93,16 @@ ShardReceipt ShardWriter::State::flush() {
     std::throw_with_nested(UnfinishedShardLost(
         "expected the file that was being written, got nothing: it was silent for so long that "
         "another process deleted it, in " +
-        target.string()));
+        output.target().string()));
   }
 }
 
 ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header)
-    : state_(std::make_unique<State>()) {
+    : state_(std::make_unique<State>(folder, header)) {
   quiet_hdf5_errors();
   stored_volume_size(header);
   State& state = *state_;
-  state.header = header;
-  state.target = folder / header.name;
-  state.temporary = temporary_beside(state.target);
-  state.created = true;  // whatever fails from here on, nothing stays of it
-  state.file.emplace(state.temporary, creation_properties(H5P_FILE_CREATE));
+  state.file.emplace(state.output.temporary(), creation_properties(H5P_FILE_CREATE));
   state.write([&] { state.volume = create_objects(state.file->id(), header); });
 }
 
@@ -168,7 +139,7 @@ ShardReceipt ShardWriter::commit() {
     state.file->close();
   });
   ShardReceipt receipt = state.flush();
-  publish(state.temporary, state.target);
+  state.output.publish();
   state.committed = true;
   return receipt;
 }

@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <stdexcept>
-#include <system_error>
 
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
@@ -72,23 +71,14 @@ void write_file(hid_t file, const std::vector<DatasetView>& views) {
   }
 }
 
-/// Deleted at the end of its scope, unless it was published.
-struct TemporaryView {
-  std::filesystem::path path;
-  ~TemporaryView() {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-  }
-};
-
 }  // namespace
 
 ViewReceipt write_dataset_view(const std::filesystem::path& target,
                                const std::vector<DatasetView>& views) {
   if (views.empty()) throw std::invalid_argument("expected at least one view, got none");
   quiet_hdf5_errors();
-  const TemporaryView temporary{temporary_beside(target)};
-  Hdf5OutputFile file(temporary.path, creation_properties(H5P_FILE_CREATE));
+  AtomicFile output(target);
+  Hdf5OutputFile file(output.temporary(), creation_properties(H5P_FILE_CREATE));
   try {
     write_file(file.id(), views);
     file.close();
@@ -96,10 +86,10 @@ ViewReceipt write_dataset_view(const std::filesystem::path& target,
     file.check();
     throw std::runtime_error(target.string() + ": " + error.what());
   }
-  sync_to_disk(temporary.path);
-  ViewReceipt receipt{sha256_of_file(temporary.path),
-                      static_cast<std::int64_t>(std::filesystem::file_size(temporary.path))};
-  publish(temporary.path, target);
+  output.sync();
+  ViewReceipt receipt{sha256_of_file(output.temporary()),
+                      static_cast<std::int64_t>(std::filesystem::file_size(output.temporary()))};
+  output.publish();
   return receipt;
 }
 
