@@ -1,14 +1,11 @@
 #include "stages/shards/shard_writer.h"
 
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
 
-#include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_output_file_internal.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_objects_internal.h"
@@ -18,26 +15,23 @@ namespace eventgan {
 
 struct ShardWriter::State {
   ShardHeader header;
-  AtomicFile output;  ///< before its HDF5, which is closed first
-  std::optional<Hdf5OutputFile> file;
+  Hdf5OutputFile file;
   Hdf5Handle volume;
   ShardTables tables;
   int next_slot = 0;
   bool committed = false;
 
   State(const std::filesystem::path& folder, const ShardHeader& of)
-      : header(of), output(folder / of.name) {}
+      : header(of), file(folder / of.name) {}
 
   /// Runs HDF5 calls; errors name the file.
   template <class Work>
   void write(Work&& work) {
     try {
-      work();
+      file.write(work);
     } catch (const Hdf5Error& error) {
-      file->check();
-      throw std::runtime_error(output.target().string() + ": " + error.what());
+      throw std::runtime_error(file.target().string() + ": " + error.what());
     }
-    file->check();
   }
 
   void write_chunk(std::span<const std::byte> chunk);
@@ -75,15 +69,15 @@ void ShardWriter::State::write_columns() {
     if (spec.optional && column.empty()) return;
     Dims dims{rows(spec.rows)};
     dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
-    write_dataset(file->id(), spec.path, column, dims, header.deflate_level);
+    write_dataset(file.id(), spec.path, column, dims, header.deflate_level);
   });
 }
 
 /// Step 3, and the hash of what is read back.
 ShardReceipt ShardWriter::State::flush() {
-  const std::filesystem::path& temporary = output.temporary();
+  const std::filesystem::path& temporary = file.output().temporary();
   try {
-    output.sync();
+    file.output().sync();
     return {sha256_of_file(temporary),
             static_cast<std::int64_t>(std::filesystem::file_size(temporary)),
             contents_of(tables, header.label_schema)};
@@ -93,23 +87,19 @@ ShardReceipt ShardWriter::State::flush() {
     std::throw_with_nested(UnfinishedShardLost(
         "expected the file that was being written, got nothing: it was silent for so long that "
         "another process deleted it, in " +
-        output.target().string()));
+        file.target().string()));
   }
 }
 
-ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header)
-    : state_(std::make_unique<State>(folder, header)) {
-  quiet_hdf5_errors();
+ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header) {
   stored_volume_size(header);
-  State& state = *state_;
-  state.file.emplace(state.output.temporary(), creation_properties(H5P_FILE_CREATE));
-  state.write([&] { state.volume = create_objects(state.file->id(), header); });
+  state_ = std::make_unique<State>(folder, header);
+  state_->write([&] { state_->volume = create_objects(state_->file.id(), header); });
 }
 
-ShardWriter::~ShardWriter() { quiet_hdf5_errors(); }
+ShardWriter::~ShardWriter() = default;
 
 void ShardWriter::append(const ShardSample& sample, std::span<const std::byte> chunk) {
-  quiet_hdf5_errors();
   State& state = *state_;
   const std::string where = " (" + sample.sample_id + ", " + state.header.name + ")";
   if (state.committed || state.next_slot == state.header.sample_count) {
@@ -124,7 +114,6 @@ void ShardWriter::append(const ShardSample& sample, std::span<const std::byte> c
 }
 
 ShardReceipt ShardWriter::commit() {
-  quiet_hdf5_errors();
   State& state = *state_;
   if (state.committed) throw std::logic_error("a shard is committed once: " + state.header.name);
   if (state.next_slot != state.header.sample_count) {
@@ -134,12 +123,12 @@ ShardReceipt ShardWriter::commit() {
   }
   state.write([&] {
     state.write_columns();
-    describe_columns(state.file->id(), state.header);
+    describe_columns(state.file.id(), state.header);
     state.volume.close("/events/volume");
-    state.file->close();
+    state.file.close();
   });
   ShardReceipt receipt = state.flush();
-  state.output.publish();
+  state.file.output().publish();
   state.committed = true;
   return receipt;
 }

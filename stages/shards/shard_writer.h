@@ -36,8 +36,7 @@ class UnfinishedShardLost : public std::runtime_error {
 /// the caller's next step. A writer destroyed before `commit` deletes its temporary file.
 ///
 /// The same header and samples give the same bytes. Errors (disk full, no permission) are thrown as
-/// std::runtime_error that names the path. Thread safety: HDF5 has one global lock, so use one
-/// writer, from one thread at a time.
+/// std::runtime_error that names the path. Thread safety: one writer is for one thread at a time.
 class ShardWriter {
  public:
   /// Throws std::invalid_argument for an empty shape or volumes of 4 GiB and more.

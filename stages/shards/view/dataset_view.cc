@@ -3,22 +3,13 @@
 #include <cstdint>
 #include <stdexcept>
 
-#include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_attribute_internal.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_output_file_internal.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/view/view_columns_internal.h"
 
 namespace eventgan {
 namespace {
-
-Hdf5Handle create_group(hid_t location, const std::string& name) {
-  const Hdf5Handle creation = creation_properties(H5P_GROUP_CREATE);
-  return {H5Gcreate2(location, name.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose,
-          "create", name};
-}
 
 /// Groups `shards` and `splits`: which rows are whose.
 template <class Range, class NameOf>
@@ -76,16 +67,16 @@ void write_file(hid_t file, const std::vector<DatasetView>& views) {
 ViewReceipt write_dataset_view(const std::filesystem::path& target,
                                const std::vector<DatasetView>& views) {
   if (views.empty()) throw std::invalid_argument("expected at least one view, got none");
-  quiet_hdf5_errors();
-  AtomicFile output(target);
-  Hdf5OutputFile file(output.temporary(), creation_properties(H5P_FILE_CREATE));
+  Hdf5OutputFile file(target);
   try {
-    write_file(file.id(), views);
-    file.close();
+    file.write([&] {
+      write_file(file.id(), views);
+      file.close();
+    });
   } catch (const Hdf5Error& error) {
-    file.check();
     throw std::runtime_error(target.string() + ": " + error.what());
   }
+  AtomicFile& output = file.output();
   output.sync();
   ViewReceipt receipt{sha256_of_file(output.temporary()),
                       static_cast<std::int64_t>(std::filesystem::file_size(output.temporary()))};

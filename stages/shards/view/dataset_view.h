@@ -32,7 +32,7 @@ struct ViewReceipt {
 /// same views give the same bytes; the file is published whole (atomic_file.h). `views`:
 /// at least one; more than one must all have groups, each its own.
 ///
-/// Throws std::runtime_error naming the path. Thread safety: as HDF5, one thread at a time.
+/// Throws std::runtime_error naming the path. Thread safe.
 ViewReceipt write_dataset_view(const std::filesystem::path& target,
                                const std::vector<DatasetView>& views);
 
