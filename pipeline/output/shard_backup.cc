@@ -11,7 +11,6 @@
 #include "pipeline/output/shard_state.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/files/stale_temporaries.h"
 #include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"
 

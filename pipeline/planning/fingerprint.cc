@@ -1,6 +1,5 @@
 #include "pipeline/planning/fingerprint.h"
 
-#include <hdf5.h>
 #include <link.h>
 #include <png.h>
 #include <zlib.h>
@@ -14,6 +13,7 @@
 
 #include "manifests/manifest_fields.h"
 #include "stages/files/sha256.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 namespace {
@@ -127,10 +127,7 @@ std::string loaded_library(const std::string& name) {
 
 /// Of all that makes or reads bytes, as it runs, which need not be what was compiled against.
 std::string libraries(bool with_videos) {
-  unsigned major = 0, minor = 0, release = 0;
-  H5get_libversion(&major, &minor, &release);
-  std::string text = "HDF5 " + std::to_string(major) + "." + std::to_string(minor) + "." +
-                     std::to_string(release) + ", zlib " + zlibVersion() + ", OpenCV " +
+  std::string text = "HDF5 " + hdf5_version() + ", zlib " + zlibVersion() + ", OpenCV " +
                      cv::getVersionString() + ", libpng " + png_get_libpng_ver(nullptr) + ", " +
                      loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
                      loaded_library("libwebp") + ", " + loaded_library("libtiff");

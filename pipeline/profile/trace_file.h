@@ -3,6 +3,8 @@
 #include <filesystem>
 #include <string_view>
 
+#include "stages/files/atomic_file.h"
+
 namespace eventgan {
 
 /// How every trace of this program begins.
@@ -15,23 +17,16 @@ class TraceFile {
   /// Throws UsageError if `target` cannot be written to, or holds what is neither empty nor a
   /// trace: a trace given the wrong name by a slip of the hand is not worth a manifest. If it is a
   /// link, what it points to is written. Deletes what dead writers of the same trace have left.
-  explicit TraceFile(std::filesystem::path target);
-
-  /// Deletes the temporary file unless it was committed.
-  ~TraceFile();
-  TraceFile(const TraceFile&) = delete;
-  TraceFile& operator=(const TraceFile&) = delete;
+  explicit TraceFile(const std::filesystem::path& target);
 
   /// Throws std::runtime_error naming the path.
   void write(std::string_view text);
 
   /// Flushes to disk and renames, over an earlier trace too. Throws as `write` does. Once.
-  void commit();
+  void commit() { file_.publish(); }
 
  private:
-  std::filesystem::path target_;
-  std::filesystem::path temporary_;
-  int descriptor_ = -1;
+  AtomicFile file_;
 };
 
 }  // namespace eventgan

@@ -8,8 +8,7 @@
 #include "manifests/plan.h"
 #include "pipeline/planning/fingerprint.h"
 #include "stages/files/text_file.h"
-#include "stages/hdf5/hdf5_attribute_internal.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 namespace {
@@ -53,11 +52,9 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
 std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {
   if (!std::filesystem::exists(file)) return std::nullopt;
   require_regular_file(file);
-  quiet_hdf5_errors();
+  const Hdf5Lock lock;
   try {
-    const Hdf5Handle opened(H5Fopen(file.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose, "open",
-                            "the file");
-    return read_text_attribute(opened, kSettingsAttribute);
+    return read_text_attribute(open_hdf5_file(file), kSettingsAttribute);
   } catch (const Hdf5Error&) {
     std::throw_with_nested(
         InputError("expected no file, or a recording that eventgan simulate has written, got "

@@ -20,7 +20,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
                                std::optional<std::int64_t> picture);
 
 /// The settings that a recording on disk was made with; none if there is no such file. Throws
-/// InputError if it is no recording of a simulation. Not thread safe: calls HDF5.
+/// InputError if it is no recording of a simulation. Thread safe.
 std::optional<std::string> settings_on_disk(const std::filesystem::path& file);
 
 /// Throws UsageError telling field by field how `found` differs from `expected`, if it does.

@@ -15,7 +15,7 @@
 #include "pipeline/simulation/recording_plan.h"
 #include "pipeline/simulation/recording_settings.h"
 #include "pipeline/threads/thread_count.h"
-#include "stages/files/stale_temporaries.h"
+#include "stages/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

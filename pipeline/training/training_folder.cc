@@ -1,6 +1,6 @@
 #include "pipeline/training/training_folder.h"
 
-#include "stages/files/stale_temporaries.h"
+#include "stages/files/unfinished_files.h"
 
 namespace eventgan {
 

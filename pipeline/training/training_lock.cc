@@ -10,7 +10,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/files/temporary_name.h"
+#include "stages/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

@@ -13,8 +13,8 @@
 
 namespace eventgan {
 
-/// Compares shards with the sources they were made from, as these are today. Thread safety: as
-/// HDF5, one thread at a time.
+/// Compares shards with the sources they were made from, as these are today. Thread safety: one
+/// thread at a time.
 class SourceComparison {
  public:
   /// Opens the sources of `manifest`, which is the frozen one. A source that is not there is left

@@ -19,8 +19,7 @@ struct Hdf5Arrays {
 /// variable length. A dataset that claims more values than its stored bytes can hold is refused
 /// before anything is allocated. Links into other files are not followed.
 ///
-/// Throws std::runtime_error naming the file and the dataset. HDF5 is not thread safe: call this
-/// only while no other thread uses HDF5.
+/// Throws std::runtime_error naming the file and the dataset. Thread safe.
 Hdf5Arrays read_hdf5_arrays(const std::filesystem::path& file);
 
 }  // namespace eventgan

@@ -7,11 +7,11 @@
 
 #include <atomic>
 #include <cerrno>
-#include <cstring>
-#include <stdexcept>
+#include <string>
+#include <system_error>
 #include <utility>
 
-#include "stages/files/temporary_name.h"
+#include "stages/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {
@@ -19,51 +19,12 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void fail(const std::string& what) {
-  throw std::runtime_error(what + ": " + std::strerror(errno));
+  throw std::system_error(errno, std::generic_category(), what);
 }
 
 fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
 }
-
-/// A file under a temporary name, closed and deleted at the end of its scope; after it was
-/// published there is nothing left to delete.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const fs::path& target)
-      : path_(temporary_beside(target)),
-        descriptor_(::open(path_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666)) {
-    if (descriptor_ < 0) fail("cannot create " + path_.string());
-  }
-  ~TemporaryFile() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-    ::unlink(path_.c_str());
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-
-  const fs::path& path() const { return path_; }
-
-  void write(std::string_view text) {
-    while (!text.empty()) {
-      const ssize_t written = ::write(descriptor_, text.data(), text.size());
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) fail("cannot write " + path_.string());
-      text.remove_prefix(static_cast<std::size_t>(written));
-    }
-  }
-
-  /// Fsyncs and closes: network file systems report some errors of writing only here.
-  void finish() {
-    if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) {
-      fail("cannot write " + path_.string());
-    }
-  }
-
- private:
-  fs::path path_;
-  int descriptor_;
-};
 
 /// link() and not rename(), because it fails where the target exists. Over NFS its answer can be
 /// lost after it worked; the count of links tells.
@@ -112,26 +73,64 @@ void publish(const fs::path& temporary, const fs::path& target) {
   sync_to_disk(folder_of(target));
 }
 
-void write_file_atomically(const fs::path& target, std::string_view text) {
-  TemporaryFile temporary(target);
-  temporary.write(text);
-  temporary.finish();
-  publish(temporary.path(), target);
+AtomicFile::AtomicFile(fs::path target)
+    : target_(std::move(target)), temporary_(temporary_beside(target_)) {}
+
+AtomicFile::~AtomicFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+  ::unlink(temporary_.c_str());  // of a link to it, or what is left after an error
 }
 
-bool create_file_atomically(const fs::path& target, std::string_view text) {
-  return create_file_atomically(target, [&](const TextSink& sink) { sink(text); });
+void AtomicFile::create() {
+  descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  if (descriptor_ < 0) fail("cannot create " + temporary_.string());
+}
+
+void AtomicFile::write(std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t written = ::write(descriptor_, bytes.data(), bytes.size());
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail("cannot write " + temporary_.string());
+    bytes.remove_prefix(static_cast<std::size_t>(written));
+  }
+}
+
+void AtomicFile::sync() {
+  if (descriptor_ < 0) {
+    sync_to_disk(temporary_);
+    // Network file systems report some errors of writing only when a file is closed.
+  } else if (::fsync(descriptor_) != 0 || ::close(std::exchange(descriptor_, -1)) != 0) {
+    fail("cannot write " + temporary_.string());
+  }
+  synced_ = true;
+}
+
+void AtomicFile::publish() {
+  if (!synced_) sync();
+  eventgan::publish(temporary_, target_);
+}
+
+bool AtomicFile::publish_if_absent() {
+  if (!synced_) sync();
+  if (!link_exclusively(temporary_, target_)) return false;
+  sync_to_disk(folder_of(target_));
+  return true;
+}
+
+void write_file_atomically(const fs::path& target, std::string_view text) {
+  AtomicFile file(target);
+  file.create();
+  file.write(text);
+  file.publish();
 }
 
 bool create_file_atomically(const fs::path& target,
                             const std::function<void(const TextSink&)>& write) {
   if (fs::exists(fs::symlink_status(target))) return false;
-  TemporaryFile temporary(target);
-  write([&](std::string_view text) { temporary.write(text); });
-  temporary.finish();
-  if (!link_exclusively(temporary.path(), target)) return false;
-  sync_to_disk(folder_of(target));
-  return true;
+  AtomicFile file(target);
+  file.create();
+  write([&](std::string_view text) { file.write(text); });
+  return file.publish_if_absent();
 }
 
 }  // namespace eventgan

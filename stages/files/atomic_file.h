@@ -2,36 +2,87 @@
 
 #include <filesystem>
 #include <functional>
-#include <string>
 #include <string_view>
 
 namespace eventgan {
 
-/// A name for a temporary file beside `target` that no other writer uses:
-/// ".NAME.HOST.PID.ATTEMPT.tmp".
-std::filesystem::path temporary_beside(const std::filesystem::path& target);
+// How every file that this program writes comes to be under its name whole or not at all (DESIGN
+// section 6, manifests/guarantees.md):
+//
+//   1. Create a temporary of a name that no other writer uses, beside the target:
+//      FOLDER/.NAME.HOST.PID.ATTEMPT.tmp.
+//   2. Write it, and close it where somebody else than AtomicFile writes; each write and close is
+//      checked.
+//   3. fsync it, so that the bytes are on disk before the name is.
+//   4. rename() it to FOLDER/NAME. That replaces: of two processes that write the same file, each
+//      publishes a whole one. Where a file must not be replaced, link() it, which fails if one is
+//      there.
+//   5. fsync FOLDER, so that the name is on disk before anything can say so.
+//
+// What fails before step 4 is thrown, the temporary is removed, and the target is what it was; if
+// step 5 fails, the whole file has its name, but a power cut may take it. After a kill -9 or a
+// power cut before step 4 the temporary stays, with a name that says whose it was: the next run
+// removes it (unfinished_files.h).
+//
+// Errors of the system are std::system_error, a std::runtime_error, "cannot DO PATH: REASON".
 
-/// fsync of a file or a folder. Throws std::runtime_error naming the path.
-void sync_to_disk(const std::filesystem::path& path);
+/// A file on its way through the steps above. Thread safety: one thread at a time.
+class AtomicFile {
+ public:
+  /// Chooses the temporary's name. Made it is by `create`, or by a library that writes files by
+  /// itself.
+  explicit AtomicFile(std::filesystem::path target);
 
-/// Renames `temporary` to `target` and fsyncs the folder: afterwards `target` is whole, also after
-/// a power cut. Throws std::runtime_error naming both paths.
-void publish(const std::filesystem::path& temporary, const std::filesystem::path& target);
+  /// Removes the temporary, unless that has the target's name by now.
+  ~AtomicFile();
+  AtomicFile(const AtomicFile&) = delete;
+  AtomicFile& operator=(const AtomicFile&) = delete;
 
-/// Writes `text` under a temporary name, fsyncs it and publishes it. On an error the temporary is
-/// gone and `target` is what it was. Throws std::runtime_error naming the path.
+  const std::filesystem::path& target() const { return target_; }
+  const std::filesystem::path& temporary() const { return temporary_; }
+
+  /// Steps 1 and 2 for bytes.
+  void create();
+  void write(std::string_view bytes);
+
+  /// Step 3, for those who want to hash what is on disk.
+  void sync();
+
+  /// Steps 3, unless that is done, to 5. Once.
+  void publish();
+
+  /// The same, but only if the target does not exist; false if it does.
+  bool publish_if_absent();
+
+ private:
+  std::filesystem::path target_;
+  std::filesystem::path temporary_;
+  int descriptor_ = -1;  ///< of the temporary, while it is written here
+  bool synced_ = false;
+};
+
+/// Writes `text` as `target`, in place of what was there.
 void write_file_atomically(const std::filesystem::path& target, std::string_view text);
-
-/// The same, but only if `target` does not exist; false (and nothing changed) if it does. Of two
-/// processes that race, one wins.
-bool create_file_atomically(const std::filesystem::path& target, std::string_view text);
 
 /// Takes a file's text piece by piece; pieces should be large.
 using TextSink = std::function<void(std::string_view)>;
 
-/// The same for a text that need not stand in memory: `write` is called with the sink to give it
-/// to, unless `target` exists already. What `write` throws is passed on, and nothing has changed.
+/// Writes a text that need not stand in memory, but only if `target` does not exist; false (and
+/// nothing changed) if it does. Of two processes that race, one wins. `write` is called with the
+/// sink to give the text to, unless `target` exists already. What it throws is passed on, and
+/// nothing has changed.
 bool create_file_atomically(const std::filesystem::path& target,
                             const std::function<void(const TextSink&)>& write);
+
+// The steps alone, for what is no new file (a backup that is put back, a checkpoint that moves on).
+
+/// Step 1's name, never given twice.
+std::filesystem::path temporary_beside(const std::filesystem::path& target);
+
+/// fsync of a file or a folder.
+void sync_to_disk(const std::filesystem::path& path);
+
+/// Steps 4 and 5: afterwards `target` is whole, also after a power cut.
+void publish(const std::filesystem::path& temporary, const std::filesystem::path& target);
 
 }  // namespace eventgan

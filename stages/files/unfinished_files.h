@@ -1,11 +1,39 @@
 #pragma once
 
+#include <sys/types.h>
+
 #include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
-#include "stages/files/temporary_name.h"
-
 namespace eventgan {
+
+// What is between steps 1 and 4 of atomic_file.h: files under way, and what dead writers left.
+
+/// Name of a file that is being written: ".NAME.HOST.PID.ATTEMPT.tmp", so that everyone can tell
+/// whose it is.
+struct TemporaryName {
+  std::string target;  ///< name of the file it will become
+  std::string host;    ///< without dots, see host_name
+  pid_t pid = 0;
+  unsigned attempt = 0;  ///< counts within the process
+  bool operator==(const TemporaryName&) const = default;
+};
+
+std::string to_string(const TemporaryName& name);
+
+/// The parts of a temporary file's name, made on any host; nothing for any other name.
+std::optional<TemporaryName> parse_temporary_name(std::string_view name);
+
+/// Where a pid means something: this machine's name and the number of the process's pid namespace
+/// (containers on one machine may share its name and not its pids), without dots: "node7_lab-12".
+std::string host_name();
+
+/// `machine` as part of a file name and free of dots: these and slashes become underlines, which no
+/// valid machine name has.
+std::string without_dots(std::string machine);
 
 /// Whether the process that writes a temporary file lives.
 enum class WriterLife {
@@ -37,5 +65,11 @@ std::vector<UnfinishedFile> unfinished_files(const std::filesystem::path& folder
 
 /// Whether its writer is dead, as far as can be known.
 bool is_stale(const UnfinishedFile& file);
+
+/// Deletes the temporary files in `folder` (not below it) whose writers are dead, as is_stale
+/// tells, of the file named `target` or, where that is empty, of all; every other file stays. Gives
+/// the deleted paths, sorted. Throws std::runtime_error naming the folder if it cannot be listed.
+std::vector<std::filesystem::path> remove_stale_temporaries(const std::filesystem::path& folder,
+                                                            std::string_view target = {});
 
 }  // namespace eventgan

@@ -131,31 +131,28 @@ hid_t register_driver() {
 
 }  // namespace
 
-Hdf5OutputFile::Hdf5OutputFile(const std::filesystem::path& path, hid_t creation)
-    : path_(path), error_(std::make_unique<int>(0)) {
+Hdf5OutputFile::Hdf5OutputFile(const std::filesystem::path& target)
+    : output_(target), error_(std::make_unique<int>(0)) {
+  const Hdf5Lock lock;
   static const hid_t driver = checked(register_driver(), "register", "the file driver");
   const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "create", "access properties");
   int* const error = error_.get();
   checked(H5Pset_driver(access, driver, &error), "set", "the file driver");
   checked(H5Pset_fclose_degree(access, H5F_CLOSE_SEMI), "set", "the close degree");
   checked(H5Pset_libver_bounds(access, H5F_LIBVER_V110, H5F_LIBVER_V110), "set", "the version");
-  const hid_t id = H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation, access);
+  const std::string path = output_.temporary().string();
+  const hid_t id =
+      H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation_properties(H5P_FILE_CREATE), access);
   if (id < 0 && *error != 0) {
-    throw std::runtime_error("cannot create " + path.string() + ": " + std::strerror(*error));
+    throw std::runtime_error("cannot create " + path + ": " + std::strerror(*error));
   }
-  file_ = Hdf5Handle(id, H5Fclose, "create", path.string());
+  file_ = Hdf5Handle(id, H5Fclose, "create", path);
 }
-
-Hdf5OutputFile::~Hdf5OutputFile() = default;
 
 void Hdf5OutputFile::check() const {
   if (*error_ == 0) return;
-  throw std::runtime_error("cannot write " + path_.string() + ": " + std::strerror(*error_));
-}
-
-void Hdf5OutputFile::close() {
-  file_.close(path_.string());
-  check();
+  throw std::runtime_error("cannot write " + output_.temporary().string() + ": " +
+                           std::strerror(*error_));
 }
 
 }  // namespace eventgan

@@ -1,7 +1,5 @@
 #include <algorithm>
 #include <cstdint>
-#include <functional>
-#include <numeric>
 
 #include "stages/recordings/growing_dataset_internal.h"
 
@@ -9,7 +7,7 @@ namespace eventgan {
 namespace {
 
 std::size_t values_per_row(const Dims& dims) {
-  return std::accumulate(dims.begin() + 1, dims.end(), std::size_t{1}, std::multiplies<>());
+  return element_count({dims.begin() + 1, dims.end()});
 }
 
 Dims with_rows(hsize_t rows, const Dims& inner) {
@@ -21,15 +19,11 @@ Dims with_rows(hsize_t rows, const Dims& inner) {
 Hdf5Handle create(hid_t file, const std::string& path, hid_t type, const Dims& dims,
                   const Dims& chunk) {
   const Hdf5Handle creation = creation_properties(H5P_DATASET_CREATE);
-  const int rank = static_cast<int>(chunk.size());
-  checked(H5Pset_chunk(creation, rank, chunk.data()), "chunk", path);
+  set_chunks(creation, chunk, path);
   set_filters(creation, kRecordingDeflateLevel, path);
-  Dims limit = dims;
-  limit[0] = H5S_UNLIMITED;
-  const Hdf5Handle space(H5Screate_simple(rank, dims.data(), limit.data()), H5Sclose, "create",
-                         path);
-  return {H5Dcreate2(file, path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT), H5Dclose,
-          "create", path};
+  Dims limits = dims;
+  limits[0] = H5S_UNLIMITED;
+  return create_dataset(file, path, type, space_of(dims, path, limits), creation);
 }
 
 }  // namespace
@@ -61,13 +55,7 @@ void GrowingDataset<Number>::write_pending() {
   count[0] = pending_.size() / values_per_row(dims_);
   dims_[0] += count[0];
   checked(H5Dset_extent(dataset_, dims_.data()), "extend", path_);
-  const Hdf5Handle to(H5Dget_space(dataset_), H5Sclose, "write", path_);
-  checked(H5Sselect_hyperslab(to, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
-          "select in", path_);
-  const Hdf5Handle from(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr),
-                        H5Sclose, "write", path_);
-  checked(H5Dwrite(dataset_, element_type<Number>(), from, to, H5P_DEFAULT, pending_.data()),
-          "write", path_);
+  write_block(dataset_, path_, start, count, element_type<Number>(), pending_.data());
   pending_.clear();
 }
 

@@ -4,9 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 

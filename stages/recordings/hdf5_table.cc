@@ -8,9 +8,6 @@
 namespace eventgan {
 namespace {
 
-// No deflate stream grows by more than this factor when it is inflated.
-constexpr hsize_t kDeflateLimit = 1032;
-
 constexpr std::size_t kUsualCacheBytes = std::size_t{1} << 20;
 constexpr std::size_t kLargestCacheBytes = std::size_t{16} << 20;
 constexpr std::size_t kChunkCacheSlots = 1009;
@@ -62,12 +59,6 @@ std::string describe_type(hid_t type) {
   }
 }
 
-std::string describe_shape(const Dims& dims) {
-  std::string text;
-  for (const hsize_t dim : dims) text += (text.empty() ? "" : ", ") + std::to_string(dim);
-  return "[" + text + "]";
-}
-
 /// How many values of `width` bytes the dataset's share of the file can give.
 hsize_t most_values(hid_t dataset, std::size_t width) {
   constexpr hsize_t kMost = std::numeric_limits<hsize_t>::max();
@@ -79,24 +70,7 @@ hsize_t most_values(hid_t dataset, std::size_t width) {
   return stored > kMost / growth ? kMost : stored * growth / width;
 }
 
-bool holds_at_most(const Dims& dims, hsize_t limit) {
-  hsize_t count = 1;
-  for (const hsize_t dim : dims) {
-    if (dim == 0) return true;
-  }
-  for (const hsize_t dim : dims) {
-    if (dim > limit / count) return false;
-    count *= dim;
-  }
-  return true;
-}
-
 }  // namespace
-
-bool has_object(hid_t file, const std::string& path) {
-  return H5Lexists(file, path.c_str(), H5P_DEFAULT) > 0 &&
-         H5Oexists_by_name(file, path.c_str(), H5P_DEFAULT) > 0;
-}
 
 Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& file_name)
     : place_(file_name + " (dataset " + path + ")") {
@@ -108,7 +82,7 @@ Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& fil
     is_float_ = type_ == "float32" || type_ == "float64";
     dims_ = dims_of(dataset_, path);
     if (type_ == "text" || type_ == "no numbers") refuse("numbers");
-    if (!holds_at_most(dims_, most_values(dataset_, H5Tget_size(type)))) {
+    if (side_beyond(dims_, most_values(dataset_, H5Tget_size(type)))) {
       refuse("what its " + std::to_string(H5Dget_storage_size(dataset_)) +
              " stored bytes can hold");
     }
@@ -118,17 +92,8 @@ Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& fil
 }
 
 void Hdf5Table::refuse(const std::string& expected) const {
-  throw InputError("expected " + expected + ", got " + type_ + " " + describe_shape(dims_) +
-                   ", in " + place_);
-}
-
-void Hdf5Table::read(const Dims& start, const Dims& count, hid_t memory_type, void* values) const {
-  const Hdf5Handle from(H5Dget_space(dataset_), H5Sclose, "read", place_);
-  checked(H5Sselect_hyperslab(from, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
-          "select in", place_);
-  const Hdf5Handle to(H5Screate_simple(static_cast<int>(count.size()), count.data(), nullptr),
-                      H5Sclose, "read", place_);
-  checked(H5Dread(dataset_, memory_type, to, from, H5P_DEFAULT, values), "read", place_);
+  throw InputError("expected " + expected + ", got " + type_ + " " + shape_text(dims_) + ", in " +
+                   place_);
 }
 
 }  // namespace eventgan

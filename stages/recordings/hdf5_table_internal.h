@@ -2,13 +2,11 @@
 
 #include <string>
 
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 
-/// An open dataset of numbers, of which parts are read. Use it within an Hdf5Turn.
+/// An open dataset of numbers, of which parts are read.
 class Hdf5Table {
  public:
   /// Throws InputError if there is no such dataset, if it does not hold numbers, or if its shape
@@ -29,20 +27,15 @@ class Hdf5Table {
   /// Throws Hdf5Error.
   template <class Number>
   void read(const Dims& start, const Dims& count, Number* values) const {
-    read(start, count, element_type<Number>(), values);
+    read_block(dataset_, place_, start, count, element_type<Number>(), values);
   }
 
  private:
-  void read(const Dims& start, const Dims& count, hid_t memory_type, void* values) const;
-
   std::string place_;
   Hdf5Handle dataset_;
   Dims dims_;
   std::string type_;  ///< numpy's name of it
   bool is_float_ = false;
 };
-
-/// Whether `path` leads to something in `file`.
-bool has_object(hid_t file, const std::string& path);
 
 }  // namespace eventgan

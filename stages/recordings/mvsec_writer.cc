@@ -1,7 +1,3 @@
-// How a recording comes to be under its name whole or not at all: it is written to a temporary name
-// beside it, closed with every close checked, fsynced, renamed, and the folder fsynced. Whatever
-// goes wrong before the rename, the destructor deletes the temporary file.
-
 #include "stages/recordings/mvsec_writer.h"
 
 #include <cmath>
@@ -9,17 +5,19 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
-#include <system_error>
 #include <vector>
 
-#include "stages/files/atomic_file.h"
+#include "stages/hdf5/hdf5_output_file_internal.h"
 #include "stages/recordings/event_check_internal.h"
-#include "stages/recordings/hdf5_turn_internal.h"
-#include "stages/recordings/mvsec_file_internal.h"
+#include "stages/recordings/growing_dataset_internal.h"
+#include "stages/recordings/hdf5_recording_internal.h"
 
 namespace eventgan {
 namespace {
 
+// Events are chunked by column, since x, y, t and p compress best each among its like.
+constexpr hsize_t kEventsPerChunk = 32768;
+constexpr char kCamera[] = "left";
 constexpr double kBeforeAll = -std::numeric_limits<double>::infinity();
 constexpr double kAfterAll = std::numeric_limits<double>::max();
 
@@ -32,14 +30,24 @@ bool is_field(const FlowField& flow, ImageSize size) {
          flow.y_px.size() == size.pixel_count();
 }
 
+/// Runs `work`; its errors name the recording.
+template <class Work>
+void naming(const std::filesystem::path& target, Work work) {
+  try {
+    work();
+  } catch (const std::runtime_error&) {
+    std::throw_with_nested(std::runtime_error("cannot write the recording " + target.string()));
+  }
+}
+
 }  // namespace
 
 struct MvsecWriter::File {
-  std::filesystem::path target;
-  std::filesystem::path temporary;
+  Hdf5OutputFile hdf5;
   ImageSize size;
-  std::optional<MvsecFile> hdf5;
-  bool created = false;
+  std::optional<GrowingDataset<double>> events;
+  std::optional<GrowingDataset<std::uint8_t>> frames;
+  std::optional<GrowingDataset<float>> flow;
   bool committed = false;
   bool has_flow = false;
   std::int64_t event_count = 0;
@@ -47,49 +55,73 @@ struct MvsecWriter::File {
   std::vector<double> times_s;
   std::vector<std::int64_t> event_index;
 
-  ~File();
+  File(const std::filesystem::path& target, ImageSize frame_size)
+      : hdf5(target), size(frame_size) {}
 
-  /// Runs HDF5 calls in this thread's turn; errors name the file.
   template <class Work>
   void write(Work work);
 
+  void create_objects(const std::string& settings);
+  void append_flow(const FlowField& field);
+  void close();
+
+  Dims picture() const {
+    return {static_cast<hsize_t>(size.height), static_cast<hsize_t>(size.width)};
+  }
   double last_frame_s() const { return times_s.empty() ? kBeforeAll : times_s.back(); }
-  std::vector<double> rows_of(std::span<const Event> events) const;
-  void check_frame(const GreyImage& frame, double time_s, const FlowField* flow) const;
+  std::vector<double> rows_of(std::span<const Event> events_to_add) const;
+  void check_frame(const GreyImage& frame, double time_s, const FlowField* flow_to_frame) const;
 };
 
-MvsecWriter::File::~File() {
-  const Hdf5Turn turn;
-  hdf5.reset();
-  if (!created) return;
-  std::error_code ignored;  // after a commit there is nothing to delete
-  std::filesystem::remove(temporary, ignored);
-}
-
+/// Runs HDF5 calls.
 template <class Work>
 void MvsecWriter::File::write(Work work) {
-  if (committed) throw std::logic_error("expected no more calls after commit: " + target.string());
-  const Hdf5Turn turn;
-  try {
-    try {
-      work();
-    } catch (const Hdf5Error&) {
-      if (hdf5) hdf5->check();  // a full disk explains more than what HDF5 made of it
-      throw;
-    }
-    hdf5->check();
-  } catch (const std::runtime_error&) {
-    std::throw_with_nested(std::runtime_error("cannot write the recording " + target.string()));
+  if (committed) {
+    throw std::logic_error("expected no more calls after commit: " + hdf5.target().string());
   }
+  naming(hdf5.target(), [&] { hdf5.write(work); });
+}
+
+void MvsecWriter::File::create_objects(const std::string& settings) {
+  write_attribute(hdf5.id(), "simulation", settings);
+  for (const std::string& path : {std::string("davis"), std::string("davis/") + kCamera}) {
+    create_group(hdf5.id(), path).close(path);
+  }
+  const Hdf5Layout layout = mvsec_layout(kCamera);
+  events.emplace(hdf5.id(), layout.events, Dims{4}, Dims{kEventsPerChunk, 1}, kEventsPerChunk);
+  const Dims sides = picture();
+  frames.emplace(hdf5.id(), layout.frames, sides, Dims{1, sides[0], sides[1]}, 1);
+}
+
+void MvsecWriter::File::append_flow(const FlowField& field) {
+  if (!flow) {
+    const Dims sides = picture();
+    flow.emplace(hdf5.id(), mvsec_layout(kCamera).flow, Dims{2, sides[0], sides[1]},
+                 Dims{1, 1, sides[0], sides[1]}, 1);
+  }
+  flow->append(field.x_px);
+  flow->append(field.y_px);
+}
+
+/// Writes the frames' times and event indices, and closes everything.
+void MvsecWriter::File::close() {
+  const Hdf5Layout layout = mvsec_layout(kCamera);
+  events->close();
+  frames->close();
+  if (flow) flow->close();
+  write_dataset(hdf5.id(), layout.frame_times, times_s, {times_s.size()}, kRecordingDeflateLevel);
+  write_dataset(hdf5.id(), layout.event_index, event_index, {event_index.size()},
+                kRecordingDeflateLevel);
+  hdf5.close();
 }
 
 /// [events, 4], after checking the events.
-std::vector<double> MvsecWriter::File::rows_of(std::span<const Event> events) const {
+std::vector<double> MvsecWriter::File::rows_of(std::span<const Event> events_to_add) const {
   std::vector<double> rows;
-  rows.reserve(4 * events.size());
+  rows.reserve(4 * events_to_add.size());
   EventCheck check(size, last_frame_s(), kAfterAll);
   double last_s = last_event_s;
-  for (const Event& event : events) {
+  for (const Event& event : events_to_add) {
     const StoredEvent row{static_cast<double>(event.x), static_cast<double>(event.y), event.t_s,
                           event.positive ? 1.0 : -1.0};
     try {
@@ -105,27 +137,27 @@ std::vector<double> MvsecWriter::File::rows_of(std::span<const Event> events) co
 }
 
 void MvsecWriter::File::check_frame(const GreyImage& frame, double time_s,
-                                    const FlowField* flow) const {
+                                    const FlowField* flow_to_frame) const {
   require(frame.size == size && frame.pixels.size() == size.pixel_count(),
           "expected frames of the recording's size");
   require(std::isfinite(time_s) && time_s > last_frame_s() && time_s >= last_event_s,
           "expected a frame after the one before and not before any event");
-  if (times_s.empty()) return require(flow == nullptr, "expected no flow to the first frame");
-  if (times_s.size() > 1) {
-    require(has_flow == (flow != nullptr), "expected a flow to every frame but the first, or none");
+  if (times_s.empty()) {
+    return require(flow_to_frame == nullptr, "expected no flow to the first frame");
   }
-  require(flow == nullptr || is_field(*flow, size), "expected a flow of the recording's size");
+  if (times_s.size() > 1) {
+    require(has_flow == (flow_to_frame != nullptr),
+            "expected a flow to every frame but the first, or none");
+  }
+  require(flow_to_frame == nullptr || is_field(*flow_to_frame, size),
+          "expected a flow of the recording's size");
 }
 
 MvsecWriter::MvsecWriter(const std::filesystem::path& file, ImageSize size,
-                         const std::string& settings)
-    : file_(std::make_unique<File>()) {
+                         const std::string& settings) {
   require(size.height > 0 && size.width > 0, "expected a picture size of at least 1x1");
-  file_->target = file;
-  file_->size = size;
-  file_->temporary = temporary_beside(file);
-  file_->created = true;  // from here on the name is ours
-  file_->write([&] { file_->hdf5.emplace(file_->temporary, size, settings); });
+  naming(file, [&] { file_ = std::make_unique<File>(file, size); });
+  file_->write([&] { file_->create_objects(settings); });
 }
 
 MvsecWriter::~MvsecWriter() = default;
@@ -133,7 +165,7 @@ MvsecWriter::~MvsecWriter() = default;
 void MvsecWriter::add_events(std::span<const Event> events) {
   if (events.empty()) return;
   const std::vector<double> rows = file_->rows_of(events);
-  file_->write([&] { file_->hdf5->append_events(rows); });
+  file_->write([&] { file_->events->append(rows); });
   file_->event_count += static_cast<std::int64_t>(events.size());
   file_->last_event_s = events.back().t_s;
 }
@@ -142,9 +174,8 @@ void MvsecWriter::add_frame(const GreyImage& frame, double time_s,
                             const FlowField* flow_from_previous) {
   file_->check_frame(frame, time_s, flow_from_previous);
   file_->write([&] {
-    file_->hdf5->append_frame(frame.pixels);
-    if (flow_from_previous == nullptr) return;
-    file_->hdf5->append_flow(flow_from_previous->x_px, flow_from_previous->y_px);
+    file_->frames->append(frame.pixels);
+    if (flow_from_previous != nullptr) file_->append_flow(*flow_from_previous);
   });
   file_->has_flow = flow_from_previous != nullptr;
   file_->times_s.push_back(time_s);
@@ -152,17 +183,12 @@ void MvsecWriter::add_frame(const GreyImage& frame, double time_s,
 }
 
 void MvsecWriter::commit() {
+  const std::filesystem::path& target = file_->hdf5.target();
   if (file_->times_s.empty()) {
-    throw std::logic_error("expected at least one frame, got none, in " + file_->target.string());
+    throw std::logic_error("expected at least one frame, got none, in " + target.string());
   }
-  file_->write([&] { file_->hdf5->close(file_->times_s, file_->event_index); });
-  try {
-    sync_to_disk(file_->temporary);
-    publish(file_->temporary, file_->target);
-  } catch (const std::runtime_error&) {
-    std::throw_with_nested(
-        std::runtime_error("cannot write the recording " + file_->target.string()));
-  }
+  file_->write([&] { file_->close(); });
+  naming(target, [&] { file_->hdf5.output().publish(); });
   file_->committed = true;
 }
 

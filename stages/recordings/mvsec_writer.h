@@ -15,7 +15,8 @@ namespace eventgan {
 /// or before the frame, -1 if none), and, as in MVSEC's ground-truth files, `flow_dist` [F-1, 2, H,
 /// W] float32 (x, y in pixels) where flows are given. All chunked and compressed, with checksums.
 ///
-/// The file appears under its name on commit() only, whole, in place of one that was there before;
+/// The file appears under its name on commit() only, whole (atomic_file.h), in place of one that
+/// was there before;
 /// without it the destructor leaves nothing behind. The same calls give the same bytes, however the
 /// events are portioned.
 ///

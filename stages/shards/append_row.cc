@@ -153,7 +153,8 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
 
   append_events(sample, tables.events);
   append_pair(header, sample, tables.pairs);
-  tables.original.push_back({sample.annotation.original});
+  tables.original.emplace_back(sample.annotation.original.begin(),
+                               sample.annotation.original.end());
   tables.valid.push_back(sample.valid);
   if (labelled) {
     for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {

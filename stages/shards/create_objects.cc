@@ -3,9 +3,6 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/hdf5/hdf5_attribute_internal.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/volume_words_internal.h"
@@ -15,8 +12,13 @@ namespace {
 
 constexpr char kVolumePath[] = "/events/volume";
 
-Hdf5Handle open_object(hid_t location, const char* path) {
-  return {H5Oopen(location, path, H5P_DEFAULT), H5Oclose, "open", path};
+/// IEEE 754 binary16, which HDF5 1.10 has no name for.
+Hdf5Handle half_type() {
+  Hdf5Handle type = number_type(4, true, true);
+  checked(H5Tset_fields(type, 15, 10, 5, 0, 10), "make", "float16");
+  checked(H5Tset_size(type, 2), "make", "float16");
+  checked(H5Tset_ebias(type, 15), "make", "float16");
+  return type;
 }
 
 void write_root_attributes(hid_t file, const ShardHeader& header) {
@@ -35,15 +37,12 @@ Hdf5Handle create_volume(hid_t file, const ShardHeader& header) {
                   static_cast<hsize_t>(header.volume.size.width)};
   const Dims chunk{1, dims[1], dims[2], dims[3]};
   const Hdf5Handle creation = creation_properties(H5P_DATASET_CREATE);
-  checked(H5Pset_chunk(creation, 4, chunk.data()), "chunk", kVolumePath);
+  set_chunks(creation, chunk, kVolumePath);
   set_filters(creation, header.deflate_level, kVolumePath);
-  const Hdf5Handle space(H5Screate_simple(4, dims.data(), nullptr), H5Sclose, "create",
-                         kVolumePath);
   // HDF5's default fill value is zero and its default is to allocate no chunk before it is written:
   // that is how the slots of quarantined samples read as zeros.
-  return {H5Dcreate2(file, kVolumePath, volume_type(header.dtype), space, H5P_DEFAULT, creation,
-                     H5P_DEFAULT),
-          H5Dclose, "create", kVolumePath};
+  return create_dataset(file, kVolumePath, volume_type(header.dtype), space_of(dims, kVolumePath),
+                        creation);
 }
 
 }  // namespace
@@ -61,6 +60,18 @@ std::size_t stored_volume_size(const ShardHeader& header) {
   return size;
 }
 
+Hdf5Handle volume_type(StoredType type) {
+  switch (type) {
+    case StoredType::kFloat32:
+      return number_type(4, true, true);
+    case StoredType::kFloat16:
+      return half_type();
+    case StoredType::kUint8:
+      return number_type(1, false, false);
+  }
+  throw std::logic_error("unknown stored type");
+}
+
 void describe_origin(hid_t object, const ShardHeader& header) {
   write_attribute(object, "plan_hash", header.plan_hash);
   write_attribute(object, "manifest", header.manifest_text);
@@ -71,12 +82,9 @@ void describe_origin(hid_t object, const ShardHeader& header) {
 }
 
 void create_groups(hid_t location) {
-  const Hdf5Handle creation = creation_properties(H5P_GROUP_CREATE);
   for (const char* path :
        {"events", "events/statistics", "pairs", "labels", "labels/boxes", "labels/poses"}) {
-    Hdf5Handle group(H5Gcreate2(location, path, H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose,
-                     "create", path);
-    group.close(path);
+    create_group(location, path).close(path);
   }
 }
 

@@ -126,7 +126,7 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   }
   sample.statistics = statistics_at(tables.events, row);
   sample.scale = tables.events.scale[row];
-  sample.annotation.original = tables.original[row].value;
+  sample.annotation.original.assign(tables.original[row].begin(), tables.original[row].end());
 
   const auto rows_of = [row](const std::vector<std::int64_t>& offsets, auto&& each) {
     for (std::int64_t k = offsets[row]; k < offsets[row + 1]; ++k)

@@ -1,8 +1,5 @@
 #include <string>
 
-#include "stages/hdf5/hdf5_attribute_internal.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/volume_words_internal.h"
 
@@ -10,10 +7,6 @@ namespace eventgan {
 namespace {
 
 constexpr char kVolumePath[] = "/events/volume";
-
-Hdf5Handle open_object(hid_t file, const char* path) {
-  return {H5Oopen(file, path, H5P_DEFAULT), H5Oclose, "open", path};
-}
 
 void check_format(hid_t file) {
   const std::string format = read_text_attribute(file, "format");

@@ -136,7 +136,7 @@ std::vector<std::string> count_faults(const std::filesystem::path& shard,
   ShardTables tables;
   LabelSchema schema;
   {
-    const auto turn = hdf5_turn();
+    const Hdf5Lock lock;
     ShardFile file = open_shard(shard, faults, Columns::kCounted);
     tables = std::move(file.tables);
     schema = std::move(file.header.label_schema);

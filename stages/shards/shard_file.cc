@@ -10,8 +10,6 @@
 
 #include "manifests/faults.h"
 #include "stages/files/text_file.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/codec/fletcher32.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_file_internal.h"
@@ -21,19 +19,6 @@ namespace eventgan {
 namespace {
 
 constexpr char kVolumePath[] = "/events/volume";
-
-Hdf5Handle open_file(const std::filesystem::path& path) {
-  const Hdf5Handle access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose, "create", "access properties");
-  // A shard under its final name never changes, and many cluster file systems have no locks.
-  checked(H5Pset_file_locking(access, false, true), "set", "file locking");
-  return {H5Fopen(path.c_str(), H5F_ACC_RDONLY, access), H5Fclose, "open", "the file"};
-}
-
-std::string shape_text(const Dims& dims) {
-  std::string text;
-  for (const hsize_t dim : dims) text += (text.empty() ? "" : ", ") + std::to_string(dim);
-  return "[" + text + "]";
-}
 
 /// Shuffle, deflate (at level 0 none), fletcher32.
 bool has_own_filters(hid_t volume, int deflate_level) {
@@ -127,24 +112,17 @@ class ColumnReader {
 
 }  // namespace
 
-std::unique_lock<std::mutex> hdf5_turn() {
-  static std::mutex mutex;
-  return std::unique_lock(mutex);
-}
-
 ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>& faults,
                      Columns columns) {
-  quiet_hdf5_errors();
   if (std::error_code ignored; !std::filesystem::exists(path, ignored)) {
     throw InputError("expected a shard, got no file, in " + path.string());
   }
   ShardFile shard;
   require_regular_file(path);
   try {
-    shard.file = open_file(path);
+    shard.file = open_hdf5_file(path);
     shard.header = read_header(shard.file);
-    shard.volume =
-        Hdf5Handle(H5Dopen2(shard.file, kVolumePath, H5P_DEFAULT), H5Dclose, "open", kVolumePath);
+    shard.volume = open_object(shard.file, kVolumePath);
     stored_volume_size(shard.header);
     shard.has_own_filters = has_own_filters(shard.volume, shard.header.deflate_level);
   } catch (const std::exception& error) {
@@ -157,17 +135,11 @@ ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>
 
 std::vector<std::byte> read_stored_volume(const ShardFile& shard, int slot) {
   const Dims dims = dims_of(shard.volume, kVolumePath);
-  const Dims start{static_cast<hsize_t>(slot), 0, 0, 0};
-  const Dims count{1, dims[1], dims[2], dims[3]};
-  const Hdf5Handle from(H5Dget_space(shard.volume), H5Sclose, "read", kVolumePath);
-  checked(H5Sselect_hyperslab(from, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr),
-          "select in", kVolumePath);
-  const Hdf5Handle to(H5Screate_simple(4, count.data(), nullptr), H5Sclose, "read", kVolumePath);
   std::vector<std::byte> bytes(stored_volume_size(shard.header));
   // Read as it is stored: HDF5's own conversion from float16 is slow.
-  checked(
-      H5Dread(shard.volume, volume_type(shard.header.dtype), to, from, H5P_DEFAULT, bytes.data()),
-      "read", std::string(kVolumePath) + "[" + std::to_string(slot) + "]");
+  read_block(shard.volume, std::string(kVolumePath) + "[" + std::to_string(slot) + "]",
+             {static_cast<hsize_t>(slot), 0, 0, 0}, {1, dims[1], dims[2], dims[3]},
+             volume_type(shard.header.dtype), bytes.data());
   return bytes;
 }
 

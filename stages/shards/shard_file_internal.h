@@ -1,19 +1,14 @@
 #pragma once
 
 #include <filesystem>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "manifests/shard.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {
-
-/// HDF5 takes one thread at a time: those that read shards side by side hold this lock for every
-/// call of it, closing included, and do the rest (hashing, inflating, checking) without it.
-std::unique_lock<std::mutex> hdf5_turn();
 
 /// A shard open for reading, with everything in memory but the volumes.
 struct ShardFile {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "manifests/shard.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 
@@ -11,6 +11,9 @@ namespace eventgan {
 /// Bytes of one volume as stored, before compression. Throws std::invalid_argument if HDF5 has no
 /// chunks that large (4 GiB), or the shape is empty.
 std::size_t stored_volume_size(const ShardHeader& header);
+
+/// The type of `/events/volume`.
+Hdf5Handle volume_type(StoredType type);
 
 /// Everything that is known before the first sample. Returns the open dataset `/events/volume`.
 Hdf5Handle create_objects(hid_t file, const ShardHeader& header);

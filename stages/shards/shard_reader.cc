@@ -15,12 +15,6 @@ struct ShardReader::State {
   std::string path;
   ShardFile shard;
 
-  ~State() {
-    const auto turn = hdf5_turn();
-    shard.volume = {};
-    shard.file = {};
-  }
-
   void check_slot(int slot) const {
     if (slot >= 0 && slot < shard.header.sample_count) return;
     throw std::out_of_range("expected a sample 0.." +
@@ -31,8 +25,7 @@ struct ShardReader::State {
   /// Empty if there is none, or it went through other filters.
   std::vector<std::byte> chunk_if_own(int slot) const {
     if (!shard.has_own_filters) return {};
-    const auto turn = hdf5_turn();
-    quiet_hdf5_errors();
+    const Hdf5Lock lock;
     return read_stored_chunk(shard, slot);
   }
 };
@@ -41,7 +34,7 @@ ShardReader::ShardReader(const std::filesystem::path& file) : state_(std::make_u
   state_->path = file.string();
   std::vector<std::string> faults;
   {
-    const auto turn = hdf5_turn();
+    const Hdf5Lock lock;
     state_->shard = open_shard(file, faults);
   }
   if (faults.empty()) return;
@@ -78,8 +71,7 @@ std::vector<float> ShardReader::volume(int slot) const {
     }
   } catch (const Hdf5Error&) {  // the same again, in HDF5's words
   }
-  const auto turn = hdf5_turn();
-  quiet_hdf5_errors();
+  const Hdf5Lock lock;
   try {
     return dequantize(read_stored_volume(shard, slot), shard.header.dtype, scale);
   } catch (const Hdf5Error& error) {
@@ -89,8 +81,7 @@ std::vector<float> ShardReader::volume(int slot) const {
 
 std::vector<std::byte> ShardReader::stored_chunk(int slot) const {
   state_->check_slot(slot);
-  const auto turn = hdf5_turn();
-  quiet_hdf5_errors();
+  const Hdf5Lock lock;
   try {
     return read_stored_chunk(state_->shard, slot);
   } catch (const Hdf5Error& error) {

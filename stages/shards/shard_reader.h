@@ -12,7 +12,7 @@ namespace eventgan {
 
 /// Reads a shard back, field by field and with every checksum. Errors are std::runtime_error naming
 /// the file and the HDF5 path. Thread safety: several threads may have readers and share them; what
-/// HDF5 does for them takes turns. Nothing else may use HDF5 meanwhile.
+/// HDF5 does for them takes turns.
 class ShardReader {
  public:
   /// Reads everything but the volumes. Throws InputError if there is no file, std::runtime_error if

@@ -6,11 +6,6 @@
 
 namespace eventgan {
 
-/// An element of a column of byte sequences.
-struct Bytes {
-  std::string value;
-};
-
 // Everything in a shard but the volumes, column by column: a member for each dataset, of the same
 // name and element type; arrays with inner dimensions are flat, in C order. shard_columns.h says
 // which is where; manifests/guides/shard_format.md says what each means.
@@ -64,7 +59,7 @@ struct PoseColumns {
 struct ShardTables {
   EventColumns events;
   PairColumns pairs;
-  std::vector<Bytes> original;
+  std::vector<std::vector<char>> original;  ///< bytes
   BoxColumns boxes;
   PoseColumns poses;
   std::vector<std::uint8_t> valid;

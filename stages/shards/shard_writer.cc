@@ -1,31 +1,11 @@
-// How a shard comes to be under its final name whole or not at all (DESIGN section 6). Steps 2 to 5
-// are `commit`; whatever goes wrong before step 4, the destructor deletes the temporary file.
-//
-//   1. Create FOLDER/.NAME.HOST.PID.ATTEMPT.tmp. The volumes are written to it as they come, in
-//   slot order; the rows
-//      of everything else are kept in memory.
-//   2. Write the rows. Close every object and then the file, checking each close: HDF5 writes
-//      most of its own data only then. The close degree SEMI makes a forgotten object an error.
-//   3. Reopen and fsync, so that the bytes are on disk before the name is; hash them as they are
-//   read back.
-//   4. rename() to FOLDER/NAME. It replaces: of two processes that write the same shard, each
-//   publishes a whole file,
-//      and both files hold the same bytes.
-//   5. fsync FOLDER, so that the name is on disk before the marker can say so.
-//
-// Not everything that a write can meet surfaces in an HDF5 call: see Hdf5OutputFile.
-
 #include "stages/shards/shard_writer.h"
 
 #include <cstdint>
-#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <vector>
 
-#include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_output_file_internal.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_objects_internal.h"
@@ -35,41 +15,29 @@ namespace eventgan {
 
 struct ShardWriter::State {
   ShardHeader header;
-  std::filesystem::path target;
-  std::filesystem::path temporary;
-  bool created = false;
-  std::optional<Hdf5OutputFile> file;
+  Hdf5OutputFile file;
   Hdf5Handle volume;
   ShardTables tables;
   int next_slot = 0;
   bool committed = false;
 
-  ~State();
+  State(const std::filesystem::path& folder, const ShardHeader& of)
+      : header(of), file(folder / of.name) {}
 
   /// Runs HDF5 calls; errors name the file.
   template <class Work>
   void write(Work&& work) {
     try {
-      work();
+      file.write(work);
     } catch (const Hdf5Error& error) {
-      file->check();
-      throw std::runtime_error(target.string() + ": " + error.what());
+      throw std::runtime_error(file.target().string() + ": " + error.what());
     }
-    file->check();
   }
 
   void write_chunk(std::span<const std::byte> chunk);
   void write_columns();
   ShardReceipt flush();
 };
-
-ShardWriter::State::~State() {
-  volume = Hdf5Handle();
-  file.reset();
-  if (!created) return;
-  std::error_code ignored;  // after a commit there is nothing to delete
-  std::filesystem::remove(temporary, ignored);
-}
 
 void ShardWriter::State::write_chunk(std::span<const std::byte> chunk) {
   const hsize_t offset[4] = {static_cast<hsize_t>(next_slot), 0, 0, 0};
@@ -101,14 +69,15 @@ void ShardWriter::State::write_columns() {
     if (spec.optional && column.empty()) return;
     Dims dims{rows(spec.rows)};
     dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
-    write_dataset(file->id(), spec.path, column, dims, header.deflate_level);
+    write_dataset(file.id(), spec.path, column, dims, header.deflate_level);
   });
 }
 
-/// Step 3.
+/// Step 3, and the hash of what is read back.
 ShardReceipt ShardWriter::State::flush() {
+  const std::filesystem::path& temporary = file.output().temporary();
   try {
-    sync_to_disk(temporary);
+    file.output().sync();
     return {sha256_of_file(temporary),
             static_cast<std::int64_t>(std::filesystem::file_size(temporary)),
             contents_of(tables, header.label_schema)};
@@ -118,27 +87,19 @@ ShardReceipt ShardWriter::State::flush() {
     std::throw_with_nested(UnfinishedShardLost(
         "expected the file that was being written, got nothing: it was silent for so long that "
         "another process deleted it, in " +
-        target.string()));
+        file.target().string()));
   }
 }
 
-ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header)
-    : state_(std::make_unique<State>()) {
-  quiet_hdf5_errors();
+ShardWriter::ShardWriter(const std::filesystem::path& folder, const ShardHeader& header) {
   stored_volume_size(header);
-  State& state = *state_;
-  state.header = header;
-  state.target = folder / header.name;
-  state.temporary = temporary_beside(state.target);
-  state.created = true;  // whatever fails from here on, nothing stays of it
-  state.file.emplace(state.temporary, creation_properties(H5P_FILE_CREATE));
-  state.write([&] { state.volume = create_objects(state.file->id(), header); });
+  state_ = std::make_unique<State>(folder, header);
+  state_->write([&] { state_->volume = create_objects(state_->file.id(), header); });
 }
 
-ShardWriter::~ShardWriter() { quiet_hdf5_errors(); }
+ShardWriter::~ShardWriter() = default;
 
 void ShardWriter::append(const ShardSample& sample, std::span<const std::byte> chunk) {
-  quiet_hdf5_errors();
   State& state = *state_;
   const std::string where = " (" + sample.sample_id + ", " + state.header.name + ")";
   if (state.committed || state.next_slot == state.header.sample_count) {
@@ -153,7 +114,6 @@ void ShardWriter::append(const ShardSample& sample, std::span<const std::byte> c
 }
 
 ShardReceipt ShardWriter::commit() {
-  quiet_hdf5_errors();
   State& state = *state_;
   if (state.committed) throw std::logic_error("a shard is committed once: " + state.header.name);
   if (state.next_slot != state.header.sample_count) {
@@ -163,12 +123,12 @@ ShardReceipt ShardWriter::commit() {
   }
   state.write([&] {
     state.write_columns();
-    describe_columns(state.file->id(), state.header);
+    describe_columns(state.file.id(), state.header);
     state.volume.close("/events/volume");
-    state.file->close();
+    state.file.close();
   });
   ShardReceipt receipt = state.flush();
-  publish(state.temporary, state.target);
+  state.file.output().publish();
   state.committed = true;
   return receipt;
 }

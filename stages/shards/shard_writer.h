@@ -27,19 +27,16 @@ class UnfinishedShardLost : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Writes one shard so that it is under its final name whole or not at all. The protocol (DESIGN
-/// section 6):
-///   1. create FOLDER/.NAME.HOST.PID.ATTEMPT.tmp, write samples in slot order;
-///   2. close every HDF5 object and the file, checking each close;
-///   3. reopen, fsync, hash;
-///   4. rename to FOLDER/NAME;
-///   5. fsync the folder.
-/// The marker is the caller's next step (see atomic_file.h). A writer destroyed before `commit`
-/// deletes its temporary file.
+/// Writes one shard so that it is under its final name whole or not at all, by the steps of
+/// atomic_file.h: volumes are written to the temporary as they come, in slot order, and the rows of
+/// everything else are kept in memory until `commit`. That closes every HDF5 object and then the
+/// file, checking each close, since HDF5 writes most of its own data only then; the close degree
+/// SEMI makes a forgotten object an error. Not everything that a write can meet surfaces in an HDF5
+/// call: see Hdf5OutputFile. The file is hashed as it is read back after its fsync. The marker is
+/// the caller's next step. A writer destroyed before `commit` deletes its temporary file.
 ///
 /// The same header and samples give the same bytes. Errors (disk full, no permission) are thrown as
-/// std::runtime_error that names the path. Thread safety: HDF5 has one global lock, so use one
-/// writer, from one thread at a time.
+/// std::runtime_error that names the path. Thread safety: one writer is for one thread at a time.
 class ShardWriter {
  public:
   /// Throws std::invalid_argument for an empty shape or volumes of 4 GiB and more.
@@ -55,8 +52,8 @@ class ShardWriter {
   /// schema; after any other error the writer can only be destroyed.
   void append(const ShardSample& sample, std::span<const std::byte> chunk);
 
-  /// Steps 2-5. Throws std::logic_error if slots are missing, UnfinishedShardLost if the temporary
-  /// file is gone. Once.
+  /// Steps 2 to 5. Throws std::logic_error if slots are missing, UnfinishedShardLost if the
+  /// temporary file is gone. Once.
   ShardReceipt commit();
 
  private:

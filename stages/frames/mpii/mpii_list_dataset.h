@@ -25,9 +25,8 @@ namespace eventgan {
 /// reads all of the sequences' file sizes. Images without such a frame, and all without
 /// `sequences`, have no neighbours.
 ///
-/// Relative paths start at `base`. Everything is read at opening (HDF5 is not thread
-/// safe). Throws UsageError without `annotations`; InputError if a file or folder is missing or
-/// damaged.
+/// Relative paths start at `base`. Everything is read at opening. Throws UsageError without
+/// `annotations`; InputError if a file or folder is missing or damaged.
 std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec,
                                                 const std::filesystem::path& base);
 

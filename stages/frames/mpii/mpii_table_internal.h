@@ -10,7 +10,7 @@ namespace eventgan {
 /// of each belonging to person i. Every numeric or text dataset as long as `imgname` becomes a
 /// field of the rows, NaN and infinity null; others are named in the notes. `imgname` may be fixed
 /// or variable-length text, or an array of character codes padded with zeros. Throws InputError.
-/// Not thread safe: HDF5 is not.
+/// Thread safe.
 MpiiList read_mpii_table(const std::filesystem::path& file);
 
 }  // namespace eventgan

@@ -1,12 +1,13 @@
 #include "stages/scenes/layouts/human36m_layout_writer.h"
 
 #include <array>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "stages/hdf5/hdf5_internal.h"
 #include "stages/scenes/figure/figure_casting.h"
 #include "stages/scenes/figure/figure_scene.h"
-#include "stages/scenes/layouts/hdf5_tables_internal.h"
 #include "stages/scenes/layouts/output_files.h"
 
 namespace eventgan {
@@ -43,21 +44,40 @@ struct Rows {
   }
 };
 
+/// A table as h36m-fetch has them: in one piece, and here without the time of writing, which would
+/// make each file different.
+template <class Number>
+void write_table(hid_t file, const std::string& name, const Dims& dims,
+                 const std::vector<Number>& values) {
+  Hdf5Handle table = create_dataset(file, name, element_type<Number>(), space_of(dims, name),
+                                    creation_properties(H5P_DATASET_CREATE));
+  write_elements(table, name, values);
+  table.close(name);
+}
+
 void write_annotations(const std::filesystem::path& path, const Rows& rows) {
   const hsize_t count = rows.camera.size();
-  Hdf5Tables tables(path);
-  tables.write("pose/2d", {count, kFigureJoints, 2}, rows.pose_2d);
-  tables.write("pose/3d-univ", {count, kFigureJoints, 3}, rows.pose_3d);
-  tables.write("camera", {count}, rows.camera);
-  tables.write("frame", {count}, rows.frame);
-  tables.write("subject", {count}, rows.one);
-  tables.write("action", {count}, rows.one);
-  for (const Camera& camera : kCameras) {
-    const Intrinsics& lens = camera.intrinsics;
-    tables.write("intrinsics/" + std::to_string(camera.number), {4},
-                 std::vector<double>{lens.focal_x, lens.centre_x, lens.focal_y, lens.centre_y});
+  const Hdf5Lock lock;
+  try {
+    Hdf5Handle file(H5Fcreate(path.c_str(), H5F_ACC_EXCL, H5P_DEFAULT, H5P_DEFAULT), H5Fclose,
+                    "create", "the file");
+    create_group(file, "pose").close("pose");
+    write_table(file, "pose/2d", {count, kFigureJoints, 2}, rows.pose_2d);
+    write_table(file, "pose/3d-univ", {count, kFigureJoints, 3}, rows.pose_3d);
+    write_table(file, "camera", {count}, rows.camera);
+    write_table(file, "frame", {count}, rows.frame);
+    write_table(file, "subject", {count}, rows.one);
+    write_table(file, "action", {count}, rows.one);
+    create_group(file, "intrinsics").close("intrinsics");
+    for (const Camera& camera : kCameras) {
+      const Intrinsics& lens = camera.intrinsics;
+      write_table(file, "intrinsics/" + std::to_string(camera.number), {4},
+                  std::vector<double>{lens.focal_x, lens.centre_x, lens.focal_y, lens.centre_y});
+    }
+    file.close("the file");
+  } catch (const Hdf5Error&) {
+    throw std::runtime_error("cannot write " + path.string());
   }
-  tables.close();
 }
 
 }  // namespace

@@ -2,24 +2,14 @@
 
 #include <cstdint>
 #include <stdexcept>
-#include <system_error>
 
-#include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_attribute_internal.h"
-#include "stages/hdf5/hdf5_dataset_internal.h"
 #include "stages/hdf5/hdf5_output_file_internal.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/view/view_columns_internal.h"
 
 namespace eventgan {
 namespace {
-
-Hdf5Handle create_group(hid_t location, const std::string& name) {
-  const Hdf5Handle creation = creation_properties(H5P_GROUP_CREATE);
-  return {H5Gcreate2(location, name.c_str(), H5P_DEFAULT, creation, H5P_DEFAULT), H5Gclose,
-          "create", name};
-}
 
 /// Groups `shards` and `splits`: which rows are whose.
 template <class Range, class NameOf>
@@ -72,34 +62,25 @@ void write_file(hid_t file, const std::vector<DatasetView>& views) {
   }
 }
 
-/// Deleted at the end of its scope, unless it was published.
-struct TemporaryView {
-  std::filesystem::path path;
-  ~TemporaryView() {
-    std::error_code ignored;
-    std::filesystem::remove(path, ignored);
-  }
-};
-
 }  // namespace
 
 ViewReceipt write_dataset_view(const std::filesystem::path& target,
                                const std::vector<DatasetView>& views) {
   if (views.empty()) throw std::invalid_argument("expected at least one view, got none");
-  quiet_hdf5_errors();
-  const TemporaryView temporary{temporary_beside(target)};
-  Hdf5OutputFile file(temporary.path, creation_properties(H5P_FILE_CREATE));
+  Hdf5OutputFile file(target);
   try {
-    write_file(file.id(), views);
-    file.close();
+    file.write([&] {
+      write_file(file.id(), views);
+      file.close();
+    });
   } catch (const Hdf5Error& error) {
-    file.check();
     throw std::runtime_error(target.string() + ": " + error.what());
   }
-  sync_to_disk(temporary.path);
-  ViewReceipt receipt{sha256_of_file(temporary.path),
-                      static_cast<std::int64_t>(std::filesystem::file_size(temporary.path))};
-  publish(temporary.path, target);
+  AtomicFile& output = file.output();
+  output.sync();
+  ViewReceipt receipt{sha256_of_file(output.temporary()),
+                      static_cast<std::int64_t>(std::filesystem::file_size(output.temporary()))};
+  output.publish();
   return receipt;
 }
 

@@ -29,10 +29,10 @@ struct ViewReceipt {
 /// Writes `target`, an HDF5 file in which the shards beside it read as one dataset
 /// (manifests/guides/shard_format.md, "The whole dataset"): every column is a virtual dataset over
 /// the shards', but for the offsets and `valid`, which follow from the markers. No shard is opened.
-/// The same views give the same bytes; the file is published whole (temporary, fsync, rename).
-/// `views`: at least one; more than one must all have groups, each its own.
+/// The same views give the same bytes; the file is published whole (atomic_file.h). `views`: at
+/// least one; more than one must all have groups, each its own.
 ///
-/// Throws std::runtime_error naming the path. Thread safety: as HDF5, one thread at a time.
+/// Throws std::runtime_error naming the path. Thread safe.
 ViewReceipt write_dataset_view(const std::filesystem::path& target,
                                const std::vector<DatasetView>& views);
 

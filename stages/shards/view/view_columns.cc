@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_types_internal.h"
 #include "stages/shards/shard_columns.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/view/view_columns_internal.h"

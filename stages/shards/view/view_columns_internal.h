@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stages/hdf5/hdf5_handle_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 #include "stages/shards/view/dataset_view.h"
 
 namespace eventgan {

@@ -1,14 +1,6 @@
 #include "stages/shards/view/virtual_dataset_internal.h"
 
 namespace eventgan {
-namespace {
-
-Hdf5Handle space_of(const Dims& dims, const std::string& path) {
-  return {H5Screate_simple(static_cast<int>(dims.size()), dims.data(), nullptr), H5Sclose, "create",
-          path};
-}
-
-}  // namespace
 
 Hdf5Handle create_virtual_dataset(hid_t location, const std::string& path,
                                   const std::string& source, hid_t type, const Dims& dims,
@@ -28,9 +20,7 @@ Hdf5Handle create_virtual_dataset(hid_t location, const std::string& path,
         H5Pset_virtual(creation, space, range.file.c_str(), source.c_str(), space_of(count, path)),
         "map", path);
   }
-  checked(H5Sselect_all(space), "select in", path);
-  return {H5Dcreate2(location, path.c_str(), type, space, H5P_DEFAULT, creation, H5P_DEFAULT),
-          H5Dclose, "create", path};
+  return create_dataset(location, path, type, space_of(dims, path), creation);
 }
 
 }  // namespace eventgan

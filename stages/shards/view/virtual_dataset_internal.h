@@ -6,8 +6,7 @@
 #include <type_traits>
 #include <vector>
 
-#include "stages/hdf5/hdf5_dataset_internal.h"
-#include "stages/hdf5/hdf5_handle_internal.h"
+#include "stages/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 

@@ -31,6 +31,10 @@ std::string error_of(Work&& work) {
   return "no error";
 }
 
+bool create(const std::filesystem::path& target, const std::string& text) {
+  return create_file_atomically(target, [&](const TextSink& sink) { sink(text); });
+}
+
 TEST(AtomicFile, WritesAndReplaces) {
   const TemporaryFolder folder;
   write_file_atomically(folder / "a.json", "first");
@@ -42,8 +46,8 @@ TEST(AtomicFile, WritesAndReplaces) {
 
 TEST(AtomicFile, CreatesOnlyWhatIsNotThere) {
   const TemporaryFolder folder;
-  EXPECT_TRUE(create_file_atomically(folder / "plan.json", "mine"));
-  EXPECT_FALSE(create_file_atomically(folder / "plan.json", "yours"));
+  EXPECT_TRUE(create(folder / "plan.json", "mine"));
+  EXPECT_FALSE(create(folder / "plan.json", "yours"));
   EXPECT_EQ(read_file(folder / "plan.json"), "mine");
   EXPECT_THAT(names_in(folder.path()), ElementsAre("plan.json"));
 }
@@ -76,7 +80,7 @@ TEST(AtomicFile, OfManyCreatorsOneWins) {
   std::vector<std::jthread> creators;
   for (int i = 0; i < 8; ++i) {
     creators.emplace_back([&, i] {
-      if (!create_file_atomically(folder / "plan.json", std::string(10000, char('a' + i)))) return;
+      if (!create(folder / "plan.json", std::string(10000, char('a' + i)))) return;
       winner = i;
       ++wins;
     });
@@ -104,8 +108,7 @@ TEST(AtomicFile, ErrorsNameThePath) {
   const auto inside = folder / "absent" / "a.json";
   EXPECT_THAT(error_of([&] { write_file_atomically(inside, "x"); }),
               HasSubstr((folder / "absent").string()));
-  EXPECT_THAT(error_of([&] { create_file_atomically(inside, "x"); }),
-              HasSubstr((folder / "absent").string()));
+  EXPECT_THAT(error_of([&] { create(inside, "x"); }), HasSubstr((folder / "absent").string()));
   EXPECT_THAT(error_of([&] { sync_to_disk(inside); }), HasSubstr(inside.string()));
   EXPECT_THAT(error_of([&] { publish(folder / "t", folder / "a.json"); }),
               AllOf(HasSubstr((folder / "t").string()), HasSubstr((folder / "a.json").string())));

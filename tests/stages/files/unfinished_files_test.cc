@@ -7,7 +7,10 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
+
 #include "stages/files/atomic_file.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -23,6 +26,36 @@ pid_t dead_pid() {
   if (child == 0) ::_exit(0);
   ::waitpid(child, nullptr, 0);
   return child;
+}
+
+TEST(TemporaryName, ThereAndBackFromAnyHost) {
+  // Host names can hold digits alone, and targets dots and digits.
+  for (const std::string host : {"node7", "node7_cluster_edu-4026531836", "10_0_0_1", "12"}) {
+    for (const std::string target : {"a-train-00000-of-00002.h5", "plan", "a.1.2", ".a"}) {
+      const TemporaryName name{target, host, 4242, 3};
+      EXPECT_EQ(to_string(name), "." + target + "." + host + ".4242.3.tmp");
+      EXPECT_EQ(parse_temporary_name(to_string(name)), name);
+    }
+  }
+}
+
+TEST(TemporaryName, NothingElseIsTakenForOne) {
+  for (const std::string_view name :
+       {"", ".", ".tmp", "a.h5", "a.h5.node.12.0.tmp", ".a.h5.node.12.0", ".a.h5.node.12.0.tmp~",
+        ".a.h5.node.12.tmp", ".a.h5.node.x.0.tmp", ".a.h5.node.12.-1.tmp", ".a.h5.node.0.0.tmp",
+        ".a.h5.node.-12.0.tmp", ".node.12.0.tmp", "..node.12.0.tmp", ".a..12.0.tmp",
+        ".a.h5.node.99999999999999999999.0.tmp", ".12.0.tmp", "....tmp"}) {
+    EXPECT_FALSE(parse_temporary_name(name)) << name;
+  }
+}
+
+TEST(TemporaryName, AHostIsAWordOfAFileName) {
+  EXPECT_EQ(without_dots("node7.cluster.edu"), "node7_cluster_edu");
+  EXPECT_EQ(without_dots("../x"), "___x");
+  EXPECT_EQ(without_dots("node-7"), "node-7");
+  EXPECT_FALSE(host_name().empty());
+  const TemporaryName name{"a.h5", host_name(), ::getpid(), 0};
+  EXPECT_EQ(parse_temporary_name(to_string(name)), name);
 }
 
 class UnfinishedFiles : public ::testing::Test {
@@ -105,6 +138,38 @@ TEST_F(UnfinishedFiles, NamesAFolderThatCannotBeListed) {
   EXPECT_THAT([&] { unfinished_files(folder_ / "absent"); },
               ::testing::ThrowsMessage<std::runtime_error>(
                   ::testing::HasSubstr((folder_ / "absent").string())));
+}
+
+TEST(StaleTemporaries, OnlyThoseOfDeadWritersGo) {
+  const testing::TemporaryFolder folder;
+  const pid_t dead = dead_pid();
+  const std::string other_host = host_name() + "-2";
+  const std::string stale = to_string(TemporaryName{"a.h5", host_name(), dead, 0});
+  const std::string silent = to_string(TemporaryName{"b.h5", other_host, dead, 0});
+  const std::string stale_too = to_string(TemporaryName{"plan.json", host_name(), dead, 17});
+  const std::string alive = to_string(TemporaryName{"a.h5", host_name(), ::getpid(), 0});
+  const std::string foreign = to_string(TemporaryName{"a.h5", other_host, dead, 0});
+  for (const auto& name : {stale, silent, stale_too, alive, foreign, std::string("a.h5")}) {
+    testing::write_file(folder / name, "x");
+  }
+  using std::chrono::hours;
+  std::filesystem::last_write_time(folder / silent,
+                                   std::filesystem::file_time_type::clock::now() - hours(2));
+  EXPECT_THAT(remove_stale_temporaries(folder.path()),
+              ::testing::ElementsAre(folder / stale, folder / silent, folder / stale_too));
+  EXPECT_THAT(testing::names_in(folder.path()),
+              ::testing::UnorderedElementsAre(alive, foreign, "a.h5"));
+  EXPECT_TRUE(remove_stale_temporaries(folder.path()).empty());
+}
+
+TEST(StaleTemporaries, NamesAFolderThatCannotBeListed) {
+  const testing::TemporaryFolder folder;
+  try {
+    remove_stale_temporaries(folder / "absent");
+    FAIL();
+  } catch (const std::runtime_error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr((folder / "absent").string()));
+  }
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <numeric>
 
 #include "stages/recordings/growing_dataset_internal.h"
-#include "stages/recordings/hdf5_turn_internal.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -15,7 +14,7 @@ class GrowingDatasetTest : public ::testing::Test {
   /// Writes `values` as [rows, 2], `portion` of them at a time, 3 rows a chunk.
   testing::GoldenArray write_and_read(const std::vector<float>& values, std::size_t portion) {
     {
-      const Hdf5Turn turn;
+      const Hdf5Lock lock;
       const Hdf5Handle file(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
                             H5Fclose);
       GrowingDataset<float> dataset(file, "d", {2}, {3, 1}, 3);

@@ -5,7 +5,6 @@
 
 #include "manifests/faults.h"
 #include "stages/recordings/hdf5_table_internal.h"
-#include "stages/recordings/hdf5_turn_internal.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
@@ -32,7 +31,7 @@ class Hdf5TableTest : public ::testing::Test {
     return {H5Dcreate2(file_, name, type, space, H5P_DEFAULT, how, H5P_DEFAULT), H5Dclose};
   }
 
-  const Hdf5Turn turn_;
+  const Hdf5Lock lock_;
   testing::TemporaryFolder folder_;
   Hdf5Handle file_;
 };

@@ -1,8 +1,10 @@
 #include "stages/scenes/layouts/human36m_layout_writer.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <hdf5.h>
 
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -48,6 +50,34 @@ TEST(Human36mLayout, EveryRowIsTheProjectionOfItsCamerasJoints) {
     EXPECT_TRUE(std::filesystem::exists(action / picture)) << picture;
   }
   H5Fclose(file);
+}
+
+TEST(Human36mLayout, NoTimeOfWritingIsStored) {
+  const testing::TemporaryFolder folder;
+  write_human36m_layout(folder / "h36m", 7);
+  const auto path = folder / "h36m/S1/Walking-1/annot.h5";
+  const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT);
+  for (const char* name : {"pose", "pose/2d", "camera", "intrinsics"}) {
+    H5O_info_t info;
+    ASSERT_GE(H5Oget_info_by_name(file, name, &info, H5P_DEFAULT), 0);
+    EXPECT_EQ(info.mtime, 0) << name;
+  }
+  H5Fclose(file);
+}
+
+TEST(Human36mLayout, ATableThatCannotBeMadeIsNamedAndLeavesNothingOpen) {
+  const testing::TemporaryFolder folder;
+  const auto path = folder / "h36m/S1/Walking-1/annot.h5";
+  std::filesystem::create_directories(path);
+  // HDF5 numbers property lists as they are made.
+  const hid_t before = H5Pcreate(H5P_LINK_CREATE);
+  EXPECT_THAT([&] { write_human36m_layout(folder / "h36m", 7); },
+              ::testing::ThrowsMessage<std::runtime_error>("cannot write " + path.string()));
+  const hid_t after = H5Pcreate(H5P_LINK_CREATE);
+  for (hid_t id = before + 1; id < after; ++id) EXPECT_LE(H5Iis_valid(id), 0) << id - before;
+  EXPECT_EQ(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0);
+  H5Pclose(after);
+  H5Pclose(before);
 }
 
 }  // namespace
