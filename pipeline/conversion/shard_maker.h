@@ -15,8 +15,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/samples/graph_limits.h"
 #include "pipeline/samples/sample_stages.h"
-#include "pipeline/stopping/shard_pace.h"
-#include "pipeline/stopping/stop_monitor.h"
+#include "pipeline/stopping/stop_order.h"
 #include "pipeline/workers/shard_queue.h"
 #include "stages/generator/generator.h"
 

@@ -15,7 +15,6 @@
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/profile/trace_recorder.h"
 #include "pipeline/samples/sample_message.h"
-#include "pipeline/stopping/shard_pace.h"
 #include "pipeline/stopping/stop_order.h"
 #include "stages/shards/shard_writer.h"
 

@@ -18,8 +18,7 @@
 #include "pipeline/samples/conversion_graph.h"
 #include "pipeline/samples/graph_limits.h"
 #include "pipeline/samples/sample_stages.h"
-#include "pipeline/stopping/shard_pace.h"
-#include "pipeline/stopping/stop_monitor.h"
+#include "pipeline/stopping/stop_order.h"
 #include "pipeline/threads/thread_count.h"
 #include "stages/shards/shard_reader.h"
 
@@ -125,7 +124,7 @@ void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob&
       options.make_progress && to_do > 0 ? options.make_progress(to_do) : nullptr;
   ShardPace pace(limits.threads);
   const StopMonitor monitor(options.since_stop_request, options.grace_s,
-                            [&] { return pace.open_shard(); });
+                            [&] { return pace.work_left(); });
   RetrySink sink(folder, shards, pace, report, options.trace);
   auto next = samples.begin();
   const TraceSpan span(options.trace, "redo samples", "job");

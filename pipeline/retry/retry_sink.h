@@ -9,7 +9,7 @@
 #include "pipeline/retry/retry_work.h"
 #include "pipeline/retry/shard_rewrite.h"
 #include "pipeline/samples/sample_message.h"
-#include "pipeline/stopping/shard_pace.h"
+#include "pipeline/stopping/stop_order.h"
 
 namespace eventgan {
 

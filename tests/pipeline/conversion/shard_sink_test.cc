@@ -79,10 +79,10 @@ class ShardSinkTest : public ::testing::Test {
 
 TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_TRUE(accept(a_, 0));
-  EXPECT_TRUE(pace_.open_shard());
+  EXPECT_TRUE(pace_.work_left());
   EXPECT_THAT(sink_->committed(), IsEmpty());
   EXPECT_TRUE(accept(a_, 1, /*valid=*/false));
-  EXPECT_FALSE(pace_.open_shard());
+  EXPECT_FALSE(pace_.work_left());
   EXPECT_TRUE(accept(b_, 0));
   EXPECT_TRUE(accept(b_, 1));
   EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json", "b.h5", "b.json"));
@@ -104,7 +104,7 @@ TEST_F(ShardSinkTest, AbandonedLeavesNothing) {
   accept(a_, 0);
   sink_->abandon();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
-  EXPECT_FALSE(pace_.open_shard());
+  EXPECT_FALSE(pace_.work_left());
 }
 
 TEST_F(ShardSinkTest, FinishingTheShardTakesNoOther) {

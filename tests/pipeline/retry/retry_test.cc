@@ -16,7 +16,6 @@
 #include "pipeline/finalization/finalize.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/stopping/stopped.h"
 #include "pipeline/verification/verify_folder.h"
 #include "stages/files/temporary_name.h"
 #include "stages/shards/shard_reader.h"
