@@ -1,9 +1,8 @@
-#include "pipeline/conversion/shared_folder.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include "pipeline/conversion/shard_queue.h"
 #include "pipeline/output/output_folder.h"
 #include "stages/files/temporary_name.h"
 #include "tests/pipeline/conversion/small_conversion.h"

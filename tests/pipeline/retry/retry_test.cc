@@ -80,7 +80,7 @@ class Retry : public ::testing::Test {
   const fs::path out_ = folder_ / "out";
   JobManifest manifest_;
   testing::FakeGenerator generator_;
-  RetryOptions options_{.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
+  RunOptions options_{.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
 };
 
 TEST_F(Retry, RedoesOnlyWhatWasQuarantined) {

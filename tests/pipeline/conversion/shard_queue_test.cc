@@ -1,4 +1,4 @@
-#include "pipeline/workers/shard_queue.h"
+#include "pipeline/conversion/shard_queue.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -82,6 +82,18 @@ TEST_F(ShardQueueTest, TakesFirstWhatAnotherHasGivenUp) {
   activity_["b"] = ShardActivity::kFree;
   EXPECT_EQ(name_of(all.next()), "b");
   for (const char* expected : {"a", "c", "none"}) EXPECT_EQ(name_of(all.next()), expected);
+}
+
+TEST_F(ShardQueueTest, AStopEndsTheLooks) {
+  for (const PlannedShard& shard : plan_) activity_[shard.name] = ShardActivity::kDone;
+  ShardQueue all = queue();
+  int asked = 0;
+  EXPECT_EQ(all.next([&] { return ++asked == 3; }), nullptr);
+  EXPECT_THAT(done(all), ElementsAre("a", "b"));
+  for (const PlannedShard& shard : plan_) activity_[shard.name] = ShardActivity::kBusy;
+  ShardQueue busy = queue();
+  asked = 0;
+  EXPECT_EQ(busy.next([&] { return ++asked == 5; }), nullptr);
 }
 
 TEST_F(ShardQueueTest, AFailedLookLosesNoShard) {

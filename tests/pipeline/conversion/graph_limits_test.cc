@@ -1,10 +1,9 @@
-#include "pipeline/samples/graph_limits.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
+#include "pipeline/conversion/conversion_run.h"
 #include "tests/testing/fake_generator.h"
 
 namespace eventgan {
