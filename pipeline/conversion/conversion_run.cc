@@ -127,17 +127,19 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
   auto finish = parallel(Stage::kFinish, limits.threads, bodies.finish);
   flow::sequencer_node<Message> sequencer(graph,
                                           [](const Message& message) { return message->number; });
-  flow::function_node<Message, flow::continue_msg> write(graph, flow::serial, [&](Message message) {
-    ++arrived;
-    at_writer = message->shard;
-    const SampleSpan span(trace, Stage::kWrite, *message);
-    const StopOrder now = order();
-    const bool begins_shard = message->slot == 0;
-    if (now == StopOrder::kAbort || (now == StopOrder::kFinishShard && begins_shard)) stop = true;
-    if (!stop && !bodies.write(*message)) stop = true;
-    if (trace) --trace->gauges().samples_in_flight;
-    return flow::continue_msg();
-  });
+  flow::function_node<Message, flow::continue_msg> write(
+      graph, flow::serial, [&](const Message& message) {
+        ++arrived;
+        at_writer = message->shard;
+        const SampleSpan span(trace, Stage::kWrite, *message);
+        const StopOrder now = order();
+        const bool begins_shard = message->slot == 0;
+        if (now == StopOrder::kAbort || (now == StopOrder::kFinishShard && begins_shard))
+          stop = true;
+        if (!stop && !bodies.write(*message)) stop = true;
+        if (trace) --trace->gauges().samples_in_flight;
+        return flow::continue_msg();
+      });
 
   flow::make_edge(source, limiter);
   flow::make_edge(limiter, read);
