@@ -44,4 +44,10 @@ class TooManyFaults : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Asked to stop before anything was begun. Exit code 75.
+class Stopped : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
 }  // namespace eventgan

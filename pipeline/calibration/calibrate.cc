@@ -8,7 +8,6 @@
 #include "pipeline/calibration/volume_distance.h"
 #include "pipeline/generation/engine_support.h"
 #include "pipeline/samples/sample_stages.h"
-#include "pipeline/stopping/stopped.h"
 #include "stages/files/sha256.h"
 #include "stages/generator/calibration/calibration.h"
 #include "stages/generator/onednn/onednn_generator.h"

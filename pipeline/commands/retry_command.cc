@@ -23,7 +23,7 @@ struct RetryArguments {
   std::string folder;
   std::optional<std::string> manifest;
   int threads = 0;
-  double grace_s = RetryOptions().grace_s;
+  double grace_s = RunOptions().grace_s;
   std::optional<std::string> profile;
   ProgressStyle progress = ProgressStyle::kAuto;
 
@@ -44,7 +44,7 @@ int finish(const RetryArguments& arguments, const RetryReport& report, const Err
 int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder* trace) {
   const FrozenOutline frozen = read_frozen_outline(arguments.folder);
   const JobManifest manifest = recorded_manifest(arguments.folder, frozen.plan, arguments.manifest);
-  RetryOptions options;
+  RunOptions options;
   options.threads = arguments.threads;
   options.grace_s = arguments.grace_s;
   options.trace = trace;

@@ -10,15 +10,12 @@
 #include "manifests/faults.h"
 #include "manifests/plan_outline.h"
 #include "pipeline/conversion/earlier_shards.h"
-#include "pipeline/conversion/part_of_plan.h"
-#include "pipeline/conversion/shard_maker.h"
-#include "pipeline/memory/memory_limit.h"
+#include "pipeline/conversion/shard_sink.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/shard_backup.h"
 #include "pipeline/output/shard_state.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
-#include "pipeline/samples/graph_limits.h"
 #include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
 
@@ -29,10 +26,6 @@ namespace fs = std::filesystem;
 
 void tell(const std::function<void(const std::string&)>& listener, const std::string& text) {
   if (listener) listener(text);
-}
-
-bool stop_requested(const ConversionOptions& options) {
-  return options.since_stop_request && options.since_stop_request().has_value();
 }
 
 std::int64_t volume_bytes(const JobManifest& manifest, const PlannedShard& shard) {
@@ -72,16 +65,18 @@ FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, P
   return frozen;
 }
 
+using PlannedShards = std::vector<const PlannedShard*>;  // of the frozen plan, in its order
+
 /// Of a run that has not begun.
-ConversionReport empty_report(const fs::path& folder, const Plan& plan, const PartOfPlan& split,
-                              const ShardPart& part) {
+ConversionReport empty_report(const fs::path& folder, const Plan& plan, const PlannedShards& own,
+                              const WorkerPart& part) {
   ConversionReport report;
   report.folder = folder.string();
   report.plan_pairs = plan.sample_count();
   report.plan_shards = static_cast<int>(plan.shards.size());
   report.part = to_text(part, report.plan_shards);
-  report.planned = count_samples(split.part);
-  report.shards_planned = static_cast<int>(split.part.size());
+  report.shards_planned = static_cast<int>(own.size());
+  for (const PlannedShard* shard : own) report.planned += std::ssize(shard->samples);
   for (const SourceSummary& source : plan.sources) {
     report.without_partner += source.without_partner;
     report.frames_without_partner += static_cast<std::int64_t>(source.without_partner_ids.size());
@@ -99,14 +94,15 @@ void say_part(const ConversionReport& report, const ConversionOptions& options) 
 }
 
 /// Checks what earlier runs left, and reports it.
-EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
+EarlierShards look_back(const ConversionJob& job, const ConversionOptions& options,
+                        const PlannedShards& own, const PlannedShards& elsewhere,
                         ConversionReport& report) {
-  const TraceSpan span(job.options.trace, "check earlier shards", "job");
-  const EarlierCheck check{job.threads, [&] { return stop_requested(job.options); },
-                           job.options.note, job.options.trace};
-  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, split.part, check);
+  const TraceSpan span(options.trace, "check earlier shards", "job");
+  const EarlierCheck check{thread_count(options.threads), [&] { return options.stop_requested(); },
+                           options.note, options.trace};
+  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, check);
   for (const std::string& fault : earlier.faults) {
-    tell(job.options.warn, fault + "; it is made again");
+    tell(options.warn, fault + "; it is made again");
   }
   report.damaged = earlier.faults;
   for (const CommittedShard& done : earlier.done) {
@@ -115,20 +111,20 @@ EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
   report.shards_done_before = report.shards_done;
   // Where not even a plan of quarantined samples passes the limits, nobody needs to count.
   if (beyond_limits(job.manifest.errors, report.plan_pairs, report.plan_pairs)) {
-    report.quarantined_elsewhere =
-        count_quarantined(job.folder, job.frozen, split.elsewhere, check);
+    report.quarantined_elsewhere = count_quarantined(job.folder, job.frozen, elsewhere, check);
   }
   return earlier;
 }
 
-void add_made(const ConversionJob& job, const ShardMaker& maker, ConversionReport& report) {
-  for (const CommittedShard& made : maker.made()) {
+void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_this_run,
+              const PlannedShards& by_others, ConversionReport& report) {
+  for (const CommittedShard& made : by_this_run) {
     add_shard(made.marker, volume_bytes(job.manifest, *made.shard), report);
     for (const auto& [stage, seconds] : made.marker.stage_seconds) {
       report.stage_seconds[stage] += seconds;
     }
   }
-  for (const PlannedShard* shard : maker.done_by_others()) {
+  for (const PlannedShard* shard : by_others) {
     const ShardState state = shard_state(job.folder, outline_of(*shard), job.frozen.hash);
     if (!state.done()) continue;  // the last look tells of it
     ++report.shards_done_by_others;
@@ -138,18 +134,19 @@ void add_made(const ConversionJob& job, const ShardMaker& maker, ConversionRepor
 
 /// A last look at the part, so that "complete" is what stands in the folder: beside this run
 /// another may have overwritten, or a person deleted, what was committed.
-void look_again(const ConversionJob& job, const PartOfPlan& split, ConversionReport& report) {
-  const TraceSpan span(job.options.trace, "look again at all shards", "job");
-  std::vector<ShardCondition> conditions(split.part.size());
-  for_each_index(split.part.size(), job.threads, [&](std::size_t i) {
-    conditions[i] = shard_state(job.folder, outline_of(*split.part[i]), job.frozen.hash).condition;
+void look_again(const ConversionJob& job, const ConversionOptions& options,
+                const PlannedShards& own, ConversionReport& report) {
+  const TraceSpan span(options.trace, "look again at all shards", "job");
+  std::vector<ShardCondition> conditions(own.size());
+  for_each_index(own.size(), thread_count(options.threads), [&](std::size_t i) {
+    conditions[i] = shard_state(job.folder, outline_of(*own[i]), job.frozen.hash).condition;
   });
   for (std::size_t i = 0; i < conditions.size(); ++i) {
     if (conditions[i] == ShardCondition::kDone) continue;
-    report.lost.push_back((job.folder / split.part[i]->name).string() +
+    report.lost.push_back((job.folder / own[i]->name).string() +
                           ": expected the shard that was committed, got it " +
                           to_string(conditions[i]));
-    tell(job.options.warn, report.lost.back() + "; run again");
+    tell(options.warn, report.lost.back() + "; run again");
   }
 }
 
@@ -160,7 +157,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
   PlannedJob planned = make_plan(
-      manifest, weights_hash, generator.description(), [&] { return stop_requested(options); },
+      manifest, weights_hash, generator.description(), [&] { return options.stop_requested(); },
       options.trace);
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
@@ -168,22 +165,27 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
   if (frozen.plan.fingerprint != fingerprint) {  // inputs were mended since
     complete_plan(manifest, planned.datasets, frozen.plan);
   }
-  const ConversionJob job{manifest,         options,   folder,       frozen,
-                          planned.datasets, generator, weights_hash, thread_count(options.threads)};
+  const ConversionJob job{manifest, planned.datasets, generator, weights_hash,
+                          folder,   frozen,           options};
 
-  const PartOfPlan split = split_plan(frozen.plan, options.part);
-  ConversionReport report = empty_report(folder, frozen.plan, split, options.part);
+  PlannedShards own;  // this worker's
+  PlannedShards elsewhere;
+  for (std::size_t i = 0; i < frozen.plan.shards.size(); ++i) {
+    const bool is_own = options.part.has(static_cast<int>(i));
+    (is_own ? own : elsewhere).push_back(&frozen.plan.shards[i]);
+  }
+  ConversionReport report = empty_report(folder, frozen.plan, own, options.part);
   report.notes = std::move(notes);
   say_part(report, options);
-  EarlierShards earlier = look_back(job, split, report);
-  check_pairs_fit(earlier.left, generator, memory_limit_bytes());
-  ShardMaker maker(job, std::move(earlier), report.quarantined_in_plan());
-  maker.make();
-  add_made(job, maker, report);
+  EarlierShards earlier = look_back(job, options, own, elsewhere, report);
+  SharedFolder shared(folder, frozen.hash, std::move(earlier.distrusted));
+  ShardSink sink(job, shared, report.quarantined_in_plan());
+  const PlannedShards by_others = run_conversion("make shards", job, earlier.left, sink, &shared);
+  add_made(job, sink.committed(), by_others, report);
   report.too_many_faults =
       beyond_limits(manifest.errors, report.quarantined_in_plan(), report.plan_pairs);
-  report.stopped = stop_requested(options) && !report.complete();
-  if (!report.stopped && !report.too_many_faults) look_again(job, split, report);
+  report.stopped = options.stop_requested() && !report.complete();
+  if (!report.stopped && !report.too_many_faults) look_again(job, options, own, report);
   report.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;

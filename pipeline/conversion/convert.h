@@ -2,35 +2,25 @@
 
 #include <filesystem>
 #include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 
 #include "manifests/job_manifest.h"
 #include "pipeline/conversion/conversion_report.h"
-#include "pipeline/profile/trace_recorder.h"
-#include "pipeline/progress/progress.h"
-#include "pipeline/workers/shard_part.h"
+#include "pipeline/conversion/conversion_run.h"
+#include "pipeline/conversion/worker_part.h"
 #include "stages/generator/generator.h"
 
 namespace eventgan {
 
-struct ConversionOptions {
+struct ConversionOptions : RunOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
-  int threads = 0;                              ///< 0: all cores
   bool overwrite = false;                       ///< discard what an earlier run left in the folder
-  ShardPart part;                               ///< this worker's shards
-  double grace_s = 20;                          ///< time after a request to stop, ≥ 0
-  /// Seconds since the request to stop, if one has come (see StopSignal); called from several
-  /// threads. None: nobody asks.
-  std::function<std::optional<double>()> since_stop_request;
-  /// Called with the number of pairs to do; shows progress. None: silent.
-  std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
+  WorkerPart part;                              ///< this worker's shards
   /// Told what a person should know: shards that are made again. None: silent.
   std::function<void(const std::string&)> warn;
   /// Told what goes on: which part this is, that checking takes long. None: silent.
   std::function<void(const std::string&)> note;
-  TraceRecorder* trace = nullptr;  ///< of every stage and thread; null: nobody asks
 };
 
 /// The job: plans, freezes the plan, converts every shard of this worker's part that is not done,

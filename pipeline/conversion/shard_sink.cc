@@ -1,9 +1,12 @@
 #include "pipeline/conversion/shard_sink.h"
 
+#include <cstddef>
+#include <iterator>
 #include <utility>
 
 #include "manifests/error_limits.h"
 #include "manifests/faults.h"
+#include "pipeline/planning/fingerprint.h"
 #include "pipeline/profile/processor_time.h"
 #include "pipeline/profile/trace_span.h"
 #include "stages/files/atomic_file.h"
@@ -11,35 +14,71 @@
 namespace eventgan {
 namespace {
 
+ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
+  const JobManifest& manifest = job.manifest;
+  const auto source = static_cast<std::size_t>(shard.source);
+  ShardHeader header;
+  header.name = shard.name;
+  header.dataset = to_string(manifest.sources[source].dataset);
+  header.split = manifest.sources[source].split;
+  header.sample_count = static_cast<int>(shard.samples.size());
+  header.volume = {manifest.volume.bins, shard.volume_size};
+  header.dtype = manifest.output.dtype;
+  header.deflate_level = manifest.output.deflate_level;
+  header.normalization = manifest.volume.normalize;
+  header.unit = manifest.generator.kind == GeneratorKind::kNetwork ? VolumeUnit::kLearned
+                                                                   : VolumeUnit::kEvents;
+  header.label_schema = job.datasets[source]->label_schema();
+  header.preprocessing = preprocessing_json(manifest.image);
+  header.plan_hash = job.frozen.hash;
+  header.manifest_text = job.frozen.plan.manifest_text;
+  header.weights_hash = job.weights_hash;
+  header.generator = job.generator.description();
+  header.program_version = program_version();
+  return header;
+}
+
 double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-double busy_seconds_since(std::int64_t start_ns) {
-  return 1e-9 * static_cast<double>(thread_processor_ns() - start_ns);
-}
-
-double& write_seconds(ShardMarker& marker) {
-  return marker.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]];
+/// Counts the calling thread's work since `start_ns` (thread_processor_ns) as the stage "write".
+void add_write_seconds(std::int64_t start_ns, ShardMarker& marker) {
+  marker.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]] +=
+      1e-9 * static_cast<double>(thread_processor_ns() - start_ns);
 }
 
 }  // namespace
 
-ShardSink::ShardSink(SinkSetup setup, ShardPace& pace)
-    : setup_(std::move(setup)),
-      pace_(pace),
-      committed_at_(std::chrono::steady_clock::now()),
-      quarantined_(setup_.quarantined_before),
-      closed_(beyond_limits(setup_.errors, quarantined_, setup_.planned)) {}
+ShardSink::ShardSink(const ConversionJob& job, SharedFolder& shared,
+                     std::int64_t quarantined_before)
+    : job_(job),
+      shared_(shared),
+      quarantined_(quarantined_before),
+      committed_at_(std::chrono::steady_clock::now()) {}
 
-bool ShardSink::accept(SampleMessage& message) {
-  if (!obey()) return false;
+bool ShardSink::closed() const {
+  return beyond_limits(job_.manifest.errors, quarantined_, job_.frozen.plan.sample_count());
+}
+
+void ShardSink::open(const PlannedShard& shard) {
+  TraceSpan span(job_.options.trace, "open shard", "shard");
+  span.note("shard", shard.name);
   const std::int64_t start_ns = thread_processor_ns();
-  const PlannedShard& shard = *message.shard;
-  if (message.failed() && setup_.errors.policy == ErrorPolicy::kFail) {
+  writer_ = std::make_unique<ShardWriter>(job_.folder, header_of(shard, job_));
+  shared_.opened(shard);
+  shard_ = &shard;
+  marker_ = {};
+  marker_.shard = shard.name;
+  marker_.plan_hash = job_.frozen.hash;
+  add_write_seconds(start_ns, marker_);
+}
+
+void ShardSink::add(const SampleMessage& message) {
+  if (message.failed() && job_.manifest.errors.policy == ErrorPolicy::kFail) {
     throw TooManyFaults("errors.policy is \"fail\": " + message.sample.fault);
   }
-  if (!writer_) open(shard);
+  const std::int64_t start_ns = thread_processor_ns();
   writer_->append(message.sample, message.chunk);
   ++marker_.samples;
   if (message.failed()) {
@@ -50,70 +89,38 @@ bool ShardSink::accept(SampleMessage& message) {
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
-  write_seconds(marker_) += busy_seconds_since(start_ns);
-  pace_.take(std::ssize(message.chunk));
-  if (marker_.samples == static_cast<int>(shard.samples.size())) commit(shard);
-  return true;
+  add_write_seconds(start_ns, marker_);
 }
 
-void ShardSink::abandon() {
-  writer_.reset();
-  pace_.close();
-}
-
-bool ShardSink::obey() {
-  if (closed_) return false;
-  const StopOrder order = setup_.order();
-  if (order == StopOrder::kAbort || (order == StopOrder::kFinishShard && !writer_)) {
-    abandon();
-    closed_ = true;
-  }
-  return !closed_;
-}
-
-void ShardSink::open(const PlannedShard& shard) {
-  TraceSpan span(setup_.trace, "open shard", "shard");
-  span.note("shard", shard.name);
-  writer_ = std::make_unique<ShardWriter>(setup_.folder, setup_.header_of(shard));
-  if (setup_.opened) setup_.opened(shard);
-  marker_ = {};
-  marker_.shard = shard.name;
-  marker_.plan_hash = setup_.plan_hash;
-  pace_.open(static_cast<int>(shard.samples.size()));
-}
-
-void ShardSink::commit(const PlannedShard& shard) {
-  TraceSpan span(setup_.trace, "commit shard", "shard");
-  span.note("shard", shard.name);
+bool ShardSink::commit() {
+  TraceSpan span(job_.options.trace, "commit shard", "shard");
+  span.note("shard", shard_->name);
   span.note("samples", marker_.samples);
   const std::int64_t start_ns = thread_processor_ns();
-  pace_.begin_commit();
   ShardReceipt receipt;
   try {
-    const TraceSpan file(setup_.trace, "close, fsync, hash, rename", "shard");
+    const TraceSpan file(job_.options.trace, "close, fsync, hash, rename", "shard");
     receipt = writer_->commit();
   } catch (const UnfinishedShardLost&) {
-    if (!setup_.is_done || !setup_.is_done(shard)) throw;
+    if (!shared_.is_done(*shard_)) throw;
     abandon();
-    done_by_others_.push_back(&shard);
-    return;
+    return false;
   }
   writer_.reset();
   marker_.sha256 = receipt.sha256;
   marker_.size_bytes = receipt.size_bytes;
   span.note("bytes", receipt.size_bytes);
   enter(std::move(receipt.contents), marker_);
-  write_seconds(marker_) += busy_seconds_since(start_ns);
+  add_write_seconds(start_ns, marker_);
   marker_.wall_seconds = seconds_since(committed_at_);
   {
-    const TraceSpan file(setup_.trace, "write marker", "shard");
-    write_file_atomically(setup_.folder / marker_name(shard.name), to_json(marker_));
+    const TraceSpan file(job_.options.trace, "write marker", "shard");
+    write_file_atomically(job_.folder / marker_name(shard_->name), to_json(marker_));
   }
-  pace_.close();
   committed_at_ = std::chrono::steady_clock::now();
   quarantined_ += std::ssize(marker_.quarantined);
-  committed_.push_back({&shard, std::move(marker_)});
-  closed_ = beyond_limits(setup_.errors, quarantined_, setup_.planned);
+  committed_.push_back({shard_, std::move(marker_)});
+  return true;
 }
 
 }  // namespace eventgan

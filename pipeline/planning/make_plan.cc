@@ -10,7 +10,6 @@
 #include "pipeline/planning/pair_choice.h"
 #include "pipeline/planning/shard_layout.h"
 #include "pipeline/profile/trace_span.h"
-#include "pipeline/stopping/stopped.h"
 #include "stages/frames/decoding/image_size_probe.h"
 #include "stages/frames/open_dataset.h"
 

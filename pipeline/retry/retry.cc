@@ -1,25 +1,22 @@
 #include "pipeline/retry/retry.h"
 
 #include <chrono>
+#include <cstddef>
+#include <iterator>
 #include <map>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "manifests/error_limits.h"
 #include "manifests/faults.h"
 #include "manifests/plan_outline.h"
-#include "pipeline/memory/memory_limit.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/shard_backup.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
-#include "pipeline/retry/retry_sink.h"
 #include "pipeline/retry/retry_work.h"
-#include "pipeline/samples/conversion_graph.h"
-#include "pipeline/samples/graph_limits.h"
-#include "pipeline/samples/sample_stages.h"
-#include "pipeline/stopping/shard_pace.h"
-#include "pipeline/stopping/stop_monitor.h"
+#include "pipeline/retry/shard_rewrite.h"
 #include "pipeline/threads/thread_count.h"
 #include "stages/shards/shard_reader.h"
 
@@ -69,36 +66,24 @@ void accept_inputs(const fs::path& folder, const std::string& plan_hash, const F
   }
 }
 
-bool stop_requested(const RetryOptions& options) {
-  return options.since_stop_request && options.since_stop_request().has_value();
-}
-
 PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_hash,
-                      const std::string& engine, const RetryOptions& options) {
+                      const std::string& engine, const RunOptions& options) {
   return make_plan(
-      manifest, weights_hash, engine, [&] { return stop_requested(options); }, options.trace);
-}
-
-/// A shard that has good samples already has the size of these.
-void keep_sizes(const fs::path& folder, std::vector<RetriedShard>& shards) {
-  for (RetriedShard& shard : shards) {
-    if (!shard.samples.size_unknown || shard.marker.valid == 0) continue;
-    shard.samples.volume_size = ShardReader(folder / shard.marker.shard).header().volume.size;
-  }
+      manifest, weights_hash, engine, [&] { return options.stop_requested(); }, options.trace);
 }
 
 /// The shards with quarantined samples that prove whole; the others are reported. After a request
 /// to stop there may be fewer.
 std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenPlan& frozen,
                                            const QuarantinedSamples& found,
-                                           const RetryOptions& options, RetryReport& report) {
+                                           const RunOptions& options, RetryReport& report) {
   std::vector<const PlannedShard*> shards;
   for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
   EarlierShards earlier = check_earlier_shards(
       folder, frozen, shards,
-      {thread_count(options.threads), [&] { return stop_requested(options); }, {}, options.trace});
+      {thread_count(options.threads), [&] { return options.stop_requested(); }, {}, options.trace});
   for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
-  if (!stop_requested(options)) {
+  if (!options.stop_requested()) {
     report.quarantined = 0;  // what a damaged shard held does not count
     for (const CommittedShard& shard : earlier.done) {
       report.quarantined += std::ssize(shard.marker.quarantined);
@@ -107,51 +92,66 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   return std::move(earlier.done);
 }
 
-/// Runs the samples through the stages and into their shards.
-void redo(const fs::path& folder, const JobManifest& manifest, const PlannedJob& job,
-          const Generator& generator, const std::vector<RetriedShard>& shards,
-          const RetryOptions& options, RetryReport& report) {
-  std::vector<const PlannedShard*> samples;
-  std::int64_t to_do = 0;
-  for (const RetriedShard& shard : shards) {
-    samples.push_back(&shard.samples);
-    to_do += std::ssize(shard.slots);
+/// Puts redone samples into their committed shards; for each shard once it is through, `report`
+/// gets tried, mended, failed, shards_rewritten and what is quarantined still.
+class RetrySink final : public SampleSink {
+ public:
+  /// Takes what plan_retry made of `shards`, in their order. All must outlive the sink.
+  RetrySink(const fs::path& folder, const std::vector<CommittedShard>& shards, RetryReport& report,
+            TraceRecorder* trace)
+      : folder_(folder), next_(shards.begin()), report_(report), trace_(trace) {}
+
+  void open(const PlannedShard& shard) override {
+    marker_ = &(next_++)->marker;
+    rewrite_ = std::make_unique<ShardRewrite>(
+        folder_, *marker_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
   }
-  check_pairs_fit(samples, generator, memory_limit_bytes());
-  const GraphLimits limits =
-      graph_limits(samples, generator, thread_count(options.threads), memory_limit_bytes());
-  const SampleStages stages(manifest, job.datasets, generator, static_cast<int>(limits.in_flight));
-  const std::unique_ptr<Progress> progress =
-      options.make_progress && to_do > 0 ? options.make_progress(to_do) : nullptr;
-  ShardPace pace(limits.threads);
-  const StopMonitor monitor(options.since_stop_request, options.grace_s,
-                            [&] { return pace.open_shard(); });
-  RetrySink sink(folder, shards, pace, report, options.trace);
-  auto next = samples.begin();
-  const TraceSpan span(options.trace, "redo samples", "job");
-  run_conversion_graph([&] { return next == samples.end() ? nullptr : *next++; },
-                       {[&](SampleMessage& message) { stages.read(message); },
-                        [&](SampleMessage& message) { stages.generate(message); },
-                        [&](SampleMessage& message) { stages.finish(message); },
-                        [&](SampleMessage& message) {
-                          const StopOrder order = monitor.order();
-                          if (order == StopOrder::kAbort) return false;
-                          if (order == StopOrder::kFinishShard && !sink.is_open()) return false;
-                          sink.accept(message);
-                          if (progress)
-                            progress->advance(message.failed(), std::ssize(message.chunk));
-                          return true;
-                        }},
-                       limits, [&] { return monitor.order(); }, options.trace);
-  sink.abandon();
-  if (progress) progress->finish();
-}
+
+  void add(const SampleMessage& message) override {
+    const int slot = marker_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
+    rewrite_->redo(slot, message);
+    if (!message.failed()) return;
+    failed_.push_back({marker_->shard, slot, message.sample.sample_id, message.sample.fault});
+  }
+
+  bool commit() override {
+    TraceSpan span(trace_, "commit shard", "shard");
+    span.note("shard", marker_->shard);
+    report_.shards_rewritten += rewrite_->commit();
+    rewrite_.reset();
+    const std::int64_t tried = std::ssize(marker_->quarantined);
+    const std::int64_t mended = tried - std::ssize(failed_);
+    report_.tried += tried;
+    report_.mended += mended;
+    report_.quarantined -= mended;
+    report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
+    failed_.clear();
+    return true;
+  }
+
+  /// The samples of the shard under way do not count as tried.
+  void abandon() override {
+    rewrite_.reset();
+    failed_.clear();
+  }
+
+  bool closed() const override { return false; }
+
+ private:
+  const fs::path& folder_;
+  std::vector<CommittedShard>::const_iterator next_;
+  const ShardMarker* marker_ = nullptr;    // of the shard under way
+  std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
+  std::vector<SampleLeft> failed_;         // of the shard under way
+  RetryReport& report_;
+  TraceRecorder* trace_;
+};
 
 }  // namespace
 
 std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen,
                                             const JobManifest& manifest,
-                                            const RetryOptions& options) {
+                                            const RunOptions& options) {
   restore_shards(folder, frozen);
   const QuarantinedSamples found = find_quarantined(folder, frozen);
   if (found.count > 0) return std::nullopt;
@@ -168,7 +168,7 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
 }
 
 RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Generator& generator,
-                  const std::string& weights_hash, const RetryOptions& options) {
+                  const std::string& weights_hash, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   FrozenPlan frozen = read_frozen_plan(folder);
   const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
@@ -181,12 +181,22 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
                 found.ids, report);
   job.plan = {};  // the frozen one counts, and it can be huge
   complete_plan(manifest, job.datasets, frozen.plan);
-  std::vector<RetriedShard> shards =
-      plan_retry(trusted_shards(folder, frozen, found, options, report));
-  keep_sizes(folder, shards);
+
+  const std::vector<CommittedShard> shards = trusted_shards(folder, frozen, found, options, report);
+  std::vector<PlannedShard> retried = plan_retry(shards);
+  std::vector<const PlannedShard*> to_redo;
+  for (std::size_t i = 0; i < shards.size(); ++i) {
+    to_redo.push_back(&retried[i]);
+    // A shard that has good samples already has the size of these.
+    if (!retried[i].size_unknown || shards[i].marker.valid == 0) continue;
+    retried[i].volume_size = ShardReader(folder / retried[i].name).header().volume.size;
+  }
   const std::int64_t to_do = report.quarantined;
-  redo(folder, manifest, job, generator, shards, options, report);
-  report.stopped = stop_requested(options) && report.tried < to_do;
+  RetrySink sink(folder, shards, report, options.trace);
+  run_conversion("redo samples",
+                 {manifest, job.datasets, generator, weights_hash, folder, frozen, options},
+                 to_redo, sink);
+  report.stopped = options.stop_requested() && report.tried < to_do;
   report.dataset_outdated = report.shards_rewritten > 0 && fs::exists(folder / "dataset.json");
   report.too_many_faults = beyond_limits(manifest.errors, report.quarantined, report.planned);
   report.wall_seconds =

@@ -1,31 +1,16 @@
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
-#include <functional>
-#include <memory>
 #include <optional>
 #include <string>
 
 #include "manifests/job_manifest.h"
+#include "pipeline/conversion/conversion_run.h"
 #include "pipeline/output/output_folder.h"
-#include "pipeline/profile/trace_recorder.h"
-#include "pipeline/progress/progress.h"
 #include "pipeline/retry/retry_report.h"
 #include "stages/generator/generator.h"
 
 namespace eventgan {
-
-struct RetryOptions {
-  int threads = 0;      ///< 0: all cores
-  double grace_s = 20;  ///< time after a request to stop, ≥ 0
-  /// Seconds since the request to stop, if one has come (see StopSignal); called from several
-  /// threads. None: nobody asks.
-  std::function<std::optional<double>()> since_stop_request;
-  /// Called with the number of samples to redo; shows progress. None: silent.
-  std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
-  TraceRecorder* trace = nullptr;  ///< of every stage and thread; null: nobody asks
-};
 
 /// The report where no committed shard of the folder has a quarantined sample; none if one has.
 /// First cleans up what a retry that was killed has left (see restore_shards). Inputs that have
@@ -34,8 +19,7 @@ struct RetryOptions {
 /// left to `convert` to compare. Throws as retry does.
 std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
                                             const FrozenOutline& frozen,
-                                            const JobManifest& manifest,
-                                            const RetryOptions& options);
+                                            const JobManifest& manifest, const RunOptions& options);
 
 /// Redoes the quarantined samples of an output folder's committed shards, after its inputs were
 /// mended; every other byte of the shards stays, and plan.json does. A shard is written again only
@@ -49,6 +33,6 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
 /// while it plans, or std::runtime_error when the disk or the generator fails; whole shards stay.
 RetryReport retry(const std::filesystem::path& folder, const JobManifest& manifest,
                   const Generator& generator, const std::string& weights_hash,
-                  const RetryOptions& options);
+                  const RunOptions& options);
 
 }  // namespace eventgan

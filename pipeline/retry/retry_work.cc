@@ -1,7 +1,5 @@
 #include "pipeline/retry/retry_work.h"
 
-#include <utility>
-
 #include "pipeline/output/shard_states.h"
 
 namespace eventgan {
@@ -23,20 +21,15 @@ QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
   return found;
 }
 
-std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards) {
-  std::vector<RetriedShard> retried;
+std::vector<PlannedShard> plan_retry(const std::vector<CommittedShard>& shards) {
+  std::vector<PlannedShard> retried;
   for (const CommittedShard& committed : shards) {
-    const PlannedShard& planned = *committed.shard;
-    RetriedShard shard{
-        committed.marker,
-        {planned.name, planned.source, planned.volume_size, {}, planned.size_unknown},
-        {}};
+    const PlannedShard& whole = *committed.shard;
+    PlannedShard& part = retried.emplace_back(
+        PlannedShard{whole.name, whole.source, whole.volume_size, {}, whole.size_unknown});
     for (const QuarantinedSample& quarantined : committed.marker.quarantined) {
-      shard.samples.samples.push_back(
-          planned.samples.at(static_cast<std::size_t>(quarantined.slot)));
-      shard.slots.push_back(quarantined.slot);
+      part.samples.push_back(whole.samples.at(static_cast<std::size_t>(quarantined.slot)));
     }
-    retried.push_back(std::move(shard));
   }
   return retried;
 }

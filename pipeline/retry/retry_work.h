@@ -25,14 +25,8 @@ struct QuarantinedSamples {
 QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
                                     const FrozenOutline& frozen);
 
-/// The quarantined samples of one committed shard.
-struct RetriedShard {
-  ShardMarker marker;      ///< the shard's
-  PlannedShard samples;    ///< the planned shard with these samples alone, in slot order
-  std::vector<int> slots;  ///< of each of them in the shard
-};
-
-/// What to redo of each shard.
-std::vector<RetriedShard> plan_retry(const std::vector<CommittedShard>& shards);
+/// What to redo of each shard: the planned shard with its quarantined samples alone, in the order
+/// of its marker, which says the slot of each.
+std::vector<PlannedShard> plan_retry(const std::vector<CommittedShard>& shards);
 
 }  // namespace eventgan

@@ -8,7 +8,7 @@
 
 #include "manifests/marker.h"
 #include "manifests/shard.h"
-#include "pipeline/samples/sample_message.h"
+#include "pipeline/samples/sample_stages.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_writer.h"
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "pipeline/profile/processor_time.h"
 #include "stages/events/normalization.h"
@@ -45,6 +46,16 @@ std::string size_text(ImageSize size) {
 }
 
 }  // namespace
+
+void SampleMessage::fail(std::string reason) {
+  sample.valid = false;
+  const std::string id = " (" + sample.sample_id + ")";
+  if (!reason.ends_with(id)) reason += id;
+  sample.fault = std::move(reason);
+  prepared = {};
+  volume = {};
+  chunk = {};
+}
 
 SampleStages::SampleStages(const JobManifest& manifest,
                            const std::vector<std::unique_ptr<Dataset>>& datasets,

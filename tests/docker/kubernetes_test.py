@@ -27,7 +27,7 @@ def exit_codes():
 
 
 def variables_read():
-    text = (SOURCE / "pipeline" / "workers" / "shard_part.cc").read_text()
+    text = (SOURCE / "pipeline" / "conversion" / "worker_part.cc").read_text()
     return set(re.findall(r'"([A-Z][A-Z_]+)"', text))
 
 

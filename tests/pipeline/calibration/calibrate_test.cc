@@ -5,7 +5,6 @@
 
 #include "manifests/faults.h"
 #include "pipeline/generation/engine_support.h"
-#include "pipeline/stopping/stopped.h"
 #include "stages/generator/calibration/calibration.h"
 #include "stages/generator/untrained.h"
 #include "stages/generator/weights_files/weights_file.h"

@@ -4,8 +4,8 @@
 #include <atomic>
 #include <thread>
 
+#include "manifests/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/stopping/stopped.h"
 #include "pipeline/verification/verify_folder.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 

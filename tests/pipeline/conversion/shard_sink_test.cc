@@ -3,11 +3,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <optional>
 
 #include "manifests/faults.h"
 #include "stages/files/sha256.h"
 #include "stages/shards/codec/volume_codec.h"
+#include "tests/testing/fake_dataset.h"
+#include "tests/testing/fake_generator.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -21,36 +24,25 @@ using testing::names_in;
 
 constexpr ErrorSpec kLenient{ErrorPolicy::kQuarantine, 100, 1};
 
-/// Two shards of two samples without labels, and a sink whose order a test sets.
+/// Two shards of two samples, and a sink in a folder that others share.
 class ShardSinkTest : public ::testing::Test {
  protected:
   ShardSinkTest() {
-    a_.samples.resize(2);
-    b_.samples.resize(2);
-    sink_.emplace(setup(), pace_);
+    manifest_.errors = kLenient;
+    manifest_.sources.resize(1);
+    manifest_.volume.bins = kShape.bins;
+    datasets_.push_back(std::make_unique<testing::FakeDataset>("clip", 0));
+    frozen_.hash = std::string(64, 'a');
+    for (const char* name : {"a.h5", "b.h5"}) {
+      frozen_.plan.shards.push_back({name, 0, kShape.size, std::vector<PlannedSample>(2)});
+    }
   }
 
-  SinkSetup setup() {
-    return {folder_.path(),
-            std::string(64, 'a'),
-            kLenient,
-            4,
-            0,
-            [](const PlannedShard& shard) {
-              ShardHeader header;
-              header.name = shard.name;
-              header.sample_count = static_cast<int>(shard.samples.size());
-              header.volume = kShape;
-              return header;
-            },
-            [this] { return order_; },
-            [this](const PlannedShard& shard) {
-              opened_.push_back(shard.name);
-              EXPECT_EQ(names_in(folder_.path()).empty(), false);
-            },
-            [this](const PlannedShard&) { return done_elsewhere_; }};
+  void open_sink(std::int64_t quarantined_before = 0) {
+    sink_.emplace(job_, shared_, quarantined_before);
   }
 
+  /// As the run does: opens the sample's shard with its first, commits it with its last.
   bool accept(const PlannedShard& shard, int slot, bool valid = true) {
     SampleMessage message;
     message.shard = &shard;
@@ -58,38 +50,44 @@ class ShardSinkTest : public ::testing::Test {
     message.sample.sample_id = shard.name + "/" + std::to_string(slot);
     message.sample.pair.gap_frames = slot + 1;
     if (valid) {
-      message.chunk = VolumeCodec(ShardHeader().dtype, ShardHeader().deflate_level)
+      message.chunk = VolumeCodec(manifest_.output.dtype, manifest_.output.deflate_level)
                           .encode(std::vector<float>(kShape.value_count()))
                           .chunk;
     } else {
       message.fail("expected a frame, got none");
     }
-    return sink_->accept(message);
+    if (slot == 0) sink_->open(shard);
+    sink_->add(message);
+    return slot == 0 || sink_->commit();
   }
 
   static constexpr VolumeShape kShape{1, {2, 3}};
   testing::TemporaryFolder folder_;
-  PlannedShard a_{"a.h5", 0, kShape.size, {}}, b_{"b.h5", 0, kShape.size, {}};
-  ShardPace pace_{1};
-  StopOrder order_ = StopOrder::kGoOn;
-  std::vector<std::string> opened_;
-  bool done_elsewhere_ = false;
+  JobManifest manifest_;
+  std::vector<std::unique_ptr<Dataset>> datasets_;
+  testing::FakeGenerator generator_;
+  const std::string weights_ = "weights";
+  FrozenPlan frozen_;
+  RunOptions options_;
+  const ConversionJob job_{manifest_,      datasets_, generator_, weights_,
+                           folder_.path(), frozen_,   options_};
+  SharedFolder shared_{folder_.path(), std::string(64, 'a'), {}};
   std::optional<ShardSink> sink_;
 };
 
 TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
-  EXPECT_TRUE(accept(a_, 0));
-  EXPECT_TRUE(pace_.open_shard());
+  const PlannedShard &a = frozen_.plan.shards[0], &b = frozen_.plan.shards[1];
+  open_sink();
+  EXPECT_TRUE(accept(a, 0));
   EXPECT_THAT(sink_->committed(), IsEmpty());
-  EXPECT_TRUE(accept(a_, 1, /*valid=*/false));
-  EXPECT_FALSE(pace_.open_shard());
-  EXPECT_TRUE(accept(b_, 0));
-  EXPECT_TRUE(accept(b_, 1));
+  EXPECT_TRUE(accept(a, 1, /*valid=*/false));
+  EXPECT_TRUE(accept(b, 0));
+  EXPECT_TRUE(accept(b, 1));
+  EXPECT_FALSE(sink_->closed());
   EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json", "b.h5", "b.json"));
-  EXPECT_THAT(opened_, ElementsAre("a.h5", "b.h5"));
   ASSERT_EQ(sink_->committed().size(), 2u);
   const ShardMarker& marker = sink_->committed()[0].marker;
-  EXPECT_EQ(sink_->committed()[0].shard, &a_);
+  EXPECT_EQ(sink_->committed()[0].shard, &a);
   EXPECT_EQ(parse_marker(testing::read_file(folder_ / "a.json"), "a"), marker);
   EXPECT_EQ(marker.sha256, sha256_of_file(folder_ / "a.h5"));
   EXPECT_EQ(marker.valid, 1);
@@ -100,70 +98,70 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_GT(marker.wall_seconds, 0);
 }
 
+TEST_F(ShardSinkTest, AClaimStandsUntilTheFileItselfIsThere) {
+  open_sink();
+  const PlannedShard& a = frozen_.plan.shards[0];
+  EXPECT_EQ(shared_.look_at(a), ShardActivity::kFree);
+  const auto claim = names_in(folder_.path());
+  accept(a, 0);
+  const auto file = names_in(folder_.path());
+  EXPECT_EQ(file.size(), 1u);
+  EXPECT_NE(file, claim);
+}
+
 TEST_F(ShardSinkTest, AbandonedLeavesNothing) {
-  accept(a_, 0);
+  open_sink();
+  accept(frozen_.plan.shards[0], 0);
   sink_->abandon();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
-  EXPECT_FALSE(pace_.open_shard());
-}
-
-TEST_F(ShardSinkTest, FinishingTheShardTakesNoOther) {
-  accept(a_, 0);
-  order_ = StopOrder::kFinishShard;
-  EXPECT_TRUE(accept(a_, 1));
-  EXPECT_FALSE(sink_->closed());
-  EXPECT_FALSE(accept(b_, 0));
-  EXPECT_TRUE(sink_->closed());
-  EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json"));
-}
-
-TEST_F(ShardSinkTest, AnAbortDeletesTheFileUnderWayAtOnce) {
-  accept(a_, 0);
-  accept(a_, 1);
-  accept(b_, 0);
-  order_ = StopOrder::kAbort;
-  EXPECT_FALSE(accept(b_, 1));
-  EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json"));
 }
 
 TEST_F(ShardSinkTest, TheShardThatPassesTheLimitsIsTheLast) {
-  SinkSetup strict = setup();
-  strict.errors.max_count = 3;
-  strict.quarantined_before = 3;
-  sink_.emplace(strict, pace_);
-  EXPECT_TRUE(accept(a_, 0, false));
-  EXPECT_TRUE(accept(a_, 1));
+  manifest_.errors.max_count = 3;
+  open_sink(/*quarantined_before=*/3);
+  EXPECT_FALSE(sink_->closed());
+  EXPECT_TRUE(accept(frozen_.plan.shards[0], 0, false));
+  EXPECT_TRUE(accept(frozen_.plan.shards[0], 1));
   EXPECT_TRUE(sink_->closed());
   EXPECT_EQ(sink_->committed().size(), 1u);
-  EXPECT_FALSE(accept(b_, 0));
+  open_sink(/*quarantined_before=*/4);
+  EXPECT_TRUE(sink_->closed());
 }
 
 TEST_F(ShardSinkTest, PolicyFailThrowsAtTheFirst) {
-  SinkSetup strict = setup();
-  strict.errors.policy = ErrorPolicy::kFail;
-  sink_.emplace(strict, pace_);
-  EXPECT_TRUE(accept(a_, 0));
-  EXPECT_THROW(accept(a_, 1, false), TooManyFaults);
+  manifest_.errors.policy = ErrorPolicy::kFail;
+  open_sink();
+  EXPECT_TRUE(accept(frozen_.plan.shards[0], 0));
+  EXPECT_THROW(accept(frozen_.plan.shards[0], 1, false), TooManyFaults);
   sink_.reset();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
 }
 
 TEST_F(ShardSinkTest, AFileLostUnderWayIsAnErrorUnlessAnotherHasMadeTheShard) {
-  for (const bool done : {false, true}) {
-    done_elsewhere_ = done;
-    accept(a_, 0);
-    std::filesystem::remove(folder_ / names_in(folder_.path()).at(0));
-    if (done) {
-      EXPECT_TRUE(accept(a_, 1));
-      EXPECT_THAT(sink_->done_by_others(), ElementsAre(&a_));
-    } else {
-      EXPECT_THROW(accept(a_, 1), UnfinishedShardLost);
-      sink_->abandon();
-    }
-    EXPECT_THAT(sink_->committed(), IsEmpty());
-    EXPECT_THAT(names_in(folder_.path()), IsEmpty());
-  }
-  EXPECT_TRUE(accept(b_, 0));  // and goes on
+  const PlannedShard& a = frozen_.plan.shards[0];
+  open_sink();
+  accept(a, 0);
+  std::filesystem::remove(folder_ / names_in(folder_.path()).at(0));
+  EXPECT_THROW(accept(a, 1), UnfinishedShardLost);
+  sink_->abandon();
+  EXPECT_THAT(names_in(folder_.path()), IsEmpty());
+
+  accept(a, 0);
+  std::filesystem::remove(folder_ / names_in(folder_.path()).at(0));
+  ShardMarker marker;  // another worker's, whose shard is of four bytes
+  marker.shard = a.name;
+  marker.plan_hash = frozen_.hash;
+  marker.sha256 = std::string(64, 'b');
+  marker.size_bytes = 4;
+  marker.samples = marker.valid = 2;
+  marker.boxes = marker.persons = {0, 0};
+  testing::write_file(folder_ / "a.h5", "made");
+  testing::write_file(folder_ / "a.json", to_json(marker));
+  EXPECT_FALSE(accept(a, 1));
+  EXPECT_THAT(sink_->committed(), IsEmpty());
+  EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json"));
+  EXPECT_EQ(testing::read_file(folder_ / "a.h5"), "made");
+  EXPECT_TRUE(accept(frozen_.plan.shards[1], 0));  // and goes on
 }
 
 }  // namespace

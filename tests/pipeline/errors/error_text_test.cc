@@ -4,7 +4,6 @@
 
 #include "manifests/faults.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/stopping/stopped.h"
 
 namespace eventgan {
 namespace {

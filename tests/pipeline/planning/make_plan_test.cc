@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
-#include "pipeline/stopping/stopped.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

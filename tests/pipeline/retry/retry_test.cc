@@ -16,7 +16,6 @@
 #include "pipeline/finalization/finalize.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/stopping/stopped.h"
 #include "pipeline/verification/verify_folder.h"
 #include "stages/files/temporary_name.h"
 #include "stages/shards/shard_reader.h"
@@ -81,7 +80,7 @@ class Retry : public ::testing::Test {
   const fs::path out_ = folder_ / "out";
   JobManifest manifest_;
   testing::FakeGenerator generator_;
-  RetryOptions options_{.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
+  RunOptions options_{.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
 };
 
 TEST_F(Retry, RedoesOnlyWhatWasQuarantined) {

@@ -3,16 +3,18 @@
 #include <functional>
 #include <optional>
 #include <string>
-#include <vector>
 
 namespace eventgan {
 
 /// The part of a plan's shards that one worker does: shard s belongs to part s mod count.
-struct ShardPart {
+struct WorkerPart {
   int index = 0;
   int count = 1;       ///< 0: as many parts as the plan has shards, so `index` is a shard's number
   std::string origin;  ///< what said so: "--shards", "SLURM_ARRAY_TASK_ID", ...; empty: all shards
-  bool operator==(const ShardPart&) const = default;
+  bool operator==(const WorkerPart&) const = default;
+
+  /// Whether a shard is in it, by its place in the plan; a part may be beyond the plan's shards.
+  bool has(int shard) const { return count > 0 ? shard % count == index : shard == index; }
 };
 
 /// The part this process is asked to do. The first of these that is there decides:
@@ -27,14 +29,11 @@ struct ShardPart {
 ///
 /// `environment` is getenv. Throws UsageError naming the flag or variable that is no such number,
 /// and for SHARD_COUNT without an index: each of many workers would do everything.
-ShardPart choose_part(const std::optional<std::string>& flag,
-                      const std::function<const char*(const char*)>& environment);
-
-/// The shards of a part, ascending; none if the plan has fewer shards than the part's index.
-std::vector<int> shards_of(const ShardPart& part, int shard_count);
+WorkerPart choose_part(const std::optional<std::string>& flag,
+                       const std::function<const char*(const char*)>& environment);
 
 /// For a person: "part 3 of 7 (--shards)", "shard 3 of 1024 (SLURM_ARRAY_TASK_ID)", "all shards".
 /// Parts and shards are counted from 0, as in their names.
-std::string to_text(const ShardPart& part, int shard_count);
+std::string to_text(const WorkerPart& part, int shard_count);
 
 }  // namespace eventgan

@@ -1,4 +1,4 @@
-#include "pipeline/workers/shard_part.h"
+#include "pipeline/conversion/worker_part.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,24 +19,33 @@ using ::testing::ThrowsMessage;
 
 using Variables = std::map<std::string, std::string>;
 
-ShardPart part_in(const Variables& variables,
-                  const std::optional<std::string>& flag = std::nullopt) {
+WorkerPart part_in(const Variables& variables,
+                   const std::optional<std::string>& flag = std::nullopt) {
   return choose_part(flag, [&](const char* name) {
     const auto found = variables.find(name);
     return found == variables.end() ? nullptr : found->second.c_str();
   });
 }
 
+/// The shards of a part, ascending, in a plan of so many.
+std::vector<int> shards_of(const WorkerPart& part, int shard_count) {
+  std::vector<int> shards;
+  for (int shard = 0; shard < shard_count; ++shard) {
+    if (part.has(shard)) shards.push_back(shard);
+  }
+  return shards;
+}
+
 TEST(ChoosePart, IsEverythingWithoutAWord) {
-  EXPECT_EQ(part_in({}), ShardPart());
+  EXPECT_EQ(part_in({}), WorkerPart());
   EXPECT_EQ(to_text(part_in({}), 9), "all shards");
 }
 
 TEST(ChoosePart, TheFlagWinsOverTheEnvironment) {
   const Variables variables = {{"SHARD_INDEX", "x"}, {"SLURM_ARRAY_TASK_ID", "1"}};
-  EXPECT_EQ(part_in(variables, "2/7"), (ShardPart{2, 7, "--shards"}));
-  EXPECT_EQ(part_in(variables, "0/1"), (ShardPart{0, 1, "--shards"}));
-  EXPECT_EQ(part_in(variables, "all"), ShardPart());
+  EXPECT_EQ(part_in(variables, "2/7"), (WorkerPart{2, 7, "--shards"}));
+  EXPECT_EQ(part_in(variables, "0/1"), (WorkerPart{0, 1, "--shards"}));
+  EXPECT_EQ(part_in(variables, "all"), WorkerPart());
 }
 
 TEST(ChoosePart, RefusesAFlagThatIsNoPart) {
@@ -50,8 +59,8 @@ TEST(ChoosePart, RefusesAFlagThatIsNoPart) {
 
 TEST(ChoosePart, AnIndexAloneIsAShardOfThePlan) {
   for (const char* name : {"SHARD_INDEX", "SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"}) {
-    const ShardPart part = part_in({{name, "5"}});
-    EXPECT_EQ(part, (ShardPart{5, 0, name}));
+    const WorkerPart part = part_in({{name, "5"}});
+    EXPECT_EQ(part, (WorkerPart{5, 0, name}));
     EXPECT_THAT(shards_of(part, 6), ElementsAre(5));
     EXPECT_EQ(to_text(part, 1024), "shard 5 of 1024 (" + std::string(name) + ")");
   }
@@ -61,12 +70,12 @@ TEST(ChoosePart, TheSizeOfAnArrayIsNotTheNumberOfParts) {
   const Variables retry = {{"SLURM_ARRAY_TASK_ID", "7"},  {"SLURM_ARRAY_TASK_COUNT", "2"},
                            {"SLURM_ARRAY_TASK_MIN", "3"}, {"SLURM_ARRAY_TASK_MAX", "7"},
                            {"SLURM_PROCID", "0"},         {"SLURM_NTASKS", "1"}};
-  EXPECT_EQ(part_in(retry), (ShardPart{7, 0, "SLURM_ARRAY_TASK_ID"}));
+  EXPECT_EQ(part_in(retry), (WorkerPart{7, 0, "SLURM_ARRAY_TASK_ID"}));
 }
 
 TEST(ChoosePart, TheCountIsTheNumberOfParts) {
   for (const char* name : {"SHARD_INDEX", "SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"}) {
-    EXPECT_EQ(part_in({{name, "3"}, {"SHARD_COUNT", "4"}}), (ShardPart{3, 4, name}));
+    EXPECT_EQ(part_in({{name, "3"}, {"SHARD_COUNT", "4"}}), (WorkerPart{3, 4, name}));
     // An array counted from 1 by mistake.
     EXPECT_THAT(([&] {
                   part_in({{name, "4"}, {"SHARD_COUNT", "4"}});
@@ -85,12 +94,12 @@ TEST(ChoosePart, OwnVariablesWinOverThoseOfClusters) {
     EXPECT_EQ(part_in(variables).origin, name);
     variables.erase(name);
   }
-  EXPECT_EQ(part_in(variables), ShardPart());
+  EXPECT_EQ(part_in(variables), WorkerPart());
 }
 
 TEST(ChoosePart, AnMpiRankIsOneOfItsWorld) {
   EXPECT_EQ(part_in({{"OMPI_COMM_WORLD_RANK", "3"}, {"OMPI_COMM_WORLD_SIZE", "4"}}),
-            (ShardPart{3, 4, "OMPI_COMM_WORLD_RANK"}));
+            (WorkerPart{3, 4, "OMPI_COMM_WORLD_RANK"}));
   EXPECT_THAT(
       [] {
         part_in({{"OMPI_COMM_WORLD_RANK", "3"}});
@@ -99,9 +108,9 @@ TEST(ChoosePart, AnMpiRankIsOneOfItsWorld) {
 }
 
 TEST(ChoosePart, ABatchScriptIsNoTaskOfAStep) {
-  EXPECT_EQ(part_in({{"SLURM_PROCID", "0"}, {"SLURM_NTASKS", "4"}}), ShardPart());
+  EXPECT_EQ(part_in({{"SLURM_PROCID", "0"}, {"SLURM_NTASKS", "4"}}), WorkerPart());
   EXPECT_EQ(part_in({{"SLURM_PROCID", "2"}, {"SLURM_STEP_NUM_TASKS", "4"}}),
-            (ShardPart{2, 4, "SLURM_PROCID"}));
+            (WorkerPart{2, 4, "SLURM_PROCID"}));
 }
 
 TEST(ChoosePart, NamesTheVariableThatIsNoNumber) {
@@ -154,7 +163,7 @@ TEST(ShardsOf, APartBeyondThePlanIsEmpty) {
   EXPECT_THAT(shards_of({1, INT_MAX, "--shards"}, 3), ElementsAre(1));
 }
 
-TEST(ShardPart, SaysWhatItIs) {
+TEST(WorkerPart, SaysWhatItIs) {
   EXPECT_EQ(to_text({3, 7, "--shards"}, 100), "part 3 of 7 (--shards)");
 }
 

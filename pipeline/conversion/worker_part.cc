@@ -1,4 +1,4 @@
-#include "pipeline/workers/shard_part.h"
+#include "pipeline/conversion/worker_part.h"
 
 #include <charconv>
 #include <string_view>
@@ -26,7 +26,7 @@ std::optional<int> number(std::string_view text) {
   return value;
 }
 
-ShardPart part_of_flag(const std::string& text) {
+WorkerPart part_of_flag(const std::string& text) {
   if (text == "all") return {};
   const std::size_t slash = text.find('/');
   if (slash != text.npos) {
@@ -46,7 +46,7 @@ int count_of_variable(const char* name, const Environment& environment) {
 }
 
 /// `count` = 0: any index will do.
-ShardPart part_of_variable(const char* name, int count, const Environment& environment) {
+WorkerPart part_of_variable(const char* name, int count, const Environment& environment) {
   const char* text = environment(name);
   const std::optional<int> index = number(text);
   if (!index) refuse(name, "a number of 0 or more", text);
@@ -58,7 +58,7 @@ ShardPart part_of_variable(const char* name, int count, const Environment& envir
 
 }  // namespace
 
-ShardPart choose_part(const std::optional<std::string>& flag, const Environment& environment) {
+WorkerPart choose_part(const std::optional<std::string>& flag, const Environment& environment) {
   if (flag) return part_of_flag(*flag);
   const bool counted = environment(kCount) != nullptr;
   for (const char* name : {"SHARD_INDEX", "SLURM_ARRAY_TASK_ID", "JOB_COMPLETION_INDEX"}) {
@@ -78,16 +78,7 @@ ShardPart choose_part(const std::optional<std::string>& flag, const Environment&
   return {};
 }
 
-std::vector<int> shards_of(const ShardPart& part, int shard_count) {
-  std::vector<int> shards;
-  const long long step = part.count > 0 ? part.count : shard_count;
-  for (long long shard = part.index; shard < shard_count; shard += step) {
-    shards.push_back(static_cast<int>(shard));
-  }
-  return shards;
-}
-
-std::string to_text(const ShardPart& part, int shard_count) {
+std::string to_text(const WorkerPart& part, int shard_count) {
   if (part.origin.empty()) return "all shards";
   return (part.count > 0 ? "part " : "shard ") + std::to_string(part.index) + " of " +
          std::to_string(part.count > 0 ? part.count : shard_count) + " (" + part.origin + ")";

@@ -1,4 +1,4 @@
-#include "pipeline/samples/conversion_graph.h"
+#include "pipeline/conversion/conversion_run.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,12 @@
 #include <algorithm>
 #include <atomic>
 #include <deque>
+#include <map>
 #include <stdexcept>
+
+#include "tests/pipeline/profile/trace_reading.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
@@ -125,6 +130,7 @@ TEST_P(ConversionGraph, StopsWhenTheWriterSaysSo) {
   ConversionBodies bodies = Recorder().bodies();
   bodies.write = [&](SampleMessage&) { return ++written < 5; };
   const std::size_t arrived = run(bodies);
+  EXPECT_EQ(written, 5u);
   EXPECT_GE(arrived, 5u);
   EXPECT_LE(arrived, 5 + 2 * limits().in_flight);  // what was under way still comes
 }
@@ -184,17 +190,30 @@ TEST_P(ConversionGraph, FinishingAShardGivesItWholeAndNoOther) {
   EXPECT_EQ(arrived, 43u);
 }
 
-TEST_P(ConversionGraph, FinishingAShardLeavesAlmostNothingOfTheNext) {
+TEST_P(ConversionGraph, FinishingAShardLeavesAlmostNothingOfTheNextAndWritesNoneOfIt) {
   Recorder recorder;
   std::atomic<StopOrder> order = StopOrder::kGoOn;
   ConversionBodies bodies = recorder.bodies();
   const auto write = bodies.write;
   bodies.write = [&](SampleMessage& message) {
     if (message.shard == &a_) order = StopOrder::kFinishShard;
-    return write(message) && message.shard == &a_;  // as a sink that drops the others
+    return write(message);
   };
   EXPECT_LE(run(bodies, [&] { return order.load(); }), 3 + 2 * limits().in_flight);
-  EXPECT_EQ(std::count(recorder.written.begin(), recorder.written.end(), "a2"), 1);
+  EXPECT_THAT(recorder.written, ::testing::ElementsAre("a0", "a1", "a2"));
+}
+
+TEST_P(ConversionGraph, AnAbortWritesNothingMore) {
+  Recorder recorder;
+  std::atomic<StopOrder> order = StopOrder::kGoOn;
+  ConversionBodies bodies = recorder.bodies();
+  const auto write = bodies.write;
+  bodies.write = [&](SampleMessage& message) {
+    if (message.number == 4) order = StopOrder::kAbort;
+    return write(message);
+  };
+  run(bodies, [&] { return order.load(); });
+  EXPECT_THAT(recorder.written, ::testing::ElementsAre("a0", "a1", "a2", "b0", "b1"));
 }
 
 TEST_P(ConversionGraph, AnAbortLetsMessagesPassWithoutWork) {
@@ -217,13 +236,121 @@ TEST_P(ConversionGraph, AnAbortBeforeTheStartDoesNothing) {
   EXPECT_EQ(run(recorder.bodies(), [] { return StopOrder::kAbort; }), 0u);
 }
 
+TEST_P(ConversionGraph, TracesEachStageOfEachSample) {
+  const testing::TemporaryFolder folder;
+  TraceRecorder trace(folder / "t.json", {});
+  ConversionBodies bodies = Recorder().bodies();
+  int most = 0;
+  bodies.read = [](SampleMessage& message) {
+    if (message.slot == 1) message.fail("expected a frame, got none");
+  };
+  bodies.finish = [&](SampleMessage& message) {
+    EXPECT_GE(trace.gauges().samples_at_work, 1);
+    message.chunk.resize(7);
+  };
+  bodies.write = [&](SampleMessage&) {
+    most = std::max(most, trace.gauges().samples_in_flight.load());
+    return true;
+  };
+  PlannedShard traced = shard("s.h5", 20);
+  traced.volume_size = {2, 3};
+  for (std::size_t i = 0; i < 20; ++i) traced.samples[i].sample_id = "id" + std::to_string(i);
+  run_conversion_graph(one_by_one({&traced}), bodies, limits(), go_on, &trace);
+  EXPECT_GE(most, 1);
+  EXPECT_EQ(trace.gauges().samples_in_flight, 0);
+  EXPECT_EQ(trace.gauges().samples_at_work, 0);
+  trace.finish();
+  const nlohmann::json json = testing::read_trace(folder / "t.json");
+  std::map<std::string, int> count;
+  for (const auto& event : testing::events(json, "X")) ++count[event.at("name")];
+  EXPECT_EQ(count, (std::map<std::string, int>{
+                       {"read", 20}, {"generate", 20}, {"finish", 20}, {"write", 20}}));
+  const auto arguments = [&](const char* stage, int slot) -> nlohmann::json {
+    for (const auto& event : testing::events(json, "X", stage)) {
+      if (event.at("args").at("slot") == slot) return event.at("args");
+    }
+    return {};
+  };
+  nlohmann::json finish = arguments("finish", 4);
+  EXPECT_GE(finish.at("waited_us"), 0);
+  finish.erase("waited_us");
+  EXPECT_EQ(finish,
+            nlohmann::json(
+                {{"sample", "id4"}, {"shard", "s.h5"}, {"slot", 4}, {"pixels", 6}, {"bytes", 7}}));
+  EXPECT_FALSE(arguments("read", 4).contains("waited_us"));
+  // A fault stands in the stage in which it arose.
+  EXPECT_THAT(arguments("read", 1).at("fault").get<std::string>(),
+              ::testing::StartsWith("expected a frame, got none"));
+  EXPECT_FALSE(arguments("generate", 1).contains("fault"));
+}
+
 INSTANTIATE_TEST_SUITE_P(Threads, ConversionGraph, ::testing::Values(1, 2, 5));
 
-TEST(SamplesInFlight, KeepsThreadsBusyWithinTheBudget) {
-  EXPECT_EQ(samples_in_flight(2, 10, 1000), 12u);   // plenty: 4 x 2 + 4
-  EXPECT_EQ(samples_in_flight(2, 100, 1000), 10u);  // the budget
-  EXPECT_EQ(samples_in_flight(2, 5000, 1000), 3u);  // never fewer than threads + 1
-  EXPECT_EQ(samples_in_flight(1, 0, 1000), 8u);
+constexpr std::size_t kMuch = std::size_t{1} << 50;
+const testing::FakeGenerator kGenerator;
+
+/// Needs a kilobyte for each pixel.
+class LargeGenerator final : public Generator {
+ public:
+  int bins() const override { return 9; }
+  void generate(std::span<const float>, ImageSize, std::span<float>) const override {}
+  std::string description() const override { return "large"; }
+  std::size_t working_bytes(ImageSize size) const override { return 1024 * size.pixel_count(); }
+};
+
+TEST(GraphLimits, KeepThreadsBusyWithSmallSamples) {
+  const PlannedShard small{"s.h5", 0, {20, 30}, {}};
+  const GraphLimits limits = graph_limits({&small}, kGenerator, 3, kMuch);
+  EXPECT_EQ(limits.threads, 3);
+  EXPECT_EQ(limits.in_flight, 16u);  // four for each thread and four more
+  EXPECT_EQ(graph_limits({}, kGenerator, 3, kMuch).in_flight, 16u);
+}
+
+TEST(GraphLimits, HoldNoMoreOfTheLargestThanAGibibyte) {
+  const PlannedShard small{"s.h5", 0, {20, 30}, {}};
+  // 18 channels of 1024 x 1024 float32, twice: 144 MiB, so seven in a gibibyte.
+  const PlannedShard large{"l.h5", 0, {1024, 1024}, {}};
+  EXPECT_EQ(graph_limits({&small, &large, &small}, kGenerator, 1, kMuch).in_flight, 7u);
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 8, kMuch).in_flight,
+            9u);  // never fewer than threads + 1
+}
+
+TEST(GraphLimits, RunNoMoreGeneratorsAtOnceThanFitIntoThreeQuartersOfTheMemory) {
+  const PlannedShard small{"s.h5", 0, {32, 32}, {}};
+  const PlannedShard large{"l.h5", 0, {1024, 1024}, {}};
+  const std::size_t gibibyte = std::size_t{1} << 30;
+  const LargeGenerator generator;
+  EXPECT_EQ(graph_limits({&small}, generator, 64, 8 * gibibyte).generators, 64);
+  EXPECT_EQ(graph_limits({&small, &large}, generator, 64, 8 * gibibyte).generators, 6);
+  EXPECT_EQ(graph_limits({&large}, generator, 64, gibibyte).generators, 1);  // one always
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 64, gibibyte).generators, 64);
+  EXPECT_EQ(graph_limits({}, generator, 64, 0).generators, 1);
+}
+
+TEST(GraphLimits, HoldFewerSamplesWhereTheyTakeMoreThanHalfOfTheMemory) {
+  // 144 MiB each (see above): seven in a gibibyte.
+  const PlannedShard large{"l.h5", 0, {1024, 1024}, {}};
+  const std::size_t gibibyte = std::size_t{1} << 30;
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 2 * gibibyte).in_flight, 7u);
+  EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 1000).in_flight, 1u);
+}
+
+TEST(CheckPairsFit, NamesThePairThatDoesNot) {
+  const PlannedSample sample{"id7", "", "", {{"a.png"}, {"b.png"}}, ""};
+  const PlannedShard small{"s.h5", 0, {32, 32}, {sample}};
+  const PlannedShard large{"l.h5", 0, {1024, 512}, {sample}};
+  const LargeGenerator generator;
+  // 1024 x 512 pixels with a kilobyte of working memory and a volume of 18 x 4 bytes each.
+  const std::size_t needed = std::size_t{1024} * 512 * (1024 + 18 * 4);
+  check_pairs_fit({&small, &large}, generator, needed);
+  EXPECT_THAT(
+      [&] {
+        check_pairs_fit({&small, &large}, generator, needed - 1);
+      },
+      ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+          ::testing::HasSubstr(std::to_string(needed - 1) + " bytes, got 512x1024"),
+          ::testing::HasSubstr("about " + std::to_string(needed)),
+          ::testing::HasSubstr("in a.png and b.png (id7)"))));
 }
 
 }  // namespace

@@ -1,15 +1,25 @@
 #pragma once
 
 #include <chrono>
+#include <deque>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <set>
 #include <string>
+#include <vector>
 
-#include "pipeline/workers/shard_queue.h"
+#include "manifests/plan.h"
 
 namespace eventgan {
+
+/// What other workers do with a shard.
+enum class ShardActivity {
+  kFree,  ///< nothing
+  kDone,  ///< one has committed it
+  kBusy   ///< one that seems alive is writing it
+};
 
 /// The output folder as several workers share it, who know of each other by files alone. A shard
 /// that this worker takes is claimed at once by an empty temporary file, since the samples of the
@@ -48,6 +58,33 @@ class SharedFolder {
   std::map<std::string, std::filesystem::path> claims_;  // by shard
   std::set<std::string> busy_;                           // what others write, when last listed
   std::chrono::steady_clock::time_point next_listing_;
+};
+
+/// The shards a worker has to do, in plan order, looked at again before each: one that another
+/// worker has finished meanwhile is skipped, one that another is writing is put off to the end and
+/// then made all the same unless it is done by then (those whose writer has given up first). So
+/// workers with overlapping parts share the work without talking, and nobody waits for a dead one.
+/// Thread safety: one thread at a time.
+class ShardQueue {
+ public:
+  using Look = std::function<ShardActivity(const PlannedShard&)>;
+
+  ShardQueue(std::vector<const PlannedShard*> shards, Look look);
+
+  /// The next shard to make; nullptr at the end, and from then on. `stop` is asked between looks,
+  /// which may take long; true is the end. None: nobody asks. Throws what `look` throws.
+  const PlannedShard* next(const std::function<bool()>& stop = {});
+
+  /// Shards that others finished before their turn came.
+  const std::vector<const PlannedShard*>& done_by_others() const { return done_by_others_; }
+
+ private:
+  const PlannedShard* next_deferred(const std::function<bool()>& stop);
+
+  std::deque<const PlannedShard*> shards_;
+  std::deque<const PlannedShard*> deferred_;
+  std::vector<const PlannedShard*> done_by_others_;
+  Look look_;
 };
 
 }  // namespace eventgan
