@@ -15,11 +15,10 @@
 #include "pipeline/memory/memory_limit.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/shard_backup.h"
-#include "pipeline/output/shard_state.h"
+#include "pipeline/output/shard_scan.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
 #include "pipeline/samples/graph_limits.h"
-#include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
 
 namespace eventgan {
@@ -102,9 +101,10 @@ void say_part(const ConversionReport& report, const ConversionOptions& options) 
 EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
                         ConversionReport& report) {
   const TraceSpan span(job.options.trace, "check earlier shards", "job");
-  const EarlierCheck check{job.threads, [&] { return stop_requested(job.options); },
-                           job.options.note, job.options.trace};
-  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, split.part, check);
+  const ScanOptions scan{job.threads, [&] { return stop_requested(job.options); },
+                         job.options.trace};
+  EarlierShards earlier =
+      check_earlier_shards(job.folder, job.frozen, split.part, scan, job.options.note);
   for (const std::string& fault : earlier.faults) {
     tell(job.options.warn, fault + "; it is made again");
   }
@@ -115,8 +115,7 @@ EarlierShards look_back(const ConversionJob& job, const PartOfPlan& split,
   report.shards_done_before = report.shards_done;
   // Where not even a plan of quarantined samples passes the limits, nobody needs to count.
   if (beyond_limits(job.manifest.errors, report.plan_pairs, report.plan_pairs)) {
-    report.quarantined_elsewhere =
-        count_quarantined(job.folder, job.frozen, split.elsewhere, check);
+    report.quarantined_elsewhere = count_quarantined(job.folder, job.frozen, split.elsewhere, scan);
   }
   return earlier;
 }
@@ -140,15 +139,12 @@ void add_made(const ConversionJob& job, const ShardMaker& maker, ConversionRepor
 /// another may have overwritten, or a person deleted, what was committed.
 void look_again(const ConversionJob& job, const PartOfPlan& split, ConversionReport& report) {
   const TraceSpan span(job.options.trace, "look again at all shards", "job");
-  std::vector<ShardCondition> conditions(split.part.size());
-  for_each_index(split.part.size(), job.threads, [&](std::size_t i) {
-    conditions[i] = shard_state(job.folder, outline_of(*split.part[i]), job.frozen.hash).condition;
-  });
-  for (std::size_t i = 0; i < conditions.size(); ++i) {
-    if (conditions[i] == ShardCondition::kDone) continue;
-    report.lost.push_back((job.folder / split.part[i]->name).string() +
+  for (const ShardState& shard : scan_shards(job.folder, outlines_of(split.part), job.frozen.hash,
+                                             ScanDepth::kMarker, {.threads = job.threads})) {
+    if (shard.done()) continue;
+    report.lost.push_back((job.folder / shard.outline.name).string() +
                           ": expected the shard that was committed, got it " +
-                          to_string(conditions[i]));
+                          to_string(shard.condition));
     tell(job.options.warn, report.lost.back() + "; run again");
   }
 }

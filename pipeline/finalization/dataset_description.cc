@@ -27,11 +27,11 @@ Json counts_json(const DatasetParts& parts) {
   DatasetCounts total;
   std::map<std::string, DatasetCounts> splits;
   std::map<std::string, DatasetCounts> datasets;
-  for (const FinishedShard& shard : parts.shards) {
+  for (const ShardState& shard : parts.done) {
     const SourceSpec& source = parts.source_of(shard.outline);
     for (DatasetCounts* counts :
          {&total, &splits[source.split], &datasets[std::string(to_string(source.dataset))]}) {
-      add(shard.marker, *counts);
+      add(*shard.marker, *counts);
     }
   }
   Json by_split = Json::object();
@@ -41,10 +41,10 @@ Json counts_json(const DatasetParts& parts) {
   return {{"total", counts_json(total)}, {"by_split", by_split}, {"by_dataset", by_dataset}};
 }
 
-Json shard_entry(const DatasetParts& parts, const FinishedShard& shard) {
+Json shard_entry(const DatasetParts& parts, const ShardState& shard) {
   const SourceSpec& source = parts.source_of(shard.outline);
   DatasetCounts counts;
-  add(shard.marker, counts);
+  add(*shard.marker, counts);
   return {{"name", shard.outline.name},
           {"split", source.split},
           {"dataset", to_string(source.dataset)},
@@ -53,7 +53,7 @@ Json shard_entry(const DatasetParts& parts, const FinishedShard& shard) {
           {"boxes", counts.boxes},
           {"persons", counts.persons},
           {"size_bytes", counts.size_bytes},
-          {"sha256", shard.marker.sha256}};
+          {"sha256", shard.marker->sha256}};
 }
 
 Json source_entry(const DatasetParts& parts, std::size_t index) {
@@ -78,8 +78,8 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
 
 Json quarantined_json(const DatasetParts& parts) {
   Json list = Json::array();
-  for (const FinishedShard& shard : parts.shards) {
-    for (const QuarantinedSample& sample : shard.marker.quarantined) {
+  for (const ShardState& shard : parts.done) {
+    for (const QuarantinedSample& sample : shard.marker->quarantined) {
       list.push_back({{"sample_id", sample.sample_id},
                       {"shard", shard.outline.name},
                       {"slot", sample.slot},
@@ -142,13 +142,13 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
                {"settings", settings(parts.frozen.plan.manifest_text)},
                {"counts", counts_json(parts)}};
   json["missing"] = Json::array();
-  for (const MissingShard& shard : parts.missing) json["missing"].push_back(shard.name);
+  for (const ShardState& shard : parts.missing) json["missing"].push_back(shard.outline.name);
   json["sources"] = Json::array();
   for (std::size_t i = 0; i < parts.manifest.sources.size(); ++i) {
     json["sources"].push_back(source_entry(parts, i));
   }
   json["shards"] = Json::array();
-  for (const FinishedShard& shard : parts.shards) {
+  for (const ShardState& shard : parts.done) {
     json["shards"].push_back(shard_entry(parts, shard));
   }
   json["quarantined"] = quarantined_json(parts);

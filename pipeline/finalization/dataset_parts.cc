@@ -4,7 +4,6 @@
 #include <utility>
 
 #include "manifests/faults.h"
-#include "pipeline/output/shard_states.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -27,7 +26,7 @@ JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
 }
 
 /// The header of a shard whose bytes are its marker's.
-ShardHeader read_shard_header(const fs::path& folder, const FinishedShard& shard,
+ShardHeader read_shard_header(const fs::path& folder, const ShardState& shard,
                               const std::string& plan_hash) {
   const fs::path file = folder / shard.outline.name;
   ShardHeader header = ShardReader(file).header();
@@ -42,34 +41,28 @@ ShardHeader read_shard_header(const fs::path& folder, const FinishedShard& shard
 }  // namespace
 
 DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
-                                std::vector<ShardState> states, const std::vector<bool>& sound) {
+                                std::vector<ShardState> shards) {
   DatasetParts parts;
   parts.frozen = std::move(frozen);
   parts.manifest = frozen_manifest(folder, parts.frozen.plan);
   parts.amendments = read_amendments(folder, parts.frozen.hash);
-  for (std::size_t i = 0; i < states.size(); ++i) {
-    const ShardOutline& outline = parts.frozen.plan.shards[i];
-    ShardState& state = states[i];
-    if (!state.done()) {
-      parts.missing.push_back(
-          {outline.name, state.fault.empty() ? to_string(state.condition) : state.fault});
+  for (ShardState& shard : shards) {
+    if (!shard.done()) {
+      parts.missing.push_back(std::move(shard));
       continue;
     }
-    parts.shards.push_back({outline, std::move(*state.marker)});
+    ShardOutline& outline = shard.outline;
     const bool is_first = !parts.headers.contains(outline.source);
-    if (!sound[i] && outline.size_unknown) parts.shards.back().outline.volume_size = {};
-    if (!sound[i] || (!is_first && !outline.size_unknown)) continue;
-    ShardHeader header = read_shard_header(folder, parts.shards.back(), parts.frozen.hash);
-    parts.shards.back().outline.volume_size = header.volume.size;
-    if (is_first) parts.headers[outline.source] = std::move(header);
+    if (shard.sound() && (is_first || outline.size_unknown)) {
+      ShardHeader header = read_shard_header(folder, shard, parts.frozen.hash);
+      outline.volume_size = header.volume.size;
+      if (is_first) parts.headers[outline.source] = std::move(header);
+    } else if (!shard.sound() && outline.size_unknown) {
+      outline.volume_size = {};
+    }
+    parts.done.push_back(std::move(shard));
   }
   return parts;
-}
-
-DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen) {
-  std::vector<ShardState> states = proven_shard_states(folder, frozen);
-  const std::vector<bool> sound(states.size(), true);
-  return read_dataset_parts(folder, std::move(frozen), std::move(states), sound);
 }
 
 }  // namespace eventgan

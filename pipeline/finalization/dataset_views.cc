@@ -32,7 +32,7 @@ void name_groups(std::vector<DatasetView>& views) {
 std::vector<DatasetView> views_of(const DatasetParts& parts) {
   std::vector<DatasetView> views;
   std::vector<std::vector<ViewShard>> shards;  // of each view
-  for (const FinishedShard& shard : parts.shards) {
+  for (const ShardState& shard : parts.done) {
     // All of a shard's header that a view shows is its source's, but for the size.
     ShardHeader header = parts.headers.at(shard.outline.source);
     header.volume.size = shard.outline.volume_size;
@@ -43,7 +43,7 @@ std::vector<DatasetView> views_of(const DatasetParts& parts) {
       views.push_back({"", std::move(header), {}});
       shards.emplace_back();
     }
-    shards[number].push_back({parts.source_of(shard.outline).split, shard.marker});
+    shards[number].push_back({parts.source_of(shard.outline).split, *shard.marker});
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     views[i].layout = lay_out_view(std::move(shards[i]));

@@ -10,9 +10,9 @@ namespace {
 
 constexpr std::size_t kListedShards = 100;
 
-/// What is wrong with a shard names its file.
-std::string line_of(const MissingShard& shard) {
-  return shard.why.find(": ") == std::string::npos ? shard.name + ": " + shard.why : shard.why;
+/// "missing", or what is wrong with what there is.
+std::string why(const ShardState& shard) {
+  return shard.faults.empty() ? to_string(shard.condition) : shard.faults.front();
 }
 
 }  // namespace
@@ -21,7 +21,9 @@ std::string to_text(const FinalizationReport& report) {
   std::string text;
   const std::size_t listed = std::min(report.missing.size(), kListedShards);
   for (std::size_t i = 0; i < listed; ++i) {
-    text += line_of(report.missing[i]) + "\n";
+    const ShardState& shard = report.missing[i];
+    // What is wrong with a shard names its file.
+    text += (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard) + "\n";
   }
   if (listed < report.missing.size()) {
     text += "... and " + std::to_string(report.missing.size() - listed) + " more (all: --json)\n";
@@ -42,8 +44,8 @@ std::string to_text(const FinalizationReport& report) {
 
 std::string to_json(const FinalizationReport& report) {
   nlohmann::json missing = nlohmann::json::array();
-  for (const MissingShard& shard : report.missing) {
-    missing.push_back({{"shard", shard.name}, {"why", shard.why}});
+  for (const ShardState& shard : report.missing) {
+    missing.push_back({{"shard", shard.outline.name}, {"why", why(shard)}});
   }
   const nlohmann::json json = {{"folder", report.folder},
                                {"complete", report.complete()},

@@ -12,12 +12,12 @@ namespace eventgan {
 struct FinalizationReport {
   std::string folder;
   int shards_planned = 0;
-  std::vector<MissingShard> missing;  ///< in plan order
-  DatasetCounts counts;               ///< of the shards that are done
-  std::vector<std::string> notes;     ///< on the inputs (see notes_of)
-  int views = 0;                      ///< in dataset.h5
-  bool written = false;               ///< dataset.h5 and dataset.json are in place
-  bool too_many_faults = false;       ///< the limits for quarantined samples are passed
+  std::vector<ShardState> missing;  ///< those that are not done, in plan order
+  DatasetCounts counts;             ///< of the shards that are done
+  std::vector<std::string> notes;   ///< on the inputs (see notes_of)
+  int views = 0;                    ///< in dataset.h5
+  bool written = false;             ///< dataset.h5 and dataset.json are in place
+  bool too_many_faults = false;     ///< the limits for quarantined samples are passed
 
   bool complete() const { return missing.empty(); }
 };

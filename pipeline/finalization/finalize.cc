@@ -15,17 +15,19 @@ FinalizationReport finalize(const std::filesystem::path& folder,
                             const FinalizationOptions& options) {
   FrozenOutline frozen = read_frozen_outline(folder);
   restore_shards(folder, frozen);  // and what a finalize that was killed has left goes
-  const DatasetParts parts = read_dataset_parts(folder, std::move(frozen));
+  std::vector<ShardState> shards =
+      scan_shards(folder, frozen.plan.shards, frozen.hash, ScanDepth::kRows);
+  const DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
   FinalizationReport report;
   report.folder = folder.string();
   report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
   report.missing = parts.missing;
   report.notes = notes_of(parts.frozen.plan.sources);
-  for (const FinishedShard& shard : parts.shards) add(shard.marker, report.counts);
+  for (const ShardState& shard : parts.done) add(*shard.marker, report.counts);
   report.too_many_faults =
       beyond_limits(options.errors.value_or(parts.manifest.errors), report.counts.quarantined(),
                     parts.frozen.plan.sample_count());
-  if (parts.shards.empty() || (!report.complete() && !options.partial)) return report;
+  if (parts.done.empty() || (!report.complete() && !options.partial)) return report;
 
   const std::vector<DatasetView> views = views_of(parts);
   const ViewReceipt receipt = write_dataset_view(folder / kViewName, views);

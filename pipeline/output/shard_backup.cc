@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "manifests/marker.h"
-#include "pipeline/output/shard_state.h"
+#include "pipeline/output/shard_scan.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
 #include "stages/files/stale_temporaries.h"
@@ -88,7 +88,7 @@ void restore_shards(const fs::path& folder, const FrozenOutline& frozen) {
     if (shard == shards.end() || !is_stale(file) || at_work.contains(shard->first)) continue;
     // What most dead writers leave is not whole, which its size tells: nothing is hashed.
     if (is_of_marker(file.path, folder / marker_name(shard->first), frozen.hash) &&
-        !hashed_shard_state(folder, *shard->second, frozen.hash).done()) {
+        !shard_state(folder, *shard->second, frozen.hash, ScanDepth::kBytes).done()) {
       put_back(file.path, folder / shard->first);
     }
   }

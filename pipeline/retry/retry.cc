@@ -96,7 +96,7 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
   EarlierShards earlier = check_earlier_shards(
       folder, frozen, shards,
-      {thread_count(options.threads), [&] { return stop_requested(options); }, {}, options.trace});
+      {thread_count(options.threads), [&] { return stop_requested(options); }, options.trace});
   for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
   if (!stop_requested(options)) {
     report.quarantined = 0;  // what a damaged shard held does not count

@@ -48,8 +48,7 @@ std::string first_difference(const std::string& expected, const std::string& got
 }  // namespace
 
 std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline frozen,
-                                        std::vector<ShardState> states,
-                                        const std::vector<bool>& sound) {
+                                        std::vector<ShardState> shards) {
   const fs::path description = folder / kDescriptionName;
   const fs::path view = folder / kViewName;
   const bool has_view = fs::exists(view);
@@ -61,12 +60,11 @@ std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline fr
   }
   if (!has_view) return {};
   try {
-    const DatasetParts parts =
-        read_dataset_parts(folder, std::move(frozen), std::move(states), sound);
-    if (parts.shards.empty()) {
+    const DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
+    if (parts.done.empty()) {
       return {description.string() + ": expected committed shards beside it, got none" + kMendedBy};
     }
-    for (const FinishedShard& shard : parts.shards) {
+    for (const ShardState& shard : parts.done) {
       const bool is_known = shard.outline.volume_size != ImageSize{};
       if (is_known && parts.headers.contains(shard.outline.source)) continue;
       return {description.string() +

@@ -2,23 +2,19 @@
 
 #include <exception>
 #include <memory>
-#include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "pipeline/output/amendments.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/recorded_manifest.h"
-#include "pipeline/output/shard_state.h"
-#include "pipeline/threads/for_each_index.h"
-#include "pipeline/threads/thread_count.h"
+#include "pipeline/output/shard_scan.h"
 #include "pipeline/verification/dataset_check.h"
 #include "pipeline/verification/fault_line.h"
 #include "pipeline/verification/source_comparison.h"
 #include "pipeline/verification/stray_files.h"
-#include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"
-#include "stages/shards/shard_check.h"
+#include "stages/shards/shard_reader.h"
 
 namespace eventgan {
 namespace {
@@ -27,19 +23,17 @@ namespace fs = std::filesystem;
 
 /// The plan that all readable markers of the plan's shards name, if there are two or more and it is
 /// not the frozen one: then the plan is what is wrong, and not each marker.
-std::optional<std::string> other_plan(const fs::path& folder, const FrozenOutline& frozen) {
-  std::set<std::string> hashes;
+std::optional<std::string> other_plan(const std::vector<ShardState>& shards,
+                                      const std::string& plan_hash) {
+  std::string other;
   int markers = 0;
-  for (const ShardOutline& shard : frozen.plan.shards) {
-    try {
-      const std::string text = read_text_file(folder / marker_name(shard.name));
-      hashes.insert(parse_marker(text, shard.name).plan_hash);
-      ++markers;
-    } catch (const std::runtime_error&) {  // reported with its shard
-    }
-    if (hashes.size() > 1 || hashes.contains(frozen.hash)) return std::nullopt;
+  for (const ShardState& shard : shards) {
+    if (shard.named_plan.empty()) continue;  // reported with its shard
+    if (shard.named_plan == plan_hash) return std::nullopt;
+    if (++markers == 1) other = shard.named_plan;
+    if (shard.named_plan != other) return std::nullopt;
   }
-  return markers > 1 ? std::optional(*hashes.begin()) : std::nullopt;
+  return markers > 1 ? std::optional(other) : std::nullopt;
 }
 
 /// One check of one folder.
@@ -51,14 +45,16 @@ class Verification {
   FolderCheck run() {
     const FrozenOutline frozen = read_frozen_outline(folder_);
     if (options_.deep) open_sources(frozen.plan);
-    if (const auto other = other_plan(folder_, frozen)) {
+    std::vector<ShardState> shards =
+        scan_shards(folder_, frozen.plan.shards, frozen.hash, ScanDepth::kContents);
+    if (const auto other = other_plan(shards, frozen.hash)) {
       fault(folder_ / "plan.json", "expected the plan with SHA-256 " + *other +
                                        " that all markers name, got " + frozen.hash +
                                        " (altered, or of another manifest)");
     }
-    check_shards(frozen);
+    for (std::size_t i = 0; i < shards.size(); ++i) tell_shard(i, shards[i]);
     append(stray_files(folder_, frozen.plan));
-    append(dataset_faults(folder_, frozen, std::move(states_), sound_));
+    append(dataset_faults(folder_, frozen, std::move(shards)));
     check_amendments(frozen.hash);
     note_temporaries();
     if (sources_) check_.compared = sources_->compared();
@@ -98,38 +94,18 @@ class Verification {
     check_.notes.insert(check_.notes.end(), notes.begin(), notes.end());
   }
 
-  /// Shards side by side; what is found is told in their order.
-  void check_shards(const FrozenOutline& frozen) {
-    const std::vector<ShardOutline>& shards = frozen.plan.shards;
-    states_.resize(shards.size());
-    std::vector<std::vector<std::string>> faults(shards.size());
-    for_each_index(shards.size(), thread_count(0), [&](std::size_t i) {
-      states_[i] = shard_state(folder_, shards[i], frozen.hash);  // check_shard hashes
-      if (states_[i].done()) faults[i] = check_shard(folder_ / shards[i].name, *states_[i].marker);
-    });
-    for (std::size_t i = 0; i < shards.size(); ++i) {
-      ++check_.shards;
-      sound_.push_back(states_[i].done() && faults[i].empty());
-      tell_shard(i, shards[i], faults[i]);
-    }
-  }
-
-  void tell_shard(std::size_t index, const ShardOutline& shard,
-                  const std::vector<std::string>& faults) {
-    const fs::path file = folder_ / shard.name;
-    const ShardState& state = states_[index];
-    if (state.condition == ShardCondition::kMissing) {
-      return fault(folder_ / marker_name(shard.name),
+  void tell_shard(std::size_t index, const ShardState& shard) {
+    ++check_.shards;
+    if (shard.condition == ShardCondition::kMissing) {
+      return fault(folder_ / marker_name(shard.outline.name),
                    "expected the shard and its marker, got neither (not made yet)");
     }
-    if (!state.done()) {
-      check_.faults.push_back(state.fault);
-      return;
-    }
-    check_.samples += state.marker->samples;
-    check_.valid += state.marker->valid;
-    append(faults);
-    if (!sources_ || !faults.empty()) return;
+    append(shard.faults);
+    if (!shard.done()) return;
+    check_.samples += shard.marker->samples;
+    check_.valid += shard.marker->valid;
+    if (!sources_ || !shard.sound()) return;
+    const fs::path file = folder_ / shard.outline.name;
     for (const std::string& what : sources_->faults(plan_.shards.at(index), ShardReader(file))) {
       fault(file, what);
     }
@@ -154,9 +130,7 @@ class Verification {
   const fs::path& folder_;
   const VerifyOptions& options_;
   FolderCheck check_;
-  std::vector<ShardState> states_;  // of the plan's shards
-  std::vector<bool> sound_;         // whether HDF5 may open them
-  Plan plan_;                       // deep only: it can be huge
+  Plan plan_;  // deep only: it can be huge
   std::unique_ptr<SourceComparison> sources_;
 };
 

@@ -274,10 +274,12 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   EXPECT_EQ(report.mended, 10);
   EXPECT_EQ(report.quarantined, 1);
   expect_sound_after_finalize();
-  const DatasetParts parts = read_dataset_parts(out_, read_frozen_outline(out_));
+  const FrozenOutline frozen = read_frozen_outline(out_);
+  const DatasetParts parts = read_dataset_parts(
+      out_, frozen, scan_shards(out_, frozen.plan.shards, frozen.hash, ScanDepth::kRows));
   std::map<int, int> heights;
-  for (const FinishedShard& shard : parts.shards) {
-    heights[shard.outline.volume_size.height] += shard.marker.valid;
+  for (const ShardState& shard : parts.done) {
+    heights[shard.outline.volume_size.height] += shard.marker->valid;
   }
   EXPECT_EQ(heights, (std::map<int, int>{{20, 5}, {40, 5}}));
 

@@ -1,4 +1,4 @@
-#include "pipeline/output/shard_state.h"
+#include "pipeline/output/shard_scan.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -13,7 +13,10 @@ namespace eventgan {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 const std::string kPlan(64, 'a');
@@ -39,14 +42,16 @@ class ShardStateTest : public ::testing::Test {
   void write_marker(const std::string& text) const { testing::write_file(marker_file_, text); }
 
   ShardState state() const { return shard_state(folder_.path(), shard_, kPlan); }
-  ShardState hashed() const { return hashed_shard_state(folder_.path(), shard_, kPlan); }
+  ShardState hashed() const {
+    return shard_state(folder_.path(), shard_, kPlan, ScanDepth::kBytes);
+  }
 
   void expect(ShardCondition condition, const std::string& fault) const {
     for (const ShardState& found : {state(), hashed()}) {
       EXPECT_EQ(found.condition, condition) << to_string(found.condition);
       EXPECT_FALSE(found.done());
       EXPECT_FALSE(found.marker);
-      EXPECT_THAT(found.fault, HasSubstr(fault));
+      EXPECT_THAT(found.faults, ElementsAre(HasSubstr(fault)));
     }
   }
 
@@ -61,7 +66,9 @@ TEST_F(ShardStateTest, IsDoneIfMarkerPlanAndSizeAgree) {
   for (const ShardState& found : {state(), hashed()}) {
     EXPECT_TRUE(found.done());
     EXPECT_EQ(found.marker, marker_);
-    EXPECT_EQ(found.fault, "");
+    EXPECT_TRUE(found.sound());
+    EXPECT_EQ(found.named_plan, kPlan);
+    EXPECT_EQ(found.committed, std::filesystem::last_write_time(marker_file_));
   }
 }
 
@@ -69,7 +76,7 @@ TEST_F(ShardStateTest, IsMissingWithoutShardAndMarkerAndThatIsNoFault) {
   std::filesystem::remove(shard_file_);
   std::filesystem::remove(marker_file_);
   EXPECT_EQ(state().condition, ShardCondition::kMissing);
-  EXPECT_EQ(hashed().fault, "");
+  EXPECT_THAT(hashed().faults, IsEmpty());
 }
 
 TEST_F(ShardStateTest, AShardWithoutMarkerIsNotCommitted) {
@@ -94,7 +101,7 @@ TEST_F(ShardStateTest, ATornMarkerIsNotTrustedWhereverItEnds) {
   }
   write_marker("\xff\xfe not JSON");
   expect(ShardCondition::kTornMarker, marker_file_.string() + ":");
-  EXPECT_EQ(state().fault.find('\n'), std::string::npos);
+  EXPECT_THAT(state().faults, ElementsAre(Not(HasSubstr("\n"))));
   std::filesystem::remove(marker_file_);
   std::filesystem::create_directory(marker_file_);
   expect(ShardCondition::kTornMarker, marker_file_.string());
@@ -131,8 +138,64 @@ TEST_F(ShardStateTest, AFlippedBitShowsInTheHashAlone) {
   const ShardState found = hashed();
   EXPECT_EQ(found.condition, ShardCondition::kOtherBytes);
   EXPECT_FALSE(found.marker);
-  EXPECT_THAT(found.fault, AllOf(StartsWith(shard_file_.string() + ": expected SHA-256 "),
-                                 HasSubstr("got " + sha256_hex("12354"))));
+  EXPECT_THAT(found.faults,
+              ElementsAre(AllOf(StartsWith(shard_file_.string() + ": expected SHA-256 "),
+                                HasSubstr("got " + sha256_hex("12354")))));
+}
+
+/// Of 100 shards every third is done, the one after it has a torn marker, the next is not there.
+TEST(ShardStates, AreInTheOrderOfThePlan) {
+  const testing::TemporaryFolder folder;
+  std::vector<ShardOutline> shards;
+  for (int i = 0; i < 100; ++i) {
+    const std::string name = "job-train-" + std::to_string(i) + ".h5";
+    shards.push_back({name, 0, {2, 2}, 1});
+    if (i % 3 == 2) continue;
+    ShardMarker marker;
+    marker.shard = name;
+    marker.plan_hash = kPlan;
+    marker.sha256 = std::string(64, '0');
+    marker.size_bytes = 5;
+    marker.samples = marker.valid = 1;
+    marker.boxes = marker.persons = {0};
+    testing::write_file(folder / name, "shard");
+    testing::write_file(folder / marker_name(name), i % 3 == 0 ? to_json(marker) : "{");
+  }
+  const std::vector<ShardState> states = scan_shards(folder.path(), shards, kPlan);
+  ASSERT_EQ(states.size(), 100u);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    constexpr ShardCondition kExpected[] = {ShardCondition::kDone, ShardCondition::kTornMarker,
+                                            ShardCondition::kMissing};
+    EXPECT_EQ(states[i].outline, shards[i]);
+    EXPECT_EQ(states[i].condition, kExpected[i % 3]) << i;
+    EXPECT_EQ(states[i].marker ? states[i].marker->shard : "", i % 3 == 0 ? shards[i].name : "");
+  }
+}
+
+TEST(ShardStates, OfAnEmptyPlanAreNone) {
+  const testing::TemporaryFolder folder;
+  EXPECT_TRUE(scan_shards(folder.path(), {}, kPlan).empty());
+}
+
+TEST_F(ShardStateTest, AgainOnlyThoseThatAreAskedForAreLookedAt) {
+  const std::vector<ShardOutline> shards{shard_, {"job-train-00001-of-00002.h5", 0, {2, 2}, 1}};
+  std::vector<ShardState> states = scan_shards(folder_.path(), shards, kPlan);
+  write_shard("12354");
+  scan_again(folder_.path(), kPlan, /*done=*/false, states, ScanDepth::kBytes);
+  EXPECT_TRUE(states[0].done());
+  scan_again(folder_.path(), kPlan, /*done=*/true, states, ScanDepth::kBytes);
+  EXPECT_EQ(states[0].condition, ShardCondition::kOtherBytes);
+  EXPECT_EQ(states[1].condition, ShardCondition::kMissing);
+  EXPECT_EQ(states[1].outline, shards[1]);
+}
+
+TEST_F(ShardStateTest, WhatIsLeftOutByARequestToStopCountsAsMissing) {
+  const ScanOptions stopped{.threads = 1, .stop = [] { return true; }};
+  for (const ShardState& state :
+       scan_shards(folder_.path(), {shard_}, kPlan, ScanDepth::kMarker, stopped)) {
+    EXPECT_EQ(state.condition, ShardCondition::kMissing);
+    EXPECT_EQ(state.outline, shard_);
+  }
 }
 
 }  // namespace
