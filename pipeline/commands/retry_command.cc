@@ -11,7 +11,7 @@
 #include "pipeline/commands/progress_option.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_generator.h"
-#include "pipeline/output/recorded_manifest.h"
+#include "pipeline/output/output_folder.h"
 #include "pipeline/profile/trace_span.h"
 #include "pipeline/retry/retry.h"
 #include "pipeline/stopping/stop_signal.h"

@@ -1,11 +1,132 @@
 #include "pipeline/finalization/dataset_description.h"
 
+#include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
 
-#include "pipeline/finalization/dataset_counts.h"
+#include "manifests/faults.h"
+#include "stages/shards/shard_reader.h"
 
 namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
+  const std::string name = "the manifest in " + (folder / "plan.json").string();
+  try {
+    return parse_job_manifest(plan.manifest_text, folder, name);
+  } catch (const UsageError&) {  // of whoever wrote the plan, not of who finalizes
+    std::throw_with_nested(std::runtime_error("expected a plan with a sound manifest"));
+  }
+}
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& what) {
+  throw std::runtime_error("expected a shard as its plan and its marker say, got another " + what +
+                           ", in " + file.string() + " (eventgan convert makes it again)");
+}
+
+/// The header of a shard whose bytes are its marker's.
+ShardHeader read_shard_header(const fs::path& folder, const ShardState& shard,
+                              const std::string& plan_hash) {
+  const fs::path file = folder / shard.outline.name;
+  ShardHeader header = ShardReader(file).header();
+  if (header.name != shard.outline.name) refuse(file, "name");
+  if (header.plan_hash != plan_hash) refuse(file, "plan hash");
+  if (header.sample_count != shard.outline.samples) refuse(file, "number of samples");
+  if (header.volume.size != shard.outline.volume_size && !shard.outline.size_unknown)
+    refuse(file, "size of volumes");
+  return header;
+}
+
+}  // namespace
+
+DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
+                                std::vector<ShardState> shards) {
+  DatasetParts parts;
+  parts.frozen = std::move(frozen);
+  parts.manifest = frozen_manifest(folder, parts.frozen.plan);
+  parts.amendments = read_amendments(folder, parts.frozen.hash);
+  for (ShardState& shard : shards) {
+    if (!shard.done()) {
+      parts.missing.push_back(std::move(shard));
+      continue;
+    }
+    ShardOutline& outline = shard.outline;
+    const bool is_first = !parts.headers.contains(outline.source);
+    if (shard.sound() && (is_first || outline.size_unknown)) {
+      ShardHeader header = read_shard_header(folder, shard, parts.frozen.hash);
+      outline.volume_size = header.volume.size;
+      if (is_first) parts.headers[outline.source] = std::move(header);
+    } else if (!shard.sound() && outline.size_unknown) {
+      outline.volume_size = {};
+    }
+    parts.done.push_back(std::move(shard));
+  }
+  return parts;
+}
+
+namespace {
+
+bool alike(const ShardHeader& a, const ShardHeader& b) {
+  return a.dataset == b.dataset && a.volume == b.volume && a.label_schema == b.label_schema;
+}
+
+std::string kind_of(const ShardHeader& header) {
+  const ImageSize& size = header.volume.size;
+  return header.dataset + "-" + std::to_string(size.height) + "x" + std::to_string(size.width);
+}
+
+void name_groups(std::vector<DatasetView>& views) {
+  if (views.size() < 2) return;
+  std::map<std::string, int> seen;
+  for (DatasetView& view : views) {
+    view.group = kind_of(view.header);
+    if (const int number = ++seen[view.group]; number > 1) {
+      view.group += "-" + std::to_string(number);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<DatasetView> views_of(const DatasetParts& parts) {
+  std::vector<DatasetView> views;
+  std::vector<std::vector<ViewShard>> shards;  // of each view
+  for (const ShardState& shard : parts.done) {
+    // All of a shard's header that a view shows is its source's, but for the size.
+    ShardHeader header = parts.headers.at(shard.outline.source);
+    header.volume.size = shard.outline.volume_size;
+    const auto view = std::ranges::find_if(
+        views, [&](const DatasetView& known) { return alike(known.header, header); });
+    const auto number = static_cast<std::size_t>(view - views.begin());
+    if (view == views.end()) {
+      views.push_back({"", std::move(header), {}});
+      shards.emplace_back();
+    }
+    shards[number].push_back({parts.source_of(shard.outline).split, *shard.marker});
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].layout = lay_out_view(std::move(shards[i]));
+  }
+  name_groups(views);
+  return views;
+}
+
+void add(const ShardMarker& marker, DatasetCounts& counts) {
+  ++counts.shards;
+  counts.samples += marker.samples;
+  counts.valid += marker.valid;
+  counts.boxes += std::accumulate(marker.boxes.begin(), marker.boxes.end(), std::int64_t{0});
+  counts.persons += std::accumulate(marker.persons.begin(), marker.persons.end(), std::int64_t{0});
+  counts.size_bytes += marker.size_bytes;
+  for (const auto& [name, boxes] : marker.classes) counts.classes[name] += boxes;
+  for (const auto& [gap, samples] : marker.gaps) counts.gaps[gap] += samples;
+}
+
 namespace {
 
 using Json = nlohmann::json;

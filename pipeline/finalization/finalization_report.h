@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/finalization/dataset_counts.h"
-#include "pipeline/finalization/dataset_parts.h"
+#include "pipeline/finalization/dataset_description.h"
 
 namespace eventgan {
 

@@ -4,8 +4,6 @@
 
 #include "manifests/error_limits.h"
 #include "pipeline/finalization/dataset_description.h"
-#include "pipeline/finalization/dataset_parts.h"
-#include "pipeline/finalization/dataset_views.h"
 #include "pipeline/output/shard_backup.h"
 #include "stages/files/atomic_file.h"
 

@@ -1,11 +1,13 @@
 #include "pipeline/inspection/preview_shard.h"
 
 #include <algorithm>
+#include <charconv>
+#include <set>
+#include <utility>
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
 #include "pipeline/inspection/shard_guard.h"
-#include "pipeline/inspection/slot_selection.h"
 #include "pipeline/output/output_folder.h"
 #include "stages/events/pictures/preview_picture.h"
 #include "stages/frames/decoding/frame_decoder.h"
@@ -67,6 +69,11 @@ PreviewContent content_of(const ShardReader& reader, int slot, const FrameDecode
   return content;
 }
 
+[[noreturn]] void refuse_slots(const std::string& text, int sample_count) {
+  throw UsageError("--samples: expected slots 0.." + std::to_string(sample_count - 1) +
+                   " such as 0,3-5, got \"" + text + "\"");
+}
+
 }  // namespace
 
 std::vector<fs::path> preview_shard(const fs::path& shard, const PreviewOptions& options,
@@ -90,6 +97,42 @@ std::vector<fs::path> preview_shard(const fs::path& shard, const PreviewOptions&
                       pictures.back().string());
   }
   return pictures;
+}
+
+std::vector<int> parse_slots(const std::string& text, int sample_count) {
+  std::set<int> slots;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const auto number = [&] {
+    int value = -1;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 0 || value >= sample_count)
+      refuse_slots(text, sample_count);
+    at = next;
+    return value;
+  };
+  while (true) {
+    const int first = number();
+    int last = first;
+    if (at != end && *at == '-') {
+      ++at;
+      last = number();
+    }
+    if (last < first) refuse_slots(text, sample_count);
+    for (int slot = first; slot <= last; ++slot) slots.insert(slot);
+    if (at == end) break;
+    if (*at++ != ',') refuse_slots(text, sample_count);
+  }
+  return {slots.begin(), slots.end()};
+}
+
+std::vector<int> spread_slots(int count, int sample_count) {
+  std::vector<int> slots;
+  const int taken = std::min(count, sample_count);
+  for (int i = 0; i < taken; ++i) {
+    slots.push_back(static_cast<int>(static_cast<long long>(i) * sample_count / taken));
+  }
+  return slots;
 }
 
 }  // namespace eventgan

@@ -21,4 +21,11 @@ std::vector<std::filesystem::path> preview_shard(const std::filesystem::path& sh
                                                  const PreviewOptions& options,
                                                  std::vector<std::string>& warnings);
 
+/// Slots named by text such as "0,3-5": {0, 3, 4, 5}; ascending, each once. Throws UsageError for
+/// anything else, or a slot that a shard of `sample_count` samples does not have.
+std::vector<int> parse_slots(const std::string& text, int sample_count);
+
+/// `count` slots spread evenly over a shard, the first included.
+std::vector<int> spread_slots(int count, int sample_count);
+
 }  // namespace eventgan

@@ -1,17 +1,21 @@
 #include "pipeline/output/output_folder.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <streambuf>
+#include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "manifests/faults.h"
 #include "manifests/marker.h"
 #include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/output/amendments.h"
-#include "pipeline/output/hashed_file.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
 #include "stages/files/text_file.h"
@@ -25,6 +29,43 @@ constexpr char kPlanName[] = "plan.json";
 constexpr char kRunName[] = "run.json";
 constexpr char kManifestFolder[] = "manifest_folder";
 constexpr char kManifestFolderBytes[] = "manifest_folder_bytes";  // of a name that is not UTF-8
+
+/// A file that is hashed as it is read: what was parsed and what was hashed are the same bytes, and
+/// a large file is read once. To be read through a std::istream; its errors are std::system_error
+/// naming the path, which the stream passes on if its exceptions include badbit.
+class HashedFile : public std::streambuf {
+ public:
+  explicit HashedFile(const fs::path& file) : path_(file), block_(std::size_t{1} << 20) {
+    std::error_code unknown;
+    // Opening a FIFO would wait for its writer, for ever perhaps.
+    if (!fs::is_other(file, unknown)) file_.open(file, std::ios::binary);
+  }
+
+  bool is_open() const { return file_.is_open(); }
+
+  /// SHA-256 of the file up to where the last block read ends: of the whole file once the stream
+  /// has met its end.
+  std::string hash_of_read() const { return hash_.hex(); }
+
+ protected:
+  int_type underflow() override {
+    file_.read(block_.data(), static_cast<std::streamsize>(block_.size()));
+    const auto size = static_cast<std::size_t>(file_.gcount());
+    if (file_.bad() || (size < block_.size() && !file_.eof())) {
+      throw std::system_error(errno, std::generic_category(), "cannot read " + path_.string());
+    }
+    if (size == 0) return traits_type::eof();
+    hash_.update(std::string_view(block_.data(), size));
+    setg(block_.data(), block_.data(), block_.data() + size);
+    return traits_type::to_int_type(block_.front());
+  }
+
+ private:
+  fs::path path_;
+  std::ifstream file_;
+  std::vector<char> block_;
+  Sha256 hash_;
+};
 
 /// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
 template <class Frozen, class Read>
@@ -177,6 +218,17 @@ std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
   } catch (const nlohmann::json::type_error&) {  // other values
     return std::nullopt;
   }
+}
+
+JobManifest recorded_manifest(const fs::path& folder, const PlanOutline& plan,
+                              const std::optional<fs::path>& file) {
+  if (file) return read_job_manifest(*file);
+  const auto inputs = recorded_manifest_folder(folder);
+  if (!inputs) {
+    throw UsageError("expected the manifest's folder, got none, in " +
+                     (folder / "run.json").string() + " (--manifest FILE says where it is)");
+  }
+  return parse_job_manifest(plan.manifest_text, *inputs, (folder / "plan.json").string());
 }
 
 }  // namespace eventgan

@@ -44,4 +44,10 @@ void discard_output(const std::filesystem::path& folder);
 void record_manifest_folder(const std::filesystem::path& folder, const JobManifest& manifest);
 std::optional<std::filesystem::path> recorded_manifest_folder(const std::filesystem::path& folder);
 
+/// The job of an output folder, so that its inputs can be read again: the frozen manifest, its
+/// paths starting at the folder that run.json records; or, where the inputs have moved, the
+/// manifest in `file`. Throws UsageError if there is neither, InputError if `file` cannot be read.
+JobManifest recorded_manifest(const std::filesystem::path& folder, const PlanOutline& plan,
+                              const std::optional<std::filesystem::path>& file);
+
 }  // namespace eventgan

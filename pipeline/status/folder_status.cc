@@ -10,7 +10,6 @@
 #include "manifests/marker.h"
 #include "pipeline/output/output_folder.h"
 #include "pipeline/output/shard_scan.h"
-#include "pipeline/status/worker_rate.h"
 
 namespace eventgan {
 namespace {
@@ -145,6 +144,30 @@ std::optional<double> FolderStatus::seconds_left() const {
 FolderStatus folder_status(const fs::path& folder) {
   const FrozenOutline frozen = read_frozen_outline(folder);
   return Observer(folder, frozen).status();
+}
+
+std::optional<double> worker_rate(std::vector<CommitRecord> records, int writers) {
+  constexpr std::size_t kFewest = 8;
+  constexpr std::size_t kOfEachWriter = 3;
+  std::erase_if(records, [](const CommitRecord& record) {
+    return record.samples <= 0 || !(record.wall_seconds > 0);
+  });
+  if (records.empty()) return std::nullopt;
+  const auto wanted = std::max(kFewest, kOfEachWriter * static_cast<std::size_t>(writers));
+  const auto last = static_cast<std::ptrdiff_t>(std::min(records.size(), wanted));
+  std::partial_sort(records.begin(), records.begin() + last, records.end(),
+                    [](const auto& one, const auto& other) { return one.time_s > other.time_s; });
+  std::vector<double> rates;
+  for (auto record = records.begin(); record != records.begin() + last; ++record) {
+    rates.push_back(record->samples / record->wall_seconds);
+  }
+  std::sort(rates.begin(), rates.end());
+  const std::size_t middle = rates.size() / 2;
+  return rates.size() % 2 == 1 ? rates[middle] : (rates[middle - 1] + rates[middle]) / 2;
+}
+
+std::string fault_kind(const std::string& reason) {
+  return reason.substr(0, std::min(reason.find(", in "), reason.find('\n')));
 }
 
 }  // namespace eventgan

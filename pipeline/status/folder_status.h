@@ -55,4 +55,20 @@ struct FolderStatus {
 /// shards are not read; see verify_folder for that. Throws InputError if there is no plan.
 FolderStatus folder_status(const std::filesystem::path& folder);
 
+/// What a marker tells about the speed of the worker that committed it.
+struct CommitRecord {
+  double time_s = 0;  ///< when, from any fixed point in time
+  int samples = 0;
+  double wall_seconds = 0;  ///< that the worker spent on the shard; 0 if unknown
+};
+
+/// Samples a second of one worker, as of late: the median over the last commits, a few for each of
+/// `writers` workers, so that neither one that was paused for a night nor a slow beginning counts.
+/// None if no record knows its time.
+std::optional<double> worker_rate(std::vector<CommitRecord> records, int writers);
+
+/// What is wrong with a sample, without where: the reason's first line up to ", in PATH", by which
+/// the samples of a damaged disk or a wrong folder fall together.
+std::string fault_kind(const std::string& reason);
+
 }  // namespace eventgan

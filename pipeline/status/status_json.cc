@@ -1,7 +1,6 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/status/fault_kind.h"
 #include "pipeline/status/status_text.h"
 
 namespace eventgan {

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "manifests/plan.h"
-#include "pipeline/status/fault_kind.h"
 
 namespace eventgan {
 namespace {

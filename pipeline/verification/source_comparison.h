@@ -7,7 +7,10 @@
 #include <vector>
 
 #include "manifests/job_manifest.h"
+#include "manifests/labels.h"
 #include "manifests/plan.h"
+#include "manifests/shard.h"
+#include "manifests/volume_labels.h"
 #include "stages/frames/dataset.h"
 #include "stages/shards/shard_reader.h"
 
@@ -48,5 +51,12 @@ class SourceComparison {
   std::map<std::string, std::optional<ImageSize>> sizes_;  // by path; a video serves many samples
   long long compared_ = 0;
 };
+
+/// What a shard's sample holds that its source does not: the annotation's bytes, its boxes and
+/// persons exactly; their places in the volume, `mapped`, to a millionth of a pixel, since the last
+/// bits may depend on the compiler. Texts "expected X, got Y" in which `place` names the
+/// annotation; where the bytes differ, that alone. Empty if all is the same.
+std::vector<std::string> label_differences(const ShardSample& stored, const Annotation& source,
+                                           const VolumeLabels& mapped, const std::string& place);
 
 }  // namespace eventgan

@@ -5,6 +5,10 @@
 #include <string>
 #include <vector>
 
+#include "manifests/plan_outline.h"
+#include "pipeline/output/output_folder.h"
+#include "pipeline/output/shard_scan.h"
+
 namespace eventgan {
 
 struct VerifyOptions {
@@ -30,5 +34,17 @@ struct FolderCheck {
 /// (see SourceComparison). Changes nothing. Throws InputError if the folder has no plan,
 /// std::runtime_error if that is damaged.
 FolderCheck verify_folder(const std::filesystem::path& folder, const VerifyOptions& options = {});
+
+/// A line "PATH: expected X, got Y" for each .h5 or .json file of an output folder (not below it)
+/// that is neither of the plan nor one the program keeps beside it: a reader that takes all of them
+/// would take it for a part of the dataset. A job manifest is none. Sorted.
+std::vector<std::string> stray_files(const std::filesystem::path& folder, const PlanOutline& plan);
+
+/// What is wrong with dataset.json and dataset.h5 of an output folder: that they are not what
+/// `finalize` makes of the plan and the markers, or do not go together. Lines "PATH: expected X,
+/// got Y"; none if they are sound, or neither is there. `shards` as read_dataset_parts takes
+/// them: none is opened that was not found sound.
+std::vector<std::string> dataset_faults(const std::filesystem::path& folder, FrozenOutline frozen,
+                                        std::vector<ShardState> shards);
 
 }  // namespace eventgan

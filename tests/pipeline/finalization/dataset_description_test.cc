@@ -5,7 +5,6 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/finalization/dataset_views.h"
 #include "tests/pipeline/finalization/converted_folder.h"
 
 namespace eventgan {

@@ -1,10 +1,9 @@
-#include "pipeline/finalization/dataset_parts.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <stdexcept>
 
+#include "pipeline/finalization/dataset_description.h"
 #include "tests/pipeline/finalization/converted_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,7 +1,7 @@
-#include "pipeline/finalization/dataset_views.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "pipeline/finalization/dataset_description.h"
 
 namespace eventgan {
 namespace {

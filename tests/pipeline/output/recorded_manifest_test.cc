@@ -1,5 +1,3 @@
-#include "pipeline/output/recorded_manifest.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 

@@ -12,7 +12,7 @@
 
 #include "manifests/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/finalization/dataset_parts.h"
+#include "pipeline/finalization/dataset_description.h"
 #include "pipeline/finalization/finalize.h"
 #include "pipeline/output/amendments.h"
 #include "pipeline/planning/make_plan.h"
