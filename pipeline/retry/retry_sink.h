@@ -41,7 +41,7 @@ class RetrySink {
   std::vector<RetriedShard>::const_iterator next_;
   std::vector<RetriedShard>::const_iterator shard_;  // under way
   std::unique_ptr<ShardRewrite> rewrite_;            // of the shard under way
-  std::vector<SampleLeft> failed_;                   // of the shard under way
+  std::vector<QuarantinedSlot> failed_;              // of the shard under way
   ShardPace& pace_;
   RetryReport& report_;
   TraceRecorder* trace_;

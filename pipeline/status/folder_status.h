@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/marker.h"
 #include "stages/files/unfinished_files.h"
 
 namespace eventgan {
@@ -14,14 +15,6 @@ namespace eventgan {
 struct ShardAtWork {
   std::string shard;    ///< its file name
   UnfinishedFile file;  ///< the shard's temporary, or its marker's
-};
-
-/// A quarantined sample of a committed shard.
-struct QuarantinedSlot {
-  std::string shard;  ///< the shard's file name
-  int slot = 0;
-  std::string sample_id;
-  std::string reason;
 };
 
 /// What stands in an output folder.
