@@ -4,7 +4,7 @@
 
 #include "manifests/job_manifest.h"
 #include "manifests/shard.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 namespace eventgan {
 

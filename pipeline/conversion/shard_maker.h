@@ -11,7 +11,7 @@
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_sink.h"
 #include "pipeline/conversion/shared_folder.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/samples/graph_limits.h"
 #include "pipeline/samples/sample_stages.h"

@@ -11,7 +11,7 @@
 
 #include "manifests/marker.h"
 #include "manifests/plan_outline.h"
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/shard_scan.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"

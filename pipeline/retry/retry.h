@@ -8,7 +8,7 @@
 #include <string>
 
 #include "manifests/job_manifest.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/profile/trace_recorder.h"
 #include "pipeline/progress/progress.h"
 #include "pipeline/retry/retry_report.h"

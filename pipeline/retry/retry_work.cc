@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/shard_scan.h"
 
 namespace eventgan {
 

@@ -5,8 +5,8 @@
 #include <thread>
 
 #include "pipeline/conversion/convert.h"
+#include "pipeline/folder/verify_folder.h"
 #include "pipeline/stopping/stopped.h"
-#include "pipeline/verification/verify_folder.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 
 namespace eventgan {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "stages/files/temporary_name.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 

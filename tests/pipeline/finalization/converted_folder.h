@@ -5,8 +5,8 @@
 #include <vector>
 
 #include "manifests/marker.h"
-#include "pipeline/finalization/dataset_description.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/output_folder.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 

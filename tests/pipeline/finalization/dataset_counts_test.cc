@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 namespace {

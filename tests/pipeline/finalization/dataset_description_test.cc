@@ -1,4 +1,4 @@
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 #include "tests/pipeline/finalization/converted_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/finalization/finalization_report.h"
+#include "pipeline/folder/finalization_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

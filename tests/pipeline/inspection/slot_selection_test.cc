@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
-#include "pipeline/inspection/preview_shard.h"
+#include "pipeline/folder/preview_shard.h"
 
 namespace eventgan {
 namespace {

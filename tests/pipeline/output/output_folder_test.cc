@@ -1,4 +1,4 @@
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/marker.h"
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
 #include "stages/files/sha256.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "pipeline/status/folder_status.h"
+#include "pipeline/folder/folder_status.h"
 
 namespace eventgan {
 namespace {

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/conversion/convert.h"
-#include "pipeline/finalization/finalize.h"
-#include "pipeline/output/shard_scan.h"
-#include "pipeline/verification/verify_folder.h"
+#include "pipeline/folder/finalize.h"
+#include "pipeline/folder/shard_scan.h"
+#include "pipeline/folder/verify_folder.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/text_file.h"

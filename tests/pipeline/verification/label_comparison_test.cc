@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "pipeline/verification/source_comparison.h"
+#include "pipeline/folder/source_comparison.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan {

@@ -1,7 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "pipeline/verification/verify_folder.h"
+#include "pipeline/folder/verify_folder.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

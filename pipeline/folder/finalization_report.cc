@@ -1,9 +1,9 @@
-#include "pipeline/finalization/finalization_report.h"
+#include "pipeline/folder/finalization_report.h"
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 namespace eventgan {
 

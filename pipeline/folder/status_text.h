@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "pipeline/status/folder_status.h"
+#include "pipeline/folder/folder_status.h"
 
 namespace eventgan {
 

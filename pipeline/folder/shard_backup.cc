@@ -1,4 +1,4 @@
-#include "pipeline/output/shard_backup.h"
+#include "pipeline/folder/shard_backup.h"
 
 #include <map>
 #include <set>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "manifests/marker.h"
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/shard_scan.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
 #include "stages/files/stale_temporaries.h"

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "manifests/plan_outline.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
 
 namespace eventgan {
 

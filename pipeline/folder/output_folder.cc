@@ -1,4 +1,4 @@
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -15,7 +15,7 @@
 #include "manifests/faults.h"
 #include "manifests/marker.h"
 #include "manifests/strict_json/json_text_internal.h"
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/sha256.h"
 #include "stages/files/text_file.h"

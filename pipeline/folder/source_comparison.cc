@@ -1,4 +1,4 @@
-#include "pipeline/verification/source_comparison.h"
+#include "pipeline/folder/source_comparison.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,10 +1,10 @@
-#include "pipeline/finalization/finalize.h"
+#include "pipeline/folder/finalize.h"
 
 #include <utility>
 
 #include "manifests/error_limits.h"
-#include "pipeline/finalization/dataset_description.h"
-#include "pipeline/output/shard_backup.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/shard_backup.h"
 #include "stages/files/atomic_file.h"
 
 namespace eventgan {

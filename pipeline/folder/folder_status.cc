@@ -1,4 +1,4 @@
-#include "pipeline/status/folder_status.h"
+#include "pipeline/folder/folder_status.h"
 
 #include <algorithm>
 #include <chrono>
@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "manifests/marker.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
 
 namespace eventgan {
 namespace {

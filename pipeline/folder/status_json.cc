@@ -1,7 +1,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/status/status_text.h"
+#include "pipeline/folder/status_text.h"
 
 namespace eventgan {
 namespace {

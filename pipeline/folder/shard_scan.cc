@@ -1,4 +1,4 @@
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/shard_scan.h"
 
 #include <cstdint>
 #include <stdexcept>

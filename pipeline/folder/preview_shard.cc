@@ -1,4 +1,4 @@
-#include "pipeline/inspection/preview_shard.h"
+#include "pipeline/folder/preview_shard.h"
 
 #include <algorithm>
 #include <charconv>
@@ -7,8 +7,8 @@
 
 #include "manifests/faults.h"
 #include "manifests/placement.h"
-#include "pipeline/inspection/shard_guard.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_guard.h"
 #include "stages/events/pictures/preview_picture.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/placed_picture.h"

@@ -9,9 +9,9 @@
 #include "manifests/job_manifest.h"
 #include "manifests/marker.h"
 #include "manifests/shard.h"
-#include "pipeline/output/amendments.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/output/shard_scan.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
 #include "stages/shards/view/dataset_view.h"
 
 namespace eventgan {

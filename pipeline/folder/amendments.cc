@@ -1,4 +1,4 @@
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
 
 #include <fcntl.h>
 #include <sys/file.h>

@@ -4,7 +4,7 @@
 
 #include "manifests/job_manifest.h"
 #include "manifests/plan.h"
-#include "pipeline/inspection/trial.h"
+#include "pipeline/conversion/trial.h"
 
 namespace eventgan {
 

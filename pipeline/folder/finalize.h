@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "manifests/job_manifest.h"
-#include "pipeline/finalization/finalization_report.h"
+#include "pipeline/folder/finalization_report.h"
 
 namespace eventgan {
 

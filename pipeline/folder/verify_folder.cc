@@ -1,4 +1,4 @@
-#include "pipeline/verification/verify_folder.h"
+#include "pipeline/folder/verify_folder.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -15,11 +15,11 @@
 #include "manifests/marker.h"
 #include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/errors/error_text.h"
-#include "pipeline/finalization/dataset_description.h"
-#include "pipeline/output/amendments.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/output/shard_scan.h"
-#include "pipeline/verification/source_comparison.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
+#include "pipeline/folder/source_comparison.h"
 #include "stages/files/sha256.h"
 #include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"

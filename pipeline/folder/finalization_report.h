@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 
