@@ -16,6 +16,14 @@ struct QuarantinedSample {
   bool operator==(const QuarantinedSample&) const = default;
 };
 
+/// A quarantined sample and the shard it is of.
+struct QuarantinedSlot {
+  std::string shard;  ///< the shard's file name
+  int slot = 0;
+  std::string sample_id;
+  std::string reason;
+};
+
 /// The file SHARD.json beside a shard: written after the shard is whole and in place, so its
 /// existence is what says "done" (DESIGN section 6). A shard is done if its marker parses, names
 /// the plan, and the shard has the marker's size.

@@ -15,6 +15,12 @@ ShardOutline outline_of(const PlannedShard& shard) {
           shard.size_unknown};
 }
 
+std::vector<ShardOutline> outlines_of(const std::vector<const PlannedShard*>& shards) {
+  std::vector<ShardOutline> outlines;
+  for (const PlannedShard* shard : shards) outlines.push_back(outline_of(*shard));
+  return outlines;
+}
+
 PlanOutline outline_of(const Plan& plan) {
   PlanOutline outline{plan.name, plan.manifest_text, plan.fingerprint, plan.sources, {}};
   outline.shards.reserve(plan.shards.size());

@@ -34,6 +34,7 @@ struct PlanOutline {
 };
 
 ShardOutline outline_of(const PlannedShard& shard);
+std::vector<ShardOutline> outlines_of(const std::vector<const PlannedShard*>& shards);
 PlanOutline outline_of(const Plan& plan);
 
 /// Reads plan.json and skips its samples, which stand on lines of their own: a million pairs take

@@ -5,7 +5,7 @@
 #include "manifests/job_manifest.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/finalization/finalize.h"
+#include "pipeline/folder/finalize.h"
 
 namespace eventgan {
 namespace {

@@ -5,7 +5,7 @@
 #include "manifests/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/inspection/shard_guard.h"
+#include "pipeline/folder/shard_guard.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 

@@ -4,8 +4,8 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/inspection/preview_shard.h"
-#include "pipeline/inspection/shard_guard.h"
+#include "pipeline/folder/preview_shard.h"
+#include "pipeline/folder/shard_guard.h"
 
 namespace eventgan {
 namespace {

@@ -4,8 +4,8 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/status/folder_status.h"
-#include "pipeline/status/status_text.h"
+#include "pipeline/folder/folder_status.h"
+#include "pipeline/folder/status_text.h"
 
 namespace eventgan {
 namespace {

@@ -6,7 +6,7 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/errors/exit_codes.h"
-#include "pipeline/verification/verify_folder.h"
+#include "pipeline/folder/verify_folder.h"
 
 namespace eventgan {
 namespace {

@@ -11,12 +11,11 @@
 #include "manifests/plan_outline.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_sink.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/output/shard_backup.h"
-#include "pipeline/output/shard_state.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_backup.h"
+#include "pipeline/folder/shard_scan.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
-#include "pipeline/threads/for_each_index.h"
 #include "pipeline/threads/thread_count.h"
 
 namespace eventgan {
@@ -98,9 +97,10 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
                         const PlannedShards& own, const PlannedShards& elsewhere,
                         ConversionReport& report) {
   const TraceSpan span(options.trace, "check earlier shards", "job");
-  const EarlierCheck check{thread_count(options.threads), [&] { return options.stop_requested(); },
-                           options.note, options.trace};
-  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, check);
+  const ScanOptions scan{thread_count(options.threads), [&] { return options.stop_requested(); },
+                         options.trace};
+  EarlierShards earlier =
+      check_earlier_shards(job.folder, job.frozen, own, scan, options.note);
   for (const std::string& fault : earlier.faults) {
     tell(options.warn, fault + "; it is made again");
   }
@@ -111,7 +111,7 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
   report.shards_done_before = report.shards_done;
   // Where not even a plan of quarantined samples passes the limits, nobody needs to count.
   if (beyond_limits(job.manifest.errors, report.plan_pairs, report.plan_pairs)) {
-    report.quarantined_elsewhere = count_quarantined(job.folder, job.frozen, elsewhere, check);
+    report.quarantined_elsewhere = count_quarantined(job.folder, job.frozen, elsewhere, scan);
   }
   return earlier;
 }
@@ -137,15 +137,13 @@ void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_th
 void look_again(const ConversionJob& job, const ConversionOptions& options,
                 const PlannedShards& own, ConversionReport& report) {
   const TraceSpan span(options.trace, "look again at all shards", "job");
-  std::vector<ShardCondition> conditions(own.size());
-  for_each_index(own.size(), thread_count(options.threads), [&](std::size_t i) {
-    conditions[i] = shard_state(job.folder, outline_of(*own[i]), job.frozen.hash).condition;
-  });
-  for (std::size_t i = 0; i < conditions.size(); ++i) {
-    if (conditions[i] == ShardCondition::kDone) continue;
-    report.lost.push_back((job.folder / own[i]->name).string() +
+  for (const ShardState& shard :
+       scan_shards(job.folder, outlines_of(own), job.frozen.hash, ScanDepth::kMarker,
+                   {.threads = thread_count(options.threads)})) {
+    if (shard.done()) continue;
+    report.lost.push_back((job.folder / shard.outline.name).string() +
                           ": expected the shard that was committed, got it " +
-                          to_string(conditions[i]));
+                          to_string(shard.condition));
     tell(options.warn, report.lost.back() + "; run again");
   }
 }

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "manifests/marker.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/profile/trace_recorder.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
 
 namespace eventgan {
 
@@ -29,23 +29,17 @@ struct EarlierShards {
   std::map<std::string, std::string> distrusted;
 };
 
-struct EarlierCheck {
-  int threads = 1;
-  std::function<bool()> stop;  ///< asked between shards; true leaves those not looked at yet out
-  /// Told before it takes long.
-  std::function<void(const std::string&)> note;
-  TraceRecorder* trace = nullptr;  ///< of the hashing; null: nobody asks
-};
-
 /// Looks at what the folder holds of `shards` of the plan. Those that are committed are hashed, and
-/// their markers compared with them, before they are trusted (see proven_shard_state).
+/// their markers compared with them, before they are trusted (ScanDepth::kRows). `note` is told
+/// before that takes long; none: nobody asks.
 EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                    const std::vector<const PlannedShard*>& shards,
-                                   const EarlierCheck& check);
+                                   const ScanOptions& options,
+                                   const std::function<void(const std::string&)>& note = {});
 
 /// Quarantined samples of those `shards` that are done, by their markers alone.
 std::int64_t count_quarantined(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                const std::vector<const PlannedShard*>& shards,
-                               const EarlierCheck& check);
+                               const ScanOptions& options);
 
 }  // namespace eventgan

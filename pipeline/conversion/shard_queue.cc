@@ -11,7 +11,7 @@
 
 #include "manifests/marker.h"
 #include "manifests/plan_outline.h"
-#include "pipeline/output/shard_state.h"
+#include "pipeline/folder/shard_scan.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/text_file.h"
 #include "stages/files/unfinished_files.h"
@@ -63,7 +63,7 @@ bool SharedFolder::is_done(const PlannedShard& shard) const {
   if (distrusted == distrusted_.end()) {
     return shard_state(folder_, outline_of(shard), plan_hash_).done();
   }
-  return hashed_shard_state(folder_, outline_of(shard), plan_hash_).done() &&
+  return shard_state(folder_, outline_of(shard), plan_hash_, ScanDepth::kBytes).done() &&
          read_text_file(folder_ / marker_name(shard.name)) != distrusted->second;
 }
 

@@ -1,5 +1,7 @@
 #include "pipeline/errors/error_text.h"
 
+#include <sstream>
+
 #include "manifests/faults.h"
 #include "pipeline/errors/exit_codes.h"
 
@@ -11,6 +13,17 @@ std::string error_text(const std::exception& error) {
     std::rethrow_if_nested(error);
   } catch (const std::exception& nested) {
     text += "\n  because: " + error_text(nested);
+  }
+  return text;
+}
+
+std::string error_line(const std::exception& error) {
+  std::istringstream lines(error_text(error));
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t start = line.find_first_not_of(' ');
+    if (start == std::string::npos) continue;
+    text += (text.empty() ? "" : ": ") + line.substr(start);
   }
   return text;
 }

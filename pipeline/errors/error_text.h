@@ -9,6 +9,9 @@ namespace eventgan {
 /// indented.
 std::string error_text(const std::exception& error);
 
+/// The same as one line, for lists with a line a fault.
+std::string error_line(const std::exception& error);
+
 /// The exit code that stands for an exception: UsageError 64, TooManyFaults 65, InputError 66,
 /// Stopped 75, else 1.
 int exit_code_of(const std::exception& error);

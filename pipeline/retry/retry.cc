@@ -11,8 +11,8 @@
 #include "manifests/error_limits.h"
 #include "manifests/faults.h"
 #include "manifests/plan_outline.h"
-#include "pipeline/output/amendments.h"
-#include "pipeline/output/shard_backup.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/shard_backup.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/profile/trace_span.h"
 #include "pipeline/retry/retry_work.h"
@@ -81,7 +81,7 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
   EarlierShards earlier = check_earlier_shards(
       folder, frozen, shards,
-      {thread_count(options.threads), [&] { return options.stop_requested(); }, {}, options.trace});
+      {thread_count(options.threads), [&] { return options.stop_requested(); }, options.trace});
   for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
   if (!options.stop_requested()) {
     report.quarantined = 0;  // what a damaged shard held does not count
@@ -142,7 +142,7 @@ class RetrySink final : public SampleSink {
   std::vector<CommittedShard>::const_iterator next_;
   const ShardMarker* marker_ = nullptr;    // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
-  std::vector<SampleLeft> failed_;         // of the shard under way
+  std::vector<QuarantinedSlot> failed_;         // of the shard under way
   RetryReport& report_;
   TraceRecorder* trace_;
 };

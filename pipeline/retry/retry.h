@@ -6,7 +6,7 @@
 
 #include "manifests/job_manifest.h"
 #include "pipeline/conversion/conversion_run.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/retry/retry_report.h"
 #include "stages/generator/generator.h"
 

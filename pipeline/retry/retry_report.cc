@@ -55,7 +55,7 @@ std::string to_text(const RetryReport& report) {
 
 std::string to_json(const RetryReport& report) {
   nlohmann::json failed = nlohmann::json::array();
-  for (const SampleLeft& sample : report.failed) {
+  for (const QuarantinedSlot& sample : report.failed) {
     failed.push_back({{"sample_id", sample.sample_id},
                       {"shard", sample.shard},
                       {"slot", sample.slot},

@@ -4,24 +4,18 @@
 #include <string>
 #include <vector>
 
-namespace eventgan {
+#include "manifests/marker.h"
 
-/// A sample that was tried again and failed again.
-struct SampleLeft {
-  std::string shard;  ///< its file name
-  int slot = 0;
-  std::string sample_id;
-  std::string reason;
-};
+namespace eventgan {
 
 /// What a retry did.
 struct RetryReport {
   std::string folder;
-  std::int64_t planned = 0;        ///< samples of the whole plan
-  std::int64_t tried = 0;          ///< in committed shards or found to fail again
-  std::int64_t mended = 0;         ///< of these, in committed shards
-  std::vector<SampleLeft> failed;  ///< the others
-  std::int64_t quarantined = 0;    ///< samples that are quarantined now, tried or not
+  std::int64_t planned = 0;             ///< samples of the whole plan
+  std::int64_t tried = 0;               ///< in committed shards or found to fail again
+  std::int64_t mended = 0;              ///< of these, in committed shards
+  std::vector<QuarantinedSlot> failed;  ///< the others: tried again and failed again
+  std::int64_t quarantined = 0;         ///< samples that are quarantined now, tried or not
   int shards_rewritten = 0;
   std::vector<std::string> damaged_shards;  ///< "PATH: expected X, got Y": left to `convert`
   int shards_missing = 0;                   ///< not made yet: left to `convert`

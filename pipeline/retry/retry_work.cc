@@ -1,16 +1,17 @@
 #include "pipeline/retry/retry_work.h"
 
-#include "pipeline/output/shard_states.h"
+#include "pipeline/folder/shard_scan.h"
 
 namespace eventgan {
+
 QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
                                     const FrozenOutline& frozen) {
   QuarantinedSamples found;
-  const std::vector<ShardState> states = shard_states(folder, frozen);
+  const auto states = scan_shards(folder, frozen.plan.shards, frozen.hash);
   for (std::size_t i = 0; i < states.size(); ++i) {
     const ShardState& state = states[i];
     if (state.condition == ShardCondition::kMissing) ++found.shards_missing;
-    if (!state.fault.empty()) found.damaged.push_back(state.fault);
+    found.damaged.insert(found.damaged.end(), state.faults.begin(), state.faults.end());
     if (!state.done() || state.marker->quarantined.empty()) continue;
     found.shards.push_back(i);
     found.count += std::ssize(state.marker->quarantined);

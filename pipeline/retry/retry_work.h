@@ -9,7 +9,7 @@
 #include "manifests/marker.h"
 #include "manifests/plan.h"
 #include "pipeline/conversion/earlier_shards.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 namespace eventgan {
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "pipeline/output/shard_backup.h"
+#include "pipeline/folder/shard_backup.h"
 #include "stages/files/atomic_file.h"
 #include "stages/files/text_file.h"
 

@@ -8,9 +8,9 @@
 #include <set>
 
 #include "manifests/faults.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/verify_folder.h"
 #include "pipeline/generation/load_generator.h"
-#include "pipeline/output/output_folder.h"
-#include "pipeline/verification/verify_folder.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 #include "tests/pipeline/conversion/small_conversion.h"

@@ -24,6 +24,21 @@ TEST(ErrorText, TellsTheWholeChain) {
   }
 }
 
+TEST(ErrorLine, IsOneLineHoweverDeepTheCause) {
+  EXPECT_EQ(error_line(std::runtime_error("cannot read x")), "cannot read x");
+  EXPECT_EQ(error_line(std::runtime_error("two faults:\n  first\n  second\n")),
+            "two faults:: first: second");
+  try {
+    try {
+      throw std::runtime_error("no such file");
+    } catch (const std::runtime_error&) {
+      std::throw_with_nested(std::runtime_error("cannot read x"));
+    }
+  } catch (const std::runtime_error& error) {
+    EXPECT_EQ(error_line(error), "cannot read x: because: no such file");
+  }
+}
+
 TEST(ExitCodeOf, KnowsTheKindsOfErrors) {
   EXPECT_EQ(exit_code_of(UsageError("")), kUsage);
   EXPECT_EQ(exit_code_of(TooManyFaults("")), kTooManyFaults);

@@ -86,4 +86,11 @@ ShardMarker ConvertedFolder::marker(int number) const {
   return parse_marker(read_file(marker_file(number)), marker_file(number).string());
 }
 
+DatasetParts parts_of(const ConvertedFolder& folder) {
+  const FrozenOutline frozen = read_frozen_outline(folder.path());
+  return read_dataset_parts(
+      folder.path(), frozen,
+      scan_shards(folder.path(), frozen.plan.shards, frozen.hash, ScanDepth::kRows));
+}
+
 }  // namespace eventgan::testing

@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "manifests/marker.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/output_folder.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -41,5 +42,8 @@ class ConvertedFolder {
   std::filesystem::path path_;
   FrozenPlan frozen_;
 };
+
+/// Its shards as `finalize` finds them.
+DatasetParts parts_of(const ConvertedFolder& folder);
 
 }  // namespace eventgan::testing

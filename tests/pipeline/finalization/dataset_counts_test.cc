@@ -1,6 +1,6 @@
-#include "pipeline/finalization/dataset_counts.h"
-
 #include <gtest/gtest.h>
+
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 namespace {

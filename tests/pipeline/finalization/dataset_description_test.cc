@@ -1,11 +1,10 @@
-#include "pipeline/finalization/dataset_description.h"
+#include "pipeline/folder/dataset_description.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/finalization/dataset_views.h"
 #include "tests/pipeline/finalization/converted_folder.h"
 
 namespace eventgan {
@@ -13,9 +12,10 @@ namespace {
 
 using nlohmann::json;
 using testing::ConvertedFolder;
+using testing::parts_of;
 
 json description_of(const ConvertedFolder& folder) {
-  const DatasetParts parts = read_dataset_parts(folder.path(), read_frozen_outline(folder.path()));
+  const DatasetParts parts = parts_of(folder);
   return json::parse(describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
 }
 
@@ -105,8 +105,8 @@ TEST(DatasetDescription, AmendmentsAreTold) {
 
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {
   const ConvertedFolder folder;
-  DatasetParts parts = read_dataset_parts(folder.path(), read_frozen_outline(folder.path()));
-  parts.shards[0].marker.quarantined[0].reason = "cannot read \xff.png";
+  DatasetParts parts = parts_of(folder);
+  parts.done[0].marker->quarantined[0].reason = "cannot read \xff.png";
   EXPECT_NO_THROW(describe_dataset(parts, views_of(parts), {}));
 }
 

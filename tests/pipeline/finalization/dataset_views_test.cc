@@ -1,7 +1,7 @@
-#include "pipeline/finalization/dataset_views.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
 namespace {
@@ -10,13 +10,13 @@ using ::testing::ElementsAre;
 
 /// Adds a shard of one sample.
 void add_shard(DatasetParts& parts, const std::string& name, int source, ImageSize size) {
-  FinishedShard shard{{name, source, size, 1}, {}};
-  shard.marker.shard = name;
-  shard.marker.samples = 1;
-  shard.marker.valid = 1;
-  shard.marker.boxes = {1};
-  shard.marker.persons = {0};
-  parts.shards.push_back(shard);
+  ShardMarker marker;
+  marker.shard = name;
+  marker.samples = 1;
+  marker.valid = 1;
+  marker.boxes = {1};
+  marker.persons = {0};
+  parts.done.push_back({{name, source, size, 1}, ShardCondition::kDone, marker});
 }
 
 /// Three sources, in this order: kitti_object train, kitti_object val, mpii train.

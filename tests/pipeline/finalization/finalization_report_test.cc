@@ -1,4 +1,4 @@
-#include "pipeline/finalization/finalization_report.h"
+#include "pipeline/folder/finalization_report.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -19,8 +19,10 @@ FinalizationReport report_of(int missing) {
   report.counts.shards = 1;
   report.counts.samples = 5;
   report.counts.valid = 4;
-  for (int i = 0; i < missing; ++i)
-    report.missing.push_back({std::to_string(i) + ".h5", "missing"});
+  report.missing.resize(static_cast<std::size_t>(missing));
+  for (std::size_t i = 0; i < report.missing.size(); ++i) {
+    report.missing[i].outline.name = std::to_string(i) + ".h5";
+  }
   return report;
 }
 
@@ -32,7 +34,8 @@ TEST(FinalizationReportText, NamesEveryMissingShard) {
 
 TEST(FinalizationReportText, ADamagedShardIsNamedOnce) {
   FinalizationReport report = report_of(1);
-  report.missing[0].why = "out/0.h5: expected size in bytes 5, got 4";
+  report.missing[0].condition = ShardCondition::kOtherSize;
+  report.missing[0].faults = {"out/0.h5: expected size in bytes 5, got 4"};
   EXPECT_THAT(to_text(report), StartsWith("out/0.h5: expected size in bytes 5, got 4\n"));
 }
 

@@ -1,4 +1,4 @@
-#include "pipeline/finalization/finalize.h"
+#include "pipeline/folder/finalize.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "pipeline/inspection/plan_summary.h"
+#include "pipeline/conversion/plan_summary.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

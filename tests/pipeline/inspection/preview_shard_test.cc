@@ -1,4 +1,4 @@
-#include "pipeline/inspection/preview_shard.h"
+#include "pipeline/folder/preview_shard.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "pipeline/inspection/shard_guard.h"
+#include "pipeline/folder/shard_guard.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

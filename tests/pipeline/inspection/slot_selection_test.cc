@@ -1,9 +1,8 @@
-#include "pipeline/inspection/slot_selection.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
+#include "pipeline/folder/preview_shard.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/inspection/trial.h"
+#include "pipeline/conversion/trial.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/marker.h"
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
 #include "stages/files/sha256.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
@@ -175,6 +175,22 @@ TEST(ReadFrozenPlan, SaysWhenThereIsNoneOrADamagedOne) {
   write_file(folder / "plan.json", "{");
   EXPECT_THROW(read_frozen_plan(folder.path()), std::runtime_error);
   EXPECT_THROW(read_frozen_outline(folder.path()), std::runtime_error);
+}
+
+TEST(ReadFrozenPlan, GivesTheHashOfWhatItRead) {
+  const std::size_t rest = to_json(plan("w")).size();
+  // Less than a block of reading; a block; several and a part of one.
+  for (const std::size_t size : {1000, 1 << 20, (3 << 20) + 1}) {
+    const TemporaryFolder folder;
+    Plan long_one = plan("w");
+    long_one.manifest_text += std::string(size - rest, ' ');
+    freeze_plan(folder.path(), long_one);
+    ASSERT_EQ(fs::file_size(folder / "plan.json"), size);
+    const FrozenPlan frozen = read_frozen_plan(folder.path());
+    EXPECT_EQ(frozen.hash, sha256_of_file(folder / "plan.json"));
+    EXPECT_EQ(frozen.plan.manifest_text, long_one.manifest_text);
+    EXPECT_EQ(read_frozen_outline(folder.path()).hash, frozen.hash);
+  }
 }
 
 TEST(ReadFrozenOutline, IsThePlanWithoutItsSamples) {

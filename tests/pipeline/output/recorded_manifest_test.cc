@@ -1,10 +1,8 @@
-#include "pipeline/output/recorded_manifest.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,4 +1,4 @@
-#include "pipeline/output/shard_backup.h"
+#include "pipeline/folder/shard_backup.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

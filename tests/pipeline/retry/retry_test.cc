@@ -12,11 +12,16 @@
 
 #include "manifests/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/finalization/dataset_parts.h"
-#include "pipeline/finalization/finalize.h"
-#include "pipeline/output/amendments.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/finalize.h"
+#include "pipeline/folder/verify_folder.h"
 #include "pipeline/planning/make_plan.h"
+<<<<<<< HEAD
 #include "pipeline/verification/verify_folder.h"
+=======
+#include "pipeline/stopping/stopped.h"
+>>>>>>> wt-r2
 #include "stages/files/temporary_name.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/testing/fake_generator.h"
@@ -273,10 +278,12 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   EXPECT_EQ(report.mended, 10);
   EXPECT_EQ(report.quarantined, 1);
   expect_sound_after_finalize();
-  const DatasetParts parts = read_dataset_parts(out_, read_frozen_outline(out_));
+  const FrozenOutline frozen = read_frozen_outline(out_);
+  const DatasetParts parts = read_dataset_parts(
+      out_, frozen, scan_shards(out_, frozen.plan.shards, frozen.hash, ScanDepth::kRows));
   std::map<int, int> heights;
-  for (const FinishedShard& shard : parts.shards) {
-    heights[shard.outline.volume_size.height] += shard.marker.valid;
+  for (const ShardState& shard : parts.done) {
+    heights[shard.outline.volume_size.height] += shard.marker->valid;
   }
   EXPECT_EQ(heights, (std::map<int, int>{{20, 5}, {40, 5}}));
 

@@ -1,6 +1,6 @@
-#include "pipeline/status/fault_kind.h"
-
 #include <gtest/gtest.h>
+
+#include "pipeline/folder/folder_status.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/status/folder_status.h"
+#include "pipeline/folder/folder_status.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/marker.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

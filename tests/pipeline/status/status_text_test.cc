@@ -1,4 +1,4 @@
-#include "pipeline/status/status_text.h"
+#include "pipeline/folder/status_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,9 @@
-#include "pipeline/verification/label_comparison.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <functional>
 
+#include "pipeline/folder/source_comparison.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan {

@@ -1,10 +1,10 @@
-#include "pipeline/verification/source_comparison.h"
+#include "pipeline/folder/source_comparison.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "pipeline/conversion/convert.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/temporary_folder.h"

@@ -1,8 +1,7 @@
-#include "pipeline/verification/stray_files.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "pipeline/folder/verify_folder.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,12 +1,12 @@
-#include "pipeline/verification/verify_folder.h"
+#include "pipeline/folder/verify_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/finalization/finalize.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/finalize.h"
+#include "pipeline/folder/output_folder.h"
 #include "stages/files/atomic_file.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/picture_file.h"

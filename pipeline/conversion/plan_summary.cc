@@ -1,0 +1,110 @@
+#include "pipeline/conversion/plan_summary.h"
+
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+namespace eventgan {
+namespace {
+
+constexpr std::size_t kListedIds = 5;
+
+std::int64_t shards_of(const Plan& plan, int source) {
+  return std::count_if(plan.shards.begin(), plan.shards.end(),
+                       [&](const PlannedShard& shard) { return shard.source == source; });
+}
+
+std::int64_t pairs_of(const SourceSummary& summary) {
+  std::int64_t pairs = 0;
+  for (const auto& [gap, count] : summary.pairs_by_gap) pairs += count;
+  return pairs;
+}
+
+std::string source_text(const SourceSpec& spec, const SourceSummary& summary, std::int64_t shards) {
+  std::string text =
+      std::string(to_string(spec.dataset)) + " " + spec.root + " (" + spec.split + ")\n";
+  text += "  labelled frames  " + std::to_string(summary.labelled_frames) + "\n";
+  text += "  pairs            " + std::to_string(pairs_of(summary));
+  const char* separator = "  (gap ";
+  for (const auto& [gap, count] : summary.pairs_by_gap) {
+    text += separator + std::to_string(gap) + ": " + std::to_string(count);
+    separator = ", ";
+  }
+  text += summary.pairs_by_gap.empty() ? "\n" : ")\n";
+  text += "  without partner  " + std::to_string(summary.without_partner);
+  // With choose = all a frame may lack the partner of several gaps, and have that of others.
+  if (const auto frames = static_cast<std::int64_t>(summary.without_partner_ids.size());
+      frames != summary.without_partner) {
+    text += " pairs of " + std::to_string(frames) + " labelled frames";
+  }
+  for (std::size_t i = 0; i < std::min(kListedIds, summary.without_partner_ids.size()); ++i) {
+    text += (i == 0 ? "  (" : ", ") + summary.without_partner_ids[i];
+  }
+  if (summary.without_partner_ids.size() > kListedIds) text += ", ...";
+  text += summary.without_partner_ids.empty() ? "\n" : ")\n";
+  if (summary.faults > 0) {
+    text += "  to quarantine    " + std::to_string(summary.faults) +
+            "  (a frame is missing inside the sequence, or a note says why)\n";
+  }
+  for (const std::string& note : summary.notes) text += "  note: " + note + "\n";
+  return text + "  shards           " + std::to_string(shards) + "\n";
+}
+
+std::string estimate_text(const TrialEstimate& estimate, int threads) {
+  if (estimate.pairs_measured == 0) return "no pair could be tried: no estimate of size and time\n";
+  char text[256];
+  std::snprintf(text, sizeof text,
+                "about %.1f MB and %.0f s with %d thread%s (%.3f s a pair on one thread, measured "
+                "on %d pair%s)\n",
+                estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
+                estimate.seconds_per_pair, estimate.pairs_measured,
+                estimate.pairs_measured == 1 ? "" : "s");
+  return text;
+}
+
+}  // namespace
+
+std::string plan_text(const JobManifest& manifest, const Plan& plan, const TrialEstimate& estimate,
+                      int threads) {
+  std::string text;
+  for (std::size_t i = 0; i < plan.sources.size(); ++i) {
+    text += source_text(manifest.sources[i], plan.sources[i], shards_of(plan, static_cast<int>(i)));
+  }
+  text += "in all " + std::to_string(plan.sample_count()) + " pairs in " +
+          std::to_string(plan.shards.size()) + " shards, ";
+  return text + estimate_text(estimate, threads);
+}
+
+std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
+                              const TrialEstimate& estimate, int threads) {
+  nlohmann::json sources = nlohmann::json::array();
+  for (std::size_t i = 0; i < plan.sources.size(); ++i) {
+    const SourceSummary& summary = plan.sources[i];
+    nlohmann::json gaps = nlohmann::json::object();
+    for (const auto& [gap, count] : summary.pairs_by_gap) gaps[std::to_string(gap)] = count;
+    sources.push_back({{"dataset", to_string(manifest.sources[i].dataset)},
+                       {"root", manifest.sources[i].root},
+                       {"split", manifest.sources[i].split},
+                       {"labelled_frames", summary.labelled_frames},
+                       {"pairs", pairs_of(summary)},
+                       {"pairs_by_gap", gaps},
+                       {"without_partner", summary.without_partner},
+                       {"frames_without_partner", summary.without_partner_ids.size()},
+                       {"without_partner_ids", summary.without_partner_ids},
+                       {"missing_frames", summary.faults},
+                       {"notes", summary.notes},
+                       {"shards", shards_of(plan, static_cast<int>(i))}});
+  }
+  const nlohmann::json json = {{"name", plan.name},
+                               {"sources", sources},
+                               {"pairs", plan.sample_count()},
+                               {"shards", plan.shards.size()},
+                               {"threads", threads},
+                               {"pairs_measured", estimate.pairs_measured},
+                               {"seconds_per_pair", estimate.seconds_per_pair},
+                               {"estimated_seconds", estimate.seconds},
+                               {"estimated_bytes", estimate.stored_bytes}};
+  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace eventgan

@@ -1,0 +1,132 @@
+#include "pipeline/folder/amendments.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/strict_json/strict_json_internal.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/text_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kName[] = "amendments.json";
+constexpr char kFormat[] = "eventgan-amendments";
+constexpr int kVersion = 1;
+
+struct Document {
+  std::string plan_hash;
+  std::vector<Amendment> amendments;
+};
+
+/// While it lives, nobody else reads amendments in order to add one: of two that did, the one that
+/// wrote last would drop the other's. Held by flock on the folder itself, so that it leaves no
+/// file, and ends with the process however that ends; others wait. Where the file system has no
+/// flock for folders (NFS) it holds nobody off.
+class AmendmentLock {
+ public:
+  explicit AmendmentLock(const fs::path& folder)
+      : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
+    if (descriptor_ < 0) {
+      throw std::runtime_error("cannot open " + folder.string() + ": " + std::strerror(errno));
+    }
+    while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
+    }
+  }
+  ~AmendmentLock() { ::close(descriptor_); }
+  AmendmentLock(const AmendmentLock&) = delete;
+  AmendmentLock& operator=(const AmendmentLock&) = delete;
+
+ private:
+  int descriptor_;
+};
+
+Amendment read_amendment(const StrictValue& value) {
+  Amendment amendment;
+  StrictObject object = value.object();
+  for (const auto& [field, text] : object.at("fields").members()) {
+    // Anything else would let another job's output pass as this one's.
+    if (!is_amendable(field)) text.fault("fields that may change: annotations, frames", field);
+    amendment.fields[field] = text.text();
+  }
+  for (const StrictValue& sample : object.at("samples").elements()) {
+    amendment.samples.push_back(sample.text());
+  }
+  object.finish();
+  return amendment;
+}
+
+Document parse_document(const std::string& text, const std::string& name) {
+  Document document;
+  FaultList faults(name);
+  if (const auto json = parse_json_text(text, faults)) {
+    StrictObject object = StrictValue(*json, faults).object();
+    if (object.has_format(kFormat, kVersion)) {
+      document.plan_hash = object.at("plan_hash").text();
+      for (const StrictValue& element : object.at("amendments").elements()) {
+        document.amendments.push_back(read_amendment(element));
+      }
+      object.finish();
+    }
+  }
+  if (!faults.empty()) throw std::runtime_error(faults.text());
+  return document;
+}
+
+}  // namespace
+
+bool is_amendable(const std::string& fingerprint_field) {
+  return fingerprint_field == "frames" || fingerprint_field == "annotations";
+}
+
+std::vector<Amendment> read_amendments(const fs::path& folder, const std::string& plan_hash) {
+  const fs::path file = folder / kName;
+  if (!fs::exists(file)) return {};
+  Document document = parse_document(read_text_file(file), file.string());
+  // What a folder's earlier plan was amended by says nothing about this one.
+  if (document.plan_hash != plan_hash) return {};
+  return std::move(document.amendments);
+}
+
+void record_amendment(const fs::path& folder, const std::string& plan_hash,
+                      const Amendment& amendment) {
+  for (const auto& [field, value] : amendment.fields) {
+    if (!is_amendable(field)) throw std::invalid_argument("this field may not change: " + field);
+  }
+  const AmendmentLock lock(folder);
+  std::vector<Amendment> all = read_amendments(folder, plan_hash);
+  if (!all.empty() && all.back() == amendment) return;  // by another who found the same
+  all.push_back(amendment);
+  nlohmann::json amendments = nlohmann::json::array();
+  for (const auto& [fields, samples] : all) {
+    amendments.push_back({{"fields", fields}, {"samples", samples}});
+  }
+  const nlohmann::json json = {{"format", kFormat},
+                               {"version", kVersion},
+                               {"plan_hash", plan_hash},
+                               {"amendments", amendments}};
+  write_file_atomically(folder / kName,
+                        json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
+std::map<std::string, std::string> amended(std::map<std::string, std::string> fingerprint,
+                                           const std::vector<Amendment>& amendments) {
+  for (const Amendment& amendment : amendments) {
+    for (const auto& [field, value] : amendment.fields) {
+      fingerprint.insert_or_assign(field, value);
+    }
+  }
+  return fingerprint;
+}
+
+}  // namespace eventgan

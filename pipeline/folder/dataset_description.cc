@@ -1,0 +1,286 @@
+#include "pipeline/folder/dataset_description.h"
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <numeric>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/faults.h"
+#include "stages/shards/shard_reader.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
+  const std::string name = "the manifest in " + (folder / "plan.json").string();
+  try {
+    return parse_job_manifest(plan.manifest_text, folder, name);
+  } catch (const UsageError&) {  // of whoever wrote the plan, not of who finalizes
+    std::throw_with_nested(std::runtime_error("expected a plan with a sound manifest"));
+  }
+}
+
+[[noreturn]] void refuse(const fs::path& file, const std::string& what) {
+  throw std::runtime_error("expected a shard as its plan and its marker say, got another " + what +
+                           ", in " + file.string() + " (eventgan convert makes it again)");
+}
+
+/// The header of a shard whose bytes are its marker's.
+ShardHeader read_shard_header(const fs::path& folder, const ShardState& shard,
+                              const std::string& plan_hash) {
+  const fs::path file = folder / shard.outline.name;
+  ShardHeader header = ShardReader(file).header();
+  if (header.name != shard.outline.name) refuse(file, "name");
+  if (header.plan_hash != plan_hash) refuse(file, "plan hash");
+  if (header.sample_count != shard.outline.samples) refuse(file, "number of samples");
+  if (header.volume.size != shard.outline.volume_size && !shard.outline.size_unknown)
+    refuse(file, "size of volumes");
+  return header;
+}
+
+}  // namespace
+
+DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
+                                std::vector<ShardState> shards) {
+  DatasetParts parts;
+  parts.frozen = std::move(frozen);
+  parts.manifest = frozen_manifest(folder, parts.frozen.plan);
+  parts.amendments = read_amendments(folder, parts.frozen.hash);
+  for (ShardState& shard : shards) {
+    if (!shard.done()) {
+      parts.missing.push_back(std::move(shard));
+      continue;
+    }
+    ShardOutline& outline = shard.outline;
+    const bool is_first = !parts.headers.contains(outline.source);
+    if (shard.sound() && (is_first || outline.size_unknown)) {
+      ShardHeader header = read_shard_header(folder, shard, parts.frozen.hash);
+      outline.volume_size = header.volume.size;
+      if (is_first) parts.headers[outline.source] = std::move(header);
+    } else if (!shard.sound() && outline.size_unknown) {
+      outline.volume_size = {};
+    }
+    parts.done.push_back(std::move(shard));
+  }
+  return parts;
+}
+
+namespace {
+
+bool alike(const ShardHeader& a, const ShardHeader& b) {
+  return a.dataset == b.dataset && a.volume == b.volume && a.label_schema == b.label_schema;
+}
+
+std::string kind_of(const ShardHeader& header) {
+  const ImageSize& size = header.volume.size;
+  return header.dataset + "-" + std::to_string(size.height) + "x" + std::to_string(size.width);
+}
+
+void name_groups(std::vector<DatasetView>& views) {
+  if (views.size() < 2) return;
+  std::map<std::string, int> seen;
+  for (DatasetView& view : views) {
+    view.group = kind_of(view.header);
+    if (const int number = ++seen[view.group]; number > 1) {
+      view.group += "-" + std::to_string(number);
+    }
+  }
+}
+
+}  // namespace
+
+std::vector<DatasetView> views_of(const DatasetParts& parts) {
+  std::vector<DatasetView> views;
+  std::vector<std::vector<ViewShard>> shards;  // of each view
+  for (const ShardState& shard : parts.done) {
+    // All of a shard's header that a view shows is its source's, but for the size.
+    ShardHeader header = parts.headers.at(shard.outline.source);
+    header.volume.size = shard.outline.volume_size;
+    const auto view = std::ranges::find_if(
+        views, [&](const DatasetView& known) { return alike(known.header, header); });
+    const auto number = static_cast<std::size_t>(view - views.begin());
+    if (view == views.end()) {
+      views.push_back({"", std::move(header), {}});
+      shards.emplace_back();
+    }
+    shards[number].push_back({parts.source_of(shard.outline).split, *shard.marker});
+  }
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    views[i].layout = lay_out_view(std::move(shards[i]));
+  }
+  name_groups(views);
+  return views;
+}
+
+void add(const ShardMarker& marker, DatasetCounts& counts) {
+  ++counts.shards;
+  counts.samples += marker.samples;
+  counts.valid += marker.valid;
+  counts.boxes += std::accumulate(marker.boxes.begin(), marker.boxes.end(), std::int64_t{0});
+  counts.persons += std::accumulate(marker.persons.begin(), marker.persons.end(), std::int64_t{0});
+  counts.size_bytes += marker.size_bytes;
+  for (const auto& [name, boxes] : marker.classes) counts.classes[name] += boxes;
+  for (const auto& [gap, samples] : marker.gaps) counts.gaps[gap] += samples;
+}
+
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr char kFormat[] = "eventgan-dataset";
+constexpr int kVersion = 1;
+
+Json counts_json(const DatasetCounts& counts) {
+  Json gaps = Json::object();
+  for (const auto& [gap, samples] : counts.gaps) gaps[std::to_string(gap)] = samples;
+  return {{"shards", counts.shards},        {"samples", counts.samples},
+          {"valid", counts.valid},          {"quarantined", counts.quarantined()},
+          {"boxes", counts.boxes},          {"boxes_by_class", counts.classes},
+          {"persons", counts.persons},      {"samples_by_gap", gaps},
+          {"size_bytes", counts.size_bytes}};
+}
+
+Json counts_json(const DatasetParts& parts) {
+  DatasetCounts total;
+  std::map<std::string, DatasetCounts> splits;
+  std::map<std::string, DatasetCounts> datasets;
+  for (const ShardState& shard : parts.done) {
+    const SourceSpec& source = parts.source_of(shard.outline);
+    for (DatasetCounts* counts :
+         {&total, &splits[source.split], &datasets[std::string(to_string(source.dataset))]}) {
+      add(*shard.marker, *counts);
+    }
+  }
+  Json by_split = Json::object();
+  for (const auto& [name, counts] : splits) by_split[name] = counts_json(counts);
+  Json by_dataset = Json::object();
+  for (const auto& [name, counts] : datasets) by_dataset[name] = counts_json(counts);
+  return {{"total", counts_json(total)}, {"by_split", by_split}, {"by_dataset", by_dataset}};
+}
+
+Json shard_entry(const DatasetParts& parts, const ShardState& shard) {
+  const SourceSpec& source = parts.source_of(shard.outline);
+  DatasetCounts counts;
+  add(*shard.marker, counts);
+  return {{"name", shard.outline.name},
+          {"split", source.split},
+          {"dataset", to_string(source.dataset)},
+          {"samples", counts.samples},
+          {"valid", counts.valid},
+          {"boxes", counts.boxes},
+          {"persons", counts.persons},
+          {"size_bytes", counts.size_bytes},
+          {"sha256", shard.marker->sha256}};
+}
+
+Json source_entry(const DatasetParts& parts, std::size_t index) {
+  const SourceSpec& spec = parts.manifest.sources[index];
+  const SourceSummary& summary = parts.frozen.plan.sources.at(index);
+  Json source = {{"dataset", to_string(spec.dataset)},
+                 {"split", spec.split},
+                 {"labelled_frames", summary.labelled_frames},
+                 {"without_partner", summary.without_partner},
+                 {"frames_without_partner", summary.without_partner_ids.size()},
+                 {"notes", summary.notes},
+                 {"class_names", nullptr},
+                 {"joint_names", nullptr}};
+  // Names stand in the shards; a source of which no shard is done yet keeps them to itself.
+  if (const auto header = parts.headers.find(static_cast<int>(index));
+      header != parts.headers.end()) {
+    source["class_names"] = header->second.label_schema.class_names;
+    source["joint_names"] = header->second.label_schema.joint_names;
+  }
+  return source;
+}
+
+Json quarantined_json(const DatasetParts& parts) {
+  Json list = Json::array();
+  for (const ShardState& shard : parts.done) {
+    for (const QuarantinedSample& sample : shard.marker->quarantined) {
+      list.push_back({{"sample_id", sample.sample_id},
+                      {"shard", shard.outline.name},
+                      {"slot", sample.slot},
+                      {"reason", sample.reason}});
+    }
+  }
+  return list;
+}
+
+Json view_entry(const DatasetView& view) {
+  const VolumeShape& volume = view.header.volume;
+  Json splits = Json::array();
+  for (const SplitRange& split : view.layout.splits) {
+    splits.push_back(
+        {{"name", split.name}, {"first", split.samples.first}, {"rows", split.samples.count}});
+  }
+  return {{"group", view.group.empty() ? "/" : view.group},
+          {"dataset", view.header.dataset},
+          {"dtype", to_string(view.header.dtype)},
+          {"volume_shape", {volume.channels(), volume.size.height, volume.size.width}},
+          {"samples", view.layout.sample_count()},
+          {"splits", splits}};
+}
+
+/// What the settings do not say of what decided the bytes: inputs, versions, the processor. The
+/// manifest's own fields stand under "settings".
+std::map<std::string, std::string> circumstances(const DatasetParts& parts) {
+  auto fields = amended(parts.frozen.plan.fingerprint, parts.amendments);
+  std::erase_if(fields, [](const auto& field) { return field.first.starts_with("manifest "); });
+  return fields;
+}
+
+Json amendments_json(const std::vector<Amendment>& amendments) {
+  Json list = Json::array();
+  for (const Amendment& amendment : amendments) {
+    list.push_back({{"fields", amendment.fields}, {"samples", amendment.samples}});
+  }
+  return list;
+}
+
+/// The manifest, which may have comments; it was parsed strictly before.
+Json settings(const std::string& manifest_text) {
+  return Json::parse(manifest_text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
+}
+
+}  // namespace
+
+std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
+                             const ViewReceipt& receipt) {
+  const ShardHeader& header = parts.headers.begin()->second;
+  Json json = {{"format", kFormat},
+               {"version", kVersion},
+               {"name", parts.frozen.plan.name},
+               {"complete", parts.missing.empty()},
+               {"plan_hash", parts.frozen.hash},
+               {"fingerprint", circumstances(parts)},
+               {"program_version", header.program_version},
+               {"weights_hash", header.weights_hash},
+               {"generator", header.generator},
+               {"settings", settings(parts.frozen.plan.manifest_text)},
+               {"counts", counts_json(parts)}};
+  json["missing"] = Json::array();
+  for (const ShardState& shard : parts.missing) json["missing"].push_back(shard.outline.name);
+  json["sources"] = Json::array();
+  for (std::size_t i = 0; i < parts.manifest.sources.size(); ++i) {
+    json["sources"].push_back(source_entry(parts, i));
+  }
+  json["shards"] = Json::array();
+  for (const ShardState& shard : parts.done) {
+    json["shards"].push_back(shard_entry(parts, shard));
+  }
+  json["quarantined"] = quarantined_json(parts);
+  json["view"] = {{"name", kViewName},
+                  {"sha256", receipt.sha256},
+                  {"size_bytes", receipt.size_bytes},
+                  {"views", Json::array()}};
+  for (const DatasetView& view : views) json["view"]["views"].push_back(view_entry(view));
+  if (!parts.amendments.empty()) json["amendments"] = amendments_json(parts.amendments);
+  // A reason may quote a path, and paths need not be UTF-8, but JSON must be.
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace eventgan

@@ -1,0 +1,67 @@
+#include "pipeline/folder/finalization_report.h"
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/folder/dataset_description.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::size_t kListedShards = 100;
+
+/// "missing", or what is wrong with what there is.
+std::string why(const ShardState& shard) {
+  return shard.faults.empty() ? to_string(shard.condition) : shard.faults.front();
+}
+
+}  // namespace
+
+std::string to_text(const FinalizationReport& report) {
+  std::string text;
+  const std::size_t listed = std::min(report.missing.size(), kListedShards);
+  for (std::size_t i = 0; i < listed; ++i) {
+    const ShardState& shard = report.missing[i];
+    // What is wrong with a shard names its file.
+    text += (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard) + "\n";
+  }
+  if (listed < report.missing.size()) {
+    text += "... and " + std::to_string(report.missing.size() - listed) + " more (all: --json)\n";
+  }
+  const DatasetCounts& counts = report.counts;
+  text += std::to_string(counts.shards) + " of " + std::to_string(report.shards_planned) +
+          " shards: " + std::to_string(counts.samples) + " samples, " +
+          std::to_string(counts.quarantined()) + " of them quarantined, " +
+          std::to_string(counts.boxes) + " boxes, " + std::to_string(counts.persons) + " persons\n";
+  text += notes_text(report.notes);
+  if (!report.written) {
+    return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
+                                      : "not finalized: incomplete (--partial to allow it)\n");
+  }
+  if (!report.complete()) text += "PARTIAL: finalize again when the rest is done\n";
+  return text + report.folder + ": " + kDescriptionName + ", " + kViewName + "\n";
+}
+
+std::string to_json(const FinalizationReport& report) {
+  nlohmann::json missing = nlohmann::json::array();
+  for (const ShardState& shard : report.missing) {
+    missing.push_back({{"shard", shard.outline.name}, {"why", why(shard)}});
+  }
+  const nlohmann::json json = {{"folder", report.folder},
+                               {"complete", report.complete()},
+                               {"written", report.written},
+                               {"shards_planned", report.shards_planned},
+                               {"shards_done", report.counts.shards},
+                               {"missing", missing},
+                               {"samples", report.counts.samples},
+                               {"valid", report.counts.valid},
+                               {"quarantined", report.counts.quarantined()},
+                               {"boxes", report.counts.boxes},
+                               {"persons", report.counts.persons},
+                               {"notes", report.notes},
+                               {"views", report.views},
+                               {"too_many_faults", report.too_many_faults}};
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace eventgan

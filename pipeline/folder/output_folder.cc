@@ -1,0 +1,234 @@
+#include "pipeline/folder/output_folder.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <istream>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <streambuf>
+#include <string_view>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "manifests/faults.h"
+#include "manifests/marker.h"
+#include "manifests/strict_json/json_text_internal.h"
+#include "pipeline/folder/amendments.h"
+#include "stages/files/atomic_file.h"
+#include "stages/files/sha256.h"
+#include "stages/files/text_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kPlanName[] = "plan.json";
+constexpr char kRunName[] = "run.json";
+constexpr char kManifestFolder[] = "manifest_folder";
+constexpr char kManifestFolderBytes[] = "manifest_folder_bytes";  // of a name that is not UTF-8
+
+/// A file that is hashed as it is read: what was parsed and what was hashed are the same bytes, and
+/// a large file is read once. To be read through a std::istream; its errors are std::system_error
+/// naming the path, which the stream passes on if its exceptions include badbit.
+class HashedFile : public std::streambuf {
+ public:
+  explicit HashedFile(const fs::path& file) : path_(file), block_(std::size_t{1} << 20) {
+    std::error_code unknown;
+    // Opening a FIFO would wait for its writer, for ever perhaps.
+    if (!fs::is_other(file, unknown)) file_.open(file, std::ios::binary);
+  }
+
+  bool is_open() const { return file_.is_open(); }
+
+  /// SHA-256 of the file up to where the last block read ends: of the whole file once the stream
+  /// has met its end.
+  std::string hash_of_read() const { return hash_.hex(); }
+
+ protected:
+  int_type underflow() override {
+    file_.read(block_.data(), static_cast<std::streamsize>(block_.size()));
+    const auto size = static_cast<std::size_t>(file_.gcount());
+    if (file_.bad() || (size < block_.size() && !file_.eof())) {
+      throw std::system_error(errno, std::generic_category(), "cannot read " + path_.string());
+    }
+    if (size == 0) return traits_type::eof();
+    hash_.update(std::string_view(block_.data(), size));
+    setg(block_.data(), block_.data(), block_.data() + size);
+    return traits_type::to_int_type(block_.front());
+  }
+
+ private:
+  fs::path path_;
+  std::ifstream file_;
+  std::vector<char> block_;
+  Sha256 hash_;
+};
+
+/// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
+template <class Frozen, class Read>
+Frozen read_plan_file(const fs::path& folder, const Read& read) {
+  const fs::path file = folder / kPlanName;
+  HashedFile hashed(file);
+  if (!hashed.is_open()) {
+    throw InputError("expected a folder that eventgan convert has written, got no " +
+                     file.string());
+  }
+  try {
+    std::istream stream(&hashed);
+    stream.exceptions(std::ios::badbit);  // else an error of reading would pass for the end
+    auto plan = read(stream, file.string());
+    return {std::move(plan), hashed.hash_of_read()};
+  } catch (const std::system_error&) {
+    throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
+  } catch (const std::runtime_error&) {
+    std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
+                                              file.string() + " (--overwrite starts again)"));
+  }
+}
+
+std::string hash_of(const Plan& plan) {
+  Sha256 hash;
+  write_plan(plan, [&](std::string_view piece) { hash.update(piece); });
+  return hash.hex();
+}
+
+/// What to do about a fingerprint that differs: inputs that were mended ask for no new start, which
+/// would throw away what all other shards took.
+const char* way_out(const std::map<std::string, std::string>& frozen,
+                    std::map<std::string, std::string> now) {
+  for (const auto& [field, value] : frozen) {
+    if (is_amendable(field)) now[field] = value;
+  }
+  return frozen == now ? " (if inputs were mended, `eventgan retry` takes them and keeps what is "
+                         "done; --overwrite starts again):"
+                       : " (--overwrite starts again):";
+}
+
+/// Throws UsageError with a line for each field that differs.
+void require_same_fingerprint(const fs::path& plan_file,
+                              const std::map<std::string, std::string>& frozen,
+                              const std::map<std::string, std::string>& now) {
+  const auto differences = fingerprint_differences(frozen, now);
+  if (differences.empty()) return;
+  std::string message = plan_file.string() +
+                        " was frozen by a run that would have written other bytes" +
+                        way_out(frozen, now);
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
+}  // namespace
+
+FrozenPlan read_frozen_plan(const fs::path& folder) {
+  return read_plan_file<FrozenPlan>(folder, &read_plan);
+}
+
+FrozenOutline read_frozen_outline(const fs::path& folder) {
+  return read_plan_file<FrozenOutline>(folder, &read_plan_outline);
+}
+
+FrozenPlan freeze_plan(const fs::path& folder, Plan plan) {
+  const fs::path file = folder / kPlanName;
+  std::string hash;
+  const bool is_first = create_file_atomically(file, [&](const TextSink& sink) {
+    Sha256 hashed;
+    write_plan(plan, [&](std::string_view piece) {
+      hashed.update(piece);
+      sink(piece);
+    });
+    hash = hashed.hex();
+  });
+  if (is_first) return {std::move(plan), hash};
+  if (hash.empty()) hash = hash_of(plan);  // there was a plan from the start
+
+  const std::string frozen_hash = sha256_of_file(file);
+  const std::vector<Amendment> amendments = read_amendments(folder, frozen_hash);
+  if (amendments.empty() && hash == frozen_hash) return {std::move(plan), hash};
+
+  FrozenOutline frozen = read_frozen_outline(folder);
+  require_same_fingerprint(file, amended(frozen.plan.fingerprint, amendments), plan.fingerprint);
+  // Inputs that were mended since then may give other samples now (a hole that was filled): those
+  // that were frozen stay.
+  if (!amendments.empty()) {
+    plan = {};  // a large plan need not stand in memory twice
+    return read_frozen_plan(folder);
+  }
+  // The manifest may differ in what does not change bytes, and what was noteworthy beside the
+  // inputs may (a file that belongs to nothing); nothing else may.
+  plan.manifest_text = std::move(frozen.plan.manifest_text);
+  for (std::size_t i = 0; i < std::min(plan.sources.size(), frozen.plan.sources.size()); ++i) {
+    plan.sources[i].notes = std::move(frozen.plan.sources[i].notes);
+  }
+  if (hash_of(plan) == frozen.hash) return {std::move(plan), frozen.hash};
+  throw UsageError(
+      "expected the plan that this manifest and these inputs give, got an altered one, in " +
+      file.string() + " (--overwrite starts again)");
+}
+
+void discard_output(const fs::path& folder) {
+  if (!fs::exists(folder / kPlanName)) return;
+  std::vector<ShardOutline> shards;
+  try {
+    shards = read_frozen_outline(folder).plan.shards;
+  } catch (const std::runtime_error&) {
+    // A damaged plan names no shards; those that are left are made anew, or reported by `verify`.
+  }
+  // What says that something is whole goes before what it says it of; the plan last, so that after
+  // an interruption the next run finds the rest.
+  for (const char* name : {"dataset.json", "dataset.h5"}) fs::remove(folder / name);
+  for (const ShardOutline& shard : shards) {
+    fs::remove(folder / marker_name(shard.name));
+    fs::remove(folder / shard.name);
+  }
+  fs::remove(folder / "amendments.json");
+  fs::remove(folder / kPlanName);
+}
+
+void record_manifest_folder(const fs::path& folder, const JobManifest& manifest) {
+  const std::string where = manifest.directory.string();
+  std::string text;
+  try {
+    text = nlohmann::json{{kManifestFolder, where}}.dump(2);
+  } catch (const nlohmann::json::type_error&) {  // a name that is not UTF-8, as JSON must be
+    text = nlohmann::json{{kManifestFolderBytes,
+                           std::vector<unsigned char>(where.begin(), where.end())}}
+               .dump();
+  }
+  write_file_atomically(folder / kRunName, text + "\n");
+}
+
+std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
+  std::string text;
+  try {
+    text = read_text_file(folder / kRunName);
+  } catch (const std::runtime_error&) {  // there is none, as a rule
+    return std::nullopt;
+  }
+  FaultList faults(kRunName);
+  const auto json = parse_json_text(text, faults);
+  if (!json || !json->is_object()) return std::nullopt;
+  try {
+    if (json->contains(kManifestFolder)) return json->at(kManifestFolder).get<std::string>();
+    if (!json->contains(kManifestFolderBytes)) return std::nullopt;
+    const auto bytes = json->at(kManifestFolderBytes).get<std::vector<unsigned char>>();
+    return std::string(bytes.begin(), bytes.end());
+  } catch (const nlohmann::json::type_error&) {  // other values
+    return std::nullopt;
+  }
+}
+
+JobManifest recorded_manifest(const fs::path& folder, const PlanOutline& plan,
+                              const std::optional<fs::path>& file) {
+  if (file) return read_job_manifest(*file);
+  const auto inputs = recorded_manifest_folder(folder);
+  if (!inputs) {
+    throw UsageError("expected the manifest's folder, got none, in " +
+                     (folder / "run.json").string() + " (--manifest FILE says where it is)");
+  }
+  return parse_job_manifest(plan.manifest_text, *inputs, (folder / "plan.json").string());
+}
+
+}  // namespace eventgan

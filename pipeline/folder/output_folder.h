@@ -1,0 +1,53 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "manifests/job_manifest.h"
+#include "manifests/plan.h"
+#include "manifests/plan_outline.h"
+
+namespace eventgan {
+
+/// A plan as it stands in an output folder.
+struct FrozenPlan {
+  Plan plan;
+  std::string hash;  ///< SHA-256 of plan.json, hex
+};
+
+/// The same without its samples: small and quick to read for any number of pairs.
+struct FrozenOutline {
+  PlanOutline plan;
+  std::string hash;  ///< SHA-256 of plan.json, hex
+};
+
+/// Freezes `plan` as FOLDER/plan.json, created whole and only if absent; written piece by piece, so
+/// that its text never stands in memory. If a plan is there already (from an earlier run, or a
+/// process that was faster) it is taken, provided its fingerprint, with the folder's amendments, is
+/// the same. Throws UsageError listing the fields that differ otherwise, or if the same fingerprint
+/// has another plan; std::runtime_error if the one that is there is damaged, or on an error of
+/// writing, after which there is no plan.json. Safe in several processes and threads at once.
+FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan);
+
+/// The plan of an output folder. Throws InputError if there is none, std::runtime_error if it is
+/// damaged.
+FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
+FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
+
+/// Deletes plan.json, every shard and marker it names, and what was made from these (dataset.json,
+/// dataset.h5, amendments.json); other files are left alone. Nothing happens without plan.json.
+void discard_output(const std::filesystem::path& folder);
+
+/// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a
+/// convenience, not part of the plan.
+void record_manifest_folder(const std::filesystem::path& folder, const JobManifest& manifest);
+std::optional<std::filesystem::path> recorded_manifest_folder(const std::filesystem::path& folder);
+
+/// The job of an output folder, so that its inputs can be read again: the frozen manifest, its
+/// paths starting at the folder that run.json records; or, where the inputs have moved, the
+/// manifest in `file`. Throws UsageError if there is neither, InputError if `file` cannot be read.
+JobManifest recorded_manifest(const std::filesystem::path& folder, const PlanOutline& plan,
+                              const std::optional<std::filesystem::path>& file);
+
+}  // namespace eventgan

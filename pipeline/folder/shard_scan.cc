@@ -1,0 +1,200 @@
+#include "pipeline/folder/shard_scan.h"
+
+#include <cstdint>
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "pipeline/profile/trace_span.h"
+#include "pipeline/threads/for_each_index.h"
+#include "pipeline/threads/thread_count.h"
+#include "stages/files/sha256.h"
+#include "stages/files/text_file.h"
+#include "stages/shards/shard_check.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A marker that does not parse may be wrong in many places; the first says enough.
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+/// One look at one shard.
+class Look {
+ public:
+  Look(const fs::path& folder, const ShardOutline& shard, const std::string& plan_hash)
+      : plan_hash_(plan_hash),
+        shard_file_(folder / shard.name),
+        marker_file_(folder / marker_name(shard.name)) {
+    state_.outline = shard;
+  }
+
+  ShardState run(ScanDepth depth) && {
+    look_at_names();
+    if (depth == ScanDepth::kContents) {
+      if (state_.done()) state_.faults = check_shard(shard_file_, *state_.marker);
+      return std::move(state_);
+    }
+    if (state_.done() && depth >= ScanDepth::kBytes) hash();
+    if (state_.done() && depth >= ScanDepth::kRows) compare_rows();
+    return std::move(state_);
+  }
+
+ private:
+  void fail(ShardCondition condition, std::string fault) {
+    state_.condition = condition;
+    state_.marker.reset();
+    state_.faults = {std::move(fault)};
+  }
+
+  void fail(ShardCondition condition, const fs::path& path, const std::string& what) {
+    fail(condition, path.string() + ": " + what);
+  }
+
+  void look_at_names() {
+    std::error_code unreadable;
+    if (!fs::exists(marker_file_, unreadable) && !unreadable) {
+      if (!fs::exists(shard_file_, unreadable) && !unreadable) return;  // missing
+      return fail(ShardCondition::kUncommitted, shard_file_,
+                  "expected its marker " + marker_file_.filename().string() +
+                      " beside it, got no file (not committed)");
+    }
+    read_marker();
+    if (!state_.done()) return;
+    if (!fs::is_regular_file(shard_file_, unreadable)) {
+      return fail(
+          ShardCondition::kNoShard, shard_file_,
+          "expected the shard that " + marker_file_.filename().string() + " is of, got no file");
+    }
+    const auto size_bytes = static_cast<std::int64_t>(fs::file_size(shard_file_, unreadable));
+    if (unreadable || size_bytes != state_.marker->size_bytes) {
+      fail(ShardCondition::kOtherSize, shard_file_,
+           "expected size in bytes " + std::to_string(state_.marker->size_bytes) + ", got " +
+               (unreadable ? unreadable.message() : std::to_string(size_bytes)));
+    }
+  }
+
+  /// Done, if the marker says nothing against the plan.
+  void read_marker() {
+    try {
+      state_.marker = parse_marker(read_text_file(marker_file_), marker_file_.string());
+    } catch (const std::runtime_error& error) {
+      return fail(ShardCondition::kTornMarker, first_line(error.what()));
+    }
+    const ShardMarker& marker = *state_.marker;
+    const auto foreign = [&](const std::string& expected, const std::string& got) {
+      fail(ShardCondition::kForeignMarker, marker_file_,
+           "expected the marker of " + expected + ", got one of " + got);
+    };
+    state_.named_plan = marker.plan_hash;
+    if (marker.shard != state_.outline.name) return foreign(state_.outline.name, marker.shard);
+    if (marker.plan_hash != plan_hash_) {
+      return foreign("plan " + plan_hash_, "plan " + marker.plan_hash);
+    }
+    if (marker.samples != state_.outline.samples) {
+      return foreign(std::to_string(state_.outline.samples) + " samples",
+                     std::to_string(marker.samples) + " samples");
+    }
+    state_.condition = ShardCondition::kDone;
+    std::error_code unknown;
+    const auto committed = fs::last_write_time(marker_file_, unknown);
+    if (!unknown) state_.committed = committed;
+  }
+
+  void hash() {
+    std::string got;
+    try {
+      got = sha256_of_file(shard_file_);
+    } catch (const std::runtime_error& error) {
+      got = error.what();
+    }
+    if (got == state_.marker->sha256) return;
+    fail(ShardCondition::kOtherBytes, shard_file_,
+         "expected SHA-256 " + state_.marker->sha256 + ", got " + got);
+  }
+
+  void compare_rows() {
+    try {
+      const std::vector<std::string> faults = count_faults(shard_file_, *state_.marker);
+      if (!faults.empty()) fail(ShardCondition::kOtherCounts, marker_file_, faults.front());
+    } catch (const std::runtime_error& error) {  // not std::bad_alloc: that is not of the shard
+      fail(ShardCondition::kOtherCounts, marker_file_,
+           "expected the marker of a shard that can be read, got one whose " +
+               first_line(error.what()));
+    }
+  }
+
+  const std::string& plan_hash_;
+  fs::path shard_file_;
+  fs::path marker_file_;
+  ShardState state_;
+};
+
+/// Looks at those of `states` for which `which` is true.
+template <class Which>
+void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth depth,
+             const ScanOptions& options, std::vector<ShardState>& states, const Which& which) {
+  constexpr int kLooksAtOnce = 16;
+  const bool is_read = depth != ScanDepth::kMarker;
+  const int threads =
+      options.threads == 0 && !is_read ? kLooksAtOnce : thread_count(options.threads);
+  for_each_index(states.size(), threads, [&](std::size_t i) {
+    ShardState& state = states[i];
+    if (!which(state)) return;
+    TraceSpan span(is_read ? options.trace : nullptr, "hash earlier shard", "shard");
+    span.note("shard", state.outline.name);
+    if (state.marker) span.note("bytes", state.marker->size_bytes);
+    const ShardOutline outline = std::move(state.outline);
+    state = options.stop && options.stop() ? ShardState{.outline = outline}
+                                           : shard_state(folder, outline, plan_hash, depth);
+  });
+}
+
+}  // namespace
+
+const char* to_string(ShardCondition condition) {
+  switch (condition) {
+    case ShardCondition::kDone:
+      return "done";
+    case ShardCondition::kMissing:
+      return "missing";
+    case ShardCondition::kUncommitted:
+      return "not committed";
+    case ShardCondition::kNoShard:
+      return "marker without shard";
+    case ShardCondition::kTornMarker:
+      return "torn marker";
+    case ShardCondition::kForeignMarker:
+      return "foreign marker";
+    case ShardCondition::kOtherSize:
+      return "of another size";
+    case ShardCondition::kOtherBytes:
+      return "with other bytes";
+    case ShardCondition::kOtherCounts:
+      return "with other counts";
+  }
+  return "unknown";
+}
+
+ShardState shard_state(const fs::path& folder, const ShardOutline& shard,
+                       const std::string& plan_hash, ScanDepth depth) {
+  return Look(folder, shard, plan_hash).run(depth);
+}
+
+std::vector<ShardState> scan_shards(const fs::path& folder, const std::vector<ShardOutline>& shards,
+                                    const std::string& plan_hash, ScanDepth depth,
+                                    const ScanOptions& options) {
+  std::vector<ShardState> states(shards.size());
+  for (std::size_t i = 0; i < shards.size(); ++i) states[i].outline = shards[i];
+  look_at(folder, plan_hash, depth, options, states, [](const ShardState&) { return true; });
+  return states;
+}
+
+void scan_again(const fs::path& folder, const std::string& plan_hash, bool done,
+                std::vector<ShardState>& states, ScanDepth depth, const ScanOptions& options) {
+  look_at(folder, plan_hash, depth, options, states,
+          [&](const ShardState& state) { return state.done() == done; });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,84 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/marker.h"
+#include "manifests/plan_outline.h"
+
+namespace eventgan {
+
+class TraceRecorder;
+
+/// What an output folder holds of a planned shard.
+enum class ShardCondition {
+  kDone,           ///< the marker parses, is of this plan, and the shard has its size
+  kMissing,        ///< neither shard nor marker
+  kUncommitted,    ///< a shard without a marker: its writer ended between the two
+  kNoShard,        ///< a marker without a shard
+  kTornMarker,     ///< the marker does not parse
+  kForeignMarker,  ///< the marker is of another plan or another shard
+  kOtherSize,      ///< the shard has not the marker's size
+  kOtherBytes,     ///< the shard has not the marker's SHA-256
+  kOtherCounts     ///< the shard is the marker's, but not what the marker says of its rows
+};
+
+/// Short words for a person: "done", "missing", "not committed", ...
+const char* to_string(ShardCondition condition);
+
+/// A planned shard as it stands in an output folder.
+struct ShardState {
+  ShardOutline outline;
+  ShardCondition condition = ShardCondition::kMissing;
+  std::optional<ShardMarker> marker{};          ///< kDone: the shard's
+  std::filesystem::file_time_type committed{};  ///< kDone: when the marker was written, if known
+  std::string named_plan{};  ///< hash of the plan that the marker names; empty: no marker parses
+  /// "PATH: expected X, got Y". None for kMissing; for kDone only after ScanDepth::kContents; else
+  /// one.
+  std::vector<std::string> faults{};
+
+  bool done() const { return condition == ShardCondition::kDone; }
+  /// At the depth that was asked for.
+  bool sound() const { return done() && faults.empty(); }
+};
+
+/// How far a look at a shard goes; each goes on where the one before has found the shard done.
+/// HDF5 opens a shard only if its bytes are the marker's: it does not promise to survive others.
+enum class ScanDepth {
+  kMarker,   ///< names, sizes and the marker alone (DESIGN section 6)
+  kBytes,    ///< and the shard is hashed: may find kOtherBytes
+  kRows,     ///< and what the marker says of the rows is compared: may find kOtherCounts
+  kContents  ///< as kMarker, and then all that check_shard finds: faults of a shard that is done
+};
+
+/// Looks at one shard of the plan with hash `plan_hash`. Never throws for what stands in the
+/// folder. Thread safe; with kRows and kContents nothing else may use HDF5 meanwhile but this and
+/// ShardReaders.
+ShardState shard_state(const std::filesystem::path& folder, const ShardOutline& shard,
+                       const std::string& plan_hash, ScanDepth depth = ScanDepth::kMarker);
+
+struct ScanOptions {
+  /// Shards to look at side by side. 0: all cores, or with kMarker, where on a network file system
+  /// each look is a few waits, as many as fit.
+  int threads = 0;
+  /// Asked before each shard, from several threads: true leaves it out, as if it were missing.
+  std::function<bool()> stop{};
+  TraceRecorder* trace = nullptr;  ///< of shards that are read; null: nobody asks
+};
+
+/// What the folder holds of each of `shards`, in their order.
+std::vector<ShardState> scan_shards(const std::filesystem::path& folder,
+                                    const std::vector<ShardOutline>& shards,
+                                    const std::string& plan_hash,
+                                    ScanDepth depth = ScanDepth::kMarker,
+                                    const ScanOptions& options = {});
+
+/// Looks again, at those of an earlier scan that are done, or at those that are not.
+void scan_again(const std::filesystem::path& folder, const std::string& plan_hash, bool done,
+                std::vector<ShardState>& states, ScanDepth depth = ScanDepth::kMarker,
+                const ScanOptions& options = {});
+
+}  // namespace eventgan
