@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
+
 namespace eventgan {
 namespace {
 
@@ -111,7 +113,7 @@ std::string to_json(const ConversionReport& report) {
                                {"stage_seconds", report.stage_seconds},
                                {"wall_seconds", report.wall_seconds},
                                {"too_many_faults", report.too_many_faults}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/finalization/dataset_description.h"
 
 namespace eventgan {
@@ -59,7 +60,7 @@ std::string to_json(const FinalizationReport& report) {
                                {"notes", report.notes},
                                {"views", report.views},
                                {"too_many_faults", report.too_many_faults}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

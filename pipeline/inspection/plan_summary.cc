@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
+
 namespace eventgan {
 namespace {
 
@@ -104,7 +106,7 @@ std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
                                {"seconds_per_pair", estimate.seconds_per_pair},
                                {"estimated_seconds", estimate.seconds},
                                {"estimated_bytes", estimate.stored_bytes}};
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

@@ -3,11 +3,11 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
+
 namespace eventgan {
 
-std::string trace_string(std::string_view text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+std::string trace_string(std::string_view text) { return dump_json(nlohmann::json(text)); }
 
 std::string trace_microseconds(std::int64_t nanoseconds) {
   char text[32];

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
+
 namespace eventgan {
 namespace {
 
@@ -76,7 +78,7 @@ std::string to_json(const RetryReport& report) {
                                {"too_many_faults", report.too_many_faults},
                                {"dataset_outdated", report.dataset_outdated},
                                {"wall_seconds", report.wall_seconds}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
+
 namespace eventgan {
 namespace {
 
@@ -78,7 +80,7 @@ std::string to_json(const SimulationReport& report) {
                                {"kept", report.kept},
                                {"total", summary_json(sum(report.made))},
                                {"wall_seconds", report.wall_seconds}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

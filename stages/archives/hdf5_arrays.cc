@@ -1,6 +1,7 @@
 #include "stages/archives/hdf5_arrays.h"
 
 #include <hdf5.h>
+#include <utf8.h>
 
 #include <algorithm>
 #include <cstring>
@@ -9,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/archives/utf8_internal.h"
 #include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_handle_internal.h"
 
@@ -93,7 +93,9 @@ decltype(TypedArray::values) read_values(const OpenDataset& dataset) {
     case H5T_STRING: {
       auto values = H5Tis_variable_str(dataset.type) > 0 ? read_variable_text(dataset)
                                                          : read_fixed_text(dataset);
-      if (!std::ranges::all_of(values, is_utf8)) throw NotAnArray{"text that is not UTF-8"};
+      for (const std::string& text : values) {
+        if (!utf8::is_valid(text)) throw NotAnArray{"text that is not UTF-8"};
+      }
       return values;
     }
     default:
