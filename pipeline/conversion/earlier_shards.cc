@@ -1,8 +1,9 @@
 #include "pipeline/conversion/earlier_shards.h"
 
+#include <fmt/core.h>
+
 #include <atomic>
 #include <cstddef>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -29,10 +30,8 @@ void tell_if_long(const std::vector<ShardState>& states, const EarlierCheck& che
     bytes += state.marker->size_bytes;
   }
   if (!check.note || bytes < kNotedBytes) return;
-  char text[80];
-  std::snprintf(text, sizeof text, "checking %d committed shards (%.1f GB)", done,
-                1e-9 * static_cast<double>(bytes));
-  check.note(text);
+  check.note(fmt::format("checking {} committed shards ({:.1f} GB)", done,
+                         1e-9 * static_cast<double>(bytes)));
 }
 
 /// Empty if somebody has taken it away meanwhile.

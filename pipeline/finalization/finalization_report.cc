@@ -1,5 +1,7 @@
 #include "pipeline/finalization/finalization_report.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
@@ -25,13 +27,12 @@ std::string to_text(const FinalizationReport& report) {
     text += line_of(report.missing[i]) + "\n";
   }
   if (listed < report.missing.size()) {
-    text += "... and " + std::to_string(report.missing.size() - listed) + " more (all: --json)\n";
+    text += fmt::format("... and {} more (all: --json)\n", report.missing.size() - listed);
   }
   const DatasetCounts& counts = report.counts;
-  text += std::to_string(counts.shards) + " of " + std::to_string(report.shards_planned) +
-          " shards: " + std::to_string(counts.samples) + " samples, " +
-          std::to_string(counts.quarantined()) + " of them quarantined, " +
-          std::to_string(counts.boxes) + " boxes, " + std::to_string(counts.persons) + " persons\n";
+  text += fmt::format("{} of {} shards: {} samples, {} of them quarantined, {} boxes, {} persons\n",
+                      counts.shards, report.shards_planned, counts.samples, counts.quarantined(),
+                      counts.boxes, counts.persons);
   text += notes_text(report.notes);
   if (!report.written) {
     return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
