@@ -1,6 +1,6 @@
 #include "manifests/error_limits.h"
 
-#include <sstream>
+#include <fmt/core.h>
 
 namespace eventgan {
 
@@ -14,10 +14,8 @@ std::string limits_text(const ErrorSpec& errors) {
   if (errors.policy == ErrorPolicy::kFail) {
     return "no quarantined pair (errors.policy in the manifest is \"fail\")";
   }
-  std::ostringstream text;
-  text << "at most " << errors.max_count << " quarantined pairs and " << errors.max_fraction
-       << " of all (errors in the manifest)";
-  return text.str();
+  return fmt::format("at most {} quarantined pairs and {:g} of all (errors in the manifest)",
+                     errors.max_count, errors.max_fraction);
 }
 
 }  // namespace eventgan

@@ -76,15 +76,13 @@ void require_seconds(double seconds, const std::string& of) {
 }
 
 /// Canonical JSON of a marker: two-space indent, except that an array of numbers stands on one
-/// line, however long it is. A reason may quote a path, and paths need not be UTF-8, but JSON must
-/// be.
+/// line, however long it is.
 std::string indented(const nlohmann::json& object) {
-  constexpr auto kReplace = nlohmann::json::error_handler_t::replace;
   std::string text = "{";
   for (const auto& [key, value] : object.items()) {
     const bool on_one_line = value.is_array() && !value.empty() && value[0].is_number();
     text += (text.size() == 1 ? "\n  " : ",\n  ") + nlohmann::json(key).dump() + ": ";
-    for (const char c : value.dump(on_one_line ? -1 : 2, ' ', false, kReplace)) {
+    for (const char c : dump_json(value, on_one_line ? JsonLayout::kLine : JsonLayout::kIndented)) {
       text += c;
       if (c == '\n') text += "  ";  // within a string it would be written as \n
     }

@@ -5,6 +5,7 @@
 #include "manifests/plan.h"
 #include "manifests/plan_lines_internal.h"
 #include "manifests/plan_parts_internal.h"
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
@@ -16,8 +17,7 @@ std::string dump(const json& value) {
   try {
     return value.dump();
   } catch (const json::type_error&) {
-    throw std::runtime_error("expected names in UTF-8, got other bytes, in " +
-                             value.dump(-1, ' ', false, json::error_handler_t::replace));
+    throw std::runtime_error("expected names in UTF-8, got other bytes, in " + dump_json(value));
   }
 }
 

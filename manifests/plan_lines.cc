@@ -62,8 +62,7 @@ class Lines {
     constexpr std::size_t kLongest = 60;
     const std::string got =
         at_end_ ? "the end of the file"
-                : nlohmann::json(line_.substr(0, kLongest))
-                      .dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+                : dump_json(nlohmann::json(line_.substr(0, kLongest)), JsonLayout::kAsciiLine);
     throw std::runtime_error(place(number_) + ": expected " + expected + ", got " + got);
   }
 

@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/plan_parts_internal.h"
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
@@ -38,7 +39,7 @@ std::vector<std::string> read_texts(const StrictValue& value) {
 
 /// A note may name files of any bytes, which are nobody's inputs: what is not UTF-8 is replaced.
 json notes_as_json(const std::vector<std::string>& notes) {
-  return json::parse(json(notes).dump(-1, ' ', false, json::error_handler_t::replace));
+  return json::parse(dump_json(json(notes)));
 }
 
 }  // namespace

@@ -48,10 +48,10 @@ int main(int argc, char** argv) {
     const bool asked_for = app.exit(error, std::cout, message) == 0;  // --help, --version
     exit_code = asked_for ? eventgan::kComplete : eventgan::kUsage;
     if (!asked_for)
-      streams.tell_error(message.str().substr(0, message.str().find_last_not_of('\n') + 1));
+      eventgan::tell_error(message.str().substr(0, message.str().find_last_not_of('\n') + 1));
   } catch (const std::exception& error) {
     exit_code = eventgan::exit_code_of(error);
-    streams.tell_error(eventgan::error_text(error));
+    eventgan::tell_error(eventgan::error_text(error));
   }
   return streams.finish(exit_code);
 }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/strict_json/json_path_internal.h"
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 
@@ -12,8 +13,7 @@ std::string json_path(std::string_view parent, std::string_view key) {
   });
   std::string path(parent);
   if (is_word) return path.append(".").append(key);
-  const std::string quoted =
-      nlohmann::json(key).dump(-1, ' ', true, nlohmann::json::error_handler_t::replace);
+  const std::string quoted = dump_json(nlohmann::json(key), JsonLayout::kAsciiLine);
   return path.append("[").append(quoted).append("]");
 }
 

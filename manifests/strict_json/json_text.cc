@@ -1,3 +1,6 @@
+#include <utf8.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <string>
@@ -17,25 +20,14 @@ constexpr std::size_t kDeepest = 32;
 /// Byte of the first character that is not well-formed UTF-8 (no overlong forms, no surrogates), or
 /// of the first NUL; text.size() if there is none. The parser itself looks into strings only.
 std::size_t first_unsound_byte(std::string_view text) {
-  const auto byte = [&](std::size_t i) -> unsigned {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0;
-  };
-  for (std::size_t i = 0; i < text.size();) {
-    const unsigned first = byte(i);
-    const std::size_t more = first < 0x80 ? 0 : first < 0xe0 ? 1 : first < 0xf0 ? 2 : 3;
-    if (first == 0 || (first >= 0x80 && first < 0xc2) || first > 0xf4) return i;
-    for (std::size_t k = 1; k <= more; ++k) {
-      if ((byte(i + k) & 0xc0) != 0x80) return i;
-    }
-    // The second byte tells overlong forms, surrogates and what lies beyond U+10FFFF.
-    const unsigned second = byte(i + 1);
-    if ((first == 0xe0 && second < 0xa0) || (first == 0xed && second > 0x9f) ||
-        (first == 0xf0 && second < 0x90) || (first == 0xf4 && second > 0x8f)) {
-      return i;
-    }
-    i += 1 + more;
-  }
-  return text.size();
+  const std::size_t nul = std::min(text.find('\0'), text.size());
+  return std::min(utf8::find_invalid(text.substr(0, nul)), nul);
+}
+
+template <class Json>
+std::string dump(const Json& document, JsonLayout layout) {
+  return document.dump(layout == JsonLayout::kIndented ? 2 : -1, ' ',
+                       layout == JsonLayout::kAsciiLine, Json::error_handler_t::replace);
 }
 
 /// Builds the document from the parser's events, since the parser's own builder lets a second key
@@ -165,6 +157,14 @@ std::optional<Json> parse_text(std::string_view text, FaultList& faults, bool ig
 }
 
 }  // namespace
+
+std::string dump_json(const nlohmann::json& document, JsonLayout layout) {
+  return dump(document, layout);
+}
+
+std::string dump_json(const nlohmann::ordered_json& document, JsonLayout layout) {
+  return dump(document, layout);
+}
 
 std::optional<nlohmann::json> parse_json_text(std::string_view text, FaultList& faults) {
   if (text.starts_with("\xef\xbb\xbf")) {

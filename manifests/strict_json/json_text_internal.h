@@ -18,6 +18,19 @@ namespace eventgan {
 /// is a fault too, but leaves a document, so that its other faults are found as well.
 std::optional<nlohmann::json> parse_json_text(std::string_view text, FaultList& faults);
 
+enum class JsonLayout {
+  kLine,
+  kAsciiLine,  ///< a line with \u1234 for what is not ASCII, so that no message can garble a
+               ///< terminal
+  kIndented    ///< a line a value, indented by two
+};
+
+/// A document as text, without a line end behind it. What it quotes, such as a path or an
+/// annotation, need not be UTF-8, but JSON must be: other bytes become U+FFFD.
+std::string dump_json(const nlohmann::json& document, JsonLayout layout = JsonLayout::kLine);
+std::string dump_json(const nlohmann::ordered_json& document,
+                      JsonLayout layout = JsonLayout::kLine);
+
 enum class JsonComments { kRefused, kPassedOver };
 
 /// Parses data of users, labels and lists of them, keys in the order of the text: as strictly, but

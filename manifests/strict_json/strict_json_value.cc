@@ -2,6 +2,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/strict_json/json_path_internal.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "manifests/strict_json/strict_json_internal.h"
 
 namespace eventgan {
@@ -12,7 +13,7 @@ using Json = nlohmann::json;
 /// A value as JSON in ASCII, so that no message can garble a terminal; cut if it is long.
 std::string shown(const Json& value) {
   constexpr std::size_t kLongest = 80;
-  std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
+  std::string text = dump_json(value, JsonLayout::kAsciiLine);
   if (text.size() > kLongest) text = text.substr(0, kLongest) + "...";
   return text;
 }

@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "manifests/weights_name.h"
 
 namespace eventgan {
@@ -50,9 +51,7 @@ fs::path calibrated_file(const JobManifest& manifest, int base_channels,
 std::string calibrated_generator_line(const JobManifest& manifest, const fs::path& file) {
   fs::path shown = file.lexically_relative(manifest.directory);
   if (shown.empty() || *shown.begin() == "..") shown = file;
-  return "\"generator\": { \"weights\": " +
-         nlohmann::json(shown.generic_string())
-             .dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
+  return "\"generator\": { \"weights\": " + dump_json(nlohmann::json(shown.generic_string())) +
          ", \"precision\": \"int8\" }";
 }
 

@@ -1,6 +1,7 @@
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <cstdio>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "pipeline/calibration/calibrated_file.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_weights.h"
 #include "pipeline/planning/make_plan.h"
@@ -30,17 +32,6 @@ struct CalibrateArguments {
   ProgressStyle progress = ProgressStyle::kAuto;
 };
 
-void warn(const CalibrateArguments& arguments, const std::string& text) {
-  const bool as_json = arguments.progress == ProgressStyle::kJson;
-  std::cerr << (as_json ? warning_json(text) : "warning: " + text) << std::endl;
-}
-
-std::string decimals(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3f", value);
-  return text;
-}
-
 /// What int8 costs, or why that is not known.
 std::string error_line(const CalibrationOutcome& outcome) {
   if (!outcome.unmeasured.empty()) return "int8 error: not measured, " + outcome.unmeasured;
@@ -48,8 +39,9 @@ std::string error_line(const CalibrationOutcome& outcome) {
   if (sorted.empty()) return "int8 error: not measured, no other pairs to measure it on";
   std::ranges::sort(sorted);
   const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
-  return "int8 error against float32, relative L2, on " + std::to_string(sorted.size()) +
-         " other pairs: median " + decimals(median) + ", worst " + decimals(sorted.back());
+  return fmt::format(
+      "int8 error against float32, relative L2, on {} other pairs: median {:.3f}, worst {:.3f}",
+      sorted.size(), median, sorted.back());
 }
 
 CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobManifest& manifest,
@@ -76,10 +68,10 @@ int run(const CalibrateArguments& arguments) {
   const LoadedWeights loaded = load_weights(manifest);
   const std::filesystem::path file =
       calibrated_file(manifest, loaded.weights.base_channels, arguments.out);
-  if (!loaded.warning.empty()) warn(arguments, loaded.warning);
+  if (!loaded.warning.empty()) tell_warning(loaded.warning);
 
   const CalibrationOutcome outcome = calibrate_job(arguments, manifest, loaded, signal);
-  for (const std::string& skipped : outcome.skipped) warn(arguments, "skipped " + skipped);
+  for (const std::string& skipped : outcome.skipped) tell_warning("skipped " + skipped);
   const std::string bytes = serialize_weights(outcome.weights);
   write_file_atomically(file, bytes);
   std::cout << file.string() << ": calibrated on " << outcome.weights.calibration->pairs

@@ -10,6 +10,7 @@
 #include "pipeline/commands/job_options.h"
 #include "pipeline/commands/profile_option.h"
 #include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/generation/load_generator.h"
@@ -25,10 +26,6 @@ struct ConvertArguments {
   double grace_s = ConversionOptions().grace_s;
   std::optional<std::string> profile;
 };
-
-void warn(const JobOptions& job, const std::string& text) {
-  std::cerr << (job.as_json() ? warning_json(text) : "warning: " + text) << std::endl;
-}
 
 int judge(const ConversionReport& report, const ErrorSpec& errors) {
   if (report.too_many_faults) {
@@ -46,7 +43,7 @@ int convert_and_report(const JobOptions& job, const JobManifest& manifest,
     const TraceSpan span(options.trace, "load generator", "job");
     return load_generator(manifest);
   }();
-  tell_generator(loaded, job.as_json());
+  tell_generator(loaded);
   const ConversionReport report =
       convert(manifest, *loaded.generator, loaded.weights_hash, options);
   std::cout << (job.as_json() ? to_json(report) : to_text(report)) << std::flush;
@@ -65,17 +62,14 @@ int run(const ConvertArguments& arguments) {
   options.threads = job.threads;
   options.overwrite = job.overwrite;
   options.make_progress = [&](std::int64_t total) { return show_progress(job.progress, total); };
-  options.warn = [&](const std::string& text) { warn(job, text); };
-  options.note = [&](const std::string& text) {
-    std::cerr << (job.as_json() ? note_json(text) : text) << std::endl;
-  };
+  options.warn = tell_warning;
+  options.note = [](const std::string& text) { tell(text); };
   const std::filesystem::path folder =
       options.output.value_or(resolve(manifest, manifest.output.directory));
-  return run_profiled({arguments.profile, "convert", folder, job.as_json()},
-                      [&](TraceRecorder* trace) {
-                        options.trace = trace;
-                        return convert_and_report(job, manifest, options);
-                      });
+  return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {
+    options.trace = trace;
+    return convert_and_report(job, manifest, options);
+  });
 }
 
 }  // namespace

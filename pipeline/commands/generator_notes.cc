@@ -1,19 +1,12 @@
 #include "pipeline/commands/generator_notes.h"
 
-#include <iostream>
-#include <string>
-
-#include "pipeline/progress/progress.h"
+#include "pipeline/commands/standard_streams.h"
 
 namespace eventgan {
 
-void tell_generator(const LoadedGenerator& loaded, bool as_json) {
-  if (!loaded.choice.empty()) {
-    std::cerr << (as_json ? note_json(loaded.choice) : loaded.choice) << std::endl;
-  }
-  for (const std::string& warning : loaded.warnings) {
-    std::cerr << (as_json ? warning_json(warning) : "warning: " + warning) << std::endl;
-  }
+void tell_generator(const LoadedGenerator& loaded) {
+  if (!loaded.choice.empty()) tell(loaded.choice);
+  for (const std::string& warning : loaded.warnings) tell_warning(warning);
 }
 
 }  // namespace eventgan

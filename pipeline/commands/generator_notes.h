@@ -4,8 +4,7 @@
 
 namespace eventgan {
 
-/// Tells on the standard error stream which engine was chosen, and the warnings; a JSON line each
-/// if `as_json`.
-void tell_generator(const LoadedGenerator& loaded, bool as_json);
+/// Tells on the standard error stream which engine was chosen, and the warnings.
+void tell_generator(const LoadedGenerator& loaded);
 
 }  // namespace eventgan

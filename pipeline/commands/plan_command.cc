@@ -7,6 +7,7 @@
 
 #include "manifests/faults.h"
 #include "manifests/job_manifest.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/generator_notes.h"
 #include "pipeline/conversion/plan_summary.h"
@@ -35,7 +36,7 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                  {"plan_hash", frozen.hash},
                                  {"samples", frozen.plan.sample_count()},
                                  {"shards", frozen.plan.shards.size()}};
-    std::cout << json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << std::endl;
+    std::cout << dump_json(json, JsonLayout::kIndented) << std::endl;
     return;
   }
   std::cout << "Frozen in " << (folder / "plan.json").string() << ": " << frozen.plan.sample_count()
@@ -59,7 +60,7 @@ int freeze(const Arguments& arguments, const JobManifest& manifest, Plan plan) {
 int run(const Arguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
-  tell_generator(loaded, /*as_json=*/false);
+  tell_generator(loaded);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description());
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);

@@ -2,13 +2,12 @@
 
 #include <CLI/CLI.hpp>
 #include <exception>
-#include <iostream>
 #include <system_error>
 
 #include "manifests/faults.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/profile/trace_watch.h"
-#include "pipeline/progress/progress.h"
 
 namespace eventgan {
 namespace {
@@ -27,13 +26,10 @@ void refuse_output_folder(const ProfiledCommand& command) {
 void finish(TraceRecorder& trace, const ProfiledCommand& command) {
   try {
     trace.finish();
-    const std::string text =
-        "trace of every stage and thread: " + *command.file +
-        " (open it in https://ui.perfetto.dev, chrome://tracing or https://www.speedscope.app)";
-    std::cerr << (command.as_json ? note_json(text) : text) << std::endl;
+    tell("trace of every stage and thread: " + *command.file +
+         " (open it in https://ui.perfetto.dev, chrome://tracing or https://www.speedscope.app)");
   } catch (const std::exception& error) {
-    const std::string text = std::string("no trace: ") + error.what();
-    std::cerr << (command.as_json ? warning_json(text) : "warning: " + text) << std::endl;
+    tell_warning(std::string("no trace: ") + error.what());
   }
 }
 

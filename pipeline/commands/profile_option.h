@@ -21,7 +21,6 @@ struct ProfiledCommand {
   std::optional<std::string> file;  ///< of the trace; none: not asked for
   std::string name;
   std::filesystem::path output;  ///< the folder of shards, in which no trace may lie
-  bool as_json = false;          ///< how to speak on the standard error stream
 };
 
 /// Runs a command's work with a trace, or with none (null) if no file was given; its exit code. The

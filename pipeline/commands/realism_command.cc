@@ -8,6 +8,7 @@
 #include "manifests/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/realism/realism.h"
 #include "stages/recordings/open_recording.h"
@@ -74,10 +75,7 @@ int run_realism(const RealismArguments& arguments) {
   const RealismReport report = measure_realism(*recording, options, [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
   });
-  const bool json_lines = arguments.progress == ProgressStyle::kJson;
-  for (const std::string& note : recording->notes()) {
-    std::cerr << (json_lines ? note_json(note) : "note: " + note) << std::endl;
-  }
+  for (const std::string& note : recording->notes()) tell_note(note);
   std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
   return kComplete;
 }

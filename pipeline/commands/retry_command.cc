@@ -56,7 +56,7 @@ int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder
     const TraceSpan span(trace, "load generator", "job");
     return load_generator(manifest);
   }();
-  tell_generator(loaded, arguments.as_json());
+  tell_generator(loaded);
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total);
   };
@@ -89,7 +89,7 @@ void add_retry_command(CLI::App& app, int& exit_code) {
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] {
     const StopSignal signal;
-    exit_code = run_profiled({arguments->profile, "retry", arguments->folder, arguments->as_json()},
+    exit_code = run_profiled({arguments->profile, "retry", arguments->folder},
                              [&](TraceRecorder* trace) { return run(*arguments, signal, trace); });
   });
 }

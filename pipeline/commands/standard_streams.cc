@@ -35,15 +35,18 @@ bool asks_for_json(int argc, const char* const* argv) {
 
 std::string json_line(const std::string& line) {
   if (line.starts_with('{') && nlohmann::json::accept(line)) return line;
-  struct Kind {
-    std::string_view start;
-    std::string (*as_json)(const std::string&);
-  };
-  for (const auto& [start, as_json] :
-       {Kind{"error: ", error_json}, {"warning: ", warning_json}, {"note: ", note_json}}) {
-    if (line.starts_with(start)) return as_json(line.substr(start.size()));
+  for (const std::string event : {"error", "warning", "note"}) {
+    const std::string start = event + ": ";
+    if (line.starts_with(start)) return message_json(event, line.substr(start.size()));
   }
-  return note_json(line);
+  return message_json("note", line);
+}
+
+/// Whether the standard error stream is for machines; set before there are other threads.
+bool is_json = false;
+
+void tell(const std::string& event, const std::string& start, const std::string& text) {
+  std::cerr << (is_json ? message_json(event, text) : start + text) << std::endl;
 }
 
 }  // namespace
@@ -83,14 +86,11 @@ thread_local std::string StandardStreams::JsonLines::line_;
 
 StandardStreams::StandardStreams(int argc, const char* const* argv) {
   open_closed_streams();
-  if (asks_for_json(argc, argv)) json_lines_ = std::make_unique<JsonLines>();
+  is_json = asks_for_json(argc, argv);
+  if (is_json) json_lines_ = std::make_unique<JsonLines>();
 }
 
 StandardStreams::~StandardStreams() = default;
-
-void StandardStreams::tell_error(const std::string& text) const {
-  std::cerr << (json_lines_ ? error_json(text) : "error: " + text) << std::endl;
-}
 
 int StandardStreams::finish(int exit_code) const {
   std::cout.flush();
@@ -100,5 +100,13 @@ int StandardStreams::finish(int exit_code) const {
       "or a full disk)");
   return exit_code == kComplete ? static_cast<int>(kFailed) : exit_code;
 }
+
+void tell_error(const std::string& text) { tell("error", "error: ", text); }
+
+void tell_warning(const std::string& text) { tell("warning", "warning: ", text); }
+
+void tell_note(const std::string& text) { tell("note", "note: ", text); }
+
+void tell(const std::string& text) { tell("note", "", text); }
 
 }  // namespace eventgan

@@ -22,9 +22,6 @@ class StandardStreams {
   StandardStreams(const StandardStreams&) = delete;
   StandardStreams& operator=(const StandardStreams&) = delete;
 
-  /// "error: TEXT", or one JSON line however many lines the text has.
-  void tell_error(const std::string& text) const;
-
   /// The exit code of a program that would end with `exit_code`: the same, but kFailed instead of
   /// kComplete, and an error is told, if the standard output did not take all that was written.
   int finish(int exit_code) const;
@@ -33,5 +30,13 @@ class StandardStreams {
   class JsonLines;
   std::unique_ptr<JsonLines> json_lines_;  ///< null: lines are for people
 };
+
+/// A message on the standard error stream: "error: TEXT", "warning: TEXT", "note: TEXT", or TEXT
+/// alone, and a line end; with `--progress json` one JSON line, however many lines the text has.
+/// Thread safe: a line of one thread stays whole.
+void tell_error(const std::string& text);
+void tell_warning(const std::string& text);
+void tell_note(const std::string& text);
+void tell(const std::string& text);
 
 }  // namespace eventgan

@@ -7,6 +7,7 @@
 #include "manifests/training_manifest.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/job_options.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/errors/exit_codes.h"
 #include "pipeline/stopping/stop_signal.h"
 #include "pipeline/training/run_training.h"
@@ -21,7 +22,6 @@ struct TrainArguments {
 
 int run(const TrainArguments& arguments) {
   const TrainingManifest manifest = read_training_manifest(arguments.job.manifest);
-  const bool json = arguments.job.as_json();
   const StopSignal signal;
   TrainingOptions options;
   options.output = arguments.job.output_folder();
@@ -29,18 +29,14 @@ int run(const TrainArguments& arguments) {
   options.device = arguments.device;
   options.overwrite = arguments.job.overwrite;
   options.stop = [&] { return signal.requested(); };
-  options.warn = [&](const std::string& text) {
-    std::cerr << (json ? warning_json(text) : "warning: " + text) << std::endl;
-  };
-  options.note = [&](const std::string& text) {
-    std::cerr << (json ? note_json(text) : "note: " + text) << std::endl;
-  };
+  options.warn = tell_warning;
+  options.note = tell_note;
   options.make_progress = [&] {
     return std::make_unique<TrainingProgress>(std::cerr, arguments.job.progress,
                                               isatty(STDERR_FILENO) != 0);
   };
   const TrainingReport report = run_training(manifest, options);
-  std::cout << (json ? to_json(report) : to_text(report)) << std::flush;
+  std::cout << (arguments.job.as_json() ? to_json(report) : to_text(report)) << std::flush;
   return report.complete ? kComplete : kStopped;
 }
 

@@ -1,21 +1,17 @@
 #include "pipeline/conversion/conversion_report.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kListedFaults = 20;
 constexpr double kMegabyte = 1e6;
-
-template <class... Values>
-std::string format(const char* pattern, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 double ratio(const ConversionReport& report) {
   return report.stored_bytes == 0 ? 0.0 : double(report.volume_bytes) / double(report.stored_bytes);
@@ -27,13 +23,12 @@ std::string part_text(const ConversionReport& report) {
 }
 
 std::string shards_text(const ConversionReport& report) {
-  std::string text =
-      format("%lld of %lld pairs written, %zu quarantined, in %d of %d shards",
-             static_cast<long long>(report.written), static_cast<long long>(report.planned),
-             report.quarantined.size(), report.shards_done, report.shards_planned);
+  const std::string text = fmt::format("{} of {} pairs written, {} quarantined, in {} of {} shards",
+                                       report.written, report.planned, report.quarantined.size(),
+                                       report.shards_done, report.shards_planned);
   std::string how;
   const auto add = [&](int count, const char* what) {
-    if (count > 0) how += (how.empty() ? "" : ", ") + std::to_string(count) + " done " + what;
+    if (count > 0) how += fmt::format("{}{} done {}", how.empty() ? "" : ", ", count, what);
   };
   add(report.shards_done_before, "before");
   add(report.shards_done_by_others, "by others");
@@ -53,28 +48,28 @@ void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionR
 
 std::string to_text(const ConversionReport& report) {
   std::string text = part_text(report) + shards_text(report);
-  text += format("\n%.1f MB, volumes compressed %.1fx, %.1f s",
-                 double(report.stored_bytes) / kMegabyte, ratio(report), report.wall_seconds);
+  text += fmt::format("\n{:.1f} MB, volumes compressed {:.1f}x, {:.1f} s",
+                      double(report.stored_bytes) / kMegabyte, ratio(report), report.wall_seconds);
   if (!report.stage_seconds.empty()) {
     text += "; busy seconds:";
     for (const auto& [stage, seconds] : report.stage_seconds) {
-      text += format(" %s %.1f", stage.c_str(), seconds);
+      text += fmt::format(" {} {:.1f}", stage, seconds);
     }
   }
   if (report.without_partner > 0) {
-    text += format("\n%lld labelled frames without a partner frame",
-                   static_cast<long long>(report.frames_without_partner));
+    text +=
+        fmt::format("\n{} labelled frames without a partner frame", report.frames_without_partner);
     if (report.frames_without_partner != report.without_partner) {
-      text += format(" for one of their gaps or more, %lld pairs in all",
-                     static_cast<long long>(report.without_partner));
+      text +=
+          fmt::format(" for one of their gaps or more, {} pairs in all", report.without_partner);
     }
     text += " (listed in plan.json)";
   }
   const std::size_t listed = std::min(report.quarantined.size(), kListedFaults);
   for (std::size_t i = 0; i < listed; ++i) text += "\nquarantined: " + report.quarantined[i].reason;
   if (listed < report.quarantined.size()) {
-    text +=
-        format("\n... and %zu more (in the shards' markers)", report.quarantined.size() - listed);
+    text += fmt::format("\n... and {} more (in the shards' markers)",
+                        report.quarantined.size() - listed);
   }
   if (report.stopped) text += "\nstopped on request; the same command goes on from here";
   return text + "\n" + notes_text(report.notes) + report.folder + "\n";
@@ -111,7 +106,7 @@ std::string to_json(const ConversionReport& report) {
                                {"stage_seconds", report.stage_seconds},
                                {"wall_seconds", report.wall_seconds},
                                {"too_many_faults", report.too_many_faults}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -11,7 +11,7 @@
 
 #include "manifests/job_manifest.h"
 #include "pipeline/conversion/shard_queue.h"
-#include "pipeline/output/output_folder.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/profile/trace_recorder.h"
 #include "pipeline/progress/progress.h"
 #include "pipeline/samples/sample_stages.h"

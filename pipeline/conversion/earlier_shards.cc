@@ -1,7 +1,8 @@
 #include "pipeline/conversion/earlier_shards.h"
 
+#include <fmt/core.h>
+
 #include <cstddef>
-#include <cstdio>
 #include <stdexcept>
 #include <utility>
 
@@ -24,10 +25,8 @@ void tell_if_long(const std::vector<ShardState>& states,
     bytes += state.marker->size_bytes;
   }
   if (!note || bytes < kNotedBytes) return;
-  char text[80];
-  std::snprintf(text, sizeof text, "checking %d committed shards (%.1f GB)", done,
-                1e-9 * static_cast<double>(bytes));
-  note(text);
+  note(fmt::format("checking {} committed shards ({:.1f} GB)", done,
+                   1e-9 * static_cast<double>(bytes)));
 }
 
 /// Empty if somebody has taken it away meanwhile.

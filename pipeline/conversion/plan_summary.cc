@@ -1,8 +1,11 @@
 #include "pipeline/conversion/plan_summary.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
@@ -21,21 +24,20 @@ std::int64_t pairs_of(const SourceSummary& summary) {
 }
 
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary, std::int64_t shards) {
-  std::string text =
-      std::string(to_string(spec.dataset)) + " " + spec.root + " (" + spec.split + ")\n";
-  text += "  labelled frames  " + std::to_string(summary.labelled_frames) + "\n";
-  text += "  pairs            " + std::to_string(pairs_of(summary));
+  std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset), spec.root, spec.split);
+  text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
+  text += fmt::format("  pairs            {}", pairs_of(summary));
   const char* separator = "  (gap ";
   for (const auto& [gap, count] : summary.pairs_by_gap) {
-    text += separator + std::to_string(gap) + ": " + std::to_string(count);
+    text += fmt::format("{}{}: {}", separator, gap, count);
     separator = ", ";
   }
   text += summary.pairs_by_gap.empty() ? "\n" : ")\n";
-  text += "  without partner  " + std::to_string(summary.without_partner);
+  text += fmt::format("  without partner  {}", summary.without_partner);
   // With choose = all a frame may lack the partner of several gaps, and have that of others.
   if (const auto frames = static_cast<std::int64_t>(summary.without_partner_ids.size());
       frames != summary.without_partner) {
-    text += " pairs of " + std::to_string(frames) + " labelled frames";
+    text += fmt::format(" pairs of {} labelled frames", frames);
   }
   for (std::size_t i = 0; i < std::min(kListedIds, summary.without_partner_ids.size()); ++i) {
     text += (i == 0 ? "  (" : ", ") + summary.without_partner_ids[i];
@@ -43,23 +45,22 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary, st
   if (summary.without_partner_ids.size() > kListedIds) text += ", ...";
   text += summary.without_partner_ids.empty() ? "\n" : ")\n";
   if (summary.faults > 0) {
-    text += "  to quarantine    " + std::to_string(summary.faults) +
-            "  (a frame is missing inside the sequence, or a note says why)\n";
+    text += fmt::format(
+        "  to quarantine    {}  (a frame is missing inside the sequence, or a note says why)\n",
+        summary.faults);
   }
   for (const std::string& note : summary.notes) text += "  note: " + note + "\n";
-  return text + "  shards           " + std::to_string(shards) + "\n";
+  return text + fmt::format("  shards           {}\n", shards);
 }
 
 std::string estimate_text(const TrialEstimate& estimate, int threads) {
   if (estimate.pairs_measured == 0) return "no pair could be tried: no estimate of size and time\n";
-  char text[256];
-  std::snprintf(text, sizeof text,
-                "about %.1f MB and %.0f s with %d thread%s (%.3f s a pair on one thread, measured "
-                "on %d pair%s)\n",
-                estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
-                estimate.seconds_per_pair, estimate.pairs_measured,
-                estimate.pairs_measured == 1 ? "" : "s");
-  return text;
+  return fmt::format(
+      "about {:.1f} MB and {:.0f} s with {} thread{} ({:.3f} s a pair on one thread, measured on "
+      "{} "
+      "pair{})\n",
+      estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
+      estimate.seconds_per_pair, estimate.pairs_measured, estimate.pairs_measured == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -70,9 +71,9 @@ std::string plan_text(const JobManifest& manifest, const Plan& plan, const Trial
   for (std::size_t i = 0; i < plan.sources.size(); ++i) {
     text += source_text(manifest.sources[i], plan.sources[i], shards_of(plan, static_cast<int>(i)));
   }
-  text += "in all " + std::to_string(plan.sample_count()) + " pairs in " +
-          std::to_string(plan.shards.size()) + " shards, ";
-  return text + estimate_text(estimate, threads);
+  return text +
+         fmt::format("in all {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
+         estimate_text(estimate, threads);
 }
 
 std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
@@ -104,7 +105,7 @@ std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
                                {"seconds_per_pair", estimate.seconds_per_pair},
                                {"estimated_seconds", estimate.seconds},
                                {"estimated_bytes", estimate.stored_bytes}};
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

@@ -115,8 +115,7 @@ void record_amendment(const fs::path& folder, const std::string& plan_hash,
                                {"version", kVersion},
                                {"plan_hash", plan_hash},
                                {"amendments", amendments}};
-  write_file_atomically(folder / kName,
-                        json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  write_file_atomically(folder / kName, dump_json(json, JsonLayout::kIndented) + "\n");
 }
 
 std::map<std::string, std::string> amended(std::map<std::string, std::string> fingerprint,

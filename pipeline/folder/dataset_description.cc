@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -280,7 +281,7 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
   for (const DatasetView& view : views) json["view"]["views"].push_back(view_entry(view));
   if (!parts.amendments.empty()) json["amendments"] = amendments_json(parts.amendments);
   // A reason may quote a path, and paths need not be UTF-8, but JSON must be.
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

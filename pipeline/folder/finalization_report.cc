@@ -1,8 +1,11 @@
 #include "pipeline/folder/finalization_report.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/folder/dataset_description.h"
 
 namespace eventgan {
@@ -26,13 +29,12 @@ std::string to_text(const FinalizationReport& report) {
     text += (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard) + "\n";
   }
   if (listed < report.missing.size()) {
-    text += "... and " + std::to_string(report.missing.size() - listed) + " more (all: --json)\n";
+    text += fmt::format("... and {} more (all: --json)\n", report.missing.size() - listed);
   }
   const DatasetCounts& counts = report.counts;
-  text += std::to_string(counts.shards) + " of " + std::to_string(report.shards_planned) +
-          " shards: " + std::to_string(counts.samples) + " samples, " +
-          std::to_string(counts.quarantined()) + " of them quarantined, " +
-          std::to_string(counts.boxes) + " boxes, " + std::to_string(counts.persons) + " persons\n";
+  text += fmt::format("{} of {} shards: {} samples, {} of them quarantined, {} boxes, {} persons\n",
+                      counts.shards, report.shards_planned, counts.samples, counts.quarantined(),
+                      counts.boxes, counts.persons);
   text += notes_text(report.notes);
   if (!report.written) {
     return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
@@ -61,7 +63,7 @@ std::string to_json(const FinalizationReport& report) {
                                {"notes", report.notes},
                                {"views", report.views},
                                {"too_many_faults", report.too_many_faults}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

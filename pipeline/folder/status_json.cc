@@ -1,6 +1,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/folder/status_text.h"
 
 namespace eventgan {
@@ -72,7 +73,7 @@ std::string status_json(const FolderStatus& status) {
                          {"workers", status.writers},
                          {"pairs_per_second", number(status.pairs_per_second())},
                          {"seconds_left", number(status.seconds_left())}};
-  return document.dump(2, ' ', false, json::error_handler_t::replace) + "\n";
+  return dump_json(document, JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

@@ -1,39 +1,20 @@
 #include "pipeline/folder/status_text.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <map>
 #include <utility>
 #include <vector>
 
 #include "manifests/plan.h"
+#include "pipeline/progress/progress.h"
 
 namespace eventgan {
 namespace {
 
 /// Lists for a person end here; --json has everything.
 constexpr std::size_t kListed = 20;
-
-std::string duration(double seconds) {
-  const auto whole = static_cast<long long>(seconds + 0.5);
-  char text[64];
-  if (whole >= 86400) {
-    std::snprintf(text, sizeof text, "%lldd%02lldh", whole / 86400, whole / 3600 % 24);
-  } else if (whole >= 3600) {
-    std::snprintf(text, sizeof text, "%lldh%02lldm", whole / 3600, whole / 60 % 60);
-  } else if (whole >= 60) {
-    std::snprintf(text, sizeof text, "%lldm%02llds", whole / 60, whole % 60);
-  } else {
-    std::snprintf(text, sizeof text, "%llds", whole);
-  }
-  return text;
-}
-
-std::string rate_text(double pairs_per_second) {
-  char text[64];
-  std::snprintf(text, sizeof text, "%.3g pairs/s", pairs_per_second);
-  return text;
-}
 
 /// Rows of cells, the columns aligned, each row indented; cut after kListed rows.
 std::string table(const std::vector<std::vector<std::string>>& rows) {
@@ -54,7 +35,7 @@ std::string table(const std::vector<std::vector<std::string>>& rows) {
     text += rows[i].back() + "\n";
   }
   if (rows.size() > shown) {
-    text += "  ... and " + std::to_string(rows.size() - shown) + " more (--json lists them)\n";
+    text += fmt::format("  ... and {} more (--json lists them)\n", rows.size() - shown);
   }
   return text;
 }
@@ -64,7 +45,7 @@ std::string section(const std::string& title, const std::vector<std::vector<std:
 }
 
 std::string age_text(const UnfinishedFile& file) {
-  return "last wrote " + duration(file.silent_s) + " ago";
+  return "last wrote " + duration_text(file.silent_s, "dhms") + " ago";
 }
 
 std::vector<std::vector<std::string>> running_rows(const FolderStatus& status) {
@@ -105,50 +86,43 @@ std::vector<std::vector<std::string>> reason_rows(const FolderStatus& status) {
   for (const auto& [kind, samples] : kinds) {
     const QuarantinedSlot& first = *samples.front();
     rows.push_back({std::to_string(samples.size()),
-                    kind + (samples.size() == 1 ? " (" : " (first: ") + first.sample_id + ", " +
-                        first.shard + " slot " + std::to_string(first.slot) + ")"});
+                    fmt::format("{} ({}{}, {} slot {})", kind, samples.size() == 1 ? "" : "first: ",
+                                first.sample_id, first.shard, first.slot)});
   }
   return rows;
 }
 
 std::string shards_text(const FolderStatus& status) {
-  std::string text = std::to_string(status.shards_done) + " of " +
-                     std::to_string(status.shards_planned) + " done, " +
-                     std::to_string(status.shards_running) + " running, " +
-                     std::to_string(status.shards_missing()) + " missing";
-  if (!status.damaged.empty()) {
-    text += " (" + std::to_string(status.damaged.size()) + " of them damaged)";
-  }
-  return text;
-}
-
-std::string samples_text(const FolderStatus& status) {
-  return std::to_string(status.samples_written) + " of " + std::to_string(status.samples_planned) +
-         " written, " + std::to_string(status.quarantined.size()) + " quarantined";
+  const std::string text =
+      fmt::format("{} of {} done, {} running, {} missing", status.shards_done,
+                  status.shards_planned, status.shards_running, status.shards_missing());
+  if (status.damaged.empty()) return text;
+  return text + fmt::format(" ({} of them damaged)", status.damaged.size());
 }
 
 std::string work_text(const FolderStatus& status) {
   const std::string at_work =
-      status.writers == 0
-          ? "nobody is at work"
-          : std::to_string(status.writers) +
-                (status.writers == 1 ? " process is at work" : " processes are at work");
+      status.writers == 0 ? "nobody is at work"
+                          : fmt::format("{} {} at work", status.writers,
+                                        status.writers == 1 ? "process is" : "processes are");
   if (status.complete()) return at_work + ", and every shard is done";
   if (status.writers == 0) return at_work + "; eventgan convert goes on from here";
   const auto rate = status.pairs_per_second();
   const auto left = status.seconds_left();
   if (!rate || !left) return at_work + ", how fast is known after the first shard";
-  return at_work + ", " + rate_text(*rate) + ", about " + duration(*left) + " left";
+  return fmt::format("{}, {:.3g} pairs/s, about {} left", at_work, *rate,
+                     duration_text(*left, "dhms"));
 }
 
 }  // namespace
 
 std::string status_text(const FolderStatus& status) {
-  return "folder   " + status.folder.string() + "\n" +          //
-         "plan     " + status.plan_hash.substr(0, 16) + "\n" +  //
-         "shards   " + shards_text(status) + "\n" +             //
-         "samples  " + samples_text(status) + "\n" +            //
-         "work     " + work_text(status) + "\n" +               //
+  return fmt::format("folder   {}\n", status.folder.string()) +
+         fmt::format("plan     {:.16}\n", status.plan_hash) +
+         fmt::format("shards   {}\n", shards_text(status)) +
+         fmt::format("samples  {} of {} written, {} quarantined\n", status.samples_written,
+                     status.samples_planned, status.quarantined.size()) +
+         fmt::format("work     {}\n", work_text(status)) +
          section("running", running_rows(status)) +
          section("left over by dead writers (deleted by the next convert)",
                  left_over_rows(status)) +

@@ -1,21 +1,13 @@
 #include "pipeline/planning/shard_layout.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <iterator>
 #include <map>
 #include <utility>
 
 namespace eventgan {
-namespace {
-
-std::string numbered(const std::string& prefix, std::size_t index, std::size_t count) {
-  char text[32];
-  std::snprintf(text, sizeof text, "-%05zu-of-%05zu.h5", index, count);
-  return prefix + text;
-}
-
-}  // namespace
 
 ShardLayout::ShardLayout(std::string name, int samples_per_shard)
     : name_(std::move(name)), samples_per_shard_(static_cast<std::size_t>(samples_per_shard)) {}
@@ -40,7 +32,8 @@ std::vector<PlannedShard> ShardLayout::finish() {
   for (const std::string& split : splits_) ++totals[split];
   std::map<std::string, std::size_t> next;
   for (std::size_t i = 0; i < shards_.size(); ++i) {
-    shards_[i].name = numbered(name_ + "-" + splits_[i], next[splits_[i]]++, totals[splits_[i]]);
+    shards_[i].name = fmt::format("{}-{}-{:05}-of-{:05}.h5", name_, splits_[i], next[splits_[i]]++,
+                                  totals[splits_[i]]);
   }
   splits_.clear();
   return std::exchange(shards_, {});

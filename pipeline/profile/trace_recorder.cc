@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/profile/trace_text.h"
 
 namespace eventgan {
@@ -103,8 +104,7 @@ void TraceRecorder::finish() {
     const std::lock_guard lock(thread->mutex);
     flush(*thread);
   }
-  write("\n],\"displayTimeUnit\":\"ms\",\"otherData\":" +
-        nlohmann::json(about_).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) +
+  write("\n],\"displayTimeUnit\":\"ms\",\"otherData\":" + dump_json(nlohmann::json(about_)) +
         "}\n");
   const std::lock_guard lock(file_mutex_);
   const std::unique_ptr<TraceFile> file = std::move(file_);

@@ -1,19 +1,17 @@
 #include "pipeline/profile/trace_text.h"
 
-#include <cstdio>
+#include <fmt/core.h>
+
 #include <nlohmann/json.hpp>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 
-std::string trace_string(std::string_view text) {
-  return nlohmann::json(text).dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
+std::string trace_string(std::string_view text) { return dump_json(nlohmann::json(text)); }
 
 std::string trace_microseconds(std::int64_t nanoseconds) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%lld.%03d", static_cast<long long>(nanoseconds / 1000),
-                static_cast<int>(nanoseconds % 1000));
-  return text;
+  return fmt::format("{}.{:03}", nanoseconds / 1000, nanoseconds % 1000);
 }
 
 }  // namespace eventgan

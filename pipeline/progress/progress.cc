@@ -1,23 +1,22 @@
 #include "pipeline/progress/progress.h"
 
-#include <cstdio>
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <nlohmann/json.hpp>
 #include <ostream>
+#include <utility>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
 
 constexpr int kBarWidth = 30;
 
-std::string duration_text(double seconds) {
-  const auto whole = static_cast<long long>(seconds + 0.5);
-  char text[64];
-  if (whole >= 3600) {
-    std::snprintf(text, sizeof text, "%lldh%02lldm", whole / 3600, whole / 60 % 60);
-  } else {
-    std::snprintf(text, sizeof text, "%lldm%02llds", whole / 60, whole % 60);
-  }
-  return text;
+ProgressStyle resolved(ProgressStyle style, bool is_terminal) {
+  if (style != ProgressStyle::kAuto) return style;
+  return is_terminal ? ProgressStyle::kBar : ProgressStyle::kLines;
 }
 
 std::chrono::milliseconds interval(ProgressStyle style) {
@@ -31,33 +30,66 @@ std::chrono::milliseconds interval(ProgressStyle style) {
   }
 }
 
-std::string event_json(const char* event, const std::string& text) {
-  const nlohmann::json json = {{"event", event}, {"text", text}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-}
-
 }  // namespace
 
-std::string progress_line(const ProgressState& state) {
-  const char* unit = state.unit.name.c_str();
-  char text[160];
-  std::snprintf(text, sizeof text, "%lld/%lld %s, %.2f %s/s, ", static_cast<long long>(state.done),
-                static_cast<long long>(state.total), unit, state.per_second(), unit);
-  std::string line = text;
-  if (state.unit.has_bytes) {
-    std::snprintf(text, sizeof text, "%.1f MB/s, ", state.megabytes_per_second());
-    line += text;
+std::string duration_text(double seconds, std::string_view leading, int count) {
+  constexpr std::pair<char, long long> kUnits[] = {{'d', 86400}, {'h', 3600}, {'m', 60}, {'s', 1}};
+  auto rest = static_cast<long long>(seconds + 0.5);
+  std::string text;
+  for (const auto& [unit, length] : kUnits) {
+    const bool leads =
+        leading.find(unit) != leading.npos && (rest >= length || unit == leading.back());
+    if (text.empty() ? !leads : count == 0) continue;
+    text += fmt::format("{:0{}}{}", rest / length, text.empty() ? 1 : 2, unit);
+    rest %= length;
+    --count;
   }
-  line += (state.done > 0 ? duration_text(state.seconds_left()) : "?") + " left";
-  if (state.quarantined > 0) line += ", " + std::to_string(state.quarantined) + " quarantined";
-  return line;
+  return text;
 }
 
-std::string progress_bar(const ProgressState& state, int width) {
-  const auto filled =
-      state.total > 0 ? static_cast<std::size_t>(width * state.done / state.total) : 0;
-  return "[" + std::string(filled, '#') +
-         std::string(static_cast<std::size_t>(width) - filled, '.') + "] " + progress_line(state);
+std::string message_json(std::string_view event, std::string_view text) {
+  return dump_json(nlohmann::json{{"event", event}, {"text", text}});
+}
+
+ProgressDisplay::ProgressDisplay(std::ostream& stream, ProgressStyle style, bool is_terminal,
+                                 int bar_width, Clock clock)
+    : stream_(stream),
+      style_(resolved(style, is_terminal)),
+      bar_width_(bar_width),
+      clock_(std::move(clock)),
+      shown_(clock_()) {}
+
+bool ProgressDisplay::is_due() const { return clock_() - shown_ >= interval(style_); }
+
+void ProgressDisplay::show(std::int64_t done, std::int64_t total, const std::string& line,
+                           const std::string& json) {
+  shown_ = clock_();
+  if (style_ == ProgressStyle::kBar) {
+    std::string text = progress_bar(done, total, bar_width_) + " " + line;
+    widest_ = std::max(widest_, text.size());
+    text.resize(std::max(widest_, text.size() + 3), ' ');  // wipes what a longer line left behind
+    stream_ << '\r' << text << std::flush;
+  } else if (style_ != ProgressStyle::kNone) {
+    stream_ << (style_ == ProgressStyle::kJson ? json : line) << std::endl;
+  }
+}
+
+void ProgressDisplay::end_line() {
+  if (std::exchange(widest_, 0) > 0) stream_ << std::endl;
+}
+
+std::string progress_bar(std::int64_t done, std::int64_t total, int width) {
+  const auto filled = static_cast<std::size_t>(total > 0 ? width * done / total : 0);
+  return fmt::format("[{:.<{}}]", std::string(filled, '#'), width);
+}
+
+std::string progress_line(const ProgressState& state) {
+  std::string line = fmt::format("{0}/{1} {2}, {3:.2f} {2}/s, ", state.done, state.total,
+                                 state.unit.name, state.per_second());
+  if (state.unit.has_bytes) line += fmt::format("{:.1f} MB/s, ", state.megabytes_per_second());
+  line += (state.done > 0 ? duration_text(state.seconds_left(), "hm") : "?") + " left";
+  if (state.quarantined > 0) line += fmt::format(", {} quarantined", state.quarantined);
+  return line;
 }
 
 std::string progress_json(const ProgressState& state) {
@@ -72,24 +104,12 @@ std::string progress_json(const ProgressState& state) {
     json["bytes"] = state.bytes;
     json["mb_per_s"] = state.megabytes_per_second();
   }
-  return json.dump();
+  return dump_json(json);
 }
-
-std::string error_json(const std::string& text) { return event_json("error", text); }
-
-std::string warning_json(const std::string& text) { return event_json("warning", text); }
-
-std::string note_json(const std::string& text) { return event_json("note", text); }
 
 Progress::Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
                    Clock clock, ProgressUnit unit)
-    : stream_(stream),
-      style_(style != ProgressStyle::kAuto ? style
-             : is_terminal                 ? ProgressStyle::kBar
-                                           : ProgressStyle::kLines),
-      clock_(std::move(clock)),
-      start_(clock_()),
-      shown_(start_) {
+    : display_(stream, style, is_terminal, kBarWidth, std::move(clock)), start_(display_.now()) {
   state_.total = total;
   state_.unit = std::move(unit);
 }
@@ -98,36 +118,17 @@ void Progress::advance(bool quarantined, std::int64_t bytes) {
   ++state_.done;
   state_.quarantined += quarantined;
   state_.bytes += bytes;
-  if (clock_() - shown_ >= interval(style_)) show(false);
-}
-
-Progress::~Progress() {
-  if (style_ == ProgressStyle::kBar && !finished_) stream_ << std::endl;
+  if (display_.is_due()) show();
 }
 
 void Progress::finish() {
-  finished_ = true;
-  show(true);
+  show();
+  display_.end_line();
 }
 
-void Progress::show(bool last) {
-  shown_ = clock_();
-  state_.seconds = std::chrono::duration<double>(shown_ - start_).count();
-  switch (style_) {
-    case ProgressStyle::kBar:
-      // Trailing blanks wipe what a longer line left behind.
-      stream_ << '\r' << progress_bar(state_, kBarWidth) << "   " << (last ? "\n" : "")
-              << std::flush;
-      break;
-    case ProgressStyle::kLines:
-      stream_ << progress_line(state_) << std::endl;
-      break;
-    case ProgressStyle::kJson:
-      stream_ << progress_json(state_) << std::endl;
-      break;
-    default:
-      break;
-  }
+void Progress::show() {
+  state_.seconds = std::chrono::duration<double>(display_.now() - start_).count();
+  display_.show(state_.done, state_.total, progress_line(state_), progress_json(state_));
 }
 
 }  // namespace eventgan

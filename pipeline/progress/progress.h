@@ -5,11 +5,60 @@
 #include <functional>
 #include <iosfwd>
 #include <string>
+#include <string_view>
 
 namespace eventgan {
 
 /// kAuto is a bar on a terminal and lines elsewhere.
 enum class ProgressStyle { kAuto, kBar, kLines, kJson, kNone };
+
+/// A duration, rounded to seconds, in `count` units of d, h, m and s, such as "3h00m". The first is
+/// the largest of the units in `leading` that the duration reaches, else the last of these: with
+/// "hm" 45 seconds are "0m45s".
+std::string duration_text(double seconds, std::string_view leading, int count = 2);
+
+/// A message as one line of JSON: {"event": EVENT, "text": TEXT}. The event of what ended the run
+/// is "error", of a warning "warning", of anything else "note".
+std::string message_json(std::string_view event, std::string_view text);
+
+/// Shows on a stream how a run goes on: a bar redrawn ten times a second, a plain line every 10 s,
+/// or a JSON line a second. Thread safety: one thread at a time.
+class ProgressDisplay {
+ public:
+  using Clock = std::function<std::chrono::steady_clock::time_point()>;
+
+  /// kAuto asks whether the stream's terminal is there: `is_terminal`. `clock` is for tests.
+  ProgressDisplay(std::ostream& stream, ProgressStyle style, bool is_terminal, int bar_width,
+                  Clock clock);
+
+  /// Ends the bar's line.
+  ~ProgressDisplay() { end_line(); }
+  ProgressDisplay(const ProgressDisplay&) = delete;
+  ProgressDisplay& operator=(const ProgressDisplay&) = delete;
+
+  std::chrono::steady_clock::time_point now() const { return clock_(); }
+
+  /// Whether enough time has passed since something was shown, or since the beginning.
+  bool is_due() const;
+
+  /// `line` and `json` tell the same, without line ends: `done` of `total`, and more.
+  void show(std::int64_t done, std::int64_t total, const std::string& line,
+            const std::string& json);
+
+  /// Ends the bar's line, if there is one: something else is written next.
+  void end_line();
+
+ private:
+  std::ostream& stream_;
+  ProgressStyle style_;
+  int bar_width_;
+  Clock clock_;
+  std::chrono::steady_clock::time_point shown_;
+  std::size_t widest_ = 0;  // of the bar's line; 0: there is none
+};
+
+/// "[###.......]": `done` of `total` on `width` columns.
+std::string progress_bar(std::int64_t done, std::int64_t total, int width);
 
 /// What a run counts.
 struct ProgressUnit {
@@ -37,35 +86,16 @@ struct ProgressState {
 /// One line of progress in words, without line ends.
 std::string progress_line(const ProgressState& state);
 
-/// The same with a bar of `width` columns in front.
-std::string progress_bar(const ProgressState& state, int width);
-
 /// The same as JSON: {"event": "progress", "done": ..., ...}.
 std::string progress_json(const ProgressState& state);
 
-/// What ended the run, as JSON: {"event": "error", "text": ...}.
-std::string error_json(const std::string& text);
-
-/// A warning as JSON: {"event": "warning", "text": ...}.
-std::string warning_json(const std::string& text);
-
-/// Something that is no warning, as JSON: {"event": "note", "text": ...}.
-std::string note_json(const std::string& text);
-
-/// Shows progress on a stream: a bar redrawn ten times a second, a plain line every 10 s, or a JSON
-/// line a second; each also at the end. Thread safety: one thread at a time.
+/// Progress of a run that counts things of one kind; see ProgressDisplay.
 class Progress {
  public:
-  using Clock = std::function<std::chrono::steady_clock::time_point()>;
+  using Clock = ProgressDisplay::Clock;
 
-  /// kAuto asks whether the stream's terminal is there: `is_terminal`. `clock` is for tests.
   Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
            Clock clock = std::chrono::steady_clock::now, ProgressUnit unit = {});
-
-  /// Ends the bar's line if an error has kept `finish` from it.
-  ~Progress();
-  Progress(const Progress&) = delete;
-  Progress& operator=(const Progress&) = delete;
 
   /// One more is done.
   void advance(bool quarantined, std::int64_t bytes);
@@ -77,15 +107,11 @@ class Progress {
   void finish();
 
  private:
-  void show(bool last);
+  void show();
 
-  std::ostream& stream_;
-  ProgressStyle style_;
-  Clock clock_;
+  ProgressDisplay display_;
   std::chrono::steady_clock::time_point start_;
-  std::chrono::steady_clock::time_point shown_;
   ProgressState state_;
-  bool finished_ = false;
 };
 
 }  // namespace eventgan

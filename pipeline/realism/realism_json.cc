@@ -1,5 +1,6 @@
 #include <nlohmann/json.hpp>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/realism/realism_report.h"
 #include "pipeline/realism/score_rows_internal.h"
 
@@ -59,7 +60,7 @@ std::string to_json(const RealismReport& report) {
                                {"real", method_json(report.real, report.intervals)},
                                {"methods", methods},
                                {"wall_seconds", report.wall_seconds}};
-  return json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

@@ -1,6 +1,7 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <map>
 
@@ -9,13 +10,6 @@
 
 namespace eventgan {
 namespace {
-
-template <class... Values>
-std::string formatted(const char* pattern, Values... values) {
-  char text[512];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return text;
-}
 
 const char* symbol(BetterScore better) {
   switch (better) {
@@ -39,12 +33,12 @@ double shortfall(BetterScore better, double value, double real) {
 /// compare it with itself), then the methods', the best marked.
 std::string table_row(const std::string& label, BetterScore better, double real, bool show_real,
                       const std::vector<double>& values) {
-  std::string text = formatted("%-28.28s %s", label.c_str(), symbol(better));
+  std::string text = fmt::format("{:28.28} {}", label, symbol(better));
   const auto cell = [](double value, bool best) {
-    return std::isnan(value) ? formatted("%11s ", "-")
-                             : formatted("%11.4f%c", value, best ? '*' : ' ');
+    return std::isnan(value) ? fmt::format("{:>11} ", "-")
+                             : fmt::format("{:11.4f}{}", value, best ? '*' : ' ');
   };
-  text += show_real ? cell(real, false) : formatted("%11s ", "");
+  text += show_real ? cell(real, false) : std::string(12, ' ');
   double least = std::numeric_limits<double>::infinity();
   for (const double value : values) {
     const double distance = shortfall(better, value, real);
@@ -83,12 +77,11 @@ double fraction_of(const std::optional<DirectionScore>& direction) {
 std::string direction_rows(const RealismReport& report) {
   if (!report.real.direction) return {};
   std::vector<double> values;
-  std::string pixels = formatted("%-28s  %11lld ", "  pixels that tell it",
-                                 static_cast<long long>(report.real.direction->pixels));
+  std::string pixels =
+      fmt::format("{:28}  {:11} ", "  pixels that tell it", report.real.direction->pixels);
   for (const MethodSummary& method : report.methods) {
     values.push_back(fraction_of(method.direction));
-    pixels += formatted("%11lld ",
-                        static_cast<long long>(method.direction ? method.direction->pixels : 0));
+    pixels += fmt::format("{:11} ", method.direction ? method.direction->pixels : 0);
   }
   return table_row("direction within 30 deg", BetterScore::kHigher,
                    fraction_of(report.real.direction), true, values) +
@@ -102,18 +95,17 @@ std::string head(const RealismReport& report) {
     ++by_gap[interval.interval.gap()];
     events += interval.event_count;
   }
-  std::string text =
-      report.recording + ": " +
-      formatted("%dx%d pixels, %zu pair%s of frames (", report.size.width, report.size.height,
-                report.intervals.size(), report.intervals.size() == 1 ? "" : "s");
+  std::string text = fmt::format("{}: {}x{} pixels, {} pair{} of frames (", report.recording,
+                                 report.size.width, report.size.height, report.intervals.size(),
+                                 report.intervals.size() == 1 ? "" : "s");
   const char* separator = "";
   for (const auto& [gap, count] : by_gap) {
-    text += separator + formatted("gap %d: %d", gap, count);
+    text += fmt::format("{}gap {}: {}", separator, gap, count);
     separator = ", ";
   }
-  text += formatted("), %lld real events, %d bins\n", events, report.bins);
+  text += fmt::format("), {} real events, {} bins\n", events, report.bins);
   for (const MethodSummary& method : report.methods) {
-    text += "  " + method.name + ": " + method.settings + "\n";
+    text += fmt::format("  {}: {}\n", method.name, method.settings);
   }
   return text;
 }
@@ -121,9 +113,9 @@ std::string head(const RealismReport& report) {
 }  // namespace
 
 std::string to_text(const RealismReport& report) {
-  std::string text = head(report) + formatted("%-28s  %11s ", "", "real");
+  std::string text = head(report) + fmt::format("{:28}  {:>11} ", "", "real");
   for (const MethodSummary& method : report.methods) {
-    text += formatted("%11.11s ", method.name.c_str());
+    text += fmt::format("{:>11.11} ", method.name);
   }
   text += "\n";
   for (const ScoreRow& row : kScoreRows) {

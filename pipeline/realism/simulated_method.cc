@@ -1,9 +1,9 @@
 #include "pipeline/realism/simulated_method.h"
 
+#include <fmt/core.h>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <cmath>
-#include <cstdio>
 #include <numeric>
 #include <utility>
 
@@ -41,11 +41,10 @@ class SimulatedMethod final : public VolumeMethod {
   std::string name() const override { return scene_.name; }
 
   std::string settings() const override {
-    char text[96];
-    std::snprintf(text, sizeof text, "contrast threshold %.4g%s of ln(u/255 + %.4g)",
-                  sensor_.positive_threshold, fitted_ ? " (fitted)" : "", sensor_.log_epsilon);
-    return scene_.draws == 1 ? text
-                             : text + (", mean of " + std::to_string(scene_.draws) + " motions");
+    const std::string text =
+        fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})", sensor_.positive_threshold,
+                    fitted_ ? " (fitted)" : "", sensor_.log_epsilon);
+    return scene_.draws == 1 ? text : fmt::format("{}, mean of {} motions", text, scene_.draws);
   }
 
   int draws() const override { return scene_.draws; }

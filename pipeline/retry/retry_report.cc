@@ -1,8 +1,12 @@
 #include "pipeline/retry/retry_report.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <nlohmann/json.hpp>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
@@ -10,7 +14,7 @@ namespace {
 constexpr std::size_t kListedSamples = 20;
 
 std::string count(std::int64_t number, const std::string& what) {
-  return std::to_string(number) + " " + what + (number == 1 ? "" : "s");
+  return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
 }
 
 }  // namespace
@@ -33,18 +37,18 @@ std::string to_text(const RetryReport& report) {
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
-    text += std::to_string(report.mended) + " of " + count(report.tried, "quarantined sample") +
-            " mended, " + count(report.shards_rewritten, "shard") + " written again; " +
-            std::to_string(report.quarantined) + " of " + std::to_string(report.planned) +
-            " samples are quarantined still\n";
+    text +=
+        fmt::format("{} of {} mended, {} written again; {} of {} samples are quarantined still\n",
+                    report.mended, count(report.tried, "quarantined sample"),
+                    count(report.shards_rewritten, "shard"), report.quarantined, report.planned);
   }
   const std::size_t listed = std::min(report.failed.size(), kListedSamples);
   for (std::size_t i = 0; i < listed; ++i) {
     text += "quarantined: " + report.failed[i].reason + "\n";
   }
   if (listed < report.failed.size()) {
-    text += "... and " + std::to_string(report.failed.size() - listed) +
-            " more (in the shards' markers)\n";
+    text +=
+        fmt::format("... and {} more (in the shards' markers)\n", report.failed.size() - listed);
   }
   if (report.dataset_outdated) {
     text += "dataset.json tells of the shards as they were: eventgan finalize writes it anew\n";
@@ -76,7 +80,7 @@ std::string to_json(const RetryReport& report) {
                                {"too_many_faults", report.too_many_faults},
                                {"dataset_outdated", report.dataset_outdated},
                                {"wall_seconds", report.wall_seconds}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

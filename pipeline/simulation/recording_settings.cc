@@ -6,6 +6,7 @@
 #include "manifests/faults.h"
 #include "manifests/manifest_fields.h"
 #include "manifests/plan.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/planning/fingerprint.h"
 #include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_internal.h"
@@ -46,7 +47,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
   if (manifest.size) {
     json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
   }
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  return dump_json(json);
 }
 
 std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {

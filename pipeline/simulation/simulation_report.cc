@@ -1,18 +1,14 @@
 #include "pipeline/simulation/simulation_report.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
-#include <cstdio>
 #include <nlohmann/json.hpp>
+
+#include "manifests/strict_json/json_text_internal.h"
 
 namespace eventgan {
 namespace {
-
-template <class... Values>
-std::string line(const char* pattern, Values... values) {
-  char text[256];
-  std::snprintf(text, sizeof text, pattern, values...);
-  return std::string(text) + "\n";
-}
 
 /// All recordings as one; pixels and duration are those of one with the same events a pixel and
 /// second.
@@ -32,9 +28,9 @@ RecordingSummary sum(const std::vector<RecordingSummary>& recordings) {
 }
 
 std::string table_line(const RecordingSummary& recording) {
-  return line("%-24.200s %8lld %12lld %10.3f %10.1f", recording.name.c_str(),
-              static_cast<long long>(recording.frames), static_cast<long long>(recording.events),
-              recording.events_per_pixel_second(), recording.displacement_px);
+  return fmt::format("{:24.200} {:8} {:12} {:10.3f} {:10.1f}\n", recording.name, recording.frames,
+                     recording.events, recording.events_per_pixel_second(),
+                     recording.displacement_px);
 }
 
 nlohmann::json summary_json(const RecordingSummary& recording) {
@@ -55,16 +51,17 @@ double RecordingSummary::events_per_pixel_second() const {
 std::string to_text(const SimulationReport& report) {
   std::string text;
   if (!report.made.empty()) {
-    text =
-        line("%-24s %8s %12s %10s %10s", "recording", "frames", "events", "per px s", "px a frame");
+    text = fmt::format("{:24} {:>8} {:>12} {:>10} {:>10}\n", "recording", "frames", "events",
+                       "per px s", "px a frame");
     for (const RecordingSummary& recording : report.made) text += table_line(recording);
   }
   const RecordingSummary total = sum(report.made);
   if (report.made.size() > 1) text += table_line(total);
-  text += line("%zu recordings made, %zu kept from before; %.1f s, %.2f s a frame",
-               report.made.size(), report.kept.size(), report.wall_seconds,
-               total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0.0);
-  return text + report.folder + "\n";
+  return text +
+         fmt::format("{} recordings made, {} kept from before; {:.1f} s, {:.2f} s a frame\n{}\n",
+                     report.made.size(), report.kept.size(), report.wall_seconds,
+                     total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0,
+                     report.folder);
 }
 
 std::string to_json(const SimulationReport& report) {
@@ -78,7 +75,7 @@ std::string to_json(const SimulationReport& report) {
                                {"kept", report.kept},
                                {"total", summary_json(sum(report.made))},
                                {"wall_seconds", report.wall_seconds}};
-  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n";
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -1,25 +1,26 @@
-#include <cstdio>
+#include <fmt/core.h>
+
 #include <nlohmann/json.hpp>
 
-#include "pipeline/training/records/csv_table.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "pipeline/training/run_training.h"
 
 namespace eventgan {
 
 std::string to_text(const TrainingReport& report) {
-  char times[96];
-  std::snprintf(times, sizeof times, "%.0f s, %.0f s with earlier runs", report.run_seconds,
-                report.total_seconds);
-  std::string text = std::string(report.complete ? "complete" : "stopped, run again to go on") +
-                     ": " + report.folder + "\n  next step   " +
-                     std::string(to_string(report.position.phase)) + ' ' +
-                     std::to_string(report.position.step) + "\n  this run    " +
-                     std::to_string(report.steps_made) + " steps in " + times + '\n';
+  std::string text = fmt::format(
+      "{}: {}\n"
+      "  next step   {} {}\n"
+      "  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs\n",
+      report.complete ? "complete" : "stopped, run again to go on", report.folder,
+      to_string(report.position.phase), report.position.step, report.steps_made, report.run_seconds,
+      report.total_seconds);
   for (const auto& [name, value] : report.losses) {
-    text += "  " + name + ' ' + csv_number(value) + " (mean of the last steps)\n";
+    text += fmt::format("  {} {:.6g} (mean of the last steps)\n", name, value);
   }
   if (!report.weights.empty()) {
-    text += "  weights     " + report.weights + "\n  SHA-256     " + report.weights_sha256 + '\n';
+    text +=
+        fmt::format("  weights     {}\n  SHA-256     {}\n", report.weights, report.weights_sha256);
   }
   return text;
 }
@@ -36,7 +37,7 @@ std::string to_json(const TrainingReport& report) {
                                {"losses", report.losses},
                                {"weights", report.weights},
                                {"weights_sha256", report.weights_sha256}};
-  return json.dump() + '\n';
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

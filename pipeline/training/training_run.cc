@@ -195,4 +195,8 @@ double TrainingRun::total_seconds() const {
   return seconds_before_ + std::chrono::duration<double>(Clock::now() - start_).count();
 }
 
+TrainingReport run_training(const TrainingManifest& manifest, const TrainingOptions& options) {
+  return TrainingRun(manifest, options).run();
+}
+
 }  // namespace eventgan

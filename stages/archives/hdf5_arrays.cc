@@ -1,5 +1,7 @@
 #include "stages/archives/hdf5_arrays.h"
 
+#include <utf8.h>
+
 #include <algorithm>
 #include <cstring>
 #include <limits>
@@ -7,7 +9,6 @@
 #include <utility>
 #include <vector>
 
-#include "stages/archives/utf8_internal.h"
 #include "stages/files/text_file.h"
 #include "stages/hdf5/hdf5_internal.h"
 
@@ -62,7 +63,9 @@ decltype(TypedArray::values) read_values(hid_t dataset, hid_t type, std::size_t 
       auto values = H5Tis_variable_str(type) > 0
                         ? read_elements<std::string>(dataset, kTheValues, type)
                         : read_fixed_text(dataset, type, count);
-      if (!std::ranges::all_of(values, is_utf8)) throw NotAnArray{"text that is not UTF-8"};
+      for (const std::string& text : values) {
+        if (!utf8::is_valid(text)) throw NotAnArray{"text that is not UTF-8"};
+      }
       return values;
     }
     default:

@@ -1,3 +1,5 @@
+#include <utf8.h>
+
 #include <algorithm>
 #include <bit>
 #include <charconv>
@@ -9,7 +11,6 @@
 #include <utility>
 
 #include "stages/archives/numpy_elements_internal.h"
-#include "stages/archives/utf8_internal.h"
 
 namespace eventgan {
 namespace {
@@ -60,8 +61,11 @@ std::string utf32_text(std::span<const std::byte> element, const std::string& na
   for (std::size_t i = 0; i < end; i += 4) {
     std::uint32_t code = 0;
     std::memcpy(&code, element.data() + i, sizeof(code));
-    if (!append_utf8(code, text))
+    try {
+      utf8::append(char32_t{code}, text);
+    } catch (const utf8::invalid_code_point&) {
       refuse_numpy("Unicode text", "code point " + std::to_string(code), name);
+    }
   }
   return text;
 }
@@ -69,7 +73,7 @@ std::string utf32_text(std::span<const std::byte> element, const std::string& na
 std::string byte_text(std::span<const std::byte> element, const std::string& name) {
   std::string text(reinterpret_cast<const char*>(element.data()), element.size());
   text.resize(text.find_last_not_of('\0') + 1);
-  if (!is_utf8(text)) refuse_numpy("ASCII or UTF-8 text", "other bytes", name);
+  if (!utf8::is_valid(text)) refuse_numpy("ASCII or UTF-8 text", "other bytes", name);
   return text;
 }
 

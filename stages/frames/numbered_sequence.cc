@@ -1,5 +1,7 @@
 #include "stages/frames/numbered_sequence.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cctype>
 #include <charconv>
@@ -8,7 +10,6 @@
 
 #include "manifests/faults.h"
 #include "stages/frames/folder_listing.h"
-#include "stages/frames/padded_number.h"
 
 namespace eventgan {
 namespace {
@@ -140,7 +141,7 @@ std::string NumberedSequence::name_for(std::int64_t number) const {
   if (end == std::string::npos) end = like.size();
   std::size_t begin = end;
   while (begin > 0 && is_digit(like[begin - 1])) --begin;
-  return like.substr(0, begin) + padded_number(number, end - begin) + like.substr(end);
+  return fmt::format("{}{:0{}}{}", like.substr(0, begin), number, end - begin, like.substr(end));
 }
 
 }  // namespace eventgan

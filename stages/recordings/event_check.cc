@@ -1,6 +1,6 @@
-#include <array>
+#include <fmt/core.h>
+
 #include <cmath>
-#include <cstdio>
 #include <string>
 
 #include "stages/recordings/event_check_internal.h"
@@ -8,11 +8,7 @@
 namespace eventgan {
 namespace {
 
-std::string number(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.17g", value);
-  return text.data();
-}
+std::string number(double value) { return fmt::format("{:.17g}", value); }
 
 /// False for NaN as well.
 bool is_index(double value, int count) {
@@ -45,9 +41,8 @@ Event EventCheck::take(const StoredEvent& stored) {
 
 void EventCheck::refuse(const StoredEvent& stored) const {
   if (!is_index(stored.x, size_.width) || !is_index(stored.y, size_.height)) {
-    throw EventFault("expected a pixel of a picture of " + std::to_string(size_.width) + "x" +
-                     std::to_string(size_.height) + ", got x = " + number(stored.x) +
-                     ", y = " + number(stored.y));
+    throw EventFault(fmt::format("expected a pixel of a picture of {}x{}, got x = {}, y = {}",
+                                 size_.width, size_.height, number(stored.x), number(stored.y)));
   }
   check_event_time(last_s_, stored.t_s);
   if (first_ && stored.t_s == last_s_) {

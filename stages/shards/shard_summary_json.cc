@@ -3,6 +3,7 @@
 #include <optional>
 #include <type_traits>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/shards/shard_counts.h"
 #include "stages/shards/shard_summary.h"
 
@@ -88,9 +89,7 @@ Json json(const ShardHeader& header, const Person& person, const VolumePerson& m
 }
 
 /// Annotations and paths need not be UTF-8, but JSON must be.
-std::string text(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
+std::string text(const Json& json) { return dump_json(json, JsonLayout::kIndented) + "\n"; }
 
 }  // namespace
 

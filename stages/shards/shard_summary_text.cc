@@ -1,8 +1,10 @@
-#include <algorithm>
+#include <fmt/core.h>
+
 #include <cmath>
 #include <cstdint>
 #include <map>
-#include <sstream>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "stages/shards/shard_counts.h"
@@ -14,20 +16,22 @@ namespace {
 /// Lines "  name         value", values below each other.
 class Lines {
  public:
-  explicit Lines(const std::string& title) { out_ << title << '\n'; }
+  explicit Lines(const std::string& title) : text_(title + "\n") {}
 
-  std::ostream& operator()(const std::string& name) {
-    out_ << (open_ ? "\n" : "") << "  " << name
-         << std::string(15 - std::min<std::size_t>(name.size(), 14), ' ');
-    open_ = true;
-    return out_;
+  void add(std::string_view name, std::string_view value) {
+    text_ += fmt::format("  {:14} {}\n", name, value);
   }
 
-  std::string text() { return out_.str() + (open_ ? "\n" : ""); }
+  template <class... Values>
+  void operator()(std::string_view name, fmt::format_string<Values...> pattern,
+                  Values&&... values) {
+    add(name, fmt::format(pattern, std::forward<Values>(values)...));
+  }
+
+  const std::string& text() const { return text_; }
 
  private:
-  std::ostringstream out_;
-  bool open_ = false;
+  std::string text_;
 };
 
 std::string joined(const std::vector<std::string>& texts) {
@@ -38,43 +42,38 @@ std::string joined(const std::vector<std::string>& texts) {
 
 template <class Key>
 std::string joined(const std::map<Key, std::int64_t>& counts) {
-  std::ostringstream out;
-  for (const auto& [key, count] : counts)
-    out << (out.tellp() > 0 ? ", " : "") << key << ": " << count;
-  return out.str();
+  std::string all;
+  for (const auto& [key, count] : counts) {
+    all += fmt::format("{}{}: {}", all.empty() ? "" : ", ", key, count);
+  }
+  return all;
 }
 
-std::ostream& operator<<(std::ostream& out, const ImageSize& size) {
-  return out << size.height << " x " << size.width << " (height x width)";
+std::string text_of(const ImageSize& size) {
+  return fmt::format("{} x {} (height x width)", size.height, size.width);
 }
 
-std::ostream& operator<<(std::ostream& out, const Rectangle& r) {
-  return out << '[' << r.left << ' ' << r.top << ' ' << r.right << ' ' << r.bottom << ']';
+std::string text_of(const Rectangle& r) {
+  return fmt::format("[{:g} {:g} {:g} {:g}]", r.left, r.top, r.right, r.bottom);
 }
 
-std::ostream& operator<<(std::ostream& out, const Point& p) {
-  return out << '(' << p.x << ' ' << p.y << ')';
-}
+std::string text_of(const Point& p) { return fmt::format("({:g} {:g})", p.x, p.y); }
 
-std::ostream& operator<<(std::ostream& out, const FrameRef& frame) {
-  out << frame.path << ", frame " << frame.index;
-  if (frame.video_frame >= 0) out << " (frame " << frame.video_frame << " of the video)";
-  return out;
-}
-
-std::string visibility(int visible) {
-  return visible < 0 ? "visibility unknown" : visible > 0 ? "visible" : "hidden";
+std::string text_of(const FrameRef& frame) {
+  const std::string text = fmt::format("{}, frame {}", frame.path, frame.index);
+  if (frame.video_frame < 0) return text;
+  return fmt::format("{} (frame {} of the video)", text, frame.video_frame);
 }
 
 void describe_boxes(const ShardHeader& header, const ShardSample& sample, Lines& line) {
   for (std::size_t i = 0; i < sample.annotation.boxes.size(); ++i) {
     const Box& box = sample.annotation.boxes[i];
     const VolumeBox& mapped = sample.labels.boxes[i];
-    std::ostream& out = line("box " + std::to_string(i));
-    out << header.label_schema.class_names.at(static_cast<std::size_t>(box.class_id)) << ' '
-        << mapped.clipped << ", source " << box.xyxy;
-    if (box.track_id >= 0) out << ", track " << box.track_id;
-    if (mapped.ignore) out << ", ignore";
+    line(fmt::format("box {}", i), "{} {}, source {}{}{}",
+         header.label_schema.class_names.at(static_cast<std::size_t>(box.class_id)),
+         text_of(mapped.clipped), text_of(box.xyxy),
+         box.track_id >= 0 ? fmt::format(", track {}", box.track_id) : "",
+         mapped.ignore ? ", ignore" : "");
   }
 }
 
@@ -82,13 +81,15 @@ void describe_persons(const ShardHeader& header, const ShardSample& sample, Line
   for (std::size_t i = 0; i < sample.annotation.persons.size(); ++i) {
     const Person& person = sample.annotation.persons[i];
     const VolumePerson& mapped = sample.labels.persons[i];
-    std::ostream& out = line("person " + std::to_string(i));
-    out << "centre " << mapped.center << ", scale " << person.scale;
-    if (mapped.head_box) out << ", head " << *mapped.head_box;
+    line(fmt::format("person {}", i), "centre {}, scale {:g}{}", text_of(mapped.center),
+         person.scale, mapped.head_box ? ", head " + text_of(*mapped.head_box) : "");
     for (std::size_t j = 0; j < mapped.joints.size(); ++j) {
-      if (person.joints[j].at == kMissingPoint) continue;
-      line("") << header.label_schema.joint_names.at(j) << ' ' << mapped.joints[j] << ", "
-               << visibility(person.joints[j].visible);
+      const Joint& joint = person.joints[j];
+      if (joint.at == kMissingPoint) continue;
+      line("", "{} {}, {}", header.label_schema.joint_names.at(j), text_of(mapped.joints[j]),
+           joint.visible < 0   ? "visibility unknown"
+           : joint.visible > 0 ? "visible"
+                               : "hidden");
     }
   }
 }
@@ -99,50 +100,50 @@ std::string describe_shard(const ShardReader& reader) {
   const ShardHeader& header = reader.header();
   const ShardCounts counts = count_shard(reader);
   Lines line(header.name);
-  line("format") << kShardFormat << ' ' << kShardFormatVersion << ", written by eventgan "
-                 << header.program_version;
-  line("dataset") << header.dataset << ", split " << header.split;
-  line("samples") << header.sample_count << ", valid " << counts.valid << ", without any event "
-                  << counts.empty_volumes;
-  if (!counts.quarantined.empty()) line("quarantined") << joined(counts.quarantined);
-  line("volume") << "2 polarities x " << header.volume.bins << " bins, " << header.volume.size
-                 << ", " << to_string(header.dtype) << ", deflate " << header.deflate_level
-                 << ", normalization " << to_string(header.normalization);
-  line("gaps") << joined(counts.gaps) << " (frames: samples)";
-  line("boxes") << counts.boxes << (counts.boxes > 0 ? " (" + joined(counts.classes) + ")" : "");
-  line("persons") << counts.persons;
+  line("format", "{} {}, written by eventgan {}", kShardFormat, kShardFormatVersion,
+       header.program_version);
+  line("dataset", "{}, split {}", header.dataset, header.split);
+  line("samples", "{}, valid {}, without any event {}", header.sample_count, counts.valid,
+       counts.empty_volumes);
+  if (!counts.quarantined.empty()) line.add("quarantined", joined(counts.quarantined));
+  line("volume", "2 polarities x {} bins, {}, {}, deflate {}, normalization {}", header.volume.bins,
+       text_of(header.volume.size), to_string(header.dtype), header.deflate_level,
+       to_string(header.normalization));
+  line("gaps", "{} (frames: samples)", joined(counts.gaps));
+  line("boxes", "{}{}", counts.boxes,
+       counts.boxes > 0 ? fmt::format(" ({})", joined(counts.classes)) : "");
+  line("persons", "{}", counts.persons);
   if (!header.label_schema.joint_names.empty()) {
-    line("joints") << joined(header.label_schema.joint_names);
+    line.add("joints", joined(header.label_schema.joint_names));
   }
-  line("preprocessing") << header.preprocessing;
-  line("generator") << header.generator;
-  line("weights") << header.weights_hash;
-  line("plan") << header.plan_hash;
+  line.add("preprocessing", header.preprocessing);
+  line.add("generator", header.generator);
+  line.add("weights", header.weights_hash);
+  line.add("plan", header.plan_hash);
   return line.text();
 }
 
 std::string describe_sample(const ShardReader& reader, int slot) {
   const ShardSample sample = reader.sample(slot);
   const FramePair& pair = sample.pair;
-  Lines line("sample " + std::to_string(slot) + " of " + reader.header().name);
-  line("id") << sample.sample_id << ", sequence " << sample.sequence;
-  line("valid") << (sample.valid ? "yes" : "no: quarantined, the marker beside the shard says why");
-  line("previous") << pair.previous;
-  line("next") << pair.next;
-  std::ostream& gap = line("gap");
-  gap << pair.gap_frames << " frames";
-  if (std::isfinite(pair.gap_s())) gap << ", " << pair.gap_s() << " s";
-  line("label") << "frame " << pair.label_index << ", at " << pair.label_position
-                << " of the way from previous to next";
-  line("source size") << sample.source_size;
+  Lines line(fmt::format("sample {} of {}", slot, reader.header().name));
+  line("id", "{}, sequence {}", sample.sample_id, sample.sequence);
+  line.add("valid", sample.valid ? "yes" : "no: quarantined, the marker beside the shard says why");
+  line.add("previous", text_of(pair.previous));
+  line.add("next", text_of(pair.next));
+  line("gap", "{} frames{}", pair.gap_frames,
+       std::isfinite(pair.gap_s()) ? fmt::format(", {:g} s", pair.gap_s()) : "");
+  line("label", "frame {}, at {:g} of the way from previous to next", pair.label_index,
+       pair.label_position);
+  line.add("source size", text_of(sample.source_size));
   if (sample.valid) {
     const VolumeStatistics& statistics = sample.statistics;
-    line("volume") << "largest " << statistics.max << ", 98th percentile " << statistics.eta98
-                   << ", non-zero " << 100 * statistics.nonzero_fraction << " %, sums +"
-                   << statistics.sum_positive << " -" << statistics.sum_negative;
-    if (statistics.flags != 0) line("flags") << joined(flag_names(statistics.flags));
+    line("volume", "largest {:g}, 98th percentile {:g}, non-zero {:g} %, sums +{:g} -{:g}",
+         statistics.max, statistics.eta98, 100 * statistics.nonzero_fraction,
+         statistics.sum_positive, statistics.sum_negative);
+    if (statistics.flags != 0) line.add("flags", joined(flag_names(statistics.flags)));
   }
-  line("original") << sample.annotation.original.size() << " bytes";
+  line("original", "{} bytes", sample.annotation.original.size());
   describe_boxes(reader.header(), sample, line);
   describe_persons(reader.header(), sample, line);
   return line.text();

@@ -1,9 +1,10 @@
 #include "stages/shards/volume_check.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <sstream>
 
 #include "stages/shards/codec/half_float.h"
 
@@ -51,9 +52,7 @@ Error storage_error(StoredType type, float scale) {
 }
 
 std::string text(const char* name, double recorded, double stored) {
-  std::ostringstream out;
-  out << "expected " << name << " " << recorded << " as recorded, got " << stored;
-  return out.str();
+  return fmt::format("expected {} {:g} as recorded, got {:g}", name, recorded, stored);
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 #include "pipeline/training/records/csv_table.h"
 
+#include <fmt/core.h>
+
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -68,11 +70,7 @@ void CsvTable::flush() {
 }
 
 std::string csv_number(double value) {
-  if (std::isnan(value)) return "";
-  char text[32];
-  const auto end =
-      std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr;
-  return {text, end};
+  return std::isnan(value) ? "" : fmt::format("{:.6g}", value);
 }
 
 double csv_value(const std::string& cell) {

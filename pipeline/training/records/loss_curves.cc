@@ -1,8 +1,9 @@
 #include "pipeline/training/records/loss_curves.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -80,12 +81,6 @@ LossAxis axis_of(const LossCurve& curve) {
   return {low - room, high + room, false};
 }
 
-std::string short_number(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
 std::vector<double> running_mean(const std::vector<double>& values) {
   const std::size_t window = std::max<std::size_t>(1, values.size() / 50);
   std::vector<double> means;
@@ -112,7 +107,7 @@ class CurvePanel {
     write_text(picture_, name + (axis_.logarithmic ? " (log)" : ""), {kLeft, kTop - 10});
     for (const double share : {0.0, 0.5, 1.0}) {
       const int y = area().y + area().height - cvRound(share * area().height);
-      write_text(picture_, short_number(axis_.value(share)), {4, y + 4});
+      write_text(picture_, fmt::format("{:.3g}", axis_.value(share)), {4, y + 4});
     }
     write_text(picture_, std::to_string(static_cast<long>(row_count_)) + " steps",
                {kPanel.width - 110, kPanel.height - 8});

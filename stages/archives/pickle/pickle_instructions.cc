@@ -1,11 +1,12 @@
 // What each opcode does, in groups; a group says false to an opcode that is not its own.
 
+#include <utf8.h>
+
 #include <algorithm>
 #include <utility>
 
 #include "stages/archives/pickle/pickle_literals_internal.h"
 #include "stages/archives/pickle/pickle_machine_internal.h"
-#include "stages/archives/utf8_internal.h"
 
 namespace eventgan {
 
@@ -279,7 +280,9 @@ void PickleMachine::push_long(std::string_view bytes) {
 }
 
 void PickleMachine::push_text(Kind kind, std::string_view text) {
-  if (kind == Kind::kString && !is_utf8(text)) cursor_.fail("UTF-8", "other bytes in a string");
+  if (kind == Kind::kString && !utf8::is_valid(text)) {
+    cursor_.fail("UTF-8", "other bytes in a string");
+  }
   count_memory(text.size());
   push(kind).text = text;
 }

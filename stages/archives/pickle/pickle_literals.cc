@@ -1,8 +1,9 @@
+#include <utf8.h>
+
 #include <charconv>
 #include <system_error>
 
 #include "stages/archives/pickle/pickle_literals_internal.h"
-#include "stages/archives/utf8_internal.h"
 
 namespace eventgan {
 namespace {
@@ -68,21 +69,24 @@ std::optional<std::string> parse_pickle_string(std::string_view text) {
   return bytes;
 }
 
-std::optional<std::string> parse_pickle_unicode(std::string_view text) {
+std::optional<std::string> parse_pickle_unicode(std::string_view text) try {
   std::string result;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const bool escape =
         text[i] == '\\' && i + 1 < text.size() && (text[i + 1] == 'u' || text[i + 1] == 'U');
     if (!escape) {
-      append_utf8(static_cast<unsigned char>(text[i]), result);
+      utf8::append(char32_t{static_cast<unsigned char>(text[i])}, result);
       continue;
     }
     const std::size_t digits = text[i + 1] == 'u' ? 4 : 8;
     const auto code = hex_at(text, i + 2, digits);
-    if (!code || !append_utf8(*code, result)) return std::nullopt;
+    if (!code) return std::nullopt;
+    utf8::append(char32_t{*code}, result);
     i += 1 + digits;
   }
   return result;
+} catch (const utf8::invalid_code_point&) {
+  return std::nullopt;
 }
 
 }  // namespace eventgan

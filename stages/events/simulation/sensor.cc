@@ -1,8 +1,9 @@
 #include "stages/events/simulation/sensor.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <stdexcept>
 #include <string>
@@ -52,16 +53,13 @@ void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
                       std::size_t memory_bytes) {
   const double needed = idle_event_bytes(spec, size.pixel_count(), duration_s);
   if (needed <= static_cast<double>(memory_bytes)) return;
-  char text[320];
-  std::snprintf(
-      text, sizeof text,
-      "expected a sensor whose events fit into memory (%.3g bytes), got about %.3g events "
-      "(%.3g bytes) without any motion from %dx%d pixels in %g s: shot_noise_rate_hz %g, "
-      "hot_pixel_rate_hz %g of a share of %g, leak_rate_hz %g, refractory_s %g",
+  throw std::runtime_error(fmt::format(
+      "expected a sensor whose events fit into memory ({:.3g} bytes), got about {:.3g} events "
+      "({:.3g} bytes) without any motion from {}x{} pixels in {:g} s: shot_noise_rate_hz {:g}, "
+      "hot_pixel_rate_hz {:g} of a share of {:g}, leak_rate_hz {:g}, refractory_s {:g}",
       static_cast<double>(memory_bytes), needed / (2 * sizeof(Event)), needed, size.width,
       size.height, duration_s, spec.shot_noise_rate_hz, spec.hot_pixel_rate_hz,
-      spec.hot_pixel_fraction, spec.leak_rate_hz, spec.refractory_s);
-  throw std::runtime_error(text);
+      spec.hot_pixel_fraction, spec.leak_rate_hz, spec.refractory_s));
 }
 
 /// The time from one picture to the next. Times within are parts of it, 0..1, so that neither a

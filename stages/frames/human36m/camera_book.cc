@@ -1,8 +1,9 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <span>
-#include <sstream>
 #include <stdexcept>
 #include <vector>
 
@@ -146,11 +147,10 @@ std::string wrong_camera_note(const std::vector<double>& errors_px, const std::s
   const auto wrong =
       std::ranges::count_if(errors_px, [](double e) { return e > kProjectionTolerance_px; });
   if (wrong == 0) return "";
-  std::ostringstream note;
-  note << "no camera for " << wrong << " of " << errors_px.size() << " rows: by " << what
-       << " a joint lies up to " << std::ranges::max(errors_px) << " px from where it is annotated"
-       << " (expected at most " << kProjectionTolerance_px << "), in " << file;
-  return note.str();
+  return fmt::format(
+      "no camera for {} of {} rows: by {} a joint lies up to {:g} px from where it is annotated "
+      "(expected at most {:g}), in {}",
+      wrong, errors_px.size(), what, std::ranges::max(errors_px), kProjectionTolerance_px, file);
 }
 
 }  // namespace eventgan

@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cctype>
 #include <map>
@@ -11,7 +13,6 @@
 #include "stages/frames/human36m/indexed_dataset_internal.h"
 #include "stages/frames/human36m/layouts_internal.h"
 #include "stages/frames/human36m/npz_table_internal.h"
-#include "stages/frames/padded_number.h"
 #include "stages/frames/source_root.h"
 
 namespace eventgan {
@@ -154,7 +155,7 @@ std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
   const std::string key = annotations.on_disk.filename().string();
   for (std::size_t row = 0; row < table->row_count(); ++row) {
     const ExtractedName& name = table->name(row);
-    dataset->add_labelled(name.sequence + "_" + padded_number(name.number), name.sequence,
+    dataset->add_labelled(fmt::format("{}_{:06}", name.sequence, name.number), name.sequence,
                           name.number, key, row);
   }
   dataset->add_table(key, annotations.written, std::move(table));

@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <map>
 #include <utility>
@@ -7,7 +9,6 @@
 #include "stages/frames/human36m/fetch_table_internal.h"
 #include "stages/frames/human36m/indexed_dataset_internal.h"
 #include "stages/frames/human36m/layouts_internal.h"
-#include "stages/frames/padded_number.h"
 #include "stages/frames/source_root.h"
 
 namespace eventgan {
@@ -44,7 +45,7 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
   for (std::size_t row = 0; labelled && row < table->row_count(); ++row) {
     const std::string sequence = action + "/" + std::to_string(table->camera(row));
     const std::int64_t number = table->frame(row);
-    dataset.add_labelled(sequence + "/" + padded_number(number), sequence, number, key, row);
+    dataset.add_labelled(fmt::format("{}/{:06}", sequence, number), sequence, number, key, row);
   }
   if (labelled) dataset.add_table(key, root.written(key), std::move(table));
 

@@ -2,6 +2,7 @@
 #include <set>
 #include <utility>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/archives/hdf5_arrays.h"
 #include "stages/archives/typed_array_json_internal.h"
 #include "stages/frames/human36m/camera_book_internal.h"
@@ -111,8 +112,7 @@ Outcome<Annotation> FetchTable::annotation(std::size_t row) const {
     if (found != columns_.arrays().end()) original[found->first] = to_json(found->second);
   }
   // Names in the file may be in any encoding.
-  annotation.original =
-      original.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  annotation.original = dump_json(original);
   return annotation;
 }
 

@@ -1,8 +1,9 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <utility>
 
 #include "stages/frames/human36m/frame_folder_internal.h"
-#include "stages/frames/padded_number.h"
 
 namespace eventgan {
 
@@ -20,7 +21,7 @@ FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequenc
 
 FrameRef FrameFolder::frame(std::int64_t number) const {
   std::string name = stored_.at(number, 0).name;
-  if (name.empty()) name = prefix_ + padded_number(number) + ".jpg";
+  if (name.empty()) name = fmt::format("{}{:06}.jpg", prefix_, number);
   return {.path = folder_ + "/" + name,
           .index = number,
           .video_frame = -1,

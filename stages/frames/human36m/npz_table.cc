@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/archives/npy_array.h"
 #include "stages/archives/zip_archive.h"
 #include "stages/frames/human36m/npz_table_internal.h"
@@ -115,8 +116,7 @@ Outcome<Annotation> NpzTable::annotation(std::size_t row) const {
   auto original = columns_.fields(row, row_count());
   if (const Human36mCamera* one = camera(row)) original["cameras.pkl"] = one->fields;
   // Text of a Python 2 pickle may be in any encoding.
-  annotation.original =
-      original.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+  annotation.original = dump_json(original);
   return annotation;
 }
 

@@ -1,5 +1,7 @@
 #include "stages/frames/kitti/kitti_tracking_dataset.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <map>
 #include <set>
@@ -11,7 +13,6 @@
 #include "stages/frames/kitti/timestamps.h"
 #include "stages/frames/kitti/tracking_labels.h"
 #include "stages/frames/numbered_sequence.h"
-#include "stages/frames/padded_number.h"
 #include "stages/frames/source_root.h"
 
 namespace eventgan {
@@ -100,7 +101,7 @@ class KittiTrackingDataset : public Dataset {
     for (const auto& [number, file] : sequence.pictures.frames()) numbers.insert(number);
     for (const std::int64_t number : numbers) {
       LabelledFrame frame;
-      frame.sample_id = name + "/" + padded_number(number);
+      frame.sample_id = fmt::format("{}/{:06}", name, number);
       frame.sequence = name;
       frame.frame = frame_ref(name, sequence.pictures.at(number, 0));
       frame.label_key = label + "#" + std::to_string(number);
@@ -114,7 +115,8 @@ class KittiTrackingDataset : public Dataset {
   }
 
   FrameRef frame_ref(const std::string& sequence, const NumberedSequence::Place& place) const {
-    const std::string name = place.name.empty() ? padded_number(place.number) + ".png" : place.name;
+    const std::string name =
+        place.name.empty() ? fmt::format("{:06}.png", place.number) : place.name;
     return {root_.written("image_02/" + sequence + "/" + name), place.number, -1,
             static_cast<double>(place.number) * kKittiFrameSeconds};
   }

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/text_table.h"
 
@@ -173,7 +174,7 @@ Outcome<TrackletFrame> Tracklets::frame(std::int64_t frame_number) const {
     }
   }
   // Bytes that are not UTF-8 must not stop a run: they become U+FFFD.
-  frame.json = array.dump(-1, ' ', false, Json::error_handler_t::replace);
+  frame.json = dump_json(array);
   return frame;
 }
 

@@ -1,5 +1,6 @@
 #include <stdexcept>
 
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/frames/mpii/json_refusal_internal.h"
 
 namespace eventgan {
@@ -7,8 +8,7 @@ namespace eventgan {
 void refuse_json(const std::string& where, const std::string& expected,
                  const nlohmann::ordered_json& got) {
   constexpr std::size_t kReadable = 80;
-  std::string text =
-      got.dump(-1, ' ', /*ensure_ascii=*/true, nlohmann::ordered_json::error_handler_t::replace);
+  std::string text = dump_json(got, JsonLayout::kAsciiLine);
   if (text.size() > kReadable) text = text.substr(0, kReadable) + "...";
   throw std::invalid_argument("expected " + expected + ", got " + text + " at " + where);
 }

@@ -1,3 +1,5 @@
+#include <utf8.h>
+
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -88,25 +90,6 @@ Json number_at(const MatArray& value, std::size_t index) {
   });
 }
 
-void append_utf8(std::string& text, std::uint32_t code) {
-  const auto tail = [&](int shift) { text += static_cast<char>(0x80 | ((code >> shift) & 0x3F)); };
-  if (code < 0x80) {
-    text += static_cast<char>(code);
-  } else if (code < 0x800) {
-    text += static_cast<char>(0xC0 | code >> 6);
-    tail(0);
-  } else if (code < 0x10000) {
-    text += static_cast<char>(0xE0 | code >> 12);
-    tail(6);
-    tail(0);
-  } else {
-    text += static_cast<char>(0xF0 | code >> 18);
-    tail(12);
-    tail(6);
-    tail(0);
-  }
-}
-
 /// UTF-16 to UTF-8. A surrogate without its partner becomes a byte sequence that no decoder takes.
 std::string from_utf16(std::span<const std::uint16_t> units) {
   std::string text;
@@ -116,7 +99,7 @@ std::string from_utf16(std::span<const std::uint16_t> units) {
         units[i + 1] < 0xE000) {
       code = 0x10000 + ((code - 0xD800) << 10) + (units[++i] - 0xDC00);
     }
-    append_utf8(text, code);
+    utf8::unchecked::append(code, std::back_inserter(text));
   }
   return text;
 }

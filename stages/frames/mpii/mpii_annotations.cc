@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/frames/mpii/mat_file_internal.h"
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/frames/mpii/mpii_person_internal.h"
@@ -30,9 +31,7 @@ void copy_element(const MatArray& array, const char* name, std::size_t index, Js
   if (index < array.size) entry[name] = mat_element_to_json(array, index);
 }
 
-std::string dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
+std::string dump(const Json& json) { return dump_json(json); }
 
 /// Turns what mat_to_json refuses into an error that names the file.
 template <class Read>

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "manifests/faults.h"
+#include "manifests/strict_json/json_text_internal.h"
 #include "stages/frames/mpii/mpii_annotations.h"
 #include "stages/frames/mpii/mpii_frames.h"
 #include "stages/frames/mpii/mpii_joints.h"
@@ -72,8 +73,7 @@ class MpiiListDataset final : public Dataset {
     for (const auto& [image, rows] : rows_by_image) {
       labelled_.push_back(frames_.labelled(image, keyframes.of(image, frames_)));
       labelled_.back().label_key = image;
-      rows_.emplace(image, Rows{rows.dump(-1, ' ', false, Json::error_handler_t::replace),
-                                labelled_.back().frame.path});
+      rows_.emplace(image, Rows{dump_json(rows), labelled_.back().frame.path});
       if (frames_.is_without_picture(labelled_.back(), image)) ++unsized;
       if (spec.sequences && labelled_.back().sequence.empty()) ++alone;
     }

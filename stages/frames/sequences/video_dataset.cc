@@ -1,5 +1,7 @@
 #include "stages/frames/sequences/video_dataset.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -12,7 +14,6 @@
 
 #include "manifests/faults.h"
 #include "stages/frames/folder_listing.h"
-#include "stages/frames/padded_number.h"
 #include "stages/frames/sequences/lower_extension.h"
 #include "stages/frames/sequences/video_clip.h"
 #include "stages/frames/sequences/video_labels.h"
@@ -37,7 +38,7 @@ class VideoDataset final : public Dataset {
         std::max<std::size_t>(6, std::to_string(clip_.frame_count - 1).size());
     for (std::int64_t i = 0; i < clip_.frame_count; ++i) {
       const std::string key = labels_.contains(i) ? std::to_string(i) : std::string();
-      labelled_.push_back({stem + "/" + padded_number(i, width), stem, frame(i), key});
+      labelled_.push_back({fmt::format("{}/{:0{}}", stem, i, width), stem, frame(i), key});
     }
     note_frames_that_do_not_decode();
     if (!clip_.times_ascend && !spec.frames_per_second) {

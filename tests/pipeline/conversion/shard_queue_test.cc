@@ -4,14 +4,10 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-<<<<<<< HEAD:tests/pipeline/conversion/shard_queue_test.cc
 #include <map>
 #include <stdexcept>
 
-#include "pipeline/output/output_folder.h"
-=======
 #include "pipeline/folder/output_folder.h"
->>>>>>> wt-r2:tests/pipeline/conversion/shared_folder_test.cc
 #include "stages/files/temporary_name.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 

@@ -45,8 +45,9 @@ TEST(ProgressLine, CountsWhatItIsToldTo) {
 }
 
 TEST(ProgressBar, FillsInProportion) {
-  EXPECT_THAT(progress_bar(state(), 8), ::testing::StartsWith("[##......] 30/120"));
-  EXPECT_THAT(progress_bar({0, 0, 0, 0, 0, {}}, 4), ::testing::StartsWith("[....]"));
+  EXPECT_EQ(progress_bar(30, 120, 8), "[##......]");
+  EXPECT_EQ(progress_bar(0, 0, 4), "[....]");
+  EXPECT_EQ(progress_bar(7, 7, 4), "[####]");
 }
 
 TEST(ProgressJson, IsOneLineThatMachinesRead) {
@@ -81,6 +82,18 @@ TEST(Progress, OnATerminalRedrawsOneLine) {
   EXPECT_THAT(out.str(), ::testing::MatchesRegex("\r\\[.*1/2 pairs.*\r\\[.*2/2 pairs.* \n"));
 }
 
+TEST(ProgressDisplay, AShorterLineWipesALongerOne) {
+  std::ostringstream out;
+  HandClock clock;
+  ProgressDisplay display(out, ProgressStyle::kBar, true, 2, clock.get());
+  display.show(0, 2, "a long line", "");
+  display.show(2, 2, "done", "");
+  EXPECT_EQ(out.str(), "\r[..] a long line   \r[##] done       ");
+  display.end_line();
+  display.end_line();
+  EXPECT_TRUE(out.str().ends_with("done       \n"));
+}
+
 TEST(Progress, AnErrorDoesNotWriteIntoTheBarsLine) {
   HandClock clock;
   std::ostringstream out;
@@ -102,12 +115,23 @@ TEST(Progress, TheTotalMayTurnOutSmaller) {
   EXPECT_THAT(out.str(), ::testing::StartsWith("1/1 pairs"));
 }
 
-TEST(NoteJson, IsOneLine) {
-  EXPECT_EQ(note_json("part 1 of 2"), R"({"event":"note","text":"part 1 of 2"})");
+TEST(MessageJson, IsOneLine) {
+  EXPECT_EQ(message_json("note", "part 1 of 2"), R"({"event":"note","text":"part 1 of 2"})");
+  EXPECT_EQ(message_json("warning", "no \"weights\""),
+            R"({"event":"warning","text":"no \"weights\""})");
+  EXPECT_EQ(message_json("error", "a\nb \xff"),
+            "{\"event\":\"error\",\"text\":\"a\\nb \xef\xbf\xbd\"}");
 }
 
-TEST(WarningJson, IsOneLine) {
-  EXPECT_EQ(warning_json("no \"weights\""), R"({"event":"warning","text":"no \"weights\""})");
+TEST(DurationText, BeginsWithTheLargestUnitThatMay) {
+  EXPECT_EQ(duration_text(45, "dhms"), "45s");
+  EXPECT_EQ(duration_text(45, "hm"), "0m45s");
+  EXPECT_EQ(duration_text(45, "h", 3), "0h00m45s");
+  EXPECT_EQ(duration_text(59.5, "dhms"), "1m00s");  // rounded first
+  EXPECT_EQ(duration_text(3 * 3600 + 59, "hm"), "3h00m");
+  EXPECT_EQ(duration_text(50 * 3600, "hm"), "50h00m");
+  EXPECT_EQ(duration_text(50 * 3600, "dhms"), "2d02h");
+  EXPECT_EQ(duration_text(50 * 3600 + 61, "h", 3), "50h01m01s");
 }
 
 TEST(Progress, NoneIsSilent) {

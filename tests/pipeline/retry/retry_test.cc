@@ -17,11 +17,6 @@
 #include "pipeline/folder/finalize.h"
 #include "pipeline/folder/verify_folder.h"
 #include "pipeline/planning/make_plan.h"
-<<<<<<< HEAD
-#include "pipeline/verification/verify_folder.h"
-=======
-#include "pipeline/stopping/stopped.h"
->>>>>>> wt-r2
 #include "stages/files/temporary_name.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/testing/fake_generator.h"

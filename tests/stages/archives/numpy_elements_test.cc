@@ -1,7 +1,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <stdexcept>
+#include <utility>
 
 #include "stages/archives/numpy_elements_internal.h"
 
@@ -46,6 +48,45 @@ TEST(NumpyElementsTest, ReadsText) {
   EXPECT_THROW(decode({"<U1", false, {1}}, "\x00\xd8\x00\x00"s), std::runtime_error)
       << "a surrogate";
   EXPECT_THROW(decode({"|S1", false, {1}}, "\xff"), std::runtime_error);
+}
+
+TEST(NumpyElementsTest, TextMayReachTheEdgesOfEveryLengthOfUtf8) {
+  // First and last code point of each length, from the table of RFC 3629; a zero would be padding.
+  const std::pair<char32_t, std::string> cases[] = {
+      {0x7f, "\x7f"},
+      {0x80, "\xc2\x80"},
+      {0x7ff, "\xdf\xbf"},
+      {0x800, "\xe0\xa0\x80"},
+      {0xd7ff, "\xed\x9f\xbf"},
+      {0xe000, "\xee\x80\x80"},
+      {0xffff, "\xef\xbf\xbf"},
+      {0x10000, "\xf0\x90\x80\x80"},
+      {0x10ffff, "\xf4\x8f\xbf\xbf"},
+  };
+  for (const auto& [code, utf8] : cases) {
+    std::string wide(4, '\0');
+    std::memcpy(wide.data(), &code, 4);
+    EXPECT_THAT(values<std::string>(decode({"<U1", false, {1}}, wide)), ElementsAre(utf8));
+    const std::string descr = "|S" + std::to_string(utf8.size());
+    EXPECT_THAT(values<std::string>(decode({descr, false, {1}}, utf8)), ElementsAre(utf8));
+  }
+  for (const char32_t code : {0xd800, 0xdfff, 0x110000}) {
+    std::string wide(4, '\0');
+    std::memcpy(wide.data(), &code, 4);
+    EXPECT_THROW(decode({"<U1", false, {1}}, wide), std::runtime_error) << std::uint32_t{code};
+  }
+}
+
+TEST(NumpyElementsTest, RefusesMalformedText) {
+  for (const std::string& bad : {"\x80"s, "\xc3"s, "\xc3("s, "\xe2\x82"s, "\xff"s,
+                                 "\xc0\x81"s,          // overlong
+                                 "\xe0\x80\xaf"s,      // overlong slash
+                                 "\xed\xa0\x80"s,      // surrogate
+                                 "\xf4\x90\x80\x80"s,  // beyond U+10FFFF
+                                 "\xf8\x88\x80\x80\x80"s}) {
+    EXPECT_THROW(decode({"|S" + std::to_string(bad.size()), false, {1}}, bad), std::runtime_error)
+        << ::testing::PrintToString(bad);
+  }
 }
 
 TEST(NumpyElementsTest, TurnsFortranOrderIntoCOrder) {
