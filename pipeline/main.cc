@@ -5,11 +5,10 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/errors/error_text.h"
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/memory/big_buffers.h"
 #include "pipeline/planning/fingerprint.h"
-#include "stages/frames/decoding/picture_file.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/memory.h"
+#include "stages/base/pictures/picture_file.h"
 
 int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);

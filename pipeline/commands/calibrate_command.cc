@@ -6,21 +6,20 @@
 #include <memory>
 #include <optional>
 
-#include "manifests/faults.h"
-#include "manifests/job_manifest.h"
-#include "pipeline/calibration/calibrate.h"
-#include "pipeline/calibration/calibrated_file.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/generation/load_weights.h"
+#include "pipeline/generators/calibrate.h"
+#include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/stopping/stop_signal.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/sha256.h"
-#include "stages/generator/calibration/calibration.h"
-#include "stages/generator/weights_files/weights_file.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/sha256.h"
+#include "stages/generator/calibration.h"
+#include "stages/generator/weights_file.h"
 
 namespace eventgan {
 namespace {

@@ -7,7 +7,7 @@ class App;
 namespace eventgan {
 
 /// Each adds one subcommand to the program. Its callback does the work and sets `exit_code`; errors
-/// leave it as exceptions (see error_text.h).
+/// leave it as exceptions (see pipeline/runtime/errors.h).
 void add_convert_command(CLI::App& app, int& exit_code);
 void add_plan_command(CLI::App& app, int& exit_code);
 void add_status_command(CLI::App& app, int& exit_code);

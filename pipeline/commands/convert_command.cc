@@ -1,21 +1,20 @@
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdlib>
 #include <iostream>
 #include <memory>
 
-#include "manifests/error_limits.h"
-#include "manifests/job_manifest.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/generator_notes.h"
-#include "pipeline/commands/job_options.h"
-#include "pipeline/commands/profile_option.h"
-#include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/generation/load_generator.h"
-#include "pipeline/profile/trace_span.h"
-#include "pipeline/stopping/stop_signal.h"
+#include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
+#include "pipeline/runtime/trace.h"
 
 namespace eventgan {
 namespace {
@@ -29,8 +28,8 @@ struct ConvertArguments {
 
 int judge(const ConversionReport& report, const ErrorSpec& errors) {
   if (report.too_many_faults) {
-    std::cerr << "error: expected " << limits_text(errors) << ", got "
-              << report.quarantined_in_plan() << " of " << report.plan_pairs << std::endl;
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors),
+                           report.quarantined_in_plan(), report.plan_pairs));
     return kTooManyFaults;
   }
   if (report.complete()) return kComplete;

@@ -1,32 +1,36 @@
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 
-#include "manifests/job_manifest.h"
+#include "manifests/documents/job_manifest.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/folder/finalize.h"
+#include "pipeline/runtime/errors.h"
 
 namespace eventgan {
 namespace {
 
-struct Arguments {
+struct FinalizeArguments {
   std::string folder;
   std::string manifest;  ///< empty: the one in the plan
   bool partial = false;
   bool json = false;
 };
 
-int run(const Arguments& arguments) {
+int run(const FinalizeArguments& arguments) {
   FinalizationOptions options;
   options.partial = arguments.partial;
   if (!arguments.manifest.empty()) options.errors = read_job_manifest(arguments.manifest).errors;
   const FinalizationReport report = finalize(arguments.folder, options);
   std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
   if (report.too_many_faults) {
-    std::cerr << "error: expected no more quarantined samples than the manifest's errors allow, "
-                 "got "
-              << report.counts.quarantined() << " (--manifest FILE: other limits)" << std::endl;
+    tell_error(
+        fmt::format("expected no more quarantined samples than the manifest's errors allow, got {} "
+                    "(--manifest FILE: other limits)",
+                    report.counts.quarantined()));
     return kTooManyFaults;
   }
   return report.written ? kComplete : kFailed;
@@ -41,7 +45,7 @@ void add_finalize_command(CLI::App& app, int& exit_code) {
       "dataset.json and dataset.h5, in which all shards read as one; exit "
       "code 1 and a line for each missing shard, 65 beyond the manifest's "
       "limits for quarantined samples");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<FinalizeArguments>();
   command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
   command->add_flag("--partial", arguments->partial,
                     "Write what there is even if shards are missing (dataset.json says so)");

@@ -3,14 +3,14 @@
 #include <memory>
 #include <utility>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/sha256.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/sha256.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
-#include "stages/generator/weights_files/weights_file.h"
+#include "stages/generator/weights_file.h"
 
 namespace eventgan {
 namespace {
@@ -20,12 +20,12 @@ constexpr char kGenerator[] = "gen";
 /// What the authors' training draws gaps from (DESIGN section 4), whatever it is configured for.
 constexpr GapRange kAuthorsGaps{1, 5};
 
-struct Arguments {
+struct ImportArguments {
   std::string in;
   std::string out;
 };
 
-int run(const Arguments& arguments) {
+int run(const ImportArguments& arguments) {
   if (!arguments.out.ends_with(".safetensors")) {
     throw UsageError("expected an output named *.safetensors, got " + arguments.out);
   }
@@ -54,7 +54,7 @@ void add_import_weights_command(CLI::App& app, int& exit_code) {
       app.add_subcommand("import-weights",
                          "Converts a PyTorch checkpoint of the published generator (the zip format "
                          "and the one before PyTorch 1.6); nothing in it is executed");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<ImportArguments>();
   command->add_option("IN", arguments->in, "The checkpoint")->required();
   command->add_option("OUT", arguments->out, "The weights file to write, *.safetensors")
       ->required();

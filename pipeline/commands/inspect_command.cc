@@ -2,23 +2,23 @@
 #include <iostream>
 #include <memory>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
 #include "pipeline/folder/shard_guard.h"
+#include "pipeline/runtime/errors.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 
 namespace eventgan {
 namespace {
 
-struct Arguments {
+struct InspectArguments {
   std::string shard;
   int sample = -1;
   bool json = false;
 };
 
-int run(const Arguments& arguments) {
+int run(const InspectArguments& arguments) {
   const ShardReader reader(arguments.shard);
   const int count = reader.header().sample_count;
   if (arguments.sample >= count) {
@@ -39,7 +39,7 @@ int run(const Arguments& arguments) {
 void add_inspect_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("inspect", "Tells what is in a shard, or in one of its samples");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<InspectArguments>();
   command->add_option("SHARD", arguments->shard, "A shard")->required();
   command->add_option("--sample", arguments->sample, "A slot, counted from 0")
       ->check(CLI::NonNegativeNumber);

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
+#include "pipeline/runtime/errors.h"
 #include "stages/scenes/demo_dataset.h"
 
 namespace eventgan {

@@ -5,23 +5,22 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "manifests/faults.h"
-#include "manifests/job_manifest.h"
-#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/generator_notes.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/conversion/plan_summary.h"
-#include "pipeline/conversion/trial.h"
-#include "pipeline/errors/exit_codes.h"
 #include "pipeline/folder/output_folder.h"
-#include "pipeline/generation/load_generator.h"
+#include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/threads/thread_count.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/threads.h"
 
 namespace eventgan {
 namespace {
 
-struct Arguments {
+struct PlanArguments {
   std::string manifest;
   int threads = 0;
   bool json = false;
@@ -43,7 +42,7 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
             << " samples in " << frozen.plan.shards.size() << " shards" << std::endl;
 }
 
-int freeze(const Arguments& arguments, const JobManifest& manifest, Plan plan) {
+int freeze(const PlanArguments& arguments, const JobManifest& manifest, Plan plan) {
   if (arguments.output && arguments.output->empty()) {  // a script's unset variable
     throw UsageError("--output: expected a folder, got nothing");
   }
@@ -57,7 +56,7 @@ int freeze(const Arguments& arguments, const JobManifest& manifest, Plan plan) {
   return kComplete;
 }
 
-int run(const Arguments& arguments) {
+int run(const PlanArguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
   tell_generator(loaded);
@@ -78,7 +77,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
       "plan",
       "Tells what convert would do: pairs, what is missing, shards, size and time. Writes nothing, "
       "except with --freeze");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<PlanArguments>();
   command->add_option("MANIFEST", arguments->manifest, "The job")->required();
   command
       ->add_option("--threads", arguments->threads,

@@ -3,21 +3,22 @@
 #include <memory>
 
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/folder/preview_shard.h"
 #include "pipeline/folder/shard_guard.h"
+#include "pipeline/runtime/errors.h"
 
 namespace eventgan {
 namespace {
 
-struct Arguments {
+struct PreviewArguments {
   std::string shard;
   std::string out;
   std::string frames;
   PreviewOptions options;
 };
 
-int run(const Arguments& arguments) {
+int run(const PreviewArguments& arguments) {
   PreviewOptions options = arguments.options;
   options.out = arguments.out;
   options.frames = arguments.frames;
@@ -26,7 +27,7 @@ int run(const Arguments& arguments) {
     std::cout << picture.string() << "\n";
   }
   std::cout << std::flush;
-  for (const std::string& warning : warnings) std::cerr << "warning: " << warning << std::endl;
+  for (const std::string& warning : warnings) tell_warning(warning);
   return kComplete;
 }
 
@@ -36,7 +37,7 @@ void add_preview_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("preview",
                                      "Draws samples of a shard: both frames and the "
                                      "average-timestamp picture, with boxes and joints");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<PreviewArguments>();
   command->add_option("SHARD", arguments->shard, "A shard")->required();
   command->add_option("--out", arguments->out, "Folder for the pictures")->required();
   auto* samples =

@@ -5,13 +5,13 @@
 #include <map>
 #include <memory>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/progress_option.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/errors/exit_codes.h"
 #include "pipeline/realism/realism.h"
-#include "stages/recordings/open_recording.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/recordings/recording.h"
 
 namespace eventgan {
 namespace {

@@ -1,20 +1,21 @@
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "manifests/error_limits.h"
+#include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/generator_notes.h"
-#include "pipeline/commands/profile_option.h"
-#include "pipeline/commands/progress_option.h"
-#include "pipeline/errors/exit_codes.h"
+#include "pipeline/commands/options.h"
+#include "pipeline/commands/standard_streams.h"
+#include "pipeline/conversion/retry.h"
 #include "pipeline/folder/output_folder.h"
-#include "pipeline/generation/load_generator.h"
-#include "pipeline/profile/trace_span.h"
-#include "pipeline/retry/retry.h"
-#include "pipeline/stopping/stop_signal.h"
+#include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
+#include "pipeline/runtime/trace.h"
 
 namespace eventgan {
 namespace {
@@ -34,8 +35,8 @@ int finish(const RetryArguments& arguments, const RetryReport& report, const Err
   std::cout << (arguments.as_json() ? to_json(report) : to_text(report)) << std::flush;
   if (report.stopped) return kStopped;
   if (report.too_many_faults) {
-    std::cerr << "error: expected " << limits_text(errors) << ", got " << report.quarantined
-              << " of " << report.planned << std::endl;
+    tell_error(fmt::format("expected {}, got {} of {}", limits_text(errors), report.quarantined,
+                           report.planned));
     return kTooManyFaults;
   }
   return report.damaged_shards.empty() ? kComplete : kFailed;

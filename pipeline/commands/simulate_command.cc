@@ -2,11 +2,10 @@
 #include <iostream>
 #include <memory>
 
-#include "manifests/simulation_manifest.h"
+#include "manifests/documents/simulation_manifest.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/job_options.h"
-#include "pipeline/commands/progress_option.h"
-#include "pipeline/errors/exit_codes.h"
+#include "pipeline/commands/options.h"
+#include "pipeline/runtime/errors.h"
 #include "pipeline/simulation/simulate.h"
 
 namespace eventgan {

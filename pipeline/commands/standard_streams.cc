@@ -9,8 +9,8 @@
 #include <streambuf>
 #include <string_view>
 
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/progress/progress.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
 namespace {

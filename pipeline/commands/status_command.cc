@@ -3,14 +3,13 @@
 #include <memory>
 
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
 #include "pipeline/folder/folder_status.h"
-#include "pipeline/folder/status_text.h"
+#include "pipeline/runtime/errors.h"
 
 namespace eventgan {
 namespace {
 
-struct Arguments {
+struct StatusArguments {
   std::string folder;
   bool json = false;
 };
@@ -22,7 +21,7 @@ void add_status_command(CLI::App& app, int& exit_code) {
       "status",
       "What stands in an output folder, from its files alone and on any machine: shards done, "
       "running, missing and damaged, quarantined samples, rate, time left");
-  const auto arguments = std::make_shared<Arguments>();
+  const auto arguments = std::make_shared<StatusArguments>();
   command->add_option("DIR", arguments->folder, "A folder that convert writes")->required();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &exit_code] {

@@ -4,12 +4,12 @@
 #include <iostream>
 #include <memory>
 
-#include "manifests/training_manifest.h"
+#include "manifests/documents/training_manifest.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/job_options.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/stopping/stop_signal.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
 #include "pipeline/training/run_training.h"
 
 namespace eventgan {

@@ -5,8 +5,8 @@
 #include <string>
 
 #include "pipeline/commands/commands.h"
-#include "pipeline/errors/exit_codes.h"
 #include "pipeline/folder/verify_folder.h"
+#include "pipeline/runtime/errors.h"
 
 namespace eventgan {
 namespace {

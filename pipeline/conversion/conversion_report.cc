@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/marker.h"
 
 namespace eventgan {
 namespace {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/marker.h"
-#include "manifests/plan.h"
+#include "manifests/documents/marker.h"
+#include "manifests/documents/plan.h"
 
 namespace eventgan {
 

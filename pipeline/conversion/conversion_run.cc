@@ -9,10 +9,10 @@
 #include <iterator>
 #include <stdexcept>
 
-#include "manifests/volume.h"
-#include "pipeline/memory/memory_limit.h"
-#include "pipeline/profile/trace_span.h"
-#include "pipeline/threads/thread_count.h"
+#include "manifests/values/events.h"
+#include "pipeline/runtime/memory.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/runtime/trace.h"
 
 namespace eventgan {
 namespace {

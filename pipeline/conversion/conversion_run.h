@@ -9,13 +9,13 @@
 #include <string>
 #include <vector>
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
+#include "pipeline/conversion/sample_stages.h"
 #include "pipeline/conversion/shard_queue.h"
 #include "pipeline/folder/output_folder.h"
-#include "pipeline/profile/trace_recorder.h"
-#include "pipeline/progress/progress.h"
-#include "pipeline/samples/sample_stages.h"
-#include "pipeline/stopping/stop_order.h"
+#include "pipeline/runtime/progress.h"
+#include "pipeline/runtime/stopping.h"
+#include "pipeline/runtime/trace.h"
 #include "stages/generator/generator.h"
 
 namespace eventgan {

@@ -6,17 +6,17 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/error_limits.h"
-#include "manifests/faults.h"
-#include "manifests/plan_outline.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_sink.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_backup.h"
 #include "pipeline/folder/shard_scan.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/profile/trace_span.h"
-#include "pipeline/threads/thread_count.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/runtime/trace.h"
 
 namespace eventgan {
 namespace {
@@ -99,8 +99,7 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
   const TraceSpan span(options.trace, "check earlier shards", "job");
   const ScanOptions scan{thread_count(options.threads), [&] { return options.stop_requested(); },
                          options.trace};
-  EarlierShards earlier =
-      check_earlier_shards(job.folder, job.frozen, own, scan, options.note);
+  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, scan, options.note);
   for (const std::string& fault : earlier.faults) {
     tell(options.warn, fault + "; it is made again");
   }

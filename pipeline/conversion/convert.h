@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
 #include "pipeline/conversion/conversion_report.h"
 #include "pipeline/conversion/conversion_run.h"
 #include "pipeline/conversion/worker_part.h"

@@ -6,8 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/plan_outline.h"
-#include "stages/files/text_file.h"
+#include "manifests/documents/marker.h"
+#include "manifests/documents/plan.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

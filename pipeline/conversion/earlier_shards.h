@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/marker.h"
+#include "manifests/values/shard.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 

@@ -2,11 +2,26 @@
 
 #include <string>
 
-#include "manifests/job_manifest.h"
-#include "manifests/plan.h"
-#include "pipeline/conversion/trial.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/job.h"
+#include "pipeline/planning/make_plan.h"
+#include "stages/generator/generator.h"
 
 namespace eventgan {
+
+/// What a job will cost, measured on a few of its own pairs and scaled by picture size.
+struct TrialEstimate {
+  int pairs_measured = 0;
+  double seconds_per_pair = 0;  ///< on one thread, mean over the plan
+  double seconds = 0;           ///< wall time with the given threads
+  double stored_bytes = 0;      ///< compressed volumes
+};
+
+/// Runs up to `most` pairs from the start of each source through reading, generating and encoding
+/// on the calling thread (after one more that is not measured), and scales by source and picture
+/// size. Pairs that fail are left out.
+TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
+                            const Generator& generator, int threads, int most = 4);
 
 /// What `eventgan plan` prints: for each source its labelled frames, pairs by gap, what is missing,
 /// its shards; then the estimate for the whole.

@@ -9,12 +9,12 @@
 #include <system_error>
 #include <utility>
 
-#include "manifests/marker.h"
-#include "manifests/plan_outline.h"
+#include "manifests/documents/marker.h"
+#include "manifests/documents/plan.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/text_file.h"
-#include "stages/files/unfinished_files.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

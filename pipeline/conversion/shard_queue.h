@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/plan.h"
+#include "manifests/documents/plan.h"
 
 namespace eventgan {
 

@@ -4,12 +4,13 @@
 #include <iterator>
 #include <utility>
 
-#include "manifests/error_limits.h"
-#include "manifests/faults.h"
+#include "manifests/documents/marker.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
 #include "pipeline/planning/fingerprint.h"
-#include "pipeline/profile/processor_time.h"
-#include "pipeline/profile/trace_span.h"
-#include "stages/files/atomic_file.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/runtime/trace.h"
+#include "stages/base/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "manifests/marker.h"
-#include "manifests/plan.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/shard.h"
 #include "pipeline/conversion/conversion_run.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_queue.h"

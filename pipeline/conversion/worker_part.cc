@@ -3,7 +3,7 @@
 #include <charconv>
 #include <string_view>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 
 namespace eventgan {
 namespace {

@@ -10,10 +10,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/strict_json/json_text_internal.h"
-#include "manifests/strict_json/strict_json_internal.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/text_file.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/strict_json_internal.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -7,8 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -132,8 +133,8 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr char kFormat[] = "eventgan-dataset";
-constexpr int kVersion = 1;
+constexpr char kDatasetFormat[] = "eventgan-dataset";
+constexpr int kDatasetVersion = 1;
 
 Json counts_json(const DatasetCounts& counts) {
   Json gaps = Json::object();
@@ -252,8 +253,8 @@ Json settings(const std::string& manifest_text) {
 std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
                              const ViewReceipt& receipt) {
   const ShardHeader& header = parts.headers.begin()->second;
-  Json json = {{"format", kFormat},
-               {"version", kVersion},
+  Json json = {{"format", kDatasetFormat},
+               {"version", kDatasetVersion},
                {"name", parts.frozen.plan.name},
                {"complete", parts.missing.empty()},
                {"plan_hash", parts.frozen.hash},

@@ -6,13 +6,12 @@
 #include <string>
 #include <vector>
 
-#include "manifests/job_manifest.h"
-#include "manifests/marker.h"
-#include "manifests/shard.h"
+#include "manifests/values/job.h"
+#include "manifests/values/shard.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/shards/view/dataset_view.h"
+#include "stages/shards/dataset_view.h"
 
 namespace eventgan {
 
@@ -67,10 +66,10 @@ struct DatasetCounts {
 /// Adds what a shard holds.
 void add(const ShardMarker& marker, DatasetCounts& counts);
 
-/// The text of dataset.json (manifests/guides/shard_format.md, "The whole dataset"): what the dataset is,
-/// without any time or place, so that the same shards give the same bytes. Canonical JSON: sorted
-/// keys, two-space indent, newline at the end. `parts` has at least one shard that is done;
-/// `receipt` is the view file's. Throws std::runtime_error if the frozen manifest is no JSON.
+/// The text of dataset.json (manifests/guides/shard_format.md, "The whole dataset"): what the
+/// dataset is, without any time or place, so that the same shards give the same bytes. Canonical
+/// JSON: sorted keys, two-space indent, newline at the end. `parts` has at least one shard that is
+/// done; `receipt` is the view file's. Throws std::runtime_error if the frozen manifest is no JSON.
 std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
                              const ViewReceipt& receipt);
 

@@ -1,11 +1,16 @@
 #include "pipeline/folder/finalize.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/error_limits.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/job.h"
 #include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
-#include "stages/files/atomic_file.h"
+#include "stages/base/files/atomic_file.h"
 
 namespace eventgan {
 
@@ -33,6 +38,63 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   report.views = static_cast<int>(views.size());
   report.written = true;
   return report;
+}
+
+namespace {
+
+constexpr std::size_t kListedShards = 100;
+
+/// "missing", or what is wrong with what there is.
+std::string why(const ShardState& shard) {
+  return shard.faults.empty() ? to_string(shard.condition) : shard.faults.front();
+}
+
+}  // namespace
+
+std::string to_text(const FinalizationReport& report) {
+  std::string text;
+  const std::size_t listed = std::min(report.missing.size(), kListedShards);
+  for (std::size_t i = 0; i < listed; ++i) {
+    const ShardState& shard = report.missing[i];
+    // What is wrong with a shard names its file.
+    text += (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard) + "\n";
+  }
+  if (listed < report.missing.size()) {
+    text += fmt::format("... and {} more (all: --json)\n", report.missing.size() - listed);
+  }
+  const DatasetCounts& counts = report.counts;
+  text += fmt::format("{} of {} shards: {} samples, {} of them quarantined, {} boxes, {} persons\n",
+                      counts.shards, report.shards_planned, counts.samples, counts.quarantined(),
+                      counts.boxes, counts.persons);
+  text += notes_text(report.notes);
+  if (!report.written) {
+    return text + (counts.shards == 0 ? "not finalized: no shard is done\n"
+                                      : "not finalized: incomplete (--partial to allow it)\n");
+  }
+  if (!report.complete()) text += "PARTIAL: finalize again when the rest is done\n";
+  return text + report.folder + ": " + kDescriptionName + ", " + kViewName + "\n";
+}
+
+std::string to_json(const FinalizationReport& report) {
+  nlohmann::json missing = nlohmann::json::array();
+  for (const ShardState& shard : report.missing) {
+    missing.push_back({{"shard", shard.outline.name}, {"why", why(shard)}});
+  }
+  const nlohmann::json json = {{"folder", report.folder},
+                               {"complete", report.complete()},
+                               {"written", report.written},
+                               {"shards_planned", report.shards_planned},
+                               {"shards_done", report.counts.shards},
+                               {"missing", missing},
+                               {"samples", report.counts.samples},
+                               {"valid", report.counts.valid},
+                               {"quarantined", report.counts.quarantined()},
+                               {"boxes", report.counts.boxes},
+                               {"persons", report.counts.persons},
+                               {"notes", report.notes},
+                               {"views", report.views},
+                               {"too_many_faults", report.too_many_faults}};
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/marker.h"
-#include "stages/files/unfinished_files.h"
+#include "manifests/values/shard.h"
+#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 
@@ -63,5 +63,12 @@ std::optional<double> worker_rate(std::vector<CommitRecord> records, int writers
 /// What is wrong with a sample, without where: the reason's first line up to ", in PATH", by which
 /// the samples of a damaged disk or a wrong folder fall together.
 std::string fault_kind(const std::string& reason);
+
+/// What `eventgan status` prints: a few lines of numbers, then who is at work, what dead writers
+/// left, what is damaged, and why samples are quarantined; long lists are cut short.
+std::string status_text(const FolderStatus& status);
+
+/// The same as JSON, with every entry; null where a number is unknown.
+std::string status_json(const FolderStatus& status);
 
 }  // namespace eventgan

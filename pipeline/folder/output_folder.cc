@@ -12,13 +12,14 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/faults.h"
-#include "manifests/marker.h"
-#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/marker.h"
+#include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/sha256.h"
-#include "stages/files/text_file.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -4,9 +4,8 @@
 #include <optional>
 #include <string>
 
-#include "manifests/job_manifest.h"
-#include "manifests/plan.h"
-#include "manifests/plan_outline.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/job.h"
 
 namespace eventgan {
 

@@ -5,13 +5,14 @@
 #include <set>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "manifests/placement.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/placement.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
 #include "stages/events/pictures/preview_picture.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/decoding/placed_picture.h"
+#include "stages/frames/decoding/prepared_frame.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

@@ -7,12 +7,12 @@
 #include <system_error>
 #include <vector>
 
-#include "manifests/marker.h"
+#include "manifests/documents/marker.h"
 #include "pipeline/folder/shard_scan.h"
-#include "stages/files/atomic_file.h"
-#include "stages/files/sha256.h"
-#include "stages/files/text_file.h"
-#include "stages/files/unfinished_files.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
+#include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 namespace {

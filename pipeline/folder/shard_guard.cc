@@ -18,12 +18,11 @@
 #include <stdexcept>
 #include <string>
 
-#include "manifests/marker.h"
-#include "pipeline/errors/error_text.h"
-#include "pipeline/errors/exit_codes.h"
-#include "pipeline/memory/memory_limit.h"
-#include "stages/files/sha256.h"
-#include "stages/files/text_file.h"
+#include "manifests/documents/marker.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/memory.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {

@@ -5,11 +5,11 @@
 #include <system_error>
 #include <utility>
 
-#include "pipeline/profile/trace_span.h"
-#include "pipeline/threads/for_each_index.h"
-#include "pipeline/threads/thread_count.h"
-#include "stages/files/sha256.h"
-#include "stages/files/text_file.h"
+#include "manifests/documents/marker.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/runtime/trace.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
 #include "stages/shards/shard_check.h"
 
 namespace eventgan {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/marker.h"
-#include "manifests/plan_outline.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/shard.h"
 
 namespace eventgan {
 

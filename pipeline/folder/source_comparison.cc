@@ -7,12 +7,12 @@
 #include <utility>
 #include <variant>
 
-#include "manifests/faults.h"
-#include "manifests/placement.h"
-#include "pipeline/errors/error_text.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/placement.h"
 #include "pipeline/planning/make_plan.h"
-#include "stages/frames/decoding/image_size_probe.h"
-#include "stages/frames/open_dataset.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/frames/dataset.h"
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {

@@ -6,11 +6,10 @@
 #include <string>
 #include <vector>
 
-#include "manifests/job_manifest.h"
-#include "manifests/labels.h"
-#include "manifests/plan.h"
-#include "manifests/shard.h"
-#include "manifests/volume_labels.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+#include "manifests/values/shard.h"
 #include "stages/frames/dataset.h"
 #include "stages/shards/shard_reader.h"
 

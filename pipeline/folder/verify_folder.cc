@@ -12,17 +12,18 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/marker.h"
-#include "manifests/strict_json/json_text_internal.h"
-#include "pipeline/errors/error_text.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/marker.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "pipeline/folder/source_comparison.h"
-#include "stages/files/sha256.h"
-#include "stages/files/text_file.h"
-#include "stages/files/unfinished_files.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
+#include "stages/base/files/unfinished_files.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/plan_outline.h"
+#include "manifests/documents/plan.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 

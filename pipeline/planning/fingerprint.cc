@@ -11,9 +11,9 @@
 #include <sstream>
 #include <string_view>
 
-#include "manifests/manifest_fields.h"
-#include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_internal.h"
+#include "manifests/documents/manifest_fields.h"
+#include "stages/base/files/sha256.h"
+#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 namespace {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/job_manifest.h"
-#include "manifests/plan.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/job.h"
 
 namespace eventgan {
 

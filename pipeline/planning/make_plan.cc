@@ -1,19 +1,205 @@
 #include "pipeline/planning/make_plan.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <iterator>
+#include <map>
+#include <optional>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 
-#include "manifests/faults.h"
-#include "manifests/placement.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/placement.h"
 #include "pipeline/planning/fingerprint.h"
-#include "pipeline/planning/pair_choice.h"
-#include "pipeline/planning/shard_layout.h"
-#include "pipeline/profile/trace_span.h"
-#include "stages/frames/decoding/image_size_probe.h"
-#include "stages/frames/open_dataset.h"
+#include "pipeline/runtime/trace.h"
+#include "stages/frames/dataset.h"
+#include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {
+namespace {
+
+struct Window {
+  int first = 0;        // steps from the labelled frame to the previous frame
+  int last = 0;         // ... to the next frame
+  double position = 1;  // of the labelled frame within the pair
+};
+
+Window window(PairSide side, int gap) {
+  switch (side) {
+    case PairSide::kBefore:
+      return {-gap, 0, 1.0};
+    case PairSide::kAfter:
+      return {0, gap, 0.0};
+    case PairSide::kAround:
+      return {-gap / 2, gap / 2, 0.5};
+  }
+  return {};
+}
+
+struct Candidate {
+  Neighbour::State state = Neighbour::State::kBeyond;
+  PlannedSample sample;
+};
+
+/// Times are differences of large numbers: what the clock ticks off as 0.1 s may be a little more.
+bool too_far_apart(const FramePair& pair, std::optional<double> max_gap_s) {
+  constexpr double kTolerance_s = 1e-6;
+  return max_gap_s && pair.gap_s() > *max_gap_s + kTolerance_s;  // false if a time is unknown
+}
+
+Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const PairSpec& spec,
+                    int gap) {
+  using State = Neighbour::State;
+  const Window place = window(spec.side, gap);
+  const Neighbour previous = dataset.neighbour(frame, place.first);
+  const Neighbour next = dataset.neighbour(frame, place.last);
+
+  Candidate result;
+  result.sample = {frame.sample_id,
+                   frame.sequence,
+                   frame.label_key,
+                   {previous.frame, next.frame, gap, frame.frame.index, place.position},
+                   ""};
+  if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
+  for (const Neighbour* neighbour : {&previous, &next}) {
+    if (neighbour->state == State::kHole && result.sample.fault.empty()) {
+      result.sample.fault = "expected a frame, got no file, in " + neighbour->frame.path + " (" +
+                            frame.sample_id + ")";
+    }
+  }
+  if (!result.sample.fault.empty()) {
+    result.state = State::kHole;
+  } else if (previous.state == State::kPresent && next.state == State::kPresent) {
+    result.state = frame.fault.empty() ? State::kPresent : State::kHole;
+    result.sample.fault = frame.fault;
+  }
+  return result;
+}
+
+PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
+                            const SourceSpec& source, std::uint64_t seed) {
+  std::vector<PlannedSample> present;
+  std::vector<PlannedSample> damaged;
+  for (const int gap : source.pairs.gaps) {
+    Candidate found = candidate(dataset, frame, source.pairs, gap);
+    if (found.state == Neighbour::State::kPresent) present.push_back(std::move(found.sample));
+    if (found.state == Neighbour::State::kHole) damaged.push_back(std::move(found.sample));
+  }
+  auto& choices = present.empty() ? damaged : present;
+  if (choices.empty()) return {{}, source.pairs.gaps};
+  const CounterRandom random =
+      CounterRandom(seed).keyed(to_string(source.dataset)).keyed(frame.sample_id);
+  return {{std::move(choices[random.below(0, choices.size())])}, {}};
+}
+
+PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
+                            const SourceSpec& source) {
+  PairChoiceResult result;
+  for (const int gap : source.pairs.gaps) {
+    Candidate found = candidate(dataset, frame, source.pairs, gap);
+    if (found.state == Neighbour::State::kBeyond) {
+      result.without_partner.push_back(gap);
+      continue;
+    }
+    found.sample.sample_id += "@" + std::string(to_string(source.pairs.side)) + std::to_string(gap);
+    result.samples.push_back(std::move(found.sample));
+  }
+  return result;
+}
+
+}  // namespace
+
+PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
+                              const SourceSpec& source, std::uint64_t seed) {
+  return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed)
+                                                 : choose_all(dataset, frame, source);
+}
+
+void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
+                  PlannedSample& sample) {
+  const Window place = window(source.pairs.side, sample.pair.gap_frames);
+  const auto renew = [&](FrameRef& planned, int steps) {
+    const FrameRef today = dataset.neighbour(frame, steps).frame;
+    if (today == planned) planned.time_s = today.time_s;
+  };
+  renew(sample.pair.previous, place.first);
+  renew(sample.pair.next, place.last);
+  sample.label_key = frame.label_key;
+  if (sample.fault.empty()) sample.fault = frame.fault;
+}
+
+ShardLayout::ShardLayout(std::string name, int samples_per_shard)
+    : name_(std::move(name)), samples_per_shard_(static_cast<std::size_t>(samples_per_shard)) {}
+
+void ShardLayout::begin_source(int source, const std::string& split) {
+  end_source();
+  source_ = source;
+  split_ = split;
+}
+
+void ShardLayout::add(PlannedSample sample, ImageSize volume_size) {
+  if (volume_size == ImageSize{}) {
+    append_unknown(std::move(sample));
+  } else {
+    append(group(volume_size), std::move(sample));
+  }
+}
+
+std::vector<PlannedShard> ShardLayout::finish() {
+  end_source();
+  std::map<std::string, std::size_t> totals;
+  for (const std::string& split : splits_) ++totals[split];
+  std::map<std::string, std::size_t> next;
+  for (std::size_t i = 0; i < shards_.size(); ++i) {
+    shards_[i].name = fmt::format("{}-{}-{:05}-of-{:05}.h5", name_, splits_[i], next[splits_[i]]++,
+                                  totals[splits_[i]]);
+  }
+  splits_.clear();
+  return std::exchange(shards_, {});
+}
+
+ShardLayout::Group& ShardLayout::group(ImageSize size) {
+  const auto [entry, is_new] = group_index_.try_emplace({size.height, size.width}, groups_.size());
+  if (is_new) groups_.push_back({size, {}, {}});
+  return groups_[entry->second];
+}
+
+void ShardLayout::append(Group& group, PlannedSample sample) {
+  if (group.samples++ % samples_per_shard_ == 0) {
+    group.shards.push_back({"", source_, group.size, {}});
+  }
+  group.shards.back().samples.push_back(std::move(sample));
+}
+
+void ShardLayout::append_unknown(PlannedSample sample) {
+  const auto takes = [&](const PlannedShard& shard) {
+    return shard.samples.size() < samples_per_shard_ &&
+           shard.samples.back().pair.next.path == sample.pair.next.path;
+  };
+  if (unknown_.empty() || !takes(unknown_.back())) {
+    unknown_.push_back({"", source_, {}, {}, /*size_unknown=*/true});
+  }
+  unknown_.back().samples.push_back(std::move(sample));
+}
+
+ImageSize ShardLayout::most_common_size() const {
+  if (groups_.empty()) return {1, 1};
+  return std::ranges::max_element(groups_, {}, &Group::samples)->size;
+}
+
+void ShardLayout::end_source() {
+  for (PlannedShard& shard : unknown_) shard.volume_size = most_common_size();
+  for (Group& group : groups_) std::ranges::move(group.shards, std::back_inserter(shards_));
+  std::ranges::move(unknown_, std::back_inserter(shards_));
+  splits_.resize(shards_.size(), split_);
+  groups_.clear();
+  group_index_.clear();
+  unknown_.clear();
+}
+
 namespace {
 
 /// Sizes of pictures, each file asked once (a video serves thousands of samples).

@@ -1,16 +1,47 @@
 #include "pipeline/realism/compare_volumes.h"
 
+#include <fmt/core.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <filesystem>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
-#include "pipeline/realism/realism_picture.h"
+#include "pipeline/realism/real_interval.h"
+#include "stages/events/pictures/comparison_picture.h"
 
 namespace eventgan {
 namespace {
+
+/// A method's volume [2 bins, y, x] float32, and the method's name.
+struct NamedVolume {
+  std::string method;
+  std::vector<float> volume;
+};
+
+/// Writes FIRST-LAST.png (six digits each) into `folder`, which must exist: a row for each method,
+/// previous frame | next frame | the method's | real, both volumes normalised
+/// as they are compared. Nothing for no methods. Throws std::runtime_error if it cannot be written.
+void write_realism_picture(const RealInterval& real, std::span<const NamedVolume> volumes, int bins,
+                           const std::filesystem::path& folder) {
+  if (volumes.empty()) return;
+  const FrameInterval interval = real.frames.interval;
+  std::vector<ComparedPair> rows;
+  for (const NamedVolume& named : volumes) {
+    rows.push_back(
+        {{bins, real.frames.previous.size},
+         network_input(real.frames),
+         named.volume,
+         real.volume,
+         fmt::format("{}, frames {} and {}", named.method, interval.first, interval.last)});
+  }
+  write_comparison_png(rows,
+                       folder / fmt::format("{:06}-{:06}.png", interval.first, interval.last));
+}
 
 /// What one interval gives: the camera's scores, then each method's.
 struct IntervalResult {

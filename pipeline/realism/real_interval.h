@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "manifests/grey_image.h"
+#include "manifests/values/frames.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -46,5 +46,12 @@ std::vector<float> network_input(const IntervalFrames& frames);
 /// Both throw InputError as Recording does. Thread safe.
 IntervalFrames read_frames(const Recording& recording, const FrameInterval& interval);
 RealInterval read_interval(const Recording& recording, const FrameInterval& interval, int bins);
+
+/// The true displacement over an interval of several frames: each pixel of the first frame is
+/// carried along the flows of the frame intervals, u_k(x) = u_{k-1}(x) + f_k(x + u_{k-1}(x)),
+/// bilinear between pixels. An approximation: where another surface comes in front on the way, the
+/// pixel goes on with that surface. NaN where the path leaves the picture or the flow is not known.
+/// None if the recording does not know its flow. Throws InputError as Recording does. Thread safe.
+std::optional<FlowField> flow_path(const Recording& recording, const FrameInterval& interval);
 
 }  // namespace eventgan

@@ -7,11 +7,10 @@
 #include <set>
 #include <string>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/realism/compare_volumes.h"
-#include "pipeline/realism/network_method.h"
-#include "pipeline/realism/simulated_method.h"
-#include "pipeline/threads/thread_count.h"
+#include "pipeline/realism/volume_method.h"
+#include "pipeline/runtime/threads.h"
 
 namespace eventgan {
 namespace {

@@ -1,14 +1,45 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
-#include "pipeline/progress/progress.h"
-#include "pipeline/realism/realism_options.h"
 #include "pipeline/realism/realism_report.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
+
+/// What makes volumes in place of an event camera (as the EventGAN paper compares them).
+enum class RealismMethod {
+  kNetwork,     ///< the EventGAN generator
+  kDifference,  ///< log intensity on a line from frame to frame
+  kEsim         ///< a random affine motion of the previous frame
+};
+
+/// Which pairs of a recording are compared, and with what.
+struct RealismOptions {
+  std::int64_t first_frame = 0;            ///< frames before are not used
+  std::optional<std::int64_t> last_frame;  ///< frames after are not used; none: to the end
+  std::vector<int> gaps = {1};             ///< frames between previous and next, each ≥ 1
+  std::vector<RealismMethod> methods = {RealismMethod::kNetwork, RealismMethod::kDifference,
+                                        RealismMethod::kEsim};
+  std::string weights = "shipped";  ///< of the network: a file, "shipped" or "shipped:WIDTH"
+
+  /// Contrast threshold of the two models, 0.01..5; none: fitted, for each model, so that it makes
+  /// as many events as the camera did.
+  std::optional<double> threshold;
+  double log_epsilon = 0.02;        ///< ε of their log intensity ln(u/255 + ε), 1e-6..1
+  int esim_draws = 5;               ///< motions for a pair; its scores are the means over them
+  double esim_displacement_px = 5;  ///< largest displacement a frame of the motions
+
+  std::uint64_t seed = 0;
+  int threads = 0;                 ///< 0: all cores
+  std::filesystem::path pictures;  ///< folder for a picture of each pair; empty: none
+};
 
 /// What `eventgan realism` does: chooses the pairs, opens the network, fits the models' thresholds
 /// (on at most 16 pairs, spread evenly over the chosen ones), compares. `make_progress` is called

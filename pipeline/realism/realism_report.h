@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 #include "pipeline/realism/real_interval.h"
 #include "stages/events/realism/motion_direction.h"
 #include "stages/events/realism/realism_scores.h"

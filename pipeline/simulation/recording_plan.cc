@@ -1,8 +1,82 @@
 #include "pipeline/simulation/recording_plan.h"
 
-#include "pipeline/simulation/recording_settings.h"
+#include <nlohmann/json.hpp>
+#include <opencv2/core/utility.hpp>
+
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/manifest_fields.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/faults.h"
+#include "pipeline/planning/fingerprint.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
+namespace {
+
+constexpr char kSettingsAttribute[] = "simulation";
+
+nlohmann::json source_json(const SimulationSource& source) {
+  nlohmann::json json = {{"path", source.path},
+                         {"method", to_string(source.method)},
+                         {"first_frame", source.first_frame},
+                         {"frame_step", source.frame_step}};
+  if (source.frames_per_second) json["frames_per_second"] = *source.frames_per_second;
+  if (source.method == SimulationMethod::kAffine) {
+    json["frames_per_picture"] = source.frames_per_picture;
+    json["max_displacement_px"] = source.max_displacement_px;
+  } else {
+    json["frame_count"] = source.frame_count;
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
+                               const std::string& recording, const std::string& files_hash,
+                               std::optional<std::int64_t> picture) {
+  nlohmann::json json = {{"program", program_version()},
+                         {"libraries", "OpenCV " + cv::getVersionString()},
+                         {"seed", manifest.seed},
+                         {"name", recording},
+                         {"source", source_json(source)},
+                         {"files", files_hash},
+                         {"sensor", nlohmann::json::parse(to_json(manifest.sensor))}};
+  if (picture) json["picture"] = *picture;
+  if (manifest.size) {
+    json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
+  }
+  return dump_json(json);
+}
+
+std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return std::nullopt;
+  require_regular_file(file);
+  const Hdf5Lock lock;
+  try {
+    return read_text_attribute(open_hdf5_file(file), kSettingsAttribute);
+  } catch (const Hdf5Error&) {
+    std::throw_with_nested(
+        InputError("expected no file, or a recording that eventgan simulate has written, got "
+                   "another file, in " +
+                   file.string() + " (--overwrite makes it anew)"));
+  }
+}
+
+void check_same_settings(const std::filesystem::path& file, const std::string& found,
+                         const std::string& expected) {
+  if (found == expected) return;
+  std::string message =
+      file.string() +
+      " was made by a run that would have written other events (--overwrite makes it anew):";
+  for (const std::string& difference :
+       fingerprint_differences(manifest_fields(found), manifest_fields(expected))) {
+    message += "\n  " + difference;
+  }
+  throw UsageError(message);
+}
+
 namespace {
 
 std::string numbered(const std::string& name, std::int64_t number) {

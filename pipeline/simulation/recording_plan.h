@@ -6,10 +6,28 @@
 #include <string>
 #include <vector>
 
-#include "manifests/simulation_manifest.h"
+#include "manifests/values/simulation.h"
 #include "pipeline/simulation/clip_frames.h"
 
 namespace eventgan {
+
+/// Everything that decides a recording's bytes, as JSON: program, seed, name, source, the clip's
+/// files, sensor. It stands in the recording as the attribute `simulation`, says where a recording
+/// came from, and tells whether an existing one is what a job would make. What the manifest says of
+/// other recordings is left out, so that they may change.
+///
+/// `picture`: kAffine, the number of the picture within its clip; none for a whole clip.
+std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
+                               const std::string& recording, const std::string& files_hash,
+                               std::optional<std::int64_t> picture);
+
+/// The settings that a recording on disk was made with; none if there is no such file. Throws
+/// InputError if it is no recording of a simulation. Thread safe.
+std::optional<std::string> settings_on_disk(const std::filesystem::path& file);
+
+/// Throws UsageError telling field by field how `found` differs from `expected`, if it does.
+void check_same_settings(const std::filesystem::path& file, const std::string& found,
+                         const std::string& expected);
 
 /// A recording that a source gives.
 struct PlannedRecording {

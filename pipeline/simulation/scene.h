@@ -3,7 +3,9 @@
 #include <cstdint>
 #include <memory>
 
-#include "manifests/grey_image.h"
+#include "manifests/values/frames.h"
+#include "pipeline/simulation/clip_frames.h"
+#include "stages/events/simulation/affine_motion.h"
 #include "stages/events/simulation/interval.h"
 
 namespace eventgan {
@@ -23,6 +25,52 @@ class Scene {
 
   /// Whether the intervals know their flow.
   virtual bool has_flow() const = 0;
+};
+
+/// One picture under one steady affine motion, seen in n = frame_count frames: frame k is the
+/// picture at u = (k + 1)/n of the motion, rounded to 8 bits, so pairs any number of frames apart
+/// have a motion as far in proportion. The picture itself, u = 0, is no frame: it alone is not
+/// smoothed by interpolation, and that would look like events. In each interval at most 1 px lies
+/// between two pictures of the sensor.
+class AffineScene final : public Scene {
+ public:
+  /// frame_count ≥ 2; frames are `interval_s` apart.
+  AffineScene(GreyImage picture, const AffineMotion& motion, int frame_count, double interval_s);
+  const GreyImage& frame() const override { return frame_; }
+  double time_s() const override { return position_ * interval_s_; }
+  std::unique_ptr<Interval> advance() override;
+  bool has_flow() const override { return true; }
+
+ private:
+  GreyImage picture_;
+  AffineMotion motion_;
+  int frame_count_;
+  double interval_s_;
+  int position_ = 0;
+  GreyImage frame_;
+};
+
+/// How the intensity gets from one frame of a clip to the next.
+enum class ClipMotion {
+  kFlow,  ///< things move along the dense optical flow (FlowInterval)
+  kFade   ///< each pixel fades on a line in log intensity; nothing moves, no flow
+};
+
+/// A real clip as a scene: its frames at their times. `clip` must outlive it; members throw
+/// InputError as ClipFrames::frame does.
+class ClipScene final : public Scene {
+ public:
+  ClipScene(ClipFrames& clip, ClipMotion motion);
+  const GreyImage& frame() const override { return frame_; }
+  double time_s() const override { return clip_.time_s(position_); }
+  std::unique_ptr<Interval> advance() override;
+  bool has_flow() const override { return motion_ == ClipMotion::kFlow; }
+
+ private:
+  ClipFrames& clip_;
+  ClipMotion motion_;
+  std::int64_t position_ = 0;
+  GreyImage frame_;
 };
 
 }  // namespace eventgan

@@ -1,23 +1,86 @@
 #include "pipeline/simulation/simulate.h"
 
+#include <fmt/core.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <utility>
 #include <vector>
 
-#include "pipeline/simulation/affine_scene.h"
+#include "manifests/documents/json_text_internal.h"
+#include "pipeline/runtime/memory.h"
+#include "pipeline/runtime/threads.h"
 #include "pipeline/simulation/clip_frames.h"
-#include "pipeline/simulation/clip_scene.h"
-#include "pipeline/simulation/record.h"
 #include "pipeline/simulation/recording_plan.h"
-#include "pipeline/simulation/recording_settings.h"
-#include "pipeline/threads/thread_count.h"
-#include "stages/files/unfinished_files.h"
+#include "pipeline/simulation/scene.h"
+#include "stages/base/files/unfinished_files.h"
+#include "stages/events/simulation/sensor.h"
+#include "stages/events/simulation/simulate_pair.h"
+#include "stages/recordings/mvsec_writer.h"
 
 namespace eventgan {
+namespace {
+
+/// The 99.5th percentile over the pixels of how far they move; single pixels of a computed flow may
+/// be far off.
+double displacement(const FlowField& flow) {
+  constexpr double kShare = 0.995;
+  std::vector<float> lengths(flow.x_px.size());
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    lengths[i] = std::hypot(flow.x_px[i], flow.y_px[i]);
+  }
+  if (lengths.empty()) return 0;
+  const auto rank = static_cast<std::ptrdiff_t>(kShare * static_cast<double>(lengths.size() - 1));
+  std::nth_element(lengths.begin(), lengths.begin() + rank, lengths.end());
+  return lengths[static_cast<std::size_t>(rank)];
+}
+
+}  // namespace
+
+RecordingSummary record(Scene& scene, const SensorSpec& spec, CounterRandom random,
+                        const std::filesystem::path& file, const std::string& settings,
+                        const std::function<void()>& on_frame) {
+  const ImageSize size = scene.frame().size;
+  RecordingSummary summary;
+  summary.name = file.stem().string();
+  summary.pixels = static_cast<std::int64_t>(size.pixel_count());
+  MvsecWriter writer(file, size, settings);
+  const auto add_frame = [&](const FlowField* flow) {
+    writer.add_frame(scene.frame(), scene.time_s(), flow);
+    ++summary.frames;
+    on_frame();
+  };
+  add_frame(nullptr);
+
+  Sensor sensor(spec, size, random);
+  double from_s = scene.time_s();
+  while (const auto interval = scene.advance()) {
+    if (summary.frames == 1) sensor.step(interval->render(0), from_s);
+    check_events_fit(spec, size, scene.time_s() - from_s, memory_limit_bytes());
+    std::vector<Event> events;
+    feed_interval(sensor, *interval, from_s, scene.time_s(), events);
+    writer.add_events(events);
+    std::optional<FlowField> flow;
+    if (scene.has_flow()) {
+      FlowDisplacement moved = interval->flow();
+      flow = FlowField{moved.size, std::move(moved.x_px), std::move(moved.y_px)};
+      summary.displacement_px = std::max(summary.displacement_px, displacement(*flow));
+    }
+    add_frame(flow ? &*flow : nullptr);
+    summary.events += std::ssize(events);
+    summary.duration_s += scene.time_s() - std::exchange(from_s, scene.time_s());
+  }
+  writer.commit();
+  return summary;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -127,6 +190,76 @@ SimulationReport simulate(const SimulationManifest& manifest, const SimulationOp
   report.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
+}
+
+namespace {
+
+/// All recordings as one; pixels and duration are those of one with the same events a pixel and
+/// second.
+RecordingSummary sum(const std::vector<RecordingSummary>& recordings) {
+  RecordingSummary total;
+  double pixel_seconds = 0;
+  for (const RecordingSummary& recording : recordings) {
+    total.frames += recording.frames;
+    total.events += recording.events;
+    total.displacement_px = std::max(total.displacement_px, recording.displacement_px);
+    pixel_seconds += static_cast<double>(recording.pixels) * recording.duration_s;
+  }
+  total.name = "all";
+  total.pixels = 1;
+  total.duration_s = pixel_seconds;
+  return total;
+}
+
+std::string table_line(const RecordingSummary& recording) {
+  return fmt::format("{:24.200} {:8} {:12} {:10.3f} {:10.1f}\n", recording.name, recording.frames,
+                     recording.events, recording.events_per_pixel_second(),
+                     recording.displacement_px);
+}
+
+nlohmann::json summary_json(const RecordingSummary& recording) {
+  return {{"name", recording.name},
+          {"frames", recording.frames},
+          {"events", recording.events},
+          {"events_per_pixel_second", recording.events_per_pixel_second()},
+          {"displacement_px", recording.displacement_px}};
+}
+
+}  // namespace
+
+double RecordingSummary::events_per_pixel_second() const {
+  const double pixel_seconds = static_cast<double>(pixels) * duration_s;
+  return pixel_seconds > 0 ? static_cast<double>(events) / pixel_seconds : 0;
+}
+
+std::string to_text(const SimulationReport& report) {
+  std::string text;
+  if (!report.made.empty()) {
+    text = fmt::format("{:24} {:>8} {:>12} {:>10} {:>10}\n", "recording", "frames", "events",
+                       "per px s", "px a frame");
+    for (const RecordingSummary& recording : report.made) text += table_line(recording);
+  }
+  const RecordingSummary total = sum(report.made);
+  if (report.made.size() > 1) text += table_line(total);
+  return text +
+         fmt::format("{} recordings made, {} kept from before; {:.1f} s, {:.2f} s a frame\n{}\n",
+                     report.made.size(), report.kept.size(), report.wall_seconds,
+                     total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0,
+                     report.folder);
+}
+
+std::string to_json(const SimulationReport& report) {
+  nlohmann::json recordings = nlohmann::json::array();
+  for (const RecordingSummary& recording : report.made) {
+    recordings.push_back(summary_json(recording));
+  }
+  const nlohmann::json json = {{"event", "report"},
+                               {"folder", report.folder},
+                               {"made", recordings},
+                               {"kept", report.kept},
+                               {"total", summary_json(sum(report.made))},
+                               {"wall_seconds", report.wall_seconds}};
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -5,12 +5,50 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <vector>
 
-#include "manifests/simulation_manifest.h"
-#include "pipeline/progress/progress.h"
-#include "pipeline/simulation/simulation_report.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/events.h"
+#include "manifests/values/simulation.h"
+#include "pipeline/runtime/progress.h"
+#include "pipeline/simulation/scene.h"
 
 namespace eventgan {
+
+/// One recording made.
+struct RecordingSummary {
+  std::string name;
+  std::int64_t frames = 0;
+  std::int64_t events = 0;
+  std::int64_t pixels = 0;     ///< of a frame
+  double duration_s = 0;       ///< from first to last frame
+  double displacement_px = 0;  ///< from a frame to the next: the largest 99.5th percentile over the
+                               ///< pixels; 0 where the flow is not known
+
+  double events_per_pixel_second() const;
+};
+
+/// What a simulation did.
+struct SimulationReport {
+  std::string folder;
+  std::vector<RecordingSummary> made;  ///< in the order of the manifest
+  std::vector<std::string> kept;       ///< names of recordings that an earlier run had made
+  double wall_seconds = 0;
+};
+
+/// A few lines for a person: a table of the recordings, and their sum.
+std::string to_text(const SimulationReport& report);
+
+/// One line of JSON.
+std::string to_json(const SimulationReport& report);
+
+/// Lets a sensor look at a scene to its end and writes frames, events and flows as a recording
+/// (MvsecWriter), which appears under its name when it is whole. `on_frame` is called after each
+/// frame. Throws what scene, sensor and writer throw. Thread safe for different scenes and files.
+RecordingSummary record(Scene& scene, const SensorSpec& sensor, CounterRandom random,
+                        const std::filesystem::path& file, const std::string& settings,
+                        const std::function<void()>& on_frame);
 
 struct SimulationOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's

@@ -3,8 +3,7 @@
 #include <span>
 #include <vector>
 
-#include "manifests/event.h"
-#include "manifests/volume.h"
+#include "manifests/values/events.h"
 
 namespace eventgan {
 
@@ -13,5 +12,17 @@ namespace eventgan {
 /// → t* = 0. Throws std::invalid_argument for an event outside the picture or a time that is not
 /// finite. Thread safe.
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape);
+
+/// The average-timestamp picture of the paper, per polarity: at each pixel the mean of the bins'
+/// times τ_b = 0.1 + 0.9 b/(B-1), weighted by the volume: T(x,y) = Σ_b τ_b V_b / (Σ_b V_b + 1e-5);
+/// 0 without events. The published picture is (positive + negative)/2.
+struct TimeImage {
+  ImageSize size;
+  std::vector<float> positive;  ///< [y, x] in [0, 1]
+  std::vector<float> negative;  ///< [y, x] in [0, 1]
+};
+
+/// volume: [2 bins, H, W] float32, ≥ 0, C order. B = 1 has τ = 0.1. Thread safe.
+TimeImage time_image(std::span<const float> volume, const VolumeShape& shape);
 
 }  // namespace eventgan

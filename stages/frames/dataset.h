@@ -1,11 +1,14 @@
 #pragma once
 
+#include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
-#include "manifests/faults.h"
-#include "manifests/labels.h"
-#include "manifests/pairs.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
 
 namespace eventgan {
 
@@ -70,5 +73,10 @@ class Dataset {
   /// kitti/training/image_2"); one line each.
   virtual std::vector<std::string> notes() const { return {}; }
 };
+
+/// Opens the source described by `spec`; relative paths start at `base`, the manifest's folder.
+/// Throws InputError if the source's root or an annotation file is missing or unreadable,
+/// UsageError if the manifest's keys do not fit what is there.
+std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesystem::path& base);
 
 }  // namespace eventgan

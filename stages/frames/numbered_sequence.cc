@@ -8,15 +8,13 @@
 #include <map>
 #include <optional>
 
-#include "manifests/faults.h"
-#include "stages/frames/folder_listing.h"
+#include "manifests/values/faults.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kMaxDigits = 18;
-
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 bool ends_with_ignoring_case(std::string_view name, std::string_view lower_case_end) {
   return name.size() >= lower_case_end.size() &&

@@ -11,6 +11,9 @@
 
 namespace eventgan {
 
+/// One of 0 to 9, whatever the locale.
+inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 /// Pictures that a folder of frames may hold. Where a frame is there under two of them, the first
 /// counts.
 inline const std::vector<std::string_view> kPictureExtensions = {".png", ".jpg",  ".jpeg", ".bmp",

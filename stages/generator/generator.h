@@ -5,7 +5,7 @@
 #include <span>
 #include <string>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
 
@@ -48,5 +48,10 @@ class Generator {
   /// Engine, precision and the libraries that change bytes, for the plan's fingerprint.
   virtual std::string description() const = 0;
 };
+
+/// Throws std::invalid_argument "expected frames [2, H, W] and a volume [2 bins, H, W] of ..., got
+/// ..." unless the spans are what Generator::generate takes for this size.
+void check_generator_spans(std::span<const float> frames, ImageSize size,
+                           std::span<const float> volume, int bins);
 
 }  // namespace eventgan

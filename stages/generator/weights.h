@@ -1,16 +1,28 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 #include "stages/generator/generator.h"
 
 namespace eventgan {
+
+// What of the network's shape (DESIGN section 4) does not depend on the weights.
+
+inline constexpr int kNetworkLevels = 4;  ///< encoders, and as many decoders
+inline constexpr int kResidualBlocks = 2;
+inline constexpr float kLeakySlope = 0.01f;  ///< LeakyReLU turns x < 0 into this times x
+
+/// Size of what an encoder makes of a picture: both sides halved, rounded up.
+constexpr ImageSize half_size(ImageSize size) {
+  return {(size.height + 1) / 2, (size.width + 1) / 2};
+}
 
 /// One convolution of the folded network.
 struct Convolution {
@@ -26,7 +38,7 @@ struct Convolution {
 constexpr int kMostBaseChannels = 1024;  ///< of Weights::base_channels
 constexpr int kMostWeightBins = 64;      ///< of Weights::bins
 
-struct Calibration;  // stages/generator/calibration
+struct Calibration;  // calibration.h
 
 /// The generator's network (DESIGN section 4), spectral and batch norm folded into the
 /// convolutions.
@@ -54,5 +66,10 @@ std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t valu
 /// Throws std::runtime_error "expected X, got Y, in NAME" unless the convolutions have exactly the
 /// layout's names and shapes and all numbers are finite.
 void check_weights(const Weights& weights, const std::string& name);
+
+/// A network of random numbers, for trying the program before weights exist: its volumes mean
+/// nothing as events. He initialisation (normal, σ² = 2/fan-in), biases zero; the same seed gives
+/// the same numbers everywhere.
+Weights untrained_weights(int base_channels, int bins, std::uint64_t seed);
 
 }  // namespace eventgan

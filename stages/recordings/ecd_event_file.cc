@@ -1,12 +1,100 @@
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
+#include <system_error>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "stages/recordings/ecd_event_file_internal.h"
-#include "stages/recordings/ecd_event_line_internal.h"
 
 namespace eventgan {
+
+RandomAccessFile::RandomAccessFile(const std::filesystem::path& path)
+    : name_(path.string()), descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
+  if (descriptor_ < 0) {
+    throw InputError("expected a readable file, got " + std::string(std::strerror(errno)) +
+                     ", in " + name_);
+  }
+  struct stat status {};
+  if (::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
+    ::close(descriptor_);
+    throw InputError("expected a file, got a folder or device, in " + name_);
+  }
+  size_bytes_ = status.st_size;
+}
+
+RandomAccessFile::~RandomAccessFile() { ::close(descriptor_); }
+
+std::string RandomAccessFile::read(std::int64_t begin, std::int64_t end) const {
+  std::string bytes(static_cast<std::size_t>(end - begin), '\0');
+  std::size_t have = 0;
+  while (have < bytes.size()) {
+    const ssize_t got = ::pread(descriptor_, bytes.data() + have, bytes.size() - have,
+                                static_cast<off_t>(begin) + static_cast<off_t>(have));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      throw InputError("expected readable bytes, got " +
+                       std::string(got < 0 ? std::strerror(errno) : "a file that has shrunk") +
+                       ", in " + name_);
+    }
+    have += static_cast<std::size_t>(got);
+  }
+  return bytes;
+}
+
+namespace {
+
+bool is_blank(char character) { return character == ' ' || character == '\t' || character == '\r'; }
+
+/// Takes a number and the blanks after it off the front of `text`; false if there is none.
+template <class Number>
+bool take_number(const char*& begin, const char* end, Number& number) {
+  const auto [stop, error] = std::from_chars(begin, end, number);
+  if (error != std::errc() || (stop != end && !is_blank(*stop))) return false;
+  begin = stop;
+  while (begin != end && is_blank(*begin)) ++begin;
+  return true;
+}
+
+/// Foreign text for a message: cut, all but printable ASCII as '?'.
+[[noreturn]] void refuse(std::string_view line) {
+  std::string text(line.substr(0, 40));
+  for (char& character : text) {
+    if (character < ' ' || character > '~') character = '?';
+  }
+  throw EventFault("expected an event \"t x y p\", got \"" + text + "\"");
+}
+
+}  // namespace
+
+StoredEvent parse_ecd_event(std::string_view line) {
+  const char* begin = line.data();
+  const char* const end = begin + line.size();
+  double t_s = 0;
+  int x = 0;
+  int y = 0;
+  int polarity = 0;
+  if (!take_number(begin, end, t_s) || !take_number(begin, end, x) || !take_number(begin, end, y) ||
+      !take_number(begin, end, polarity) || begin != end) {
+    refuse(line);
+  }
+  return {static_cast<double>(x), static_cast<double>(y), t_s, static_cast<double>(polarity)};
+}
+
+double parse_ecd_event_time(std::string_view line) {
+  const char* begin = line.data();
+  double t_s = 0;
+  if (!take_number(begin, line.data() + line.size(), t_s) || !std::isfinite(t_s)) refuse(line);
+  return t_s;
+}
+
 namespace {
 
 constexpr std::int64_t kLongestLine = 256;

@@ -2,14 +2,44 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <string_view>
 #include <vector>
 
-#include "manifests/event.h"
+#include "manifests/values/events.h"
 #include "stages/recordings/event_check_internal.h"
-#include "stages/recordings/random_access_file_internal.h"
 
 namespace eventgan {
+
+/// A file of which parts are read, too large to be held whole. Thread safe.
+///
+/// Why not mapped into memory: a read error or a file that shrinks would end the process.
+class RandomAccessFile {
+ public:
+  /// Throws InputError if it is no readable file.
+  explicit RandomAccessFile(const std::filesystem::path& path);
+  ~RandomAccessFile();
+  RandomAccessFile(const RandomAccessFile&) = delete;
+  RandomAccessFile& operator=(const RandomAccessFile&) = delete;
+
+  const std::string& name() const { return name_; }
+  std::int64_t size_bytes() const { return size_bytes_; }
+
+  /// The bytes begin..end, which must lie in the file. Throws InputError if they cannot be read.
+  std::string read(std::int64_t begin, std::int64_t end) const;
+
+ private:
+  std::string name_;
+  int descriptor_;
+  std::int64_t size_bytes_ = 0;
+};
+
+/// Parses a line "t x y p" of an ECD `events.txt`: t in seconds, the others whole numbers,
+/// between blanks or tabs; without its line end, but for a CR. Throws EventFault.
+StoredEvent parse_ecd_event(std::string_view line);
+
+/// Its time alone, which must be finite here, since it is searched by.
+double parse_ecd_event_time(std::string_view line);
 
 /// `events.txt` of an ECD recording: a line "t x y p" for each event, in time order. Only what is
 /// asked for is read: a time is found by halving the file. Thread safe.

@@ -7,11 +7,19 @@
 #include <vector>
 
 #include "stages/recordings/ecd_event_file_internal.h"
-#include "stages/recordings/ecd_image_list_internal.h"
-#include "stages/recordings/event_boundaries_internal.h"
+#include "stages/recordings/frame_intervals_internal.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
+
+/// `images.txt` of an ECD recording: a line "t path" for each frame.
+struct EcdImageList {
+  std::vector<double> times_s;     ///< strictly ascending
+  std::vector<std::string> paths;  ///< relative to the recording's folder, as written
+};
+
+/// Throws InputError "expected X, got Y, in FILE (line 3)", the line counted from 1.
+EcdImageList read_ecd_image_list(const std::filesystem::path& file);
 
 /// A folder as those of the Event Camera Dataset (ECD): `images.txt`, the pictures it names, and
 /// `events.txt`. It knows no flow. The first picture, which tells the size, is read on opening.

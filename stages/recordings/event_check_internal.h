@@ -3,8 +3,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "manifests/event.h"
-#include "manifests/image_size.h"
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
 

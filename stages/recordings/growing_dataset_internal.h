@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/hdf5/hdf5_internal.h"
+#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 

@@ -3,10 +3,9 @@
 #include <system_error>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "stages/frames/decoding/picture_limits.h"
-#include "stages/recordings/frame_range_internal.h"
-#include "stages/recordings/frame_times_internal.h"
+#include "manifests/values/faults.h"
+#include "stages/base/pictures/picture_file.h"
+#include "stages/recordings/frame_intervals_internal.h"
 #include "stages/recordings/hdf5_recording_internal.h"
 
 namespace eventgan {

@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
-#include "stages/recordings/event_boundaries_internal.h"
+#include "manifests/values/frames.h"
 #include "stages/recordings/event_check_internal.h"
+#include "stages/recordings/frame_intervals_internal.h"
 #include "stages/recordings/hdf5_table_internal.h"
 #include "stages/recordings/recording.h"
 

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <limits>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "stages/recordings/hdf5_table_internal.h"
 
 namespace eventgan {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "stages/hdf5/hdf5_internal.h"
+#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 

@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stages/hdf5/hdf5_output_file_internal.h"
+#include "stages/base/hdf5/hdf5_output_file_internal.h"
 #include "stages/recordings/event_check_internal.h"
 #include "stages/recordings/growing_dataset_internal.h"
 #include "stages/recordings/hdf5_recording_internal.h"

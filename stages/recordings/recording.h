@@ -1,12 +1,15 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "manifests/event.h"
-#include "manifests/grey_image.h"
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/training.h"
 
 namespace eventgan {
 
@@ -53,5 +56,11 @@ class Recording {
   /// the frames read since then.
   virtual std::vector<std::string> notes() const { return {}; }
 };
+
+/// Opens a recording: reads the frames' times and checks that everything is there and fits
+/// together; where a frame's events end is looked up when first asked for. Throws InputError
+/// "expected X, got Y, in PATH" if it is absent or not of this format. `camera` is for kMvsec.
+std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, RecordingFormat format,
+                                          const std::string& camera = "left");
 
 }  // namespace eventgan

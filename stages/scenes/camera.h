@@ -1,9 +1,24 @@
 #pragma once
 
-#include "manifests/labels.h"
-#include "stages/scenes/vector3.h"
+#include <cmath>
+
+#include "manifests/values/labels.h"
 
 namespace eventgan {
+
+/// A point or direction in a camera's frame: x right, y down, z forward.
+struct Vector3 {
+  double x = 0;
+  double y = 0;
+  double z = 0;
+
+  Vector3 operator+(const Vector3& other) const { return {x + other.x, y + other.y, z + other.z}; }
+  Vector3 operator-(const Vector3& other) const { return {x - other.x, y - other.y, z - other.z}; }
+  Vector3 operator*(double factor) const { return {x * factor, y * factor, z * factor}; }
+};
+
+inline double dot(const Vector3& a, const Vector3& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline double length(const Vector3& v) { return std::sqrt(dot(v, v)); }
 
 /// Where a point of the camera's frame appears: u = f_x X/Z + c_x, v = f_y Y/Z + c_y; Z > 0.
 inline Point project(const Intrinsics& camera, const Vector3& point) {

@@ -2,14 +2,55 @@
 
 #include <system_error>
 
-#include "manifests/faults.h"
-#include "stages/scenes/demo_manifest.h"
+#include "manifests/values/faults.h"
 #include "stages/scenes/layouts/human36m_layout_writer.h"
 #include "stages/scenes/layouts/kitti_layout_writer.h"
 #include "stages/scenes/layouts/mpii_layout_writer.h"
 #include "stages/scenes/layouts/output_files.h"
 
 namespace eventgan {
+
+std::string demo_manifest(std::uint64_t seed) {
+  return R"(// A job for `eventgan convert`. Relative paths start at this file's folder.
+{
+  "format": "eventgan-manifest",
+  "version": 1,
+  "name": "demo",
+
+  // Everything random (which gap a pair gets) follows from this number.
+  "seed": )" +
+         std::to_string(seed) +
+         R"(,
+
+  "sources": [
+    // Labels of cars belong to the later frame of a pair, 1 to 3 frames after the earlier one.
+    { "dataset": "kitti_object", "root": "kitti/training",
+      "pairs": { "gaps": [1, 2, 3], "side": "before", "choose": "one" } },
+
+    // The labelled frame lies in the middle of a pair 2 or 4 frames apart.
+    { "dataset": "mpii", "root": "mpii",
+      "pairs": { "gaps": [2, 4], "side": "around", "choose": "one" } },
+
+    // The labelled frame comes first. The last ones of a sequence have no partner.
+    { "dataset": "human36m", "root": "h36m", "layout": "fetch",
+      "pairs": { "gaps": [1, 2], "side": "after", "choose": "one" } }
+  ],
+
+  // Pictures of any size are scaled to fit and laid into the middle of the volume.
+  "image": { "width": 346, "height": 260, "fit": "letterbox", "preset": "mpii" },
+
+  // The weights that come with the program. A file of your own may stand here, of
+  // eventgan import-weights CHECKPOINT eventgan.safetensors, or of eventgan train.
+  "generator": { "weights": "shipped", "precision": "float32" },
+
+  "volume": { "bins": 9, "normalize": "none" },
+  "output": { "directory": "events", "samples_per_shard": 8, "dtype": "float16",
+              "deflate_level": 1 },
+  "errors": { "policy": "quarantine", "max_count": 100, "max_fraction": 0.01 }
+}
+)";
+}
+
 namespace {
 
 void require_new_or_empty(const std::filesystem::path& folder) {

@@ -2,8 +2,13 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 
 namespace eventgan {
+
+/// The text of the manifest that converts the demo dataset beside it, with comments for a reader
+/// who wants to write one of his own.
+std::string demo_manifest(std::uint64_t seed);
 
 /// Writes a small synthetic dataset with exact labels into `folder`, in the layouts of KITTI object
 /// (kitti/training/{image_2, prev_2, label_2, calib}), MPII (mpii/: both .mat files, images/ and

@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
 
@@ -40,5 +41,21 @@ void set_pixel(Picture& picture, int x, int y, const Colour& colour);
 /// Write the file, whose folder must exist. Throw std::runtime_error naming the path.
 void write_png(const Picture& picture, const std::filesystem::path& path);
 void write_jpeg(const Picture& picture, const std::filesystem::path& path);
+
+/// A surface pattern without end: random values on a grid of whole numbers, smooth between them. A
+/// pure function of the place, so that a moving surface carries its pattern with it.
+class Texture {
+ public:
+  explicit Texture(CounterRandom random) : random_(random) {}
+
+  /// One value per cell of the grid, uniform in [0, 1).
+  float cell(int x, int y) const;
+
+  /// Smooth noise in [0, 1) that varies over a distance of about 1.
+  float noise(double x, double y) const;
+
+ private:
+  CounterRandom random_;
+};
 
 }  // namespace eventgan

@@ -4,15 +4,20 @@
 #include <string>
 #include <vector>
 
-#include "manifests/marker.h"
+#include "manifests/values/shard.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
+
+/// What a marker says of its shard's rows that is not so: lines "expected X, got Y" with X the
+/// marker's, at most one for each field, without the file's name; empty if sound.
+std::vector<std::string> contents_faults(const ShardContents& marker, const ShardContents& shard);
 
 /// Every fault of a shard, one line each, "FILE: what is wrong"; empty if it is sound. Checks that
 /// the marker's size and SHA-256 are the file's; that every dataset of the format is there with its
 /// type and shape; that ragged offsets ascend to the number of rows; that all chunks decode
 /// (fletcher32), hold finite values ≥ 0, and agree with the stored statistics; that all the marker
-/// says of the rows (see shard_contents.h) is so. Never throws for a bad file. Thread safe, as
+/// says of the rows (see shard_tables.h) is so. Never throws for a bad file. Thread safe, as
 /// ShardReader is.
 std::vector<std::string> check_shard(const std::filesystem::path& shard, const ShardMarker& marker);
 

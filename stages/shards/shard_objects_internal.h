@@ -1,9 +1,20 @@
 #pragma once
 
-#include "manifests/shard.h"
-#include "stages/hdf5/hdf5_internal.h"
+#include <string>
+
+#include "manifests/values/shard.h"
+#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
+
+inline constexpr char kVolumePath[] = "/events/volume";
+
+// What the attributes of /events/volume say in words.
+
+/// One text for each unit and normalisation, so that it can be read back.
+std::string unit_text(VolumeUnit unit, Normalization normalization);
+
+std::string time_axis_text(VolumeUnit unit);
 
 // The objects of a shard that are not columns: root attributes, groups, the volume dataset, and the
 // attributes that explain. All throw Hdf5Error.

@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "manifests/shard.h"
-#include "stages/shards/shard_contents.h"
+#include "manifests/values/shard.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 

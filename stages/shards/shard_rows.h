@@ -1,6 +1,6 @@
 #pragma once
 
-#include "manifests/shard.h"
+#include "manifests/values/shard.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {

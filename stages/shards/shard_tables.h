@@ -1,13 +1,18 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
+
+#include "manifests/values/labels.h"
+#include "manifests/values/shard.h"
 
 namespace eventgan {
 
 // Everything in a shard but the volumes, column by column: a member for each dataset, of the same
-// name and element type; arrays with inner dimensions are flat, in C order. shard_columns.h says
+// name and element type; arrays with inner dimensions are flat, in C order. shard_tables.h says
 // which is where; manifests/guides/shard_format.md says what each means.
 
 /// `/events/*`, one row a sample.
@@ -64,5 +69,100 @@ struct ShardTables {
   PoseColumns poses;
   std::vector<std::uint8_t> valid;
 };
+
+/// What a column has one row for. kOffsets: one more row than samples.
+enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
+
+/// Where a column stands in a shard, and its shape [rows, inner...].
+struct ColumnSpec {
+  const char* path;
+  Rows rows;
+  std::vector<std::size_t> inner;
+  bool optional = false;  ///< not in the shard if no row has a value
+};
+
+/// Calls visit(ColumnSpec, column) for every column, offsets before the rows they lead to. Writer,
+/// reader and check all go through this list, so it is the one place where the layout of a shard
+/// stands in the code. Tables: ShardTables or const ShardTables. `joints` = number of joint names.
+template <class Tables, class Visit>
+void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
+  auto& e = tables.events;
+  visit(ColumnSpec{"/events/eta98", Rows::kSamples, {}}, e.eta98);
+  visit(ColumnSpec{"/events/scale", Rows::kSamples, {}}, e.scale);
+  visit(ColumnSpec{"/events/statistics/nonzero_fraction", Rows::kSamples, {}}, e.nonzero_fraction);
+  visit(ColumnSpec{"/events/statistics/sum_positive", Rows::kSamples, {}}, e.sum_positive);
+  visit(ColumnSpec{"/events/statistics/sum_negative", Rows::kSamples, {}}, e.sum_negative);
+  visit(ColumnSpec{"/events/statistics/max", Rows::kSamples, {}}, e.max);
+  visit(ColumnSpec{"/events/statistics/flags", Rows::kSamples, {}}, e.flags);
+
+  auto& p = tables.pairs;
+  visit(ColumnSpec{"/pairs/sample_id", Rows::kSamples, {}}, p.sample_id);
+  visit(ColumnSpec{"/pairs/dataset", Rows::kSamples, {}}, p.dataset);
+  visit(ColumnSpec{"/pairs/sequence", Rows::kSamples, {}}, p.sequence);
+  visit(ColumnSpec{"/pairs/prev_path", Rows::kSamples, {}}, p.prev_path);
+  visit(ColumnSpec{"/pairs/next_path", Rows::kSamples, {}}, p.next_path);
+  visit(ColumnSpec{"/pairs/prev_index", Rows::kSamples, {}}, p.prev_index);
+  visit(ColumnSpec{"/pairs/next_index", Rows::kSamples, {}}, p.next_index);
+  visit(ColumnSpec{"/pairs/prev_video_frame", Rows::kSamples, {}}, p.prev_video_frame);
+  visit(ColumnSpec{"/pairs/next_video_frame", Rows::kSamples, {}}, p.next_video_frame);
+  visit(ColumnSpec{"/pairs/gap_frames", Rows::kSamples, {}}, p.gap_frames);
+  visit(ColumnSpec{"/pairs/gap_s", Rows::kSamples, {}}, p.gap_s);
+  visit(ColumnSpec{"/pairs/label_index", Rows::kSamples, {}}, p.label_index);
+  visit(ColumnSpec{"/pairs/label_position", Rows::kSamples, {}}, p.label_position);
+  visit(ColumnSpec{"/pairs/source_size", Rows::kSamples, {2}}, p.source_size);
+  visit(ColumnSpec{"/pairs/source_to_volume", Rows::kSamples, {2, 3}}, p.source_to_volume);
+
+  visit(ColumnSpec{"/labels/original", Rows::kSamples, {}}, tables.original);
+
+  auto& b = tables.boxes;
+  visit(ColumnSpec{"/labels/boxes/offsets", Rows::kOffsets, {}}, b.offsets);
+  visit(ColumnSpec{"/labels/boxes/xyxy", Rows::kBoxes, {4}}, b.xyxy);
+  visit(ColumnSpec{"/labels/boxes/xyxy_unclipped", Rows::kBoxes, {4}}, b.xyxy_unclipped);
+  visit(ColumnSpec{"/labels/boxes/xyxy_source", Rows::kBoxes, {4}}, b.xyxy_source);
+  visit(ColumnSpec{"/labels/boxes/class_id", Rows::kBoxes, {}}, b.class_id);
+  visit(ColumnSpec{"/labels/boxes/truncation", Rows::kBoxes, {}}, b.truncation);
+  visit(ColumnSpec{"/labels/boxes/occlusion", Rows::kBoxes, {}}, b.occlusion);
+  visit(ColumnSpec{"/labels/boxes/alpha", Rows::kBoxes, {}}, b.alpha);
+  visit(ColumnSpec{"/labels/boxes/box3d", Rows::kBoxes, {7}}, b.box3d);
+  visit(ColumnSpec{"/labels/boxes/ignore", Rows::kBoxes, {}}, b.ignore);
+  visit(ColumnSpec{"/labels/boxes/ignore_source", Rows::kBoxes, {}}, b.ignore_source);
+  visit(ColumnSpec{"/labels/boxes/track_id", Rows::kBoxes, {}}, b.track_id);
+
+  auto& h = tables.poses;
+  visit(ColumnSpec{"/labels/poses/offsets", Rows::kOffsets, {}}, h.offsets);
+  visit(ColumnSpec{"/labels/poses/joints", Rows::kPersons, {joints, 2}}, h.joints);
+  visit(ColumnSpec{"/labels/poses/joints_source", Rows::kPersons, {joints, 2}}, h.joints_source);
+  visit(ColumnSpec{"/labels/poses/visible", Rows::kPersons, {joints}}, h.visible);
+  visit(ColumnSpec{"/labels/poses/center", Rows::kPersons, {2}}, h.center);
+  visit(ColumnSpec{"/labels/poses/center_source", Rows::kPersons, {2}}, h.center_source);
+  visit(ColumnSpec{"/labels/poses/scale", Rows::kPersons, {}}, h.scale);
+  visit(ColumnSpec{"/labels/poses/scale_volume", Rows::kPersons, {}}, h.scale_volume);
+  visit(ColumnSpec{"/labels/poses/head_box", Rows::kPersons, {4}}, h.head_box);
+  visit(ColumnSpec{"/labels/poses/head_box_source", Rows::kPersons, {4}}, h.head_box_source);
+  visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, true}, h.joints3d_mm);
+  visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, true}, h.camera);
+  visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, true}, h.camera_source);
+  visit(ColumnSpec{"/labels/poses/camera_distortion", Rows::kPersons, {5}, true},
+        h.camera_distortion);
+
+  visit(ColumnSpec{"/valid", Rows::kSamples, {}}, tables.valid);
+}
+
+/// What a marker says of its shard's rows, so that a whole dataset can be laid out from markers.
+struct ShardContents {
+  std::vector<std::int32_t> boxes;              ///< rows of /labels/boxes by slot
+  std::vector<std::int32_t> persons;            ///< rows of /labels/poses by slot
+  std::map<std::string, std::int64_t> classes;  ///< boxes by class name; only names that occur
+  std::map<int, std::int64_t> gaps;             ///< samples by gap in frames
+  std::vector<std::string> optional_columns;    ///< paths, in the order of the columns
+  bool operator==(const ShardContents&) const = default;
+};
+
+/// Counts the rows of consistent tables.
+ShardContents contents_of(const ShardTables& tables, const LabelSchema& schema);
+
+/// Puts them into the marker's fields of the same names, and gives those.
+void enter(ShardContents contents, ShardMarker& marker);
+ShardContents contents_of(const ShardMarker& marker);
 
 }  // namespace eventgan

@@ -5,11 +5,11 @@
 #include <system_error>
 #include <vector>
 
-#include "stages/files/sha256.h"
-#include "stages/hdf5/hdf5_output_file_internal.h"
-#include "stages/shards/shard_columns.h"
+#include "stages/base/files/sha256.h"
+#include "stages/base/hdf5/hdf5_output_file_internal.h"
 #include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/shard_rows.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 

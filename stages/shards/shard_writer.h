@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "manifests/shard.h"
-#include "stages/shards/shard_contents.h"
+#include "manifests/values/shard.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 

@@ -2,21 +2,108 @@
 
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
+#include <torch/nn/module.h>
 
 #include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
 
-#include "stages/training/buffer_snapshot_internal.h"
-#include "stages/training/check_trainable.h"
-#include "stages/training/learner_internal.h"
-#include "stages/training/learning_rate.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/training.h"
 #include "stages/training/networks/network_state_internal.h"
+#include "stages/training/networks/patch_discriminator_internal.h"
+#include "stages/training/radam.h"
 #include "stages/training/training_batch_internal.h"
-#include "stages/training/training_device_internal.h"
 #include "stages/training/training_networks_internal.h"
 #include "stages/training/update_loss_internal.h"
 
 namespace eventgan {
 namespace {
+
+/// Batch norm divides by a spread, which a single value does not have: the deepest layers see one
+/// pixel of a 16x16 crop.
+void check_batch(const TrainingManifest& manifest) {
+  const auto deepest = [](int side) { return (side + 15) / 16; };
+  if (manifest.batch > 1 || deepest(manifest.crop.height) * deepest(manifest.crop.width) > 1)
+    return;
+  throw UsageError("expected a batch of at least 2 for a crop of " +
+                   std::to_string(manifest.crop.width) + "x" +
+                   std::to_string(manifest.crop.height) + ", got 1, in " + manifest.name);
+}
+
+/// The manifest's reader refuses these too; a manifest may also be made in code.
+void check_generator_phase(const TrainingManifest& manifest) {
+  const LossWeights& weights = manifest.losses;
+  if (manifest.steps.generator == 0) return;
+  if (weights.adversarial == 0 && weights.flow == 0 && weights.reconstruction == 0 &&
+      weights.volume == 0 && weights.count == 0) {
+    throw UsageError("expected a loss for the generator, got weight 0 for all, in " +
+                     manifest.name);
+  }
+  if (weights.adversarial == 0) return;
+  constexpr int kSmallest = PatchDiscriminatorImpl::smallest_side();
+  if (manifest.crop.height < kSmallest || manifest.crop.width < kSmallest) {
+    throw UsageError("expected a crop of at least " + std::to_string(kSmallest) +
+                     " pixels a side for the adversarial loss, got " +
+                     std::to_string(manifest.crop.width) + "x" +
+                     std::to_string(manifest.crop.height) + ", in " + manifest.name);
+  }
+  if (manifest.batch % 2 != 0) {
+    throw UsageError("expected an even batch for the adversarial loss, got " +
+                     std::to_string(manifest.batch) + ", in " + manifest.name);
+  }
+}
+
+}  // namespace
+
+void check_trainable(const TrainingManifest& manifest) {
+  check_batch(manifest);
+  check_generator_phase(manifest);
+}
+
+double learning_rate(double rate, double final_fraction, std::int64_t step, std::int64_t steps) {
+  const double progress = step < steps ? double(step) / double(steps) : 1;
+  const double fall = (1 + std::cos(std::numbers::pi * progress)) / 2;
+  return rate * (final_fraction + (1 - final_fraction) * fall);
+}
+
+/// A network and what changes it.
+struct Learner {
+  Learner(const std::string& name, torch::nn::Module& module, double base_rate,
+          const OptimizerSpec& spec);
+
+  std::string state_prefix;  ///< of the optimiser's state: "optimizer.NAME"
+  torch::nn::Module* network;
+  double rate;  ///< at the start of its phase
+  RAdam optimizer;
+};
+
+Learner::Learner(const std::string& name, torch::nn::Module& module, double base_rate,
+                 const OptimizerSpec& spec)
+    : state_prefix("optimizer." + name),
+      network(&module),
+      rate(base_rate),
+      optimizer(module.parameters(), {base_rate, spec.betas[0], spec.betas[1]}) {}
+
+namespace {
+
+/// Batch norm's mode, and whether gradients are computed.
+void set_learning(torch::nn::Module& network, bool learning) {
+  network.train(learning);
+  for (at::Tensor& parameter : network.parameters()) parameter.set_requires_grad(learning);
+}
+
+/// Of all parameters that have a gradient. A finite one whose sum is beyond float32 counts as not
+/// finite.
+bool gradients_are_finite(const torch::nn::Module& network) {
+  // A sum is not finite if a term is not, and costs one pass.
+  std::vector<at::Tensor> sums;
+  for (const at::Tensor& parameter : network.parameters()) {
+    if (parameter.grad().defined()) sums.push_back(parameter.grad().sum());
+  }
+  return sums.empty() || at::isfinite(at::stack(sums)).all().item<bool>();
+}
 
 std::string origins(std::span<const TrainingSample> samples) {
   std::string text;

@@ -8,11 +8,21 @@
 #include <string>
 #include <vector>
 
-#include "manifests/state_dict.h"
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
+#include "manifests/values/weights.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan {
+
+/// Throws UsageError if the networks cannot be trained so: a single crop of up to 16x16, too little
+/// for batch norm; a generator phase with no loss, or with the adversarial one and a crop smaller
+/// than 48 pixels a side or an odd batch.
+void check_trainable(const TrainingManifest& manifest);
+
+/// The rate of step 0..steps-1 of a phase, falling from `rate` to final_fraction · rate by half a
+/// cosine: rate · (f + (1 - f) · (1 + cos(π step / steps)) / 2). Steps from `steps` on have the
+/// final rate.
+double learning_rate(double rate, double final_fraction, std::int64_t step, std::int64_t steps);
 
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
 /// "volume", "count", "generator" (adversarial), "generator.total", "discriminator",

@@ -1,10 +1,78 @@
-#include "manifests/counter_random.h"
-#include "stages/training/autocast_scope_internal.h"
-#include "stages/training/networks/initialization_internal.h"
+#include <ATen/autocast_mode.h>
+#include <c10/core/Device.h>
+#include <torch/cuda.h>
+
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
 #include "stages/training/networks/network_state_internal.h"
 #include "stages/training/training_networks_internal.h"
 
 namespace eventgan {
+
+c10::Device training_device(const std::string& name) {
+  if (name == "cpu") return c10::kCPU;
+  if (name != "cuda") {
+    throw UsageError("expected the device \"cpu\" or \"cuda\", got \"" + name + "\"");
+  }
+  if (!torch::cuda::is_available()) {
+    throw UsageError(
+        "expected the device \"cpu\", got \"cuda\", which this LibTorch does not have (built "
+        "without "
+        "CUDA, or no device found)");
+  }
+  return c10::Device(c10::kCUDA, 0);
+}
+
+namespace {
+
+/// While it lives, this thread's convolutions on the device run in bfloat16 (LibTorch's autocast),
+/// if `enabled`. Parameters stay float32; their casts are forgotten at the end. For forward passes
+/// alone: losses and backward passes stay outside.
+class AutocastScope {
+ public:
+  AutocastScope(c10::Device device, bool enabled);
+  ~AutocastScope();
+  AutocastScope(const AutocastScope&) = delete;
+  AutocastScope& operator=(const AutocastScope&) = delete;
+
+ private:
+  void switch_to(bool on) const;
+
+  bool cuda_;
+  bool enabled_;
+  bool enabled_before_ = false;
+};
+
+}  // namespace
+
+AutocastScope::AutocastScope(c10::Device device, bool enabled)
+    : cuda_(device.is_cuda()), enabled_(enabled) {
+  if (!enabled_) return;
+  enabled_before_ = cuda_ ? at::autocast::is_enabled() : at::autocast::is_cpu_enabled();
+  if (cuda_) {
+    at::autocast::set_autocast_gpu_dtype(at::kBFloat16);
+  } else {
+    at::autocast::set_autocast_cpu_dtype(at::kBFloat16);
+  }
+  at::autocast::increment_nesting();
+  switch_to(true);
+}
+
+AutocastScope::~AutocastScope() {
+  if (!enabled_) return;
+  // The cache holds casts of parameters, which the next optimiser step makes stale.
+  if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
+  switch_to(enabled_before_);
+}
+
+void AutocastScope::switch_to(bool on) const {
+  if (cuda_) {
+    at::autocast::set_enabled(on);
+  } else {
+    at::autocast::set_cpu_enabled(on);
+  }
+}
+
 namespace {
 
 UNetSettings cycle_network(const NetworkSpec& spec, int in_channels, int out_channels) {

@@ -3,14 +3,18 @@
 #include <ATen/core/Tensor.h>
 #include <c10/core/Device.h>
 
+#include <string>
 #include <vector>
 
-#include "manifests/state_dict.h"
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
+#include "manifests/values/weights.h"
 #include "stages/training/networks/patch_discriminator_internal.h"
 #include "stages/training/networks/unet_internal.h"
 
 namespace eventgan {
+
+/// "cpu", or "cuda" where LibTorch was built with CUDA and finds a device; throws UsageError else.
+c10::Device training_device(const std::string& name);
 
 /// The four networks of a training, and in which precision they run.
 struct TrainingNetworks {

@@ -1,11 +1,8 @@
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
 
-#include "manifests/counter_random.h"
-#include "stages/training/losses/flow_loss.h"
-#include "stages/training/losses/hinge_loss.h"
-#include "stages/training/losses/reconstruction_loss.h"
-#include "stages/training/losses/volume_loss.h"
+#include "manifests/values/counter_random.h"
+#include "stages/training/losses.h"
 #include "stages/training/update_loss_internal.h"
 
 namespace eventgan {

@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
 #include "stages/training/training_batch_internal.h"
 #include "stages/training/training_networks_internal.h"
 

@@ -21,7 +21,7 @@ def read(name):
 
 def exit_codes():
     """ExitCode as the program has it: value by name. One without a value follows the one before."""
-    text = (SOURCE / "pipeline" / "errors" / "exit_codes.h").read_text()
+    text = (SOURCE / "pipeline" / "runtime" / "errors.h").read_text()
     body = re.sub(r"//.*", "", re.search(r"enum ExitCode[^{]*\{(.*?)\};", text, re.DOTALL)[1])
     return {name: int(value) for name, value in re.findall(r"(k\w+) = (\d+)", body)}
 

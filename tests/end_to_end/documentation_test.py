@@ -13,8 +13,8 @@ COMMAND = re.compile(r"\beventgan ([a-z][a-z-]*)([^#|;&]*)")
 
 
 def exit_codes():
-    """Those of pipeline/errors/exit_codes.h."""
-    return set(re.findall(r"= (\d+)", (SOURCE / "pipeline" / "errors" / "exit_codes.h").read_text()))
+    """Those of pipeline/runtime/errors.h."""
+    return set(re.findall(r"= (\d+)", (SOURCE / "pipeline" / "runtime" / "errors.h").read_text()))
 
 
 @functools.cache

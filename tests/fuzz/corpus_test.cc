@@ -8,7 +8,7 @@
 
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
-#include "stages/generator/weights_files/safetensors.h"
+#include "stages/generator/safetensors.h"
 #include "tests/fuzz/readers.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

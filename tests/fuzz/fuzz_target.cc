@@ -9,7 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "stages/generator/checkpoints/checkpoint_limits.h"
+#include "stages/generator/checkpoints/checkpoint_archive.h"
 #include "tests/fuzz/readers.h"
 
 namespace {

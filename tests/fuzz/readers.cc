@@ -4,12 +4,12 @@
 #include <fstream>
 #include <stdexcept>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
-#include "stages/generator/weights_files/safetensors.h"
-#include "stages/generator/weights_files/weights_file.h"
+#include "stages/generator/safetensors.h"
+#include "stages/generator/weights_file.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan::testing {

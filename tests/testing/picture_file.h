@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan::testing {
 

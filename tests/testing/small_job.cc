@@ -1,5 +1,6 @@
 #include "tests/testing/small_job.h"
 
+#include "manifests/documents/job_manifest.h"
 #include "tests/testing/picture_file.h"
 
 namespace eventgan::testing {

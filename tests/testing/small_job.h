@@ -1,6 +1,6 @@
 #pragma once
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan::testing {

@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <vector>
 
+#include "stages/base/files/atomic_file.h"
 #include "stages/events/pictures/time_panel_internal.h"
-#include "stages/files/atomic_file.h"
 
 namespace eventgan {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/volume.h"
+#include "manifests/values/events.h"
 
 namespace eventgan {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include "stages/events/event_volume.h"
 #include "stages/events/pictures/time_panel_internal.h"
-#include "stages/events/time_image.h"
 
 namespace eventgan {
 namespace {

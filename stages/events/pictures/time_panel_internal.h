@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <span>
 
-#include "manifests/volume.h"
+#include "manifests/values/events.h"
 
 namespace eventgan {
 

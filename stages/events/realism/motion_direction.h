@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <span>
 
-#include "manifests/volume.h"
+#include "manifests/values/events.h"
 
 namespace eventgan {
 

@@ -2,16 +2,100 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <span>
 #include <stdexcept>
 #include <string>
 
-#include "stages/events/realism/agreement_internal.h"
-#include "stages/events/time_image.h"
+#include "manifests/values/events.h"
+#include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 
 namespace eventgan {
 namespace {
+
+/// A voxel, or a sum of voxels, above this counts as an event (V2CE, Zhang et al. 2024).
+inline constexpr float kEventThreshold = 0.01f;
+
+double mean(std::span<const double> values) {
+  double sum = 0;
+  for (const double value : values) sum += value;
+  return sum / static_cast<double>(values.size());
+}
+
+bool constant(std::span<const double> values) {
+  return std::ranges::all_of(values, [&](double value) { return value == values.front(); });
+}
+
+/// Mean difference of one block of one plane: pooling is linear, so the difference of the means.
+double block_difference(const float* values, const float* real, ImageSize size, int top, int left,
+                        int side) {
+  const int bottom = std::min(top + side, size.height);
+  const int right = std::min(left + side, size.width);
+  double sum = 0;
+  for (int y = top; y < bottom; ++y) {
+    for (int x = left; x < right; ++x) {
+      const std::ptrdiff_t at = static_cast<std::ptrdiff_t>(y) * size.width + x;
+      sum += static_cast<double>(values[at]) - static_cast<double>(real[at]);
+    }
+  }
+  return sum / ((bottom - top) * (right - left));
+}
+
+/// F1 = 2 TP / (2 TP + FP + FN) of "is an event" (value > kEventThreshold), position by position;
+/// 1 if neither has an event. Spans of one size.
+double binary_match_f1(std::span<const float> values, std::span<const float> real) {
+  std::size_t both = 0;
+  std::size_t events = 0;  // 2 TP + FP + FN: the events of one plus those of the other
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    const bool here = values[i] > kEventThreshold;
+    const bool there = real[i] > kEventThreshold;
+    both += here && there;
+    events += static_cast<std::size_t>(here) + static_cast<std::size_t>(there);
+  }
+  return events == 0 ? 1.0 : 2.0 * static_cast<double>(both) / static_cast<double>(events);
+}
+
+/// Mean squared difference of two arrays [planes, y, x] after mean pooling over blocks of
+/// side x side pixels, every block counting alike; a block cut by the border is the mean of what it
+/// has.
+double pool_mse(std::span<const float> values, std::span<const float> real, ImageSize size,
+                int side) {
+  const std::size_t plane = size.pixel_count();
+  double sum = 0;
+  std::size_t blocks = 0;
+  for (std::size_t start = 0; start < values.size(); start += plane) {
+    for (int top = 0; top < size.height; top += side) {
+      for (int left = 0; left < size.width; left += side) {
+        const double difference =
+            block_difference(values.data() + start, real.data() + start, size, top, left, side);
+        sum += difference * difference;
+        ++blocks;
+      }
+    }
+  }
+  return sum / static_cast<double>(blocks);
+}
+
+/// Pearson correlation; NaN if there are no values or one side is constant.
+double pearson(std::span<const double> a, std::span<const double> b) {
+  // Exactly: a sum of squares about the mean is seldom exactly zero for a constant.
+  if (a.empty() || constant(a) || constant(b)) return std::numeric_limits<double>::quiet_NaN();
+  const double mean_a = mean(a);
+  const double mean_b = mean(b);
+  double covariance = 0;
+  double variance_a = 0;
+  double variance_b = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double from_a = a[i] - mean_a;
+    const double from_b = b[i] - mean_b;
+    covariance += from_a * from_b;
+    variance_a += from_a * from_a;
+    variance_b += from_b * from_b;
+  }
+  return covariance / std::sqrt(variance_a * variance_b);
+}
 
 void check_sizes(std::size_t volume, std::size_t real, const VolumeShape& shape,
                  const GreyImage& previous, const GreyImage& next) {
@@ -128,6 +212,55 @@ RealismScores realism_scores(std::span<const float> volume, std::span<const floa
   scores.polarity_correlation = polarity_agreement(ours.sums, previous, next);
   add_amounts(ours.volume, shape, scores);
   return scores;
+}
+
+namespace {
+
+constexpr double RealismScores::*kFields[] = {&RealismScores::f1_raw,
+                                              &RealismScores::f1_time,
+                                              &RealismScores::f1_time_polarity,
+                                              &RealismScores::pool_mse_2,
+                                              &RealismScores::pool_mse_4,
+                                              &RealismScores::time_correlation,
+                                              &RealismScores::polarity_correlation,
+                                              &RealismScores::events_per_pixel,
+                                              &RealismScores::positive_share};
+
+/// Mean over the pairs where `value_of` gives a number.
+template <class ValueOf>
+double mean_of_numbers(std::span<const RealismScores> scores, ValueOf value_of) {
+  double sum = 0;
+  int count = 0;
+  for (const RealismScores& pair : scores) {
+    const double value = value_of(pair);
+    if (std::isnan(value)) continue;
+    sum += value;
+    ++count;
+  }
+  return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
+}
+
+}  // namespace
+
+RealismScores mean_scores(std::span<const RealismScores> scores) {
+  RealismScores mean;
+  for (const auto field : kFields) {
+    mean.*field = mean_of_numbers(scores, [&](const RealismScores& pair) { return pair.*field; });
+  }
+  if (scores.empty()) return mean;
+  const std::size_t bins = scores.front().events_per_bin.size();
+  for (const RealismScores& pair : scores) {
+    if (pair.events_per_bin.size() != bins) {
+      throw std::invalid_argument("expected scores with one number of time bins, got " +
+                                  std::to_string(bins) + " and " +
+                                  std::to_string(pair.events_per_bin.size()));
+    }
+  }
+  for (std::size_t bin = 0; bin < bins; ++bin) {
+    mean.events_per_bin.push_back(mean_of_numbers(
+        scores, [&](const RealismScores& pair) { return pair.events_per_bin[bin]; }));
+  }
+  return mean;
 }
 
 }  // namespace eventgan

@@ -3,8 +3,8 @@
 #include <span>
 #include <vector>
 
-#include "manifests/grey_image.h"
-#include "manifests/volume.h"
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
 

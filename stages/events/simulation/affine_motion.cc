@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/events/simulation/linear_intensity.h"
+#include "stages/events/simulation/sensor.h"
 
 namespace eventgan {
 namespace {

@@ -3,8 +3,8 @@
 #include <array>
 #include <vector>
 
-#include "manifests/counter_random.h"
-#include "manifests/grey_image.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/frames.h"
 #include "stages/events/simulation/interval.h"
 
 namespace eventgan {

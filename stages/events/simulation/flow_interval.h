@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "manifests/grey_image.h"
+#include "manifests/values/frames.h"
 #include "stages/events/simulation/interval.h"
 
 namespace eventgan {

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
 

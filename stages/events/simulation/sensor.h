@@ -1,17 +1,60 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
-#include "manifests/counter_random.h"
-#include "manifests/event.h"
-#include "manifests/image_size.h"
-#include "manifests/sensor_spec.h"
-#include "stages/events/simulation/pixel_noise.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
 
 namespace eventgan {
+
+/// The intensity a simulated sensor sees for a picture: u/255, [y, x] float32 in [0, 1], C order.
+/// Grey values are taken for linear intensity, as ESIM and v2e take them: a camera's gamma is not
+/// undone, so contrasts are those of the picture as it is stored. Throws std::invalid_argument if
+/// the picture is empty or its size and pixels disagree. Thread safe.
+std::vector<float> linear_intensity(const GreyImage& picture);
+
+/// No pixel's contrast threshold is below this, however wide the spread.
+inline constexpr float kSmallestThreshold = 0.01f;
+
+/// Contrast thresholds of one polarity, one a pixel in C order: Gaussian (Box and Muller 1958)
+/// about `mean` with standard deviation `spread`, raised to kSmallestThreshold where lower. Thread
+/// safe.
+std::vector<float> draw_thresholds(double mean, double spread, std::size_t pixel_count,
+                                   CounterRandom random);
+
+/// Noise events of a sensor's pixels: a Poisson process a pixel, of rate shot_noise_rate_hz plus,
+/// on a hot pixel, hot_pixel_rate_hz. Times between arrivals are drawn from the exponential
+/// distribution by its inverse, so they do not depend on how time is cut into steps.
+/// Not thread safe.
+class PixelNoise {
+ public:
+  /// No arrivals before start_s.
+  PixelNoise(const SensorSpec& spec, std::size_t pixel_count, double start_s, CounterRandom random);
+
+  /// Time of the pixel's next arrival; infinity where its rate is 0.
+  double next_s(std::size_t pixel) const { return next_s_[pixel]; }
+
+  /// Takes the pixel's next arrival and draws the one after it. Returns whether its event is
+  /// positive: either for shot noise, always the same for what makes a pixel hot.
+  bool take(std::size_t pixel);
+
+ private:
+  double rate_hz(std::size_t pixel) const;
+  void draw_wait(std::size_t pixel);
+
+  double shot_rate_hz_;
+  double hot_rate_hz_;
+  CounterRandom wait_random_;
+  CounterRandom kind_random_;
+  std::vector<double> next_s_;
+  std::vector<std::uint64_t> draws_;  ///< arrivals drawn so far
+  std::vector<std::int8_t> hot_;      ///< 0 = no, else the polarity of its events: -1, +1
+};
 
 /// Memory for the events that a sensor gives without any motion, by leak and noise, about and
 /// rather too little: pixels in an interval of `duration_s` > 0.

@@ -3,7 +3,7 @@
 #include <stdexcept>
 
 #include "stages/events/simulation/affine_motion.h"
-#include "stages/events/simulation/linear_intensity.h"
+#include "stages/events/simulation/sensor.h"
 
 namespace eventgan {
 

@@ -2,10 +2,9 @@
 
 #include <vector>
 
-#include "manifests/counter_random.h"
-#include "manifests/event.h"
-#include "manifests/grey_image.h"
-#include "manifests/sensor_spec.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
 #include "stages/events/simulation/interval.h"
 #include "stages/events/simulation/sensor.h"
 

@@ -3,12 +3,16 @@
 #include <filesystem>
 #include <memory>
 
-#include "manifests/faults.h"
-#include "manifests/pairs.h"
-#include "stages/frames/decoding/colour_frame.h"
-#include "stages/frames/decoding/open_videos.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "stages/base/pictures/picture_file.h"
+#include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
+
+/// The size of a picture as stored, read from its header alone (PNG, JPEG); other formats are
+/// decoded. For a video, the size of its first frame. A fault names the file. Thread safe.
+Outcome<ImageSize> probe_image_size(const std::filesystem::path& file);
 
 /// Decodes single frames of pictures and videos. A picture that decodes only in part (a truncated
 /// JPEG, a PNG with a bad checksum) is a fault, never a picture with a grey rest. Pictures are

@@ -1,14 +1,49 @@
 #include "stages/frames/decoding/pair_reader.h"
 
+#include <algorithm>
+#include <exception>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "stages/frames/decoding/picture_file.h"
-#include "stages/frames/decoding/visible_part.h"
+#include "stages/base/pictures/picture_file.h"
+#include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
+
+SharedPictures::SharedPictures(std::size_t most) : most_(std::max<std::size_t>(most, 1)) {}
+
+SharedFrame SharedPictures::get(const std::string& name, const std::function<SharedFrame()>& make) {
+  std::promise<SharedFrame> promise;
+  {
+    std::unique_lock lock(mutex_);
+    if (const auto found = by_name_.find(name); found != by_name_.end()) {
+      pictures_.splice(pictures_.begin(), pictures_, found->second);
+      const std::shared_future<SharedFrame> frame = found->second->frame;
+      lock.unlock();
+      return frame.get();
+    }
+    add(name, promise.get_future().share());
+  }
+  try {
+    SharedFrame frame = make();
+    promise.set_value(frame);
+    return frame;
+  } catch (...) {
+    promise.set_exception(std::current_exception());
+    throw;
+  }
+}
+
+void SharedPictures::add(const std::string& name, std::shared_future<SharedFrame> frame) {
+  pictures_.push_front({name, std::move(frame)});
+  by_name_[pictures_.front().name] = pictures_.begin();
+  if (pictures_.size() <= most_) return;
+  by_name_.erase(pictures_.back().name);
+  pictures_.pop_back();
+}
+
 namespace {
 
 // Frames kept besides those of the pairs under way.

@@ -7,9 +7,21 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/frames/decoding/visible_part.h"
-
 namespace eventgan {
+
+VisiblePart visible_part(const Placement& placement) {
+  VisiblePart part;
+  part.scaled_x = std::max(0, -placement.offset_x);
+  part.scaled_y = std::max(0, -placement.offset_y);
+  part.volume_x = std::max(0, placement.offset_x);
+  part.volume_y = std::max(0, placement.offset_y);
+  part.size.height =
+      std::min(placement.scaled.height - part.scaled_y, placement.volume.height - part.volume_y);
+  part.size.width =
+      std::min(placement.scaled.width - part.scaled_x, placement.volume.width - part.volume_x);
+  return part;
+}
+
 namespace {
 
 cv::Mat as_grey(const cv::Mat& colour) {
@@ -70,6 +82,26 @@ PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec) {
 void to_input(std::span<const std::uint8_t> grey, std::span<float> input) {
   std::ranges::transform(grey, input.begin(),
                          [](std::uint8_t level) { return kInputOfGrey[level]; });
+}
+
+std::vector<std::uint8_t> place_colour(const ColourFrame& frame, const Placement& placement) {
+  if (frame.size != placement.source) {
+    throw std::invalid_argument("expected a frame of the placement's source size, got another");
+  }
+  const ImageSize volume = placement.volume;
+  std::vector<std::uint8_t> placed(3 * volume.pixel_count(), 0);
+  const cv::Mat source(frame.size.height, frame.size.width, CV_8UC3,
+                       const_cast<std::uint8_t*>(frame.bgr.data()));
+  cv::Mat scaled;
+  cv::resize(source, scaled, cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
+             cv::INTER_LINEAR);
+
+  const VisiblePart part = visible_part(placement);
+  const cv::Size size(part.size.width, part.size.height);
+  cv::Mat canvas(volume.height, volume.width, CV_8UC3, placed.data());
+  scaled(cv::Rect(cv::Point(part.scaled_x, part.scaled_y), size))
+      .copyTo(canvas(cv::Rect(cv::Point(part.volume_x, part.volume_y), size)));
+  return placed;
 }
 
 }  // namespace eventgan

@@ -5,17 +5,29 @@
 #include <span>
 #include <vector>
 
-#include "manifests/faults.h"
-#include "manifests/job_manifest.h"
-#include "manifests/placement.h"
-#include "stages/frames/decoding/colour_frame.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
+#include "manifests/values/placement.h"
+#include "stages/base/pictures/picture_file.h"
 
 namespace eventgan {
+
+/// The part of the scaled picture that lies in the volume: its size, and its top left pixel's place
+/// in either.
+struct VisiblePart {
+  ImageSize size;
+  int scaled_x = 0;
+  int scaled_y = 0;
+  int volume_x = 0;
+  int volume_y = 0;
+};
+
+VisiblePart visible_part(const Placement& placement);
 
 /// One frame as the generator sees it, in 8 bits: what is kept while other pairs may want it, since
 /// it takes a fraction of the colour picture's memory.
 struct PreparedFrame {
-  /// [y, x] uint8, C order, 0..255: the visible part (visible_part.h) of the placed picture.
+  /// [y, x] uint8, C order, 0..255: the visible part (prepared_frame.h) of the placed picture.
   std::vector<std::uint8_t> grey;
   Placement placement;  ///< placement.source is the frame's own size
 };
@@ -31,5 +43,11 @@ PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec);
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.
 void to_input(std::span<const std::uint8_t> grey, std::span<float> input);
+
+/// A colour picture laid into the volume's frame as the generator's input was (same resizing, same
+/// cut, borders black): [y, x, channel] uint8 of size placement.volume, channels blue, green, red.
+/// For looking at, not for the network. Throws std::invalid_argument if the frame's size is not the
+/// placement's source. Thread safe.
+std::vector<std::uint8_t> place_colour(const ColourFrame& frame, const Placement& placement);
 
 }  // namespace eventgan

@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <vector>
 
-#include "manifests/faults.h"
-#include "stages/archives/pickle/pickle.h"
-#include "stages/archives/pickled_array.h"
-#include "stages/archives/typed_array_json_internal.h"
-#include "stages/files/text_file.h"
+#include "manifests/values/faults.h"
+#include "stages/base/archives/numpy_arrays.h"
+#include "stages/base/archives/pickle.h"
+#include "stages/base/archives/typed_array_internal.h"
+#include "stages/base/files/input_file.h"
 #include "stages/frames/human36m/camera_book_internal.h"
-#include "stages/frames/human36m/table_columns_internal.h"
+#include "stages/frames/human36m/pose_table_internal.h"
 
 namespace eventgan {
 namespace {
@@ -72,7 +72,7 @@ std::optional<LensDistortion> distortion_of(const PickleNode& camera, const std:
   return LensDistortion{k[0], k[1], k[2], p[0], p[1]};
 }
 
-/// Where the camera sees a place before it, by the equations in manifests/labels.h.
+/// Where the camera sees a place before it, by the equations in manifests/values/labels.h.
 Point project(const Intrinsics& camera, const LensDistortion& lens,
               const std::array<double, 3>& place) {
   const double a = place[0] / place[2];

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/labels.h"
+#include "manifests/values/labels.h"
 
 namespace eventgan {
 

@@ -1,9 +1,169 @@
 #include "stages/frames/human36m/human36m_dataset.h"
 
-#include "manifests/faults.h"
-#include "stages/frames/human36m/layouts_internal.h"
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <charconv>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/human36m/human36m_dataset_internal.h"
 
 namespace eventgan {
+
+std::vector<std::string> human36m_joint_names(std::size_t count) {
+  if (count == 32) {
+    return {"Hips",
+            "RightUpLeg",
+            "RightLeg",
+            "RightFoot",
+            "RightToeBase",
+            "RightToeBase_Site",
+            "LeftUpLeg",
+            "LeftLeg",
+            "LeftFoot",
+            "LeftToeBase",
+            "LeftToeBase_Site",
+            "Spine",
+            "Spine1",
+            "Neck",
+            "Head",
+            "Head_Site",
+            "LeftShoulder",
+            "LeftArm",
+            "LeftForeArm",
+            "LeftHand",
+            "LeftHandThumb",
+            "LeftHandThumb_Site",
+            "L_Wrist_End",
+            "L_Wrist_End_Site",
+            "RightShoulder",
+            "RightArm",
+            "RightForeArm",
+            "RightHand",
+            "RightHandThumb",
+            "RightHandThumb_Site",
+            "R_Wrist_End",
+            "R_Wrist_End_Site"};
+  }
+  if (count == 17) {
+    // Lists such as h36m_coco.json have the legs the other way round, which is an old mistake.
+    return {"root (pelvis)", "right_hip",     "right_knee", "right_foot", "left_hip",
+            "left_knee",     "left_foot",     "spine",      "thorax",     "neck_base",
+            "head",          "left_shoulder", "left_elbow", "left_wrist", "right_shoulder",
+            "right_elbow",   "right_wrist"};
+  }
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) names.push_back("joint_" + std::to_string(i));
+  return names;
+}
+
+FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequence stored,
+                         const std::vector<std::int64_t>& labelled)
+    : folder_(std::move(folder)),
+      prefix_(std::move(prefix)),
+      stored_(std::move(stored)),
+      numbers_(labelled) {
+  for (const auto& [number, name] : stored_.frames()) numbers_.push_back(number);
+  std::ranges::sort(numbers_);
+  const auto repeated = std::ranges::unique(numbers_);
+  numbers_.erase(repeated.begin(), repeated.end());
+}
+
+FrameRef FrameFolder::frame(std::int64_t number) const {
+  std::string name = stored_.at(number, 0).name;
+  if (name.empty()) name = fmt::format("{}{:06}.jpg", prefix_, number);
+  return {.path = folder_ + "/" + name,
+          .index = number,
+          .video_frame = -1,
+          .time_s = static_cast<double>(number - 1) / kHuman36mFramesPerSecond};
+}
+
+Neighbour FrameFolder::neighbour(std::int64_t number, int steps) const {
+  const auto here = std::ranges::lower_bound(numbers_, number);
+  const bool is_known = here != numbers_.end() && *here == number;
+  if (steps == 0 && !is_known) return {Neighbour::State::kHole, frame(number)};
+  const std::ptrdiff_t place =
+      here - numbers_.begin() + (steps > 0 && !is_known ? steps - 1 : steps);
+  if (place < 0 || place >= std::ssize(numbers_)) return {};
+  const std::int64_t target = numbers_[static_cast<std::size_t>(place)];
+  return {stored_.contains(target) ? Neighbour::State::kPresent : Neighbour::State::kHole,
+          frame(target)};
+}
+
+void IndexedDataset::add_table(const std::string& key, const std::string& written,
+                               std::unique_ptr<PoseTable> table) {
+  if (tables_.empty()) schema_.joint_names = human36m_joint_names(table->joint_count());
+  if (table->joint_count() != schema_.joint_names.size()) {
+    throw InputError("expected " + std::to_string(schema_.joint_names.size()) +
+                     " joints as in the files before, got " + std::to_string(table->joint_count()) +
+                     ", in " + written);
+  }
+  for (std::string& note : table->notes()) notes_.push_back(std::move(note));
+  annotation_files_.push_back(written);
+  tables_[key] = {written, std::move(table)};
+}
+
+void IndexedDataset::add_annotation_file(const std::string& written) {
+  annotation_files_.push_back(written);
+}
+
+void IndexedDataset::add_video(const std::string& sequence, FrameFolder frames) {
+  videos_.emplace(sequence, std::move(frames));
+}
+
+void IndexedDataset::add_labelled(std::string sample_id, const std::string& sequence,
+                                  std::int64_t number, const std::string& table_key,
+                                  std::size_t row) {
+  labelled_.push_back({.sample_id = std::move(sample_id),
+                       .sequence = sequence,
+                       .frame = videos_.at(sequence).frame(number),
+                       .label_key = table_key + "#" + std::to_string(row)});
+}
+
+void IndexedDataset::finish(const std::string& root) {
+  if (labelled_.empty()) throw InputError("expected labelled frames, got none, in " + root);
+  std::ranges::stable_sort(labelled_, {}, &LabelledFrame::sample_id);
+  const auto twice = std::ranges::adjacent_find(labelled_, {}, &LabelledFrame::sample_id);
+  if (twice != labelled_.end()) {
+    throw InputError("expected one label for a frame, got " + twice->label_key + " and " +
+                     std::next(twice)->label_key + ", in " + root + " (" + twice->sample_id + ")");
+  }
+  std::ranges::sort(annotation_files_);
+  root_ = root;
+}
+
+Neighbour IndexedDataset::neighbour(const LabelledFrame& frame, int steps) const {
+  const auto video = videos_.find(frame.sequence);
+  if (video == videos_.end()) return {};
+  return video->second.neighbour(frame.frame.index, steps);
+}
+
+const IndexedDataset::Table* IndexedDataset::table_of(const std::string& label_key) const {
+  const std::size_t hash = label_key.rfind('#');
+  if (hash == std::string::npos) return nullptr;
+  const auto table = tables_.find(label_key.substr(0, hash));
+  return table == tables_.end() ? nullptr : &table->second;
+}
+
+Outcome<Annotation> IndexedDataset::annotation(const std::string& label_key) const {
+  if (const Table* table = table_of(label_key)) {
+    std::size_t row = 0;
+    const char* end = label_key.data() + label_key.size();
+    const auto [stop, error] =
+        std::from_chars(label_key.data() + label_key.rfind('#') + 1, end, row);
+    if (error == std::errc() && stop == end && row < table->rows->row_count()) {
+      return table->rows->annotation(row);
+    }
+  }
+  return SampleFault{"expected a row of an annotation file, got \"" + label_key + "\", in " +
+                     root_};
+}
+
+std::string IndexedDataset::label_place(const std::string& label_key) const {
+  const Table* table = table_of(label_key);
+  return table == nullptr ? root_ : table->written + label_key.substr(label_key.rfind('#'));
+}
 
 std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
                                                const std::filesystem::path& base) {

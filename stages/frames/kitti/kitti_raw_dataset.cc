@@ -6,14 +6,10 @@
 #include <set>
 #include <utility>
 
-#include "stages/frames/folder_listing.h"
 #include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/kitti/raw_calibration.h"
 #include "stages/frames/kitti/raw_drive.h"
-#include "stages/frames/kitti/text_table.h"
-#include "stages/frames/kitti/tracklet_box.h"
 #include "stages/frames/kitti/tracklets.h"
-#include "stages/frames/source_root.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {

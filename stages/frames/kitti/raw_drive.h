@@ -1,14 +1,26 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "manifests/values/faults.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/numbered_sequence.h"
-#include "stages/frames/source_root.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
+
+/// KITTI records at 10 Hz: seconds between frames where no timestamps are there.
+inline constexpr double kKittiFrameSeconds = 0.1;
+
+/// A timestamps.txt of KITTI raw: line i (from 0) holds "2011-09-26 13:02:25.594360375" for frame
+/// i. Gives seconds since the first line, exact to the nanosecond; NaN for a blank line. A fault
+/// that names `path` and the line for any other line, for a time that is not after those above it,
+/// and for a last line that is cut short: without a line end, and shorter than the first.
+Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::string& path);
 
 /// The left colour camera's frames of one drive of KITTI raw:
 /// DATE/DRIVE/image_02/data/NNNNNNNNNN.png, and image_02/timestamps.txt if it is there. Thread-safe
@@ -45,6 +57,30 @@ class RawDrive {
   std::string fault_;
   NumberedSequence pictures_;
   std::vector<double> times_s_;
+};
+
+/// A frame of KITTI raw.
+struct RawFrame {
+  std::string date;   ///< "2011_09_26"
+  std::string drive;  ///< "2011_09_26_drive_0052_sync"
+  std::int64_t number = 0;
+  bool operator==(const RawFrame&) const = default;
+};
+
+/// Where the training pictures of KITTI object come from, as the devkit's two files tell: picture n
+/// (from 0) is line rand[n] (from 1) of the mapping, whose lines read "DATE DRIVE FRAME".
+class RawMapping {
+ public:
+  /// Parses mapping/train_rand.txt and mapping/train_mapping.txt; the paths are for messages.
+  /// Throws InputError for anything that is not as above.
+  RawMapping(std::string_view rand, const std::string& rand_path, std::string_view mapping,
+             const std::string& mapping_path);
+
+  /// Nothing for a picture that the devkit does not know.
+  std::optional<RawFrame> find(std::int64_t object_number) const;
+
+ private:
+  std::vector<RawFrame> frames_;  ///< by object number
 };
 
 }  // namespace eventgan

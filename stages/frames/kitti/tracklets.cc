@@ -1,21 +1,24 @@
 #include "stages/frames/kitti/tracklets.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <pugixml.hpp>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
-#include "manifests/strict_json/json_text_internal.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
 #include "stages/frames/kitti/kitti_label.h"
-#include "stages/frames/kitti/text_table.h"
 
 namespace eventgan {
 namespace {
-
-constexpr std::int64_t kMaxFrame = 999'999'999;
 
 using Json = nlohmann::ordered_json;
 
@@ -130,9 +133,9 @@ Tracklets::Tracklets(const std::string& xml, std::string path)
   for (const pugi::xml_node& tracklet : tracklets.children("item")) {
     try {
       auto frame = number<std::int64_t>(tracklet, "first_frame");
-      if (frame < 0 || frame > kMaxFrame) {
-        throw BadField("expected a first_frame from 0 to " + std::to_string(kMaxFrame) + ", got " +
-                       std::to_string(frame));
+      if (frame < 0 || frame > kMaxKittiFrame) {
+        throw BadField("expected a first_frame from 0 to " + std::to_string(kMaxKittiFrame) +
+                       ", got " + std::to_string(frame));
       }
       check_count(tracklet.child("poses"), "poses");
       for (const pugi::xml_node& pose : tracklet.child("poses").children("item")) {
@@ -176,6 +179,187 @@ Outcome<TrackletFrame> Tracklets::frame(std::int64_t frame_number) const {
   // Bytes that are not UTF-8 must not stop a run: they become U+FFFD.
   frame.json = dump_json(array);
   return frame;
+}
+
+namespace {
+
+Point3 rotate(const std::array<double, 9>& m, const Point3& x) {
+  return {m[0] * x[0] + m[1] * x[1] + m[2] * x[2], m[3] * x[0] + m[4] * x[1] + m[5] * x[2],
+          m[6] * x[0] + m[7] * x[1] + m[8] * x[2]};
+}
+
+/// A calibration file: lines "KEY: number number ...".
+class CalibrationFile {
+ public:
+  CalibrationFile(std::string text, std::string path)
+      : text_(std::move(text)), path_(std::move(path)) {}
+
+  template <std::size_t N>
+  void read(std::string_view key, std::array<double, N>& values) const {
+    for (const TextLine& line : split_lines(text_)) {
+      const auto columns = split_columns(line.bytes);
+      if (columns.empty() || columns[0] != std::string(key) + ":") continue;
+      const std::string where = "in " + place_in_file(path_, line.number);
+      if (columns.size() != N + 1) {
+        throw InputError("expected " + std::to_string(N) + " numbers for " + std::string(key) +
+                         ", got " + std::to_string(columns.size() - 1) + ", " + where);
+      }
+      for (std::size_t i = 0; i < N; ++i) {
+        const auto number = parse_number<double>(columns[i + 1]);
+        if (!number) {
+          throw InputError("expected finite numbers for " + std::string(key) + ", got " +
+                           in_quotes(columns[i + 1]) + ", " + where);
+        }
+        values[i] = *number;
+      }
+      return;
+    }
+    throw InputError("expected a line " + std::string(key) + ", got none, in " + path_);
+  }
+
+ private:
+  std::string text_;
+  std::string path_;
+};
+
+ImageSize to_size(const std::array<double, 2>& width_height, const std::string& path) {
+  for (const double side : width_height) {
+    if (side < 1 || side > std::numeric_limits<int>::max()) {
+      throw InputError("expected a picture size for S_rect_02, got " + std::to_string(side) +
+                       ", in " + path);
+    }
+  }
+  return {static_cast<int>(std::lround(width_height[1])),
+          static_cast<int>(std::lround(width_height[0]))};
+}
+
+}  // namespace
+
+Point3 RawCalibration::to_rectified(const Point3& velodyne) const {
+  Point3 camera = rotate(rotation, velodyne);
+  for (std::size_t i = 0; i < 3; ++i) camera[i] += translation[i];
+  return rotate(rectification, camera);
+}
+
+Point RawCalibration::project(const Point3& x) const {
+  const auto row = [&](std::size_t i) {
+    const double* p = projection.data() + 4 * i;
+    return p[0] * x[0] + p[1] * x[1] + p[2] * x[2] + p[3];
+  };
+  return {row(0) / row(2), row(1) / row(2)};
+}
+
+std::optional<RawCalibration> read_raw_calibration(const SourceRoot& root,
+                                                   const std::string& date) {
+  const std::string velo_path = date + "/calib_velo_to_cam.txt";
+  const std::string cam_path = date + "/calib_cam_to_cam.txt";
+  if (!root.has_file(velo_path) || !root.has_file(cam_path)) return std::nullopt;
+
+  RawCalibration calibration;
+  const CalibrationFile velo(root.read_or_throw(velo_path), root.written(velo_path));
+  velo.read("R", calibration.rotation);
+  velo.read("T", calibration.translation);
+  const CalibrationFile cam(root.read_or_throw(cam_path), root.written(cam_path));
+  cam.read("R_rect_00", calibration.rectification);
+  cam.read("P_rect_02", calibration.projection);
+  std::array<double, 2> width_height{};
+  cam.read("S_rect_02", width_height);
+  calibration.picture = to_size(width_height, root.written(cam_path));
+  return calibration;
+}
+
+namespace {
+
+/// What is nearer than this to the camera's plane is not seen; keeps the projection finite.
+constexpr double kNearest_m = 0.1;
+
+/// The cuboid's corners in the rectified frame. Corner i is at the far end of the length, width and
+/// height where bit 0, 1 and 2 of i is set.
+std::array<Point3, 8> corners(const TrackletPose& pose, const RawCalibration& calibration) {
+  const double cosine = std::cos(pose.rotation_z);
+  const double sine = std::sin(pose.rotation_z);
+  std::array<Point3, 8> corners{};
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const double along = pose.length * ((i & 1) ? 0.5 : -0.5);
+    const double across = pose.width * ((i & 2) ? 0.5 : -0.5);
+    const double up = (i & 4) ? pose.height : 0;
+    corners[i] = calibration.to_rectified({pose.x + cosine * along - sine * across,
+                                           pose.y + sine * along + cosine * across, pose.z + up});
+  }
+  return corners;
+}
+
+/// Grows around projected points.
+struct Hull {
+  Rectangle box{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity(),
+                -std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+
+  void add(Point point) {
+    box = {std::min(box.left, point.x), std::min(box.top, point.y), std::max(box.right, point.x),
+           std::max(box.bottom, point.y)};
+  }
+};
+
+/// The part of the edge from `a` to `b` before the camera, projected: leaving out corners behind
+/// the camera alone would cut a near object short.
+void add_edge(const Point3& a, const Point3& b, const RawCalibration& calibration, Hull& hull) {
+  if (a[2] >= kNearest_m) hull.add(calibration.project(a));
+  if (b[2] >= kNearest_m) hull.add(calibration.project(b));
+  if ((a[2] >= kNearest_m) == (b[2] >= kNearest_m)) return;
+  const double t = (kNearest_m - a[2]) / (b[2] - a[2]);
+  hull.add(calibration.project({std::lerp(a[0], b[0], t), std::lerp(a[1], b[1], t), kNearest_m}));
+}
+
+/// To [-pi, pi].
+double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
+
+/// The cuboid's outline cut to the picture; nothing if it is not in the picture.
+std::optional<Rectangle> outline(const TrackletPose& pose, const RawCalibration& calibration) {
+  const auto corner = corners(pose, calibration);
+  Hull hull;
+  for (std::size_t from = 0; from < corner.size(); ++from) {
+    for (const std::size_t axis : {1u, 2u, 4u}) {
+      if ((from & axis) == 0) add_edge(corner[from], corner[from | axis], calibration, hull);
+    }
+  }
+  // Where KITTI's own labels end: a box that reaches beyond the picture is 1241, 374 at the most of
+  // 1242 x 375 pixels.
+  const double right = calibration.picture.width - 1;
+  const double bottom = calibration.picture.height - 1;
+  if (!(hull.box.left < right && hull.box.right > 0 && hull.box.top < bottom &&
+        hull.box.bottom > 0)) {
+    return std::nullopt;
+  }
+  return Rectangle{std::clamp(hull.box.left, 0.0, right), std::clamp(hull.box.top, 0.0, bottom),
+                   std::clamp(hull.box.right, 0.0, right),
+                   std::clamp(hull.box.bottom, 0.0, bottom)};
+}
+
+}  // namespace
+
+std::optional<Box> to_box(const TrackletPose& pose, const RawCalibration& calibration) {
+  const auto seen = outline(pose, calibration);
+  if (!seen) return std::nullopt;
+
+  const Point3 place = calibration.to_rectified({pose.x, pose.y, pose.z});
+  // With the axes as RawCalibration tells, the length's direction (cos rz, sin rz, 0) of the
+  // scanner is
+  // (-sin rz, 0, cos rz) of the camera; KITTI object writes that as (cos ry, 0, -sin ry).
+  const double rotation_y = wrapped(-pose.rotation_z - std::numbers::pi / 2);
+
+  Box box;
+  box.class_id = pose.class_id;
+  box.ignore = pose.class_id == kKittiDontCare;
+  box.xyxy = *seen;
+  box.truncation = pose.truncation == 0 ? 0.f : -1.f;
+  box.occlusion = pose.occlusion;
+  // The heading as the camera sees it: less the direction in which the object lies.
+  box.alpha = static_cast<float>(wrapped(rotation_y - std::atan2(place[0], place[2])));
+  const std::array<double, 7> box3d{pose.height, pose.width, pose.length, place[0],
+                                    place[1],    place[2],   rotation_y};
+  std::ranges::transform(box3d, box.box3d.begin(), [](double x) { return static_cast<float>(x); });
+  box.track_id = pose.track;
+  return box;
 }
 
 }  // namespace eventgan

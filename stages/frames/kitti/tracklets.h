@@ -1,11 +1,17 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -48,5 +54,35 @@ class Tracklets {
   struct Document;
   std::unique_ptr<Document> document_;
 };
+
+/// A point in metres.
+using Point3 = std::array<double, 3>;
+
+/// How the laser scanner's points come to lie in the rectified left colour picture, by KITTI raw's
+///   x_rect = R_rect_00 (R x_velo + T),    (u, v, 1) ~ P_rect_02 (x_rect, 1).
+/// The scanner's x points forward, y left, z up; the rectified camera's x right, y down, z forward.
+struct RawCalibration {
+  std::array<double, 9> rotation{};       ///< R, row-major
+  Point3 translation{};                   ///< T, m
+  std::array<double, 9> rectification{};  ///< R_rect_00, row-major
+  std::array<double, 12> projection{};    ///< P_rect_02, row-major [3][4]
+  ImageSize picture;                      ///< S_rect_02
+
+  Point3 to_rectified(const Point3& velodyne) const;
+
+  /// In pixels; `rectified` must lie before the camera.
+  Point project(const Point3& rectified) const;
+};
+
+/// Reads DATE/calib_velo_to_cam.txt and DATE/calib_cam_to_cam.txt; nothing unless both are there.
+/// Throws InputError if one lacks a key or has another number of values than it should.
+std::optional<RawCalibration> read_raw_calibration(const SourceRoot& root, const std::string& date);
+
+/// The tracklet as KITTI object would annotate it: the smallest upright rectangle around what the
+/// camera sees of its cuboid, cut at 0 and at the last pixel's centre (width - 1, height - 1),
+/// where KITTI's own labels end; box3d with the middle of the underside in the rectified frame.
+/// Nothing if it lies behind the camera or outside the picture. `truncation` is 0 if the annotators
+/// marked it as inside the picture, else unknown.
+std::optional<Box> to_box(const TrackletPose& pose, const RawCalibration& calibration);
 
 }  // namespace eventgan

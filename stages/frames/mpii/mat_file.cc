@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "stages/files/text_file.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/frames/mpii/mat_file_internal.h"
 
 namespace eventgan {

@@ -8,12 +8,9 @@
 #include <unordered_map>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "stages/frames/mpii/mpii_annotations.h"
+#include "manifests/values/faults.h"
+#include "stages/frames/mpii/mpii_annotations_internal.h"
 #include "stages/frames/mpii/mpii_frames.h"
-#include "stages/frames/mpii/mpii_joints.h"
-#include "stages/frames/mpii/mpii_person_internal.h"
-#include "stages/frames/mpii/mpii_places.h"
 
 namespace eventgan {
 namespace {

@@ -4,23 +4,178 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <unordered_map>
 #include <utility>
+#include <vector>
 
-#include "manifests/faults.h"
-#include "manifests/strict_json/json_text_internal.h"
-#include "stages/frames/mpii/mpii_annotations.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
+#include "stages/base/archives/hdf5_arrays.h"
+#include "stages/base/archives/typed_array_internal.h"
+#include "stages/base/files/input_file.h"
+#include "stages/frames/mpii/mpii_annotations_internal.h"
 #include "stages/frames/mpii/mpii_frames.h"
-#include "stages/frames/mpii/mpii_joints.h"
-#include "stages/frames/mpii/mpii_list_file_internal.h"
-#include "stages/frames/mpii/mpii_places.h"
-#include "stages/frames/source_root.h"
+#include "stages/frames/mpii/mpii_list_dataset_internal.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
 
-namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+Point parse_point(const Json& pair, const Point& missing, const std::string& where) {
+  if (!pair.is_array() || pair.size() != 2 || !pair[0].is_number() || !pair[1].is_number()) {
+    refuse_json(where, "two finite numbers", pair);
+  }
+  const Point point{pair[0].get<double>(), pair[1].get<double>()};
+  if (point == missing) return kMissingPoint;
+  return {point.x - 1, point.y - 1};
+}
+
+int parse_listed_visible(const Json& value, const std::string& where) {
+  if (value == 1 || value == true) return 1;
+  if (value == 0 || value == false) return 0;
+  refuse_json(where, "0 or 1", value);
+}
+
+const Json& joint_array(const Json& row, const char* name) {
+  const Json& array = row.at(name);
+  if (!array.is_array() || array.size() != kMpiiJointCount) refuse_json(name, "16 elements", array);
+  return array;
+}
+
+}  // namespace
+
+const char* image_field(MpiiListForm form) {
+  return form == MpiiListForm::kTable ? "imgname" : "image";
+}
+
+Person parse_mpii_list_row(const Json& row, MpiiListForm form) {
+  const bool is_table = form == MpiiListForm::kTable;
+  const char* const joints_name = is_table ? "part" : "joints";
+  const char* const visible_name = is_table ? "visible" : "joints_vis";
+  const Point missing_joint = is_table ? Point{0, 0} : Point{-1, -1};
+
+  Person person;
+  person.joints.assign(kMpiiJointCount, Joint{kMissingPoint, 0});
+  if (row.contains("center")) person.center = parse_point(row["center"], {-1, -1}, "center");
+  if (row.contains("scale")) {
+    if (!row["scale"].is_number()) refuse_json("scale", "a finite number", row["scale"]);
+    person.scale = row["scale"].get<double>();
+  }
+  if (!row.contains(joints_name)) return person;
+
+  const Json& joints = joint_array(row, joints_name);
+  const Json* visible = row.contains(visible_name) ? &joint_array(row, visible_name) : nullptr;
+  for (std::size_t i = 0; i < kMpiiJointCount; ++i) {
+    const std::string place = "[" + std::to_string(i) + "]";
+    Joint& joint = person.joints[i];
+    joint.at = parse_point(joints[i], missing_joint, joints_name + place);
+    const int seen =
+        visible == nullptr ? -1 : parse_listed_visible((*visible)[i], visible_name + place);
+    joint.visible = joint.at == kMissingPoint ? 0 : seen;
+  }
+  return person;
+}
+
+namespace {
+
+/// A name given as an array of characters or of character codes, padded with zeros, as text.
+Json joined(Json name) {
+  if (!name.is_array()) return name;
+  std::string text;
+  for (const Json& part : name) {
+    if (part.is_string()) text += part.get<std::string>();
+    if (part.is_number() && part.get<double>() > 0 && part.get<double>() < 256) {
+      text += static_cast<char>(static_cast<unsigned char>(part.get<double>()));
+    }
+  }
+  return text;
+}
+
+Hdf5Arrays read_columns(const std::filesystem::path& file) try {
+  return read_hdf5_arrays(file);
+} catch (const std::runtime_error& error) {
+  throw InputError(error.what());
+}
+
+}  // namespace
+
+MpiiList read_mpii_table(const std::filesystem::path& file) {
+  const Hdf5Arrays content = read_columns(file);
+  const std::string image = image_field(MpiiListForm::kTable);
+  const auto images = content.arrays.find(image);
+  if (images == content.arrays.end() || images->second.size() == 0 ||
+      images->second.shape.empty()) {
+    const auto unread = content.unread.find(image);
+    throw InputError("expected a column " + image + ", got " +
+                     (unread == content.unread.end() ? "none" : unread->second) + ", in " +
+                     file.string());
+  }
+  const std::size_t count = images->second.shape[0];
+  MpiiList list{MpiiListForm::kTable, std::vector<Json>(count, Json::object()), {}};
+  const auto note = [&](const std::string& name, const std::string& got) {
+    list.notes.push_back("column " + name + " left out (expected " + std::to_string(count) +
+                         " rows of numbers or text, got " + got + "), in " + file.string());
+  };
+  for (const auto& [name, column] : content.arrays) {
+    if (column.shape.empty() || column.shape[0] != count) {
+      note(name, column.shape_text());
+      continue;
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      Json value = to_json(column, i);
+      list.rows[i][name] = name == image ? joined(std::move(value)) : std::move(value);
+    }
+  }
+  for (const auto& [name, reason] : content.unread) note(name, reason);
+  return list;
+}
+
+namespace {
+
+MpiiList read_json_list(const std::string& text, const std::filesystem::path& file) {
+  Json rows;
+  try {
+    rows = parse_json_data(text, file.filename().string());
+  } catch (const std::runtime_error& error) {
+    throw InputError("expected a JSON list of people or an HDF5 table, got \"" +
+                     std::string(error.what()) + "\", in " + file.string());
+  }
+  if (!rows.is_array()) {
+    throw InputError(std::string("expected a JSON list of people, got one ") + rows.type_name() +
+                     ", in " + file.string());
+  }
+  return {MpiiListForm::kJsonList, rows.get<std::vector<Json>>(), {}};
+}
+
+}  // namespace
+
+MpiiList read_mpii_list(const std::filesystem::path& file) {
+  constexpr std::string_view kHdf5 = "\x89HDF\r\n\x1a\n";
+  std::string reason = "an empty file";
+  const auto bytes = try_read_file(file, reason);
+  if (!bytes || bytes->empty()) {
+    throw InputError("expected a JSON list or an HDF5 table, got nothing readable (" + reason +
+                     "), in " + file.string());
+  }
+  MpiiList list = bytes->starts_with(kHdf5) ? read_mpii_table(file) : read_json_list(*bytes, file);
+  const char* const name = image_field(list.form);
+  for (std::size_t i = 0; i < list.rows.size(); ++i) {
+    const Json& row = list.rows[i];
+    if (!row.is_object() || !row.contains(name) || !row[name].is_string() || row[name] == "") {
+      throw InputError(std::string("expected an image's name under \"") + name +
+                       "\", got none, in " + file.string() + " (row " + std::to_string(i) + ")");
+    }
+  }
+  return list;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
 
 /// Which frame of its video each image is, if a file tells: image name without extension to
 /// keyframe.

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <memory>
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
 #include "stages/frames/dataset.h"
 
 namespace eventgan {

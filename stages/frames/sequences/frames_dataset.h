@@ -1,9 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
+#include <string>
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
 #include "stages/frames/dataset.h"
 
 namespace eventgan {
@@ -26,5 +30,29 @@ namespace eventgan {
 /// `base`. Throws InputError if ROOT is none of these or a video's labels are malformed.
 std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
+
+/// open_frames_dataset for folders. Where pictures and folders lie side by side, the pictures count
+/// and the folders are named in the notes. The label_key is the sidecar's path below ROOT; the
+/// picture's if there is none.
+std::unique_ptr<Dataset> open_pictures_dataset(const SourceSpec& spec,
+                                               const std::filesystem::path& base);
+
+/// Labels by frame number.
+using VideoLabels = std::map<std::int64_t, std::string>;
+
+/// Reads a video's labels: a JSON object (comments allowed) from frame number ("12", leading zeros
+/// allowed) to any JSON value, given here as compact text, object keys in their order. Nothing if
+/// the file is a manifest of this program, which a user may well name as the video. Throws
+/// InputError naming the file and `video` if it cannot be read, is no such object, or names a frame
+/// twice.
+std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
+                                             const std::string& video);
+
+/// True for mp4, avi, mov and mkv, in small or capital letters.
+bool is_video_name(const std::filesystem::path& file);
+
+/// open_frames_dataset for a video. The label_key is the frame's number; empty if it has no label.
+std::unique_ptr<Dataset> open_video_dataset(const SourceSpec& spec,
+                                            const std::filesystem::path& base);
 
 }  // namespace eventgan

@@ -1,17 +1,60 @@
 #include "stages/frames/sequences/picture_folder.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <set>
 #include <utility>
 
-#include "stages/frames/folder_listing.h"
-#include "stages/frames/sequences/lower_extension.h"
-#include "stages/frames/sequences/natural_order.h"
+#include "stages/frames/numbered_sequence.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
+
+std::string lower_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  std::ranges::transform(extension, extension.begin(),
+                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return extension;
+}
+
+namespace {
+
+/// Cuts the run of digits that `text` starts with off it; the run without its leading zeros.
+std::string_view take_number(std::string_view& text) {
+  const auto end =
+      static_cast<std::size_t>(std::ranges::find_if_not(text, is_digit) - text.begin());
+  std::string_view digits = text.substr(0, end);
+  text.remove_prefix(end);
+  digits.remove_prefix(std::min(digits.find_first_not_of('0'), digits.size()));
+  return digits;
+}
+
+}  // namespace
+
+bool natural_less(std::string_view a, std::string_view b) {
+  std::string_view rest_a = a, rest_b = b;
+  while (!rest_a.empty() && !rest_b.empty()) {
+    if (is_digit(rest_a.front()) && is_digit(rest_b.front())) {
+      const std::string_view number_a = take_number(rest_a), number_b = take_number(rest_b);
+      if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+      if (number_a != number_b) return number_a < number_b;
+      continue;
+    }
+    if (rest_a.front() != rest_b.front()) {
+      return static_cast<unsigned char>(rest_a.front()) <
+             static_cast<unsigned char>(rest_b.front());
+    }
+    rest_a.remove_prefix(1);
+    rest_b.remove_prefix(1);
+  }
+  if (rest_a.empty() != rest_b.empty()) return rest_a.empty();
+  return a < b;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -29,11 +72,11 @@ struct NumberedStem {
 };
 
 std::optional<NumberedStem> parse_stem(std::string_view stem) {
-  constexpr std::size_t kMaxDigits = 18;
+  constexpr std::size_t kMostDigits = 18;
   const std::size_t before = stem.find_last_not_of("0123456789");
   const std::size_t begin = before == std::string_view::npos ? 0 : before + 1;
   const std::string_view digits = stem.substr(begin);
-  if (digits.empty() || digits.size() > kMaxDigits) return std::nullopt;
+  if (digits.empty() || digits.size() > kMostDigits) return std::nullopt;
   NumberedStem parsed{stem.substr(0, begin), 0};
   std::from_chars(digits.data(), digits.data() + digits.size(), parsed.number);
   return parsed;

@@ -3,11 +3,20 @@
 #include <filesystem>
 #include <map>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "stages/frames/numbered_sequence.h"
 
 namespace eventgan {
+
+/// The extension with its dot, in small letters: ".json" for "a.JSON"; empty if there is none.
+std::string lower_extension(const std::filesystem::path& file);
+
+/// Orders names as people do: runs of digits by their value ("img2" before "img10"), all else by
+/// its bytes. Names that differ only in leading zeros ("1", "01") are ordered by their bytes, so
+/// the order is total.
+bool natural_less(std::string_view a, std::string_view b);
 
 /// What lies in a folder of pictures with any names.
 struct PictureFolder {

@@ -14,8 +14,8 @@ extern "C" {
 #include <string>
 #include <utility>
 
-#include "manifests/faults.h"
-#include "stages/files/text_file.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {

@@ -8,13 +8,10 @@
 #include <stdexcept>
 #include <string_view>
 
-#include "manifests/faults.h"
-#include "stages/archives/file_bytes.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/generator/checkpoints/checkpoint_archive.h"
-#include "stages/generator/checkpoints/checkpoint_limits.h"
-#include "stages/generator/checkpoints/legacy_checkpoint.h"
 #include "stages/generator/checkpoints/stored_tensor.h"
-#include "stages/generator/checkpoints/zip_checkpoint.h"
 
 namespace eventgan {
 namespace {

@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "manifests/state_dict.h"
+#include "manifests/values/weights.h"
 
 namespace eventgan {
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "manifests/state_dict.h"
+#include "manifests/values/weights.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {

@@ -6,12 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 #include "stages/generator/onednn/activation_rows.h"
-#include "stages/generator/onednn/buffers/buffer_layout.h"
-#include "stages/generator/onednn/decoder_strips.h"
+#include "stages/generator/onednn/buffers.h"
+#include "stages/generator/onednn/fused_convolution_internal.h"
 #include "stages/generator/onednn/network_layers_internal.h"
-#include "stages/generator/onednn/row_convolution_internal.h"
 
 namespace eventgan {
 

@@ -1,11 +1,14 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <dnnl.hpp>
+#include <map>
 #include <string>
+#include <vector>
 
-#include "manifests/image_size.h"
-#include "stages/generator/onednn/layer_weights_internal.h"
+#include "manifests/values/frames.h"
+#include "stages/generator/onednn/network_layers_internal.h"
 
 namespace eventgan {
 
@@ -55,6 +58,51 @@ class FusedConvolution {
   dnnl::convolution_forward primitive_;
   dnnl::memory weights_;
   dnnl::memory bias_;
+};
+
+struct RowConvolutionSetup {
+  ImageSize input;
+  ImageSize output;
+  /// Output row r reads input rows from r - padding on, columns likewise; zeros beyond the picture.
+  int padding = 0;
+  dnnl::memory::data_type source_type = dnnl::memory::data_type::f32;
+  Activation activation = Activation::kNone;
+};
+
+/// A convolution of stride 1 whose float32 output is wanted some rows at a time, so that it stays
+/// in the cache until it is used. Thread safe but for `prepare`.
+class RowConvolution {
+ public:
+  /// `weights` must outlive it.
+  RowConvolution(const RowConvolutionSetup& setup, LayerWeights& weights,
+                 const dnnl::engine& engine);
+
+  /// Makes `run` possible for these output rows; rows of one kind share what is built. Throws
+  /// dnnl::error.
+  void prepare(int first_row, int row_count);
+
+  /// input: the whole picture [y, x, channel]; rows: [row_count, x, channel] float32.
+  void run(dnnl::stream& stream, int first_row, int row_count, const void* input, float* rows,
+           void* scratch) const;
+
+  std::size_t output_row_bytes() const;
+  std::size_t scratch_bytes() const;
+  void list_implementations(std::vector<std::string>& names) const;
+
+ private:
+  struct InputRows {
+    int first = 0;
+    int count = 0;
+    int zeros_above = 0;
+    int zeros_below = 0;
+    std::array<int, 3> kind() const { return {count, zeros_above, zeros_below}; }
+  };
+  InputRows input_rows(int first_row, int row_count) const;
+
+  RowConvolutionSetup setup_;
+  LayerWeights* weights_;
+  dnnl::engine engine_;
+  std::map<std::array<int, 3>, FusedConvolution> convolutions_;
 };
 
 }  // namespace eventgan

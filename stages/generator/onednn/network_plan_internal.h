@@ -3,12 +3,16 @@
 #include <array>
 #include <cstddef>
 #include <dnnl.hpp>
+#include <future>
+#include <list>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
-#include "stages/generator/onednn/buffers/buffer_layout.h"
+#include "manifests/values/frames.h"
+#include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/decoder_level_internal.h"
 #include "stages/generator/onednn/fused_convolution_internal.h"
 #include "stages/generator/onednn/network_layers_internal.h"
@@ -77,6 +81,32 @@ class NetworkPlan {
   std::size_t decoded_rows_ = 0;    ///< float32, a strip of the last decoder
   std::size_t predicted_rows_ = 0;  ///< [pixel, channel] float32
   std::size_t scratch_ = 0;
+};
+
+/// Plans for the 16 picture sizes used last: KITTI has a handful of sizes, a folder of pictures any
+/// number. A plan that is in use lives on when it is dropped here. Thread safe.
+class PlanCache {
+ public:
+  /// `layers` must outlive it.
+  explicit PlanCache(NetworkLayers& layers) : layers_(layers) {}
+
+  /// Builds the plan if it is not there; who asks for one that another thread builds waits for it,
+  /// and gets its exception if there is one. Throws dnnl::error; the next call tries again.
+  std::shared_ptr<const NetworkPlan> plan(ImageSize size);
+
+ private:
+  static constexpr std::size_t kKeptPlans = 16;
+  using Planned = std::shared_future<std::shared_ptr<const NetworkPlan>>;
+  struct Entry {
+    ImageSize size;
+    Planned plan;
+  };
+
+  void forget(ImageSize size);
+
+  NetworkLayers& layers_;
+  std::mutex mutex_;
+  std::list<Entry> latest_first_;
 };
 
 }  // namespace eventgan

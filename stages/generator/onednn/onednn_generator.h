@@ -1,13 +1,25 @@
 #pragma once
 
 #include <memory>
+#include <string>
 
-#include "manifests/engine.h"
+#include "manifests/values/job.h"
 #include "stages/generator/generator.h"
-#include "stages/generator/onednn/onednn_support.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {
+
+/// What this build and this processor can do with oneDNN in one precision.
+struct OnednnSupport {
+  bool built = false;   ///< the build found oneDNN
+  bool able = false;    ///< it has compiled kernels for the precision here, not loops alone
+  bool native = false;  ///< and instructions made for it, so that the precision is worth its error
+  /// What oneDNN takes the processor for, ONEDNN_MAX_CPU_ISA minded: "avx512_core_vnni".
+  std::string instruction_set;
+};
+
+/// Thread safe; the same during the whole life of a process.
+OnednnSupport onednn_support(Precision precision);
 
 /// The fast engine: oneDNN's convolutions with bias and activation fused, weights laid out once for
 /// all picture sizes, and for each size a plan that is built on its first use and then runs in

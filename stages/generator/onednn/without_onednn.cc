@@ -1,7 +1,6 @@
 #include <stdexcept>
 
 #include "stages/generator/onednn/onednn_generator.h"
-#include "stages/generator/onednn/onednn_support.h"
 
 namespace eventgan {
 

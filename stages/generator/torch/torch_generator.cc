@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "stages/generator/generator_spans.h"
+#include "stages/generator/generator.h"
 #include "stages/generator/torch/network_forward_internal.h"
 
 namespace eventgan {

@@ -2,7 +2,7 @@
 
 #include <memory>
 
-#include "manifests/engine.h"
+#include "manifests/values/job.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/weights.h"
 

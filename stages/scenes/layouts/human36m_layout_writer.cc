@@ -5,9 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "stages/hdf5/hdf5_internal.h"
-#include "stages/scenes/figure/figure_casting.h"
-#include "stages/scenes/figure/figure_scene.h"
+#include "stages/base/hdf5/hdf5_internal.h"
+#include "stages/scenes/figure_scene.h"
 #include "stages/scenes/layouts/output_files.h"
 
 namespace eventgan {

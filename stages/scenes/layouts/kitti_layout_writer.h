@@ -2,8 +2,19 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
+
+#include "manifests/values/labels.h"
+#include "stages/scenes/road_scene.h"
 
 namespace eventgan {
+
+/// The text of a label file: a line for each vehicle, 15 columns, numbers with two decimals.
+std::string kitti_labels(const std::vector<RoadLabel>& labels);
+
+/// The text of a calibration file: all four cameras are this one.
+std::string kitti_calibration(const Intrinsics& camera);
 
 /// Writes a drive (RoadScene) as KITTI's object set lays it out, 12 labelled frames with three
 /// previous frames each: `root`/{image_2, prev_2, label_2, calib}. Throws std::runtime_error naming

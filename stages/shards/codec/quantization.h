@@ -1,12 +1,27 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
-#include "manifests/job_manifest.h"
+#include "manifests/values/job.h"
 
 namespace eventgan {
+
+/// Largest finite IEEE 754 half.
+inline constexpr float kLargestHalf = 65504;
+
+/// The IEEE 754 half (binary16) nearest to `value`, ties to even, also among subnormals. `value`
+/// must be in [0, 65504]. The same on every machine, whatever its instructions.
+std::uint16_t to_half(float value);
+
+/// halves[i] = to_half(min(values[i], 65504)) for finite values >= 0, with the processor's own
+/// conversion where it has one. The same bits everywhere.
+void to_halves(std::span<const float> values, std::uint16_t* halves);
+
+/// Exact value of a half; infinities and NaN too.
+float from_half(std::uint16_t half);
 
 /// How the values of one volume become stored numbers.
 struct Quantization {
@@ -21,7 +36,7 @@ struct Quantization {
 Quantization quantization(StoredType type, float largest);
 
 /// The nearest number of the stored type for each value, in HDF5's shuffled order: byte b of the
-/// number for values[i] goes to planes[b * plane_size + i] (see byte_planes.h). Values must be
+/// number for values[i] goes to planes[b * plane_size + i] (see chunk_filters.h). Values must be
 /// finite, >= 0 and at most the `largest` of the quantisation. Thread safe.
 void quantize(std::span<const float> values, const Quantization& how, std::byte* planes,
               std::size_t plane_size);

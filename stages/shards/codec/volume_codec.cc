@@ -10,8 +10,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/shards/codec/deflater.h"
-#include "stages/shards/codec/fletcher32.h"
+#include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
 
 namespace eventgan {

@@ -6,10 +6,24 @@
 #include <span>
 #include <vector>
 
-#include "manifests/job_manifest.h"
-#include "stages/shards/codec/volume_window.h"
+#include "manifests/values/events.h"
+#include "manifests/values/job.h"
 
 namespace eventgan {
+
+/// Where given values lie in a volume: values [whole.channels(), content.height, content.width], C
+/// order, their top left pixel at (y, x) of each channel. Around them are zeros (no events), as in
+/// letterbox's borders.
+struct VolumeWindow {
+  VolumeShape whole;
+  ImageSize content;
+  int x = 0;
+  int y = 0;
+
+  std::size_t value_count() const {
+    return static_cast<std::size_t>(whole.channels()) * content.pixel_count();
+  }
+};
 
 /// One volume as it stands in the file: a whole HDF5 chunk after all filters.
 struct EncodedVolume {

@@ -1,7 +1,115 @@
+#include <torch/nn/module.h>
+#include <torch/nn/modules/batchnorm.h>
+#include <torch/nn/modules/container/any.h>
+#include <torch/nn/modules/conv.h>
+#include <torch/nn/options/conv.h>
+#include <torch/nn/pimpl.h>
+
+#include "stages/training/networks/spectral_norm_conv_internal.h"
 #include "stages/training/networks/unet_internal.h"
-#include "stages/training/networks/unet_layers_internal.h"
 
 namespace eventgan {
+namespace {
+
+enum class LayerActivation { kLeakyRelu, kRelu, kTanh };  ///< leaky: slope 0.01
+
+struct ConvLayerSettings {
+  int in_channels = 0;
+  int out_channels = 0;
+  int kernel = 3;  ///< side in pixels; padding keeps the size at stride 1
+  int stride = 1;
+  bool batch_norm = false;  ///< then the convolution has no bias
+  bool spectral_norm = false;
+  LayerActivation activation = LayerActivation::kLeakyRelu;
+};
+
+/// `conv2d`, `norm_layer` (momentum 0.01), activation.
+class ConvLayerImpl : public torch::nn::Module {
+ public:
+  explicit ConvLayerImpl(const ConvLayerSettings& settings);
+  at::Tensor forward(const at::Tensor& input);
+
+ private:
+  torch::nn::AnyModule convolution_;
+  torch::nn::BatchNorm2d norm_{nullptr};
+  LayerActivation activation_;
+};
+TORCH_MODULE(ConvLayer);
+
+/// relu(x + bn2(conv2(relu(bn1(conv1(x)))))), batch norms of momentum 0.1.
+class ResidualBlockImpl : public torch::nn::Module {
+ public:
+  ResidualBlockImpl(int channels, bool spectral_norm);
+  at::Tensor forward(const at::Tensor& input);
+
+ private:
+  torch::nn::AnyModule convolution1_, convolution2_;
+  torch::nn::BatchNorm2d norm1_{nullptr}, norm2_{nullptr};
+};
+TORCH_MODULE(ResidualBlock);
+
+constexpr double kLeakySlope = 0.01;
+
+/// In place where the layer before does not need its output for the gradient: memory and time.
+at::Tensor activate(at::Tensor x, LayerActivation activation) {
+  switch (activation) {
+    case LayerActivation::kRelu:
+      return at::relu_(x);
+    case LayerActivation::kTanh:
+      return at::tanh(x);
+    case LayerActivation::kLeakyRelu:
+      break;
+  }
+  return at::leaky_relu_(x, kLeakySlope);
+}
+
+/// A convolution, plain or spectral-normalised, to be registered under a name of its own: forward
+/// takes and gives one tensor.
+torch::nn::AnyModule make_convolution(const torch::nn::Conv2dOptions& options, bool spectral_norm) {
+  if (spectral_norm) return torch::nn::AnyModule(SpectralNormConv(options));
+  return torch::nn::AnyModule(torch::nn::Conv2d(options));
+}
+
+}  // namespace
+
+ConvLayerImpl::ConvLayerImpl(const ConvLayerSettings& settings)
+    : convolution_(make_convolution(
+          torch::nn::Conv2dOptions(settings.in_channels, settings.out_channels, settings.kernel)
+              .stride(settings.stride)
+              .padding((settings.kernel - 1) / 2)
+              .bias(!settings.batch_norm),
+          settings.spectral_norm)),
+      activation_(settings.activation) {
+  register_module("conv2d", convolution_.ptr());
+  if (settings.batch_norm) {
+    norm_ = register_module(
+        "norm_layer", torch::nn::BatchNorm2d(
+                          torch::nn::BatchNorm2dOptions(settings.out_channels).momentum(0.01)));
+  }
+}
+
+at::Tensor ConvLayerImpl::forward(const at::Tensor& input) {
+  at::Tensor x = convolution_.forward(input);
+  if (norm_) x = norm_->forward(x);
+  return activate(x, activation_);
+}
+
+ResidualBlockImpl::ResidualBlockImpl(int channels, bool spectral_norm) {
+  const auto options = torch::nn::Conv2dOptions(channels, channels, 3).padding(1).bias(false);
+  convolution1_ = make_convolution(options, spectral_norm);
+  convolution2_ = make_convolution(options, spectral_norm);
+  register_module("conv1", convolution1_.ptr());
+  register_module("conv2", convolution2_.ptr());
+  norm1_ = register_module("bn1", torch::nn::BatchNorm2d(channels));
+  norm2_ = register_module("bn2", torch::nn::BatchNorm2d(channels));
+}
+
+at::Tensor ResidualBlockImpl::forward(const at::Tensor& input) {
+  at::Tensor x = norm1_->forward(convolution1_.forward(input));
+  x = norm2_->forward(convolution2_.forward(at::relu_(x)));
+  return at::relu_(x.add_(input));
+}
+
 namespace {
 
 constexpr int kLevels = 4;
@@ -18,7 +126,7 @@ UNetImpl::UNetImpl(const UNetSettings& settings) {
         .in_channels = in_channels,
         .out_channels = settings.out_channels,
         .kernel = 1,
-        .activation = settings.multi_scale ? Activation::kTanh : Activation::kRelu});
+        .activation = settings.multi_scale ? LayerActivation::kTanh : LayerActivation::kRelu});
   };
 
   const ConvLayer head(

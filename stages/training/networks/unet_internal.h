@@ -7,7 +7,7 @@
 
 #include <vector>
 
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
 
 namespace eventgan {
 

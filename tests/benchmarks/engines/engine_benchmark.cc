@@ -15,11 +15,11 @@
 #include <string>
 #include <vector>
 
-#include "manifests/weights_name.h"
-#include "pipeline/memory/big_buffers.h"
-#include "stages/generator/untrained.h"
-#include "stages/generator/weights_files/shipped_weights.h"
-#include "stages/generator/weights_files/weights_file.h"
+#include "manifests/values/weights.h"
+#include "pipeline/runtime/memory.h"
+#include "stages/generator/shipped_weights.h"
+#include "stages/generator/weights.h"
+#include "stages/generator/weights_file.h"
 #include "tests/benchmarks/engines/engine_contender.h"
 
 namespace eventgan {

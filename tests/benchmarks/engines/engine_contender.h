@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/engine.h"
+#include "manifests/values/job.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/weights.h"
 #include "tests/benchmarks/engines/instance_threads.h"

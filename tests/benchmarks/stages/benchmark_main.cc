@@ -4,7 +4,7 @@
 
 #include <opencv2/core/utility.hpp>
 
-#include "pipeline/memory/big_buffers.h"
+#include "pipeline/runtime/memory.h"
 
 int main(int argc, char** argv) {
   eventgan::keep_big_buffers();

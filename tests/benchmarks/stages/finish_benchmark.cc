@@ -15,12 +15,8 @@
 #include <string>
 #include <vector>
 
-#include "stages/events/normalization.h"
 #include "stages/events/volume_statistics.h"
-#include "stages/shards/codec/byte_planes.h"
-#include "stages/shards/codec/deflater.h"
-#include "stages/shards/codec/fletcher32.h"
-#include "stages/shards/codec/half_float.h"
+#include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 

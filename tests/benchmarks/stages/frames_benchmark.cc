@@ -12,8 +12,8 @@
 #include <string>
 #include <vector>
 
+#include "stages/base/pictures/picture_file.h"
 #include "stages/frames/decoding/pair_reader.h"
-#include "stages/frames/decoding/picture_file.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {

@@ -9,7 +9,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "tests/pipeline/profile/trace_reading.h"
+#include "tests/pipeline/runtime/trace_reading.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/temporary_folder.h"
 

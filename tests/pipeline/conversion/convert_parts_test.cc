@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 

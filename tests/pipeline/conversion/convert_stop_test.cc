@@ -4,7 +4,7 @@
 #include <atomic>
 #include <thread>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/folder/verify_folder.h"
 #include "tests/pipeline/conversion/small_conversion.h"

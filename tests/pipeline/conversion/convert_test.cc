@@ -7,10 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "manifests/faults.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/verify_folder.h"
-#include "pipeline/generation/load_generator.h"
+#include "pipeline/generators/load_generator.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 #include "tests/pipeline/conversion/small_conversion.h"

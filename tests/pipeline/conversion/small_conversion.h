@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/documents/job_manifest.h"
 #include "pipeline/conversion/convert.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/full_disk.h"

@@ -1,10 +1,9 @@
-#include "pipeline/planning/pair_choice.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <map>
 
+#include "pipeline/planning/make_plan.h"
 #include "tests/testing/fake_dataset.h"
 
 namespace eventgan {

@@ -3,19 +3,146 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <functional>
 #include <limits>
+#include <numeric>
 
+#include "manifests/values/faults.h"
+#include "pipeline/realism/real_interval.h"
 #include "stages/events/event_volume.h"
-#include "stages/events/normalization.h"
+#include "stages/events/volume_statistics.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
 
+using ::testing::ElementsAre;
 using testing::FakeRecording;
 using testing::moving_bar_recording;
+using ::testing::SizeIs;
+
+FakeRecording recording_of(int frames) { return moving_bar_recording({4, 8}, frames); }
+
+TEST(ChooseIntervals, TakesPairsByGapWithBothFramesInside) {
+  const FakeRecording recording = recording_of(6);
+  EXPECT_THAT(choose_intervals(recording, 1, 4, {2, 1}),
+              ElementsAre(FrameInterval{1, 3}, FrameInterval{2, 4}, FrameInterval{1, 2},
+                          FrameInterval{2, 3}, FrameInterval{3, 4}));
+  EXPECT_THAT(choose_intervals(recording, 0, std::nullopt, {5}), ElementsAre(FrameInterval{0, 5}));
+  EXPECT_THAT(choose_intervals(recording, 0, std::nullopt, {1}), SizeIs(5));
+}
+
+TEST(ChooseIntervals, RefusesWhatHasNoPairs) {
+  const FakeRecording recording = recording_of(3);
+  EXPECT_THROW(choose_intervals(recording, 0, 3, {1}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, -1, 2, {1}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 2, 1, {1}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 1, 1, {1}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 0, 2, {3}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 0, 2, {}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 0, 2, {0}), UsageError);
+  EXPECT_THROW(choose_intervals(recording, 0, 2, {1, 1}), UsageError);
+}
+
+TEST(ReadInterval, HasTheIntervalsFramesEventsAndFlow) {
+  const FakeRecording recording = recording_of(4);
+  const RealInterval real = read_interval(recording, {1, 3}, 5);
+  EXPECT_EQ(real.frames.previous, recording.frame(1));
+  EXPECT_EQ(real.frames.next, recording.frame(3));
+  EXPECT_NEAR(real.frames.duration_s, 0.1, 1e-12);
+  const auto events = recording.events_between(1, 3);
+  EXPECT_EQ(real.frames.event_count, static_cast<std::int64_t>(events.size()));
+  const std::vector<float> counts = event_volume(events, {5, recording.size()});
+  EXPECT_NEAR(std::accumulate(counts.begin(), counts.end(), 0.0),
+              static_cast<double>(events.size()), 1e-4);
+  EXPECT_THAT(real.volume, SizeIs(2 * 5 * 4 * 8));
+  EXPECT_EQ(real.volume, normalized(counts));
+  ASSERT_TRUE(real.flow.has_value());
+  EXPECT_EQ(real.flow->x_px.front(), 4);  // two steps of 2 px
+  EXPECT_EQ(read_frames(recording, {1, 3}).event_count, real.frames.event_count);
+}
+
+TEST(NetworkInput, IsBothFramesInMinusOneToOne) {
+  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {51, 204}}, 0};
+  EXPECT_THAT(network_input(frames),
+              ElementsAre(-1.0f, 1.0f, ::testing::FloatEq(-0.6f), ::testing::FloatEq(0.6f)));
+}
+
+constexpr ImageSize kSize{2, 5};
+
+FlowField row_flow(const std::vector<float>& x_of_column, float y = 0) {
+  FlowField flow{kSize, {}, std::vector<float>(kSize.pixel_count(), y)};
+  for (int row = 0; row < kSize.height; ++row) {
+    flow.x_px.insert(flow.x_px.end(), x_of_column.begin(), x_of_column.end());
+  }
+  return flow;
+}
+
+FakeRecording recording_of(const std::vector<FlowField>& flows, ImageSize size = kSize) {
+  std::vector<double> times;
+  for (std::size_t i = 0; i <= flows.size(); ++i) times.push_back(static_cast<double>(i));
+  const GreyImage frame{size, std::vector<std::uint8_t>(size.pixel_count())};
+  return {std::vector<GreyImage>(times.size(), frame), times, {}, flows};
+}
+
+TEST(FlowPath, OfOneIntervalIsItsFlow) {
+  const auto recording = recording_of({row_flow({0, 1, 2, 3, 4}), row_flow({9, 9, 9, 9, 9})});
+  const auto path = flow_path(recording, {0, 1});
+  ASSERT_TRUE(path.has_value());
+  EXPECT_EQ(path->x_px, row_flow({0, 1, 2, 3, 4}).x_px);
+}
+
+TEST(FlowPath, FollowsThePixel) {
+  // From column 0 by 1.5 to 1.5, where the second flow is halfway between 10 and 20: 1.5 + 15.
+  const auto recording =
+      recording_of({row_flow({1.5f, 1, 2, 1, 0}), row_flow({0, 10, 20, 30, 40})});
+  const auto path = flow_path(recording, {0, 2});
+  ASSERT_TRUE(path.has_value());
+  EXPECT_FLOAT_EQ(path->x_px[0], 16.5f);
+  EXPECT_FLOAT_EQ(path->x_px[1], 1 + 20);
+  EXPECT_FLOAT_EQ(path->x_px[2], 2 + 40);  // arrives on the last column
+  EXPECT_FLOAT_EQ(path->x_px[3], 1 + 40);
+  EXPECT_FLOAT_EQ(path->x_px[4], 40);
+  EXPECT_FLOAT_EQ(path->y_px[0], 0);
+}
+
+TEST(FlowPath, AddsUpOverThreeIntervals) {
+  const FlowField step = row_flow({1, 1, 1, 1, 1});
+  const auto path = flow_path(recording_of({step, step, step}), {0, 3});
+  ASSERT_TRUE(path.has_value());
+  EXPECT_FLOAT_EQ(path->x_px[0], 3);
+  EXPECT_FLOAT_EQ(path->x_px[2], 3);
+}
+
+TEST(FlowPath, IsUnknownBeyondThePictureAndWhereTheFlowIs) {
+  const float unknown = std::numeric_limits<float>::quiet_NaN();
+  const auto recording =
+      recording_of({row_flow({0, 0, 0, 0, 0.5f}), row_flow({unknown, 1, 1, 1, 1})});
+  const auto path = flow_path(recording, {0, 2});
+  ASSERT_TRUE(path.has_value());
+  EXPECT_TRUE(std::isnan(path->x_px[0]));
+  EXPECT_FLOAT_EQ(path->x_px[1], 1);
+  EXPECT_TRUE(std::isnan(path->x_px[4]));
+  const auto down =
+      flow_path(recording_of({row_flow({0, 0, 0, 0, 0}, 1), row_flow({0, 0, 0, 0, 0})}), {0, 2});
+  EXPECT_FLOAT_EQ(down->y_px[0], 1);
+  EXPECT_TRUE(std::isnan(down->y_px[5]));
+}
+
+TEST(FlowPath, OfAPictureOfOnePixel) {
+  const FlowField still{{1, 1}, {0}, {0}};
+  const auto path = flow_path(recording_of({still, still}, {1, 1}), {0, 2});
+  ASSERT_TRUE(path.has_value());
+  EXPECT_EQ(path->x_px[0], 0);
+}
+
+TEST(FlowPath, IsNotKnownWithoutFlows) {
+  const GreyImage frame{{1, 1}, {0}};
+  const FakeRecording recording({frame, frame}, {0, 1}, {});
+  EXPECT_FALSE(flow_path(recording, {0, 1}).has_value());
+}
 
 constexpr int kBins = 3;
 

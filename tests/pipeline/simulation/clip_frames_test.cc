@@ -3,7 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "manifests/faults.h"
+#include <cmath>
+
+#include "manifests/values/faults.h"
+#include "pipeline/simulation/scene.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/picture_file.h"
@@ -12,6 +15,40 @@
 
 namespace eventgan {
 namespace {
+
+/// Grey columns of these values.
+ColourFrame columns(int height, const std::vector<int>& values) {
+  ColourFrame frame{{height, static_cast<int>(values.size())}, {}};
+  for (int y = 0; y < height; ++y) {
+    for (const int value : values)
+      frame.bgr.insert(frame.bgr.end(), 3, static_cast<std::uint8_t>(value));
+  }
+  return frame;
+}
+
+TEST(SensorPicture, IsGreyByBt601) {
+  // 0.114 x 200 = 22.8 of blue alone.
+  const ColourFrame blue{{1, 1}, {200, 0, 0}};
+  EXPECT_EQ(sensor_picture(blue, std::nullopt), (GreyImage{{1, 1}, {23}}));
+}
+
+TEST(SensorPicture, ShrinksByAveragingAndCutsAroundTheCentre) {
+  // 8 x 2 covers 2 x 1 by the scale 1/2: 4 x 1, of which the middle two are left.
+  const ColourFrame frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
+  EXPECT_EQ(sensor_picture(frame, ImageSize{1, 2}), (GreyImage{{1, 2}, {20, 150}}));
+}
+
+TEST(SensorPicture, GrowsToCover) {
+  const GreyImage picture = sensor_picture(columns(2, {50, 50}), ImageSize{6, 4});
+  EXPECT_EQ(picture, (GreyImage{{6, 4}, std::vector<std::uint8_t>(24, 50)}));
+}
+
+TEST(SensorPicture, OfItsOwnSizeIsUntouched) {
+  const ColourFrame frame = columns(3, {0, 255, 3});
+  EXPECT_EQ(sensor_picture(frame, ImageSize{3, 3}), sensor_picture(frame, std::nullopt));
+  EXPECT_EQ(sensor_picture(frame, std::nullopt).pixels,
+            (std::vector<std::uint8_t>{0, 255, 3, 0, 255, 3, 0, 255, 3}));
+}
 
 class ClipFramesTest : public ::testing::Test {
  protected:
@@ -125,6 +162,110 @@ TEST_F(ClipFramesTest, RefusesFramesThatCannotBeUsed) {
   clip.frame(0);
   EXPECT_THROW(clip.frame(1), InputError);
   EXPECT_THROW(clip.frame(2), InputError);
+}
+
+class ClipSceneTest : public ::testing::Test {
+ protected:
+  ClipSceneTest() {
+    testing::write_moving_clip(folder_ / "clip", {48, 64}, 3);
+    manifest_ = testing::moving_clip_manifest(folder_.path(),
+                                              R"({"path": "clip", "frames_per_second": 10})");
+    clip_ = std::make_unique<ClipFrames>(manifest_.sources.at(0), manifest_);
+  }
+
+  testing::TemporaryFolder folder_;
+  SimulationManifest manifest_;
+  std::unique_ptr<ClipFrames> clip_;
+};
+
+TEST_F(ClipSceneTest, GoesThroughTheFrames) {
+  ClipScene scene(*clip_, ClipMotion::kFade);
+  EXPECT_FALSE(scene.has_flow());
+  EXPECT_EQ(scene.frame(), clip_->frame(0));
+  const auto first = scene.advance();
+  EXPECT_EQ(scene.frame(), clip_->frame(1));
+  EXPECT_DOUBLE_EQ(scene.time_s(), 0.1);
+  EXPECT_EQ(first->steps(), 1);
+  EXPECT_FLOAT_EQ(first->render(0).at(0) * 255, clip_->frame(0).pixels.at(0));
+  EXPECT_NE(scene.advance(), nullptr);
+  EXPECT_EQ(scene.advance(), nullptr);
+  EXPECT_EQ(scene.frame(), clip_->frame(2));
+}
+
+TEST_F(ClipSceneTest, SeesTheSquareMove) {
+  ClipScene scene(*clip_, ClipMotion::kFlow);
+  EXPECT_TRUE(scene.has_flow());
+  const auto interval = scene.advance();
+  const FlowDisplacement flow = interval->flow();
+  // The square covers x 4..27, y 12..35 and moves 2 px to the right.
+  const std::size_t inside = 24 * 64 + 16, outside = 44 * 64 + 56;
+  EXPECT_NEAR(flow.x_px.at(inside), 2, 0.5);
+  EXPECT_NEAR(flow.y_px.at(inside), 0, 0.5);
+  EXPECT_NEAR(flow.x_px.at(outside), 0, 0.5);
+}
+
+/// A smooth picture, which bilinear interpolation renders well.
+GreyImage waves(ImageSize size) {
+  GreyImage image{size, {}};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      image.pixels.push_back(
+          static_cast<std::uint8_t>(std::lround(128 + 60 * std::sin(x / 7.0) * std::cos(y / 5.0))));
+    }
+  }
+  return image;
+}
+
+TEST(AffineScene, FramesFollowEachOtherByTheirFlow) {
+  const ImageSize size{48, 64};
+  const AffineMotion motion = random_affine_motion(size, 11, CounterRandom(3));
+  AffineScene scene(waves(size), motion, 4, 0.1);
+  EXPECT_EQ(scene.time_s(), 0);
+  EXPECT_TRUE(scene.has_flow());
+  int intervals = 0;
+  for (GreyImage before = scene.frame(); const auto interval = scene.advance();
+       before = scene.frame(), ++intervals) {
+    // 11 px in 4 parts are at most 2.75 px each: 3 pictures at most 1 px apart.
+    EXPECT_EQ(interval->steps(), 3);
+    const FlowDisplacement flow = interval->flow();
+    for (int y = 8; y < size.height - 8; ++y) {
+      for (int x = 8; x < size.width - 8; ++x) {
+        const auto i = static_cast<std::size_t>(y * size.width + x);
+        const auto to_x = static_cast<int>(std::lround(x + flow.x_px[i]));
+        const auto to_y = static_cast<int>(std::lround(y + flow.y_px[i]));
+        const auto j = static_cast<std::size_t>(to_y * size.width + to_x);
+        // Half a pixel of rounding times the steepest slope, 60/5 a pixel in both directions.
+        EXPECT_NEAR(before.pixels[i], scene.frame().pixels[j], 13);
+      }
+    }
+  }
+  EXPECT_EQ(intervals, 3);
+  EXPECT_DOUBLE_EQ(scene.time_s(), 0.3);
+}
+
+TEST(AffineScene, FlowOfATranslationIsTheSameEverywhere) {
+  AffineMotion motion;
+  motion.matrix = {1, 0, 6, 0, 1, -3};
+  AffineScene scene(waves({20, 30}), motion, 3, 1);
+  while (const auto interval = scene.advance()) {
+    const FlowDisplacement flow = interval->flow();
+    for (const float x : flow.x_px) EXPECT_NEAR(x, 2, 1e-5);
+    for (const float y : flow.y_px) EXPECT_NEAR(y, -1, 1e-5);
+  }
+}
+
+TEST(AffineScene, AnIntervalBeginsAndEndsWithItsFrames) {
+  AffineScene scene(waves({20, 30}), random_affine_motion({20, 30}, 5, CounterRandom(1)), 3, 1);
+  GreyImage before = scene.frame();
+  while (const auto interval = scene.advance()) {
+    const std::vector<float> first = interval->render(0);
+    const std::vector<float> last = interval->render(interval->steps());
+    for (std::size_t i = 0; i < first.size(); ++i) {
+      EXPECT_NEAR(first[i] * 255, before.pixels[i], 0.51);
+      EXPECT_NEAR(last[i] * 255, scene.frame().pixels[i], 0.51);
+    }
+    before = scene.frame();
+  }
 }
 
 }  // namespace

@@ -4,7 +4,8 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "manifests/counter_random.h"
+#include "manifests/documents/simulation_manifest.h"
+#include "manifests/values/counter_random.h"
 
 namespace eventgan::testing {
 namespace {

@@ -3,8 +3,8 @@
 #include <filesystem>
 #include <string>
 
-#include "manifests/image_size.h"
-#include "manifests/simulation_manifest.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/simulation.h"
 
 namespace eventgan::testing {
 

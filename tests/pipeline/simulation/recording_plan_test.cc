@@ -1,12 +1,65 @@
 #include "pipeline/simulation/recording_plan.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
+#include "manifests/values/faults.h"
+#include "stages/recordings/mvsec_writer.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
+
+std::string settings(const std::string& source, const std::string& more = "") {
+  const SimulationManifest manifest = testing::moving_clip_manifest("/data", source, more);
+  return recording_settings(manifest, manifest.sources.at(0), "clip", "hash", std::nullopt);
+}
+
+TEST(RecordingSettings, AreTheSourcesAndTheSensors) {
+  const auto json = nlohmann::json::parse(
+      settings(R"({"path": "clip", "frame_count": 7})", R"(, "sensor": {"leak_rate_hz": 2})"));
+  EXPECT_EQ(json.at("source").at("frame_count"), 7);
+  EXPECT_EQ(json.at("sensor").at("leak_rate_hz"), 2);
+  EXPECT_EQ(json.at("files"), "hash");
+  EXPECT_FALSE(json.contains("size"));
+}
+
+TEST(RecordingSettings, OfOtherSourcesDoNotMatter) {
+  EXPECT_EQ(settings(R"({"path": "clip"})"), settings(R"({"path": "clip"}, {"path": "other"})"));
+  EXPECT_NE(settings(R"({"path": "clip"})"), settings(R"({"path": "clip"})", R"(, "seed": 1)"));
+}
+
+TEST(RecordingSettings, HowManyPicturesFollowDoesNotMatter) {
+  EXPECT_EQ(settings(R"({"path": "clip", "method": "affine", "frame_count": 1})"),
+            settings(R"({"path": "clip", "method": "affine", "frame_count": 9})"));
+}
+
+TEST(RecordingSettings, AreReadBackFromARecording) {
+  const testing::TemporaryFolder folder;
+  EXPECT_EQ(settings_on_disk(folder / "a.hdf5"), std::nullopt);
+  MvsecWriter writer(folder / "a.hdf5", {2, 3}, "{\"a\": 1}");
+  writer.add_frame(GreyImage{{2, 3}, std::vector<std::uint8_t>(6)}, 0, nullptr);
+  writer.commit();
+  EXPECT_EQ(settings_on_disk(folder / "a.hdf5"), "{\"a\": 1}");
+  testing::write_file(folder / "b.hdf5", "no HDF5");
+  EXPECT_THROW(settings_on_disk(folder / "b.hdf5"), InputError);
+}
+
+TEST(RecordingSettings, DifferencesAreToldByField) {
+  EXPECT_NO_THROW(check_same_settings("f", "{\"a\": 1}", "{\"a\": 1}"));
+  try {
+    check_same_settings("f.hdf5", R"({"a": 1, "b": {"c": 2}})", R"({"a": 1, "b": {"c": 3}})");
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_THAT(error.what(), ::testing::AllOf(::testing::StartsWith("f.hdf5 was made by a run"),
+                                               ::testing::HasSubstr("$.b.c: expected 2, got 3"),
+                                               ::testing::Not(::testing::HasSubstr("$.a"))));
+  }
+}
 
 std::vector<PlannedRecording> plan(const testing::TemporaryFolder& folder,
                                    const std::string& source) {

@@ -2,15 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <unistd.h>
 
+#include <optional>
 #include <sstream>
 #include <stdexcept>
 
-#include "manifests/faults.h"
-#include "pipeline/errors/error_text.h"
-#include "pipeline/training/training_lock.h"
+#include "manifests/values/faults.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/training/training_folder.h"
 #include "stages/generator/torch/torch_generator.h"
-#include "stages/generator/weights_files/weights_file.h"
+#include "stages/generator/weights_file.h"
 #include "tests/pipeline/training/small_training.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -21,7 +23,101 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::SizeIs;
+using ::testing::ThrowsMessage;
+
+TEST(TrainingFolder, DiscardsItsOwnFilesOnly) {
+  const testing::TemporaryFolder root;
+  const TrainingFolder folder{root.path()};
+  folder.prepare();
+  const std::vector<std::filesystem::path> own{folder.checkpoints() / "latest.safetensors",
+                                               folder.checkpoints() / "previous.safetensors",
+                                               folder.losses(),
+                                               folder.curves(),
+                                               folder.validation(),
+                                               folder.weights(),
+                                               folder.latest_weights(),
+                                               folder.picture({TrainingPhase::kGenerator, 12})};
+  for (const auto& file : own) testing::write_file(file, "x");
+  testing::write_file(root / "notes.txt", "mine");
+  testing::write_file(folder.pictures() / "mine.png", "mine");
+  folder.discard();
+  for (const auto& file : own) EXPECT_FALSE(std::filesystem::exists(file)) << file;
+  EXPECT_TRUE(std::filesystem::exists(root / "notes.txt"));
+  EXPECT_TRUE(std::filesystem::exists(folder.pictures() / "mine.png"));
+}
+
+TEST(TrainingFolder, DiscardsNothingWhereNothingIs) {
+  EXPECT_NO_THROW(TrainingFolder{"/nowhere"}.discard());
+}
+
+TEST(TrainingLock, HoldsOthersOffAndSaysWhoItIs) {
+  const testing::TemporaryFolder root;
+  std::optional<TrainingLock> first(root / "out");
+  EXPECT_THAT(
+      [&] { TrainingLock second(root / "out"); },
+      ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("process " + std::to_string(::getpid())),
+                                              HasSubstr((root / "out").string()))));
+  const TrainingLock elsewhere(root / "other");
+  first.reset();
+  EXPECT_NO_THROW(TrainingLock(root / "out"));
+}
+
+TEST(TrainingLock, NamesTheFileThatCannotBeMade) {
+  EXPECT_THROW(TrainingLock("/proc/none"), std::runtime_error);
+}
+
+class ShownTraining : public ::testing::Test {
+ protected:
+  /// Three steps of a second each, the discriminator's loss in the second only.
+  std::string shown(ProgressStyle style) {
+    std::ostringstream stream;
+    {
+      TrainingProgress progress(stream, style, false, [&] { return now_; });
+      for (int done = 1; done <= 3; ++done) {
+        now_ += std::chrono::seconds(10);
+        progress.advance(TrainingPhase::kGenerator, done, 100,
+                         done == 2 ? std::map<std::string, double>{{"discriminator", 1.5}}
+                                   : std::map<std::string, double>{{"generator.total", 0.25}});
+      }
+    }
+    return stream.str();
+  }
+
+  std::chrono::steady_clock::time_point now_{};
+};
+
+TEST_F(ShownTraining, LinesSayPhaseRateAndLosses) {
+  EXPECT_THAT(shown(ProgressStyle::kLines),
+              HasSubstr("generator 3/100, 0.10 steps/s, 0h16m10s left, generator.total 0.25, "
+                        "discriminator 1.5\n"));
+}
+
+TEST_F(ShownTraining, ABarIsRedrawnAndEnded) {
+  const std::string text = shown(ProgressStyle::kBar);
+  EXPECT_THAT(text, HasSubstr("\r[....................] generator 3/100"));
+  EXPECT_EQ(text.back(), '\n');
+}
+
+TEST_F(ShownTraining, JsonIsALineEach) {
+  EXPECT_THAT(shown(ProgressStyle::kJson), HasSubstr("\"phase\":\"generator\""));
+  EXPECT_THAT(shown(ProgressStyle::kNone), Not(HasSubstr("generator")));
+  EXPECT_THAT(shown(ProgressStyle::kAuto), HasSubstr("generator 1/100"));  // no terminal: lines
+}
+
+constexpr char kWithout[] = "x86-64 avx2 fma avx512f avx512vnni";
+constexpr char kWith[] = "x86-64 avx2 fma avx512f avx512vnni avx512bf16";
+
+TEST(PrecisionAdvice, WarnsOfBfloat16WithoutInstructionsForIt) {
+  EXPECT_THAT(precision_advice(TrainingPrecision::kBfloat16, "cpu", kWithout), HasSubstr(kWithout));
+}
+
+TEST(PrecisionAdvice, IsSilentElsewhere) {
+  EXPECT_EQ(precision_advice(TrainingPrecision::kBfloat16, "cpu", kWith), "");
+  EXPECT_EQ(precision_advice(TrainingPrecision::kBfloat16, "cuda", kWithout), "");
+  EXPECT_EQ(precision_advice(TrainingPrecision::kFloat32, "cpu", kWithout), "");
+}
 
 class SmallTraining : public ::testing::Test {
  protected:

@@ -2,6 +2,7 @@
 
 #include <stdexcept>
 
+#include "manifests/documents/training_manifest.h"
 #include "stages/recordings/mvsec_writer.h"
 #include "tests/testing/fake_recording.h"
 

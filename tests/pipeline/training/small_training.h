@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <string>
 
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
 
 namespace eventgan::testing {
 

@@ -4,7 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
+#include "stages/generator/calibration.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/weights.h"
 
@@ -30,5 +31,9 @@ std::string size_text(ImageSize size);
 
 /// The weights with a calibration from a few natural_frames of this size.
 Weights calibrated(const Weights& weights, ImageSize size);
+
+/// A calibration of random numbers: ranges over three powers of ten, means below them, small
+/// offsets and mixings. The same seed gives the same numbers.
+Calibration sample_calibration(int base_channels, std::uint64_t seed);
 
 }  // namespace eventgan::testing

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/image_size.h"
+#include "manifests/values/frames.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan::testing {
@@ -16,5 +16,11 @@ namespace eventgan::testing {
 using TensorChange = std::function<void(const std::string& name, std::vector<double>& values)>;
 std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
                                  ImageSize size, const TensorChange& change = {});
+
+/// The 8-bit network as QuantizableNetwork describes it, as plain loops in double precision,
+/// without phases: what an int8 engine computes but for float32 rounding and its own kernels'
+/// steps. weights.calibration must be there. frames [2, H, W] → volume [2 bins, H, W].
+std::vector<float> plain_int8_network(const Weights& weights, const std::vector<float>& frames,
+                                      ImageSize size, int largest_weight = 127);
 
 }  // namespace eventgan::testing

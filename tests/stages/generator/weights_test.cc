@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <stdexcept>
+#include <vector>
 
-#include "stages/generator/network_shape.h"
-#include "stages/generator/untrained.h"
+#include "manifests/values/counter_random.h"
+#include "stages/generator/decoder_kernels.h"
+#include "stages/generator/generator.h"
 
 namespace eventgan {
 namespace {
@@ -55,6 +58,107 @@ TEST(ActivationBytes, AddUpTheTensorsBetweenTheLayers) {
   const std::size_t values = 2 * 1536 + 2 * (4 * 384 + 8 * 96 + 16 * 24) + 2 * 32 * 6;
   EXPECT_EQ(activation_bytes({32, 48}, 2, 4), values * 4 + 2 * 1536 * 4);
   EXPECT_EQ(activation_bytes({32, 48}, 2, 1), values + 2 * 1536 * 4);
+}
+
+TEST(UntrainedWeights, SameSeedSameNumbers) {
+  EXPECT_EQ(untrained_weights(2, 9, 1).convolutions[3].weight,
+            untrained_weights(2, 9, 1).convolutions[3].weight);
+  EXPECT_NE(untrained_weights(2, 9, 1).convolutions[3].weight,
+            untrained_weights(2, 9, 2).convolutions[3].weight);
+}
+
+TEST(UntrainedWeights, HaveTheLayoutAndTheDeviationOfHeInitialisation) {
+  const Weights weights = untrained_weights(8, 9, 1);
+  EXPECT_NO_THROW(check_weights(weights, "test"));
+  const Convolution& layer = weights.convolutions[5];  // resblocks.0.conv1: fan-in 128 x 9
+  double squares = 0;
+  for (const float value : layer.weight) squares += double(value) * value;
+  const double deviation = std::sqrt(squares / double(layer.weight.size()));
+  // 147,456 samples: the relative error of the deviation is about 1/√(2n) = 0.2 %.
+  EXPECT_NEAR(deviation, std::sqrt(2.0 / (128 * 9)), 0.01 * deviation);
+}
+
+TEST(CheckGeneratorSpans, TakesFramesAndVolumeOfOneSize) {
+  const std::vector<float> frames(2 * 6), volume(18 * 6);
+  EXPECT_NO_THROW(check_generator_spans(frames, {2, 3}, volume, 9));
+}
+
+TEST(CheckGeneratorSpans, RefusesOthers) {
+  const std::vector<float> frames(2 * 6), volume(18 * 6);
+  EXPECT_THROW(check_generator_spans(frames, {3, 3}, volume, 9), std::invalid_argument);
+  EXPECT_THROW(check_generator_spans(frames, {2, 3}, volume, 8), std::invalid_argument);
+  EXPECT_THROW(check_generator_spans({}, {0, 0}, {}, 9), std::invalid_argument);
+  EXPECT_THROW(check_generator_spans(frames, {-2, -3}, volume, 9), std::invalid_argument);
+}
+
+constexpr int kOut = 2;
+constexpr int kIn = 3;
+
+std::vector<float> random_values(std::size_t count, std::uint64_t seed) {
+  const CounterRandom random(seed);
+  std::vector<float> values(count);
+  for (std::size_t i = 0; i < count; ++i) values[i] = float(random.uniform(i) * 2 - 1);
+  return values;
+}
+
+/// Value of channel c at (y, x) of a picture [channel, y, x]; 0 beyond it.
+double at(const std::vector<float>& picture, int height, int width, int c, int y, int x) {
+  if (y < 0 || x < 0 || y >= height || x >= width) return 0;
+  return picture[(static_cast<std::size_t>(c) * height + y) * width + x];
+}
+
+TEST(PhaseKernel, EqualsTheConvolutionOfTheDoubledPicture) {
+  const int height = 4, width = 5;
+  const auto kernel = random_values(kOut * kIn * 9, 1);
+  const auto small = random_values(kIn * height * width, 2);
+  const auto phases = phase_kernel(kernel, kOut, kIn);
+  ASSERT_EQ(phases.size(), 4u * kOut * kIn * 4);
+
+  for (int o = 0; o < kOut; ++o) {
+    for (int y = 0; y < 2 * height; ++y) {
+      for (int x = 0; x < 2 * width; ++x) {
+        double direct = 0, phased = 0;
+        for (int c = 0; c < kIn; ++c) {
+          for (int t = 0; t < 9; ++t) {
+            const int v = y + t / 3 - 1, u = x + t % 3 - 1;
+            const bool inside = v >= 0 && u >= 0 && v < 2 * height && u < 2 * width;
+            if (inside)
+              direct += kernel[(o * kIn + c) * 9 + t] * at(small, height, width, c, v / 2, u / 2);
+          }
+          const int channel = (2 * (y % 2) + x % 2) * kOut + o;
+          const int p = (y + 1) / 2, q = (x + 1) / 2;
+          for (int t = 0; t < 4; ++t) {
+            phased += phases[(channel * kIn + c) * 4 + t] *
+                      at(small, height, width, c, p - 1 + t / 2, q - 1 + t % 2);
+          }
+        }
+        EXPECT_NEAR(phased, direct, 1e-5) << o << " " << y << " " << x;
+      }
+    }
+  }
+}
+
+TEST(DecoderKernels, SplitsTheInputChannels) {
+  Convolution decoder{
+      "decoders.3", kOut, kIn + kOut, 3, 1, random_values(kOut * (kIn + kOut) * 9, 3), {0, 0}};
+  const DecoderKernels kernels = decoder_kernels(decoder);
+  EXPECT_EQ(kernels.doubled_channels, kIn);
+  ASSERT_EQ(kernels.doubled.size(), kOut * kIn * 9u);
+  ASSERT_EQ(kernels.skip.size(), kOut * kOut * 9u);
+  const auto weight = [&](int o, int c, int t) {
+    return decoder.weight[(o * (kIn + kOut) + c) * 9 + t];
+  };
+  for (int o = 0; o < kOut; ++o) {
+    for (int t = 0; t < 9; ++t) {
+      for (int c = 0; c < kIn; ++c) {
+        EXPECT_EQ(kernels.doubled[(o * kIn + c) * 9 + t], weight(o, c, t));
+        EXPECT_EQ(kernels.transposed[(o * kIn + c) * 9 + t % 3 * 3 + t / 3], weight(o, c, t));
+      }
+      for (int c = 0; c < kOut; ++c) {
+        EXPECT_EQ(kernels.skip[(o * kOut + c) * 9 + t], weight(o, kIn + c, t));
+      }
+    }
+  }
 }
 
 }  // namespace

@@ -1,12 +1,11 @@
-#include "stages/labels/geometry.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 #include <vector>
 
-#include "manifests/placement.h"
+#include "manifests/values/placement.h"
+#include "stages/labels/label_mapping.h"
 
 namespace eventgan {
 namespace {

@@ -8,8 +8,6 @@
 #include <limits>
 #include <optional>
 
-#include "stages/labels/geometry.h"
-
 namespace eventgan {
 namespace {
 

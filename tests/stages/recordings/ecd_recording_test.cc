@@ -1,7 +1,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
-#include "manifests/faults.h"
+#include <cstdio>
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "stages/recordings/ecd_event_file_internal.h"
 #include "stages/recordings/ecd_recording_internal.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -14,6 +19,213 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
+
+class RandomAccessFileTest : public ::testing::Test {
+ protected:
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "file";
+};
+
+TEST_F(RandomAccessFileTest, ReadsParts) {
+  testing::write_file(path_, "0123456789");
+  const RandomAccessFile file(path_);
+  EXPECT_EQ(file.size_bytes(), 10);
+  EXPECT_EQ(file.read(3, 6), "345");
+  EXPECT_EQ(file.read(0, 10), "0123456789");
+  EXPECT_EQ(file.read(10, 10), "");
+}
+
+TEST_F(RandomAccessFileTest, RefusesWhatIsNoFile) {
+  EXPECT_THAT(
+      [&] { RandomAccessFile file(path_); },
+      ThrowsMessage<InputError>(HasSubstr("No such file or directory, in " + path_.string())));
+  EXPECT_THAT([&] { RandomAccessFile file(folder_.path()); },
+              ThrowsMessage<InputError>(HasSubstr("a folder or device")));
+}
+
+TEST_F(RandomAccessFileTest, TellsOfAFileThatShrinks) {
+  testing::write_file(path_, "0123456789");
+  const RandomAccessFile file(path_);
+  std::filesystem::resize_file(path_, 5);
+  EXPECT_EQ(file.read(0, 5), "01234");
+  EXPECT_THAT([&] { file.read(0, 10); }, ThrowsMessage<InputError>(HasSubstr("has shrunk")));
+}
+
+TEST(EcdEventLineTest, ParsesNumbersBetweenBlanks) {
+  for (const char* line : {"0.003811000 96 133 0", "0.003811\t96  133 0\r", "3.811e-3 96 133 0 "}) {
+    const StoredEvent event = parse_ecd_event(line);
+    EXPECT_EQ(event.t_s, 0.003811) << line;
+    EXPECT_EQ(event.x, 96);
+    EXPECT_EQ(event.y, 133);
+    EXPECT_EQ(event.polarity, 0);
+    EXPECT_EQ(parse_ecd_event_time(line), 0.003811);
+  }
+}
+
+TEST(EcdEventLineTest, RefusesOtherLines) {
+  for (const char* line :
+       {"", " ", "0.5", "0.5 1 2", "0.5 1 2 1 7", "0.5 1.5 2 1", "0.5,1,2,1", "# t x y p",
+        "0.5 1 2 1x", "0.5x 1 2 1", "0.5 99999999999 2 1", "1e999 1 2 1", " 0.5 1 2 1"}) {
+    EXPECT_THROW(parse_ecd_event(line), EventFault) << line;
+  }
+  EXPECT_THROW(parse_ecd_event_time("time"), EventFault);
+  EXPECT_THROW(parse_ecd_event_time(""), EventFault);
+  EXPECT_THROW(parse_ecd_event_time("nan 1 2 1"), EventFault);
+}
+
+TEST(EcdEventLineTest, QuotesTheLineInPrintableCharacters) {
+  EXPECT_THAT([] { parse_ecd_event("a\x01\xff" + std::string(100, 'b')); },
+              ThrowsMessage<EventFault>(HasSubstr("got \"a??" + std::string(37, 'b') + "\"")));
+}
+
+class EcdEventFileTest : public ::testing::Test {
+ protected:
+  EcdEventFile file_of(const std::string& text) {
+    testing::write_file(path_, text);
+    return EcdEventFile(path_);
+  }
+  /// The events in (after_s, until_s].
+  static std::vector<Event> between(const EcdEventFile& file, double after_s, double until_s) {
+    return file.events(file.first_byte_after(after_s), file.first_byte_after(until_s),
+                       EventCheck({100, 100}, after_s, until_s));
+  }
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "events.txt";
+};
+
+// Event i at i milliseconds, two of each time; lines of 13 to 18 bytes.
+std::string many_lines(int count) {
+  std::string text;
+  char line[64];
+  for (int i = 0; i < count; ++i) {
+    std::snprintf(line, sizeof line, "%.3f %d %d %d\n", 0.001 * (i / 2), i % 100, i / 7 % 100,
+                  i % 3 == 0);
+    text += line;
+  }
+  return text;
+}
+
+TEST_F(EcdEventFileTest, FindsWhereATimeEnds) {
+  const EcdEventFile file = file_of("1 0 0 1\n2 0 0 1\n2 1 0 1\n3 0 0 1\n");
+  EXPECT_EQ(file.first_byte_after(0), 0);
+  EXPECT_EQ(file.first_byte_after(1), 8);
+  EXPECT_EQ(file.first_byte_after(2), 24);
+  EXPECT_EQ(file.first_byte_after(2.5), 24);
+  EXPECT_EQ(file.first_byte_after(3), 32);
+}
+
+TEST_F(EcdEventFileTest, ReadsAnyStretchOfALongFile) {
+  constexpr int kCount = 200'000;  // 3 MB: several reads for all of it
+  const EcdEventFile file = file_of(many_lines(kCount));
+  for (const int first : {0, 1, 7, 5'000, 49'999, 99'990}) {
+    const std::vector<Event> events =
+        between(file, 0.001 * first + 1e-9, 0.001 * (first + 9) + 1e-9);
+    ASSERT_EQ(events.size(), 18u) << first;
+    const int i = 2 * (first + 1);  // the first event after the time
+    EXPECT_NEAR(events[0].t_s, 0.001 * (first + 1), 1e-9);
+    EXPECT_EQ(events[0].x, i % 100);
+    EXPECT_EQ(events[0].y, i / 7 % 100);
+    EXPECT_EQ(events[0].positive, i % 3 == 0);
+  }
+  const std::vector<Event> all = between(file, -1, 1e9);
+  ASSERT_EQ(all.size(), static_cast<std::size_t>(kCount));
+  for (int i = 0; i < kCount; ++i) ASSERT_EQ(all[static_cast<std::size_t>(i)].x, i % 100) << i;
+}
+
+TEST_F(EcdEventFileTest, NeedsNoEventsAndNoLastLineEnd) {
+  EXPECT_TRUE(between(file_of(""), 0, 9).empty());
+  EXPECT_EQ(between(file_of("1 0 0 1"), 0, 9).size(), 1u);
+  EXPECT_TRUE(between(file_of("1 0 0 1"), 1, 9).empty());
+  EXPECT_EQ(between(file_of("1 0 0 1\r\n2 0 0 0\r\n"), 0, 9).size(), 2u);
+}
+
+TEST_F(EcdEventFileTest, NamesTheLineThatIsWrong) {
+  EXPECT_THAT(
+      [&] { between(file_of("1 0 0 1\n2 0 0 1\n3 0 z 1\n"), 0, 9); },
+      ThrowsMessage<InputError>(HasSubstr("got \"3 0 z 1\", in " + path_.string() + " (line 3)")));
+  EXPECT_THAT([&] { between(file_of("1 0 0 1\n2 100 0 1\n"), 0, 9); },
+              ThrowsMessage<InputError>(HasSubstr("(line 2)")));
+  EXPECT_THAT([&] { between(file_of("1 0 0 1\n\n2 0 0 1\n"), 0, 9); },
+              ThrowsMessage<InputError>(HasSubstr("(line 2)")));
+}
+
+TEST_F(EcdEventFileTest, NamesTheLineFarInALongFile) {
+  std::string text = many_lines(200'000);
+  std::size_t at = 0;
+  for (int line = 1; line < 150'000; ++line) at = text.find('\n', at) + 1;
+  text[at] = 'x';
+  EXPECT_THAT([&] { between(file_of(text), -1, 1e9); },
+              ThrowsMessage<InputError>(HasSubstr("(line 150000)")));
+}
+
+TEST_F(EcdEventFileTest, RefusesTimesThatFall) {
+  EXPECT_THAT([&] { between(file_of("1 0 0 1\n3 0 0 1\n2 0 0 1\n4 0 0 1\n"), 0, 9); },
+              ThrowsMessage<InputError>(
+                  HasSubstr("got 2 s after 3 s, in " + path_.string() + " (line 3)")));
+}
+
+TEST_F(EcdEventFileTest, RefusesAStretchThatEndsBeforeItBegins) {
+  const EcdEventFile file = file_of("1 0 0 1\n2 0 0 1\n");
+  EXPECT_THAT(
+      [&] {
+        file.events(8, 0, EventCheck({1, 1}, 0, 9));
+      },
+      ThrowsMessage<InputError>(HasSubstr("times that never fall")));
+}
+
+TEST_F(EcdEventFileTest, RefusesFilesThatAreNoText) {
+  for (const std::string& bytes : {std::string(100'000, '\0'), std::string(3 << 20, 'x')}) {
+    const EcdEventFile file = file_of(bytes);
+    EXPECT_THROW(file.first_byte_after(1), InputError);
+    EXPECT_THROW(file.events(0, static_cast<std::int64_t>(bytes.size()), EventCheck({1, 1}, 0, 9)),
+                 InputError);
+  }
+}
+
+class EcdImageListTest : public ::testing::Test {
+ protected:
+  EcdImageList read(const std::string& text) {
+    testing::write_file(path_, text);
+    return read_ecd_image_list(path_);
+  }
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "images.txt";
+};
+
+TEST_F(EcdImageListTest, ReadsTimesAndPaths) {
+  const EcdImageList list = read("0.000000000 images/frame_0.png\r\n0.04 my images/b.png \n\n");
+  EXPECT_THAT(list.times_s, ElementsAre(0, 0.04));
+  EXPECT_THAT(list.paths, ElementsAre("images/frame_0.png", "my images/b.png"));
+  EXPECT_THAT(read("1.5\ta.png").paths, ElementsAre("a.png"));
+}
+
+TEST_F(EcdImageListTest, NamesTheLineThatIsWrong) {
+  for (const char* line : {"0.5", "a.png", "0.5a.png", "0.5 ", "x a.png", "0.5 /etc/a.png",
+                           "0.5 ../a.png", "0.5 images/../../a.png"}) {
+    EXPECT_THAT([&] { read(std::string("0 a.png\n") + line + "\n1 c.png\n"); },
+                ThrowsMessage<InputError>(HasSubstr("images.txt (line 2)")))
+        << line;
+  }
+  EXPECT_THAT([&] { read("0 a.png\n\n1 b.png\n"); },
+              ThrowsMessage<InputError>(HasSubstr("(line 2)")));
+}
+
+TEST_F(EcdImageListTest, RefusesTimesOutOfOrder) {
+  EXPECT_THAT([&] { read("0 a.png\n1 b.png\n1 c.png\n"); },
+              ThrowsMessage<InputError>(HasSubstr("images.txt (frame 2)")));
+  EXPECT_THAT([&] { read("nan a.png\n"); }, ThrowsMessage<InputError>(HasSubstr("finite")));
+}
+
+TEST_F(EcdImageListTest, RefusesAListWithoutFramesAndNone) {
+  EXPECT_THAT([&] { read(""); }, ThrowsMessage<InputError>(HasSubstr("at least one frame")));
+  EXPECT_THAT([&] { read_ecd_image_list(folder_ / "absent.txt"); },
+              ThrowsMessage<InputError>(HasSubstr("absent.txt")));
+  EXPECT_THAT([&] { read_ecd_image_list(folder_.path()); },
+              ThrowsMessage<InputError>(HasSubstr("no readable file")));
+  ASSERT_EQ(::mkfifo((folder_ / "fifo").c_str(), 0600), 0);
+  EXPECT_THAT([&] { read_ecd_image_list(folder_ / "fifo"); },
+              ThrowsMessage<InputError>(HasSubstr("Not a regular file")));
+}
 
 class EcdRecordingTest : public ::testing::Test {
  protected:

@@ -4,10 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numeric>
 #include <span>
 
-#include "manifests/faults.h"
-#include "stages/recordings/open_recording.h"
+#include "manifests/values/faults.h"
+#include "stages/recordings/growing_dataset_internal.h"
+#include "stages/recordings/recording.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/full_disk.h"
@@ -22,6 +24,43 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
+
+class GrowingDatasetTest : public ::testing::Test {
+ protected:
+  /// Writes `values` as [rows, 2], `portion` of them at a time, 3 rows a chunk.
+  testing::GoldenArray write_and_read(const std::vector<float>& values, std::size_t portion) {
+    {
+      const Hdf5Lock lock;
+      const Hdf5Handle file(H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT),
+                            H5Fclose);
+      GrowingDataset<float> dataset(file, "d", {2}, {3, 1}, 3);
+      for (std::size_t at = 0; at < values.size(); at += portion) {
+        dataset.append(std::span(values).subspan(at, std::min(portion, values.size() - at)));
+      }
+      dataset.close();
+    }
+    return testing::read_array(path_, "d");
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "f.h5";
+};
+
+TEST_F(GrowingDatasetTest, KeepsRowsInOrder) {
+  for (const std::size_t rows : {1u, 3u, 4u, 6u, 10u}) {
+    std::vector<float> values(2 * rows);
+    std::iota(values.begin(), values.end(), 1.0f);
+    for (const std::size_t portion : {2u, 4u, 100u}) {
+      const testing::GoldenArray read = write_and_read(values, portion);
+      EXPECT_EQ(read.shape, (std::vector<std::size_t>{rows, 2}));
+      EXPECT_EQ(read.values, values);
+    }
+  }
+}
+
+TEST_F(GrowingDatasetTest, MayStayEmpty) {
+  EXPECT_EQ(write_and_read({}, 1).shape, (std::vector<std::size_t>{0, 2}));
+}
 
 constexpr ImageSize kSize{3, 4};
 

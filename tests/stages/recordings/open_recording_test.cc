@@ -1,11 +1,10 @@
-#include "stages/recordings/open_recording.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <thread>
 
+#include "stages/recordings/recording.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"

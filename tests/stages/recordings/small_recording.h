@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/event.h"
+#include "manifests/values/events.h"
 #include "tests/testing/hdf5_file.h"
 
 namespace eventgan::testing {

@@ -7,11 +7,10 @@
 #include <map>
 #include <string>
 
-#include "manifests/faults.h"
-#include "manifests/job_manifest.h"
-#include "stages/scenes/demo_manifest.h"
-#include "stages/scenes/layouts/kitti_text.h"
-#include "stages/scenes/road/road_scene.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "stages/scenes/layouts/kitti_layout_writer.h"
+#include "stages/scenes/road_scene.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

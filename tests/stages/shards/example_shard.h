@@ -3,8 +3,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "manifests/marker.h"
-#include "manifests/shard.h"
+#include "manifests/values/shard.h"
 
 namespace eventgan::testing {
 

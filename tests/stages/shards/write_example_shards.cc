@@ -10,7 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "stages/files/atomic_file.h"
+#include "manifests/documents/marker.h"
+#include "stages/base/files/atomic_file.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan::testing {

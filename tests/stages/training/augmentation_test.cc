@@ -1,5 +1,3 @@
-#include "stages/training/augmentation.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,8 @@
 #include <map>
 #include <set>
 #include <stdexcept>
+
+#include "stages/training/training_sample.h"
 
 namespace eventgan {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <string>
 
-#include "manifests/counter_random.h"
+#include "manifests/values/counter_random.h"
 
 namespace eventgan::testing {
 namespace {

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "manifests/training_manifest.h"
+#include "manifests/values/training.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan::testing {

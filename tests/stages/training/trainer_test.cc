@@ -2,14 +2,17 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <torch/cuda.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <set>
 
+#include "manifests/values/faults.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/torch/torch_generator.h"
+#include "stages/training/training_networks_internal.h"
 #include "tests/stages/training/small_training.h"
 
 namespace eventgan {
@@ -18,6 +21,77 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+
+TEST(CheckTrainable, RefusesCropsTooSmallForTheDiscriminator) {
+  TrainingManifest manifest = testing::small_training();
+  EXPECT_NO_THROW(check_trainable(manifest));
+  manifest.crop = {47, 48};
+  EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.crop = {48, 47};
+  EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.losses.adversarial = 0;
+  EXPECT_NO_THROW(check_trainable(manifest));
+}
+
+TEST(CheckTrainable, RefusesABatchWithoutHalves) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.batch = 3;
+  EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.losses.adversarial = 0;
+  EXPECT_NO_THROW(check_trainable(manifest));
+}
+
+TEST(CheckTrainable, RefusesAGeneratorWithoutLoss) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses = {.adversarial = 0, .flow = 0, .reconstruction = 0};
+  EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.steps.generator = 0;
+  EXPECT_NO_THROW(check_trainable(manifest));
+}
+
+TEST(CheckTrainable, RefusesOnePixelForBatchNorm) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses.adversarial = 0;
+  manifest.crop = {16, 16};
+  EXPECT_NO_THROW(check_trainable(manifest));
+  manifest.batch = 1;
+  EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.crop = {17, 16};
+  EXPECT_NO_THROW(check_trainable(manifest));
+}
+
+TEST(LearningRate, FallsByHalfACosine) {
+  // Half way: (1 + cos(π/2)) / 2 = 1/2, so f + (1 - f) / 2; at a third: cos(π/3) = 1/2, so 3/4.
+  EXPECT_DOUBLE_EQ(learning_rate(2e-4, 0.1, 0, 300), 2e-4);
+  EXPECT_DOUBLE_EQ(learning_rate(2e-4, 0.1, 100, 300), 2e-4 * (0.1 + 0.9 * 0.75));
+  EXPECT_DOUBLE_EQ(learning_rate(2e-4, 0.1, 150, 300), 2e-4 * 0.55);
+  EXPECT_DOUBLE_EQ(learning_rate(2e-4, 0.1, 300, 300), 2e-4 * 0.1);
+}
+
+TEST(LearningRate, StaysAtItsEndAndWithoutSteps) {
+  EXPECT_DOUBLE_EQ(learning_rate(1, 0.25, 1000, 300), 0.25);
+  EXPECT_DOUBLE_EQ(learning_rate(1, 0.25, 0, 0), 0.25);
+  EXPECT_DOUBLE_EQ(learning_rate(1, 0, 7, 5), 0);
+}
+
+TEST(LearningRate, IsConstantAtFractionOne) {
+  for (const int step : {0, 1, 49, 50, 51}) EXPECT_DOUBLE_EQ(learning_rate(3, 1, step, 50), 3);
+}
+
+TEST(TrainingDevice, IsWhatLibTorchHas) {
+  EXPECT_TRUE(training_device("cpu").is_cpu());
+  EXPECT_THROW(training_device("tpu"), UsageError);
+  EXPECT_THROW(training_device(""), UsageError);
+  if (torch::cuda::is_available()) {
+    EXPECT_TRUE(training_device("cuda").is_cuda());
+  } else {
+    EXPECT_THROW(training_device("cuda"), UsageError);
+  }
+}
+
+TEST(TrainingDevice, IsCheckedByTheTrainer) {
+  EXPECT_THROW(Trainer(testing::small_training(), "tpu"), UsageError);
+}
 
 constexpr TrainingPhase kPhases[] = {TrainingPhase::kFlow, TrainingPhase::kReconstruction,
                                      TrainingPhase::kGenerator};

@@ -4,9 +4,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
 #include <tuple>
 
-#include "tests/stages/events/simulation/log_pictures.h"
+#include "tests/stages/events/simulation/simulated_pictures.h"
 
 namespace eventgan {
 namespace {
@@ -130,6 +133,172 @@ TEST(Sensor, StaysSilentWithoutMotionOrNoise) {
   for (int step = 0; step < 50; ++step) {
     EXPECT_THAT(sensor.step(log_picture(kSize, -1, spec), step), IsEmpty());
   }
+}
+
+/// Events of a log intensity that climbs by 1 a second from -3, shown in `steps` pictures a second.
+std::vector<Event> climb(const SensorSpec& spec, int steps) {
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  std::vector<Event> events;
+  for (int step = 0; step <= steps; ++step) {
+    const double t_s = static_cast<double>(step) / steps;
+    for (const Event& event : sensor.step(log_picture(kOnePixel, -3 + t_s, spec), t_s)) {
+      events.push_back(event);
+    }
+  }
+  return events;
+}
+
+TEST(SensorRefractory, AClimbSignalsEachThresholdPlusRefractoryTime) {
+  SensorSpec spec = exact_sensor(0.1);
+  spec.refractory_s = 0.06;
+  // Held in reset for 0.06 s after each event, then 0.1 s to the next threshold; however cut.
+  for (const int steps : {1, 7, 100}) {
+    const std::vector<Event> events = climb(spec, steps);
+    ASSERT_THAT(events, SizeIs(6)) << steps;
+    for (int k = 0; k < 6; ++k) EXPECT_NEAR(events[k].t_s, 0.1 + 0.16 * k, 1e-4) << steps;
+  }
+}
+
+TEST(SensorRefractory, WhatIsPassedMeanwhileIsLost) {
+  SensorSpec spec = exact_sensor(0.3);
+  spec.refractory_s = 1;
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  sensor.step(log_picture(kOnePixel, -3, spec), 0);
+  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1, spec), 0.01), SizeIs(1));
+  // From 1.0015 s on the level is -1, where the pixel was when it woke.
+  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1, spec), 2), IsEmpty());
+  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1.29, spec), 3), IsEmpty());
+  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -1.31, spec), 4);
+  ASSERT_THAT(events, SizeIs(1));
+  EXPECT_FALSE(events[0].positive);
+  EXPECT_NEAR(events[0].t_s, 3.5, 1e-4);
+}
+
+TEST(SensorRefractory, WakesWithinAStep) {
+  SensorSpec spec = exact_sensor(0.5);
+  spec.refractory_s = 0.5;
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  sensor.step(log_picture(kOnePixel, -3, spec), 0);
+  ASSERT_THAT(sensor.step(log_picture(kOnePixel, -2.4, spec), 0.6), SizeIs(1));  // at 0.5
+  // Wakes at 1.0 with the level on the line from (0.6, -2.4) to (2.6, -0.4), at -2: next at -1.5.
+  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -0.4, spec), 2.6);
+  ASSERT_THAT(events, SizeIs(2));
+  EXPECT_NEAR(events[0].t_s, 1.5, 1e-5);
+  EXPECT_NEAR(events[1].t_s, 2.5, 1e-5);  // woke at 2.0 and -1
+}
+
+TEST(SensorRefractory, DeadTimeLowersTheRateOfNoise) {
+  constexpr ImageSize kSize{40, 40};
+  SensorSpec spec = exact_sensor(0.2);
+  spec.shot_noise_rate_hz = 20;
+  spec.refractory_s = 0.05;
+  Sensor sensor(spec, kSize, CounterRandom(3));
+  sensor.step(log_picture(kSize, -1, spec), 0);
+  const std::vector<Event> events = sensor.step(log_picture(kSize, -1, spec), 10);
+  // A renewal process with mean wait R + 1/r = 0.1 s and variance 1/r^2: 100 events a pixel of
+  // variance T / (r^2 mean^3) = 25, and on average (1/r^2 / mean^2 - 1)/2 + ... below 1 off that.
+  const double pixels = 1600;
+  EXPECT_NEAR(static_cast<double>(events.size()), 100 * pixels, pixels + 4 * 5 * std::sqrt(pixels));
+  std::vector<double> last(kSize.pixel_count(), -1);
+  for (const Event& event : events) {
+    double& before = last[static_cast<std::size_t>(event.y * kSize.width + event.x)];
+    EXPECT_GE(event.t_s - before, 0.05 - 1e-12);
+    before = event.t_s;
+  }
+}
+
+constexpr ImageSize kSize{3, 5};
+
+TEST(SensorExtremes, BlackToWhiteAndBackIsFinite) {
+  const SensorSpec spec = exact_sensor(0.01);
+  Sensor sensor(spec, kSize, CounterRandom(1));
+  sensor.step(std::vector<float>(15, 0.0f), 0);
+  const std::vector<Event> up = sensor.step(std::vector<float>(15, 1.0f), 1);
+  const auto crossings = static_cast<std::size_t>(std::log(1.001 / 0.001) / 0.01);  // 690.9
+  EXPECT_EQ(up.size(), 15 * crossings);
+  EXPECT_TRUE(std::ranges::all_of(up, [](const Event& e) { return e.t_s > 0 && e.t_s <= 1; }));
+  // The level is 0.9 of a threshold below white, so as many come back, less or more one.
+  const std::vector<Event> down = sensor.step(std::vector<float>(15, 0.0f), 2);
+  EXPECT_NEAR(static_cast<double>(down.size()), static_cast<double>(up.size()), 15);
+}
+
+TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
+  SensorSpec spec;
+  check_events_fit(spec, {1000, 1000}, 1e6, 1);  // at rest it is silent
+  spec.shot_noise_rate_hz = 1e6;
+  // 15 pixels, 10 s: 1.5e8 events.
+  const double bytes = idle_event_bytes(spec, 15, 10);
+  EXPECT_DOUBLE_EQ(bytes, 1.5e8 * 2 * sizeof(Event));
+  check_events_fit(spec, kSize, 10, static_cast<std::size_t>(bytes));
+  EXPECT_THAT([&] { check_events_fit(spec, kSize, 10, 1000); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
+                  ::testing::HasSubstr("(1e+03 bytes), got about 1.5e+08 events"),
+                  ::testing::HasSubstr("5x3 pixels in 10 s: shot_noise_rate_hz 1e+06"))));
+  // A pixel that is held for a millisecond after each event gives 1000 a second at most.
+  spec.refractory_s = 1e-3;
+  EXPECT_NEAR(idle_event_bytes(spec, 15, 10), 15 * 10 * 1000 * 2 * sizeof(Event), 2e4);
+  // The bound is one of what really comes.
+  spec = {};
+  spec.shot_noise_rate_hz = 200;
+  Sensor sensor(spec, kSize, CounterRandom(1));
+  sensor.step(std::vector<float>(15, 0.5f), 0);
+  EXPECT_NEAR(static_cast<double>(sensor.step(std::vector<float>(15, 0.5f), 10).size()), 30000,
+              5 * std::sqrt(30000));
+}
+
+TEST(SensorExtremes, BlackAndSaturatedPicturesStaySilent) {
+  for (const float value : {0.0f, 1.0f, std::numeric_limits<float>::max()}) {
+    Sensor sensor(SensorSpec{}, kSize, CounterRandom(1));
+    sensor.step(std::vector<float>(15, value), 0);
+    EXPECT_THAT(sensor.step(std::vector<float>(15, value), 1), IsEmpty());
+  }
+}
+
+TEST(SensorExtremes, TinyStepsEnd) {
+  const SensorSpec spec = exact_sensor(0.3);
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  sensor.step(log_picture(kOnePixel, -3, spec), 0);
+  const double smallest = std::numeric_limits<double>::denorm_min();
+  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -2, spec), smallest);
+  ASSERT_THAT(events, SizeIs(3));
+  for (const Event& event : events) EXPECT_EQ(event.t_s, smallest);
+}
+
+TEST(SensorExtremes, LateTimesCostNoEvents) {
+  // Seconds since 1970: doubles are 2.4e-7 s apart there.
+  constexpr double kNow = 1.7e9;
+  const SensorSpec spec = exact_sensor(0.3);
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  sensor.step(log_picture(kOnePixel, -3, spec), kNow);
+  double before = kNow;
+  for (int step = 1; step <= 4; ++step) {
+    const double t_s = kNow + 1e-6 * step;
+    const std::vector<Event> events =
+        sensor.step(log_picture(kOnePixel, -3 + 0.95 * step, spec), t_s);
+    EXPECT_THAT(events, SizeIs(3));  // 3.2, 6.3, 9.5, 12.7 thresholds in all
+    for (const Event& event : events) EXPECT_TRUE(event.t_s > before && event.t_s <= t_s);
+    before = t_s;
+  }
+}
+
+TEST(SensorExtremes, RefusesWhatIsNoPictureAndGoesOnUnchanged) {
+  const SensorSpec spec = exact_sensor(0.3);
+  Sensor sensor(spec, kOnePixel, CounterRandom(1));
+  sensor.step(log_picture(kOnePixel, -3, spec), 1);
+  const std::vector<float> bright = log_picture(kOnePixel, -2, spec);
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  EXPECT_THROW(sensor.step(bright, 1), std::invalid_argument);
+  EXPECT_THROW(sensor.step(bright, 0.5), std::invalid_argument);
+  EXPECT_THROW(sensor.step(bright, std::nan("")), std::invalid_argument);
+  EXPECT_THROW(sensor.step(bright, kInfinity), std::invalid_argument);
+  EXPECT_THROW(sensor.step(std::vector<float>(2, 0.5f), 2), std::invalid_argument);
+  EXPECT_THROW(sensor.step(std::vector<float>{}, 2), std::invalid_argument);
+  for (const float value : {-0.1f, kInfinity, std::nanf("")}) {
+    EXPECT_THROW(sensor.step(std::vector<float>(1, value), 2), std::invalid_argument);
+  }
+  const std::vector<Event> events = sensor.step(bright, 2);
+  ASSERT_THAT(events, SizeIs(3));
+  EXPECT_NEAR(events[0].t_s, 1.3, 1e-5);
 }
 
 }  // namespace

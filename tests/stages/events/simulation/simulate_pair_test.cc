@@ -3,12 +3,16 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <opencv2/core.hpp>
 #include <stdexcept>
 
 #include "stages/events/simulation/affine_motion.h"
-#include "tests/stages/events/simulation/log_pictures.h"
-#include "tests/stages/events/simulation/textured_picture.h"
+#include "stages/events/simulation/flow_interval.h"
+#include "stages/events/simulation/sensor.h"
+#include "tests/stages/events/simulation/simulated_pictures.h"
 
 namespace eventgan {
 namespace {
@@ -16,7 +20,218 @@ namespace {
 using testing::exact_sensor;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
+using testing::texture;
 using testing::textured_picture;
+
+TEST(LinearIntensity, IsTheGreyValueOver255) {
+  EXPECT_THAT(linear_intensity({{1, 3}, {0, 51, 255}}), ::testing::ElementsAre(0.0f, 0.2f, 1.0f));
+}
+
+TEST(LinearIntensity, RefusesWhatIsNoPicture) {
+  EXPECT_THROW(linear_intensity({}), std::invalid_argument);
+  EXPECT_THROW(linear_intensity({{0, 4}, {}}), std::invalid_argument);
+  EXPECT_THROW(linear_intensity({{2, 2}, {1, 2, 3}}), std::invalid_argument);
+}
+
+AffineMotion shift(double dx, double dy) { return {{1, 0, dx, 0, 1, dy}}; }
+
+TEST(RandomAffineMotion, HasTheDisplacementAskedFor) {
+  for (const ImageSize size : {ImageSize{1, 1}, {1, 9}, {8, 8}, {180, 320}, {261, 99}}) {
+    for (const double displacement : {0.0, 0.01, 1.0, 6.0, 40.0}) {
+      for (std::uint64_t seed = 0; seed < 20; ++seed) {
+        const AffineMotion motion = random_affine_motion(size, displacement, CounterRandom(seed));
+        EXPECT_NEAR(largest_displacement(motion, size), displacement, 1e-9);
+        const auto& m = motion.matrix;
+        // ‖A₁ - I‖ ≤ 1/2 keeps the determinant at 1/4 or more.
+        EXPECT_GE(m[0] * m[4] - m[1] * m[3], 0.25 - 1e-9);
+      }
+    }
+  }
+}
+
+TEST(RandomAffineMotion, DiffersBySeedAndIsMoreThanATranslation) {
+  const AffineMotion one = random_affine_motion({180, 320}, 6, CounterRandom(1));
+  EXPECT_EQ(one.matrix, random_affine_motion({180, 320}, 6, CounterRandom(1)).matrix);
+  EXPECT_NE(one.matrix, random_affine_motion({180, 320}, 6, CounterRandom(2)).matrix);
+  EXPECT_NE(one.matrix[0], 1);
+  EXPECT_NE(one.matrix[1], 0);
+}
+
+TEST(RandomAffineMotion, RefusesBadDisplacements) {
+  for (const double bad : {-1.0, std::nan(""), std::numeric_limits<double>::infinity()}) {
+    EXPECT_THROW(random_affine_motion({8, 8}, bad, CounterRandom(1)), std::invalid_argument);
+  }
+}
+
+TEST(RenderAffine, IsThePictureAtTheStart) {
+  const GreyImage picture = textured_picture({37, 53});
+  const AffineMotion motion = random_affine_motion(picture.size, 6, CounterRandom(1));
+  EXPECT_EQ(render_affine(picture, motion, 0), linear_intensity(picture));
+}
+
+TEST(RenderAffine, MovesTheWayOfTheMatrix) {
+  const GreyImage picture{{1, 5}, {10, 20, 30, 40, 50}};
+  const std::vector<float> moved = render_affine(picture, shift(2, 0), 1);
+  // Right by two; mirrored about the first pixel at the left.
+  EXPECT_EQ(moved, linear_intensity({{1, 5}, {30, 20, 10, 20, 30}}));
+  const std::vector<float> halfway = render_affine(picture, shift(3, 0), 0.5);
+  EXPECT_NEAR(halfway[3] * 255, 25, 1e-4);  // bilinear between 20 and 30
+}
+
+TEST(RenderAffine, TakesAPictureOfOnePixel) {
+  EXPECT_EQ(render_affine({{1, 1}, {51}}, shift(3, 2), 1), std::vector<float>{0.2f});
+}
+
+TEST(AffineInterval, TakesStepsOfAPixelAtMost) {
+  const auto steps = [](const AffineMotion& motion) {
+    return AffineInterval(textured_picture({9, 9}), motion).steps();
+  };
+  EXPECT_EQ(steps({}), 1);
+  EXPECT_EQ(steps(shift(0.2, 0)), 1);
+  EXPECT_EQ(steps(shift(1, 0)), 1);
+  EXPECT_EQ(steps(shift(1.01, 0)), 2);
+  EXPECT_EQ(steps(shift(3, 4)), 5);
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    EXPECT_EQ(steps(random_affine_motion({9, 9}, 6, CounterRandom(seed))), 6);
+  }
+}
+
+TEST(AffineInterval, FlowLeadsFromThePictureToTheLastRendered) {
+  const GreyImage picture = textured_picture({60, 80});
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const AffineMotion motion = random_affine_motion(picture.size, 6, CounterRandom(seed));
+    const AffineInterval interval(picture, motion);
+    EXPECT_EQ(interval.size(), picture.size);
+    const FlowDisplacement flow = interval.flow();
+    const std::vector<float> last = interval.render(interval.steps());
+    double largest = 0;
+    for (int y = 0; y < 60; ++y) {
+      for (int x = 0; x < 80; ++x) {
+        // What lands on an inner pixel (x, y) comes from p with p + flow(p) = (x, y); the flow is
+        // smooth, so that fixed point is found in some rounds.
+        double px = x;
+        double py = y;
+        const auto& m = motion.matrix;
+        for (int round = 0; round < 60; ++round) {
+          const double dx = (m[0] - 1) * px + m[1] * py + m[2];
+          const double dy = m[3] * px + (m[4] - 1) * py + m[5];
+          px = x - dx;
+          py = y - dy;
+        }
+        if (px < 0 || py < 0 || px > 79 || py > 59) continue;
+        const double seen = last[static_cast<std::size_t>(y * 80 + x)];
+        largest = std::max(largest, std::abs(seen - texture(px, py)));
+      }
+    }
+    // Slope at most 0.2 a pixel: 1/64 px of rounded place an axis, second differences below 0.15
+    // / 8 an axis for bilinear, half a grey level.
+    EXPECT_LT(largest, 0.2 / 64 * 2 + 0.15 / 8 * 2 + 0.002) << seed;
+    for (const int place : {0, 79, 80 * 30 + 41, 80 * 59, 80 * 60 - 1}) {
+      const int x = place % 80;
+      const int y = place / 80;
+      const auto& m = motion.matrix;
+      const auto i = static_cast<std::size_t>(place);
+      EXPECT_FLOAT_EQ(flow.x_px[i], static_cast<float>((m[0] - 1) * x + m[1] * y + m[2]));
+      EXPECT_FLOAT_EQ(flow.y_px[i], static_cast<float>(m[3] * x + (m[4] - 1) * y + m[5]));
+    }
+  }
+}
+
+constexpr ImageSize kSize{90, 120};
+
+/// PSNR in dB of a rendered picture against the texture moved right by dx, `margin` px inside.
+double psnr(const std::vector<float>& rendered, double dx, int margin) {
+  double squares = 0;
+  int count = 0;
+  for (int y = margin; y < kSize.height - margin; ++y) {
+    for (int x = margin; x < kSize.width - margin; ++x, ++count) {
+      const double error =
+          rendered[static_cast<std::size_t>(y * kSize.width + x)] - texture(x - dx, y);
+      squares += error * error;
+    }
+  }
+  return -10 * std::log10(squares / count);
+}
+
+TEST(FlowInterval, BeginsAndEndsWithTheFrames) {
+  const GreyImage previous = textured_picture(kSize);
+  const GreyImage next = textured_picture(kSize, 6);
+  const FlowInterval interval(previous, next);
+  EXPECT_EQ(interval.size(), kSize);
+  EXPECT_EQ(interval.render(0), linear_intensity(previous));
+  EXPECT_EQ(interval.render(interval.steps()), linear_intensity(next));
+}
+
+TEST(FlowInterval, MovesATextureAlongItsShift) {
+  const FlowInterval interval(textured_picture(kSize), textured_picture(kSize, 6));
+  EXPECT_GE(interval.steps(), 6);
+  EXPECT_LE(interval.steps(), 8);
+  for (int step = 1; step < interval.steps(); ++step) {
+    const std::vector<float> rendered = interval.render(step);
+    const double dx = 6.0 * step / interval.steps();
+    // Half a grey level of rounding would give 59 dB; the flow's error of some 0.05 px costs most.
+    EXPECT_GT(psnr(rendered, dx, 10), 45) << step;
+    EXPECT_GT(psnr(rendered, dx, 0), 40) << step;
+  }
+}
+
+TEST(FlowInterval, FlowIsTheShift) {
+  const FlowDisplacement flow =
+      FlowInterval(textured_picture(kSize), textured_picture(kSize, 4, -3)).flow();
+  double error = 0;
+  for (int y = 15; y < kSize.height - 15; ++y) {
+    for (int x = 15; x < kSize.width - 15; ++x) {
+      const auto i = static_cast<std::size_t>(y * kSize.width + x);
+      error = std::max(error, std::hypot(flow.x_px[i] - 4.0, flow.y_px[i] + 3.0));
+    }
+  }
+  EXPECT_LT(error, 0.2);
+}
+
+TEST(FlowInterval, StaysStillBetweenEqualFrames) {
+  const GreyImage picture = textured_picture(kSize);
+  const FlowInterval interval(picture, picture);
+  EXPECT_EQ(interval.steps(), 1);
+  for (const float x : interval.flow().x_px) EXPECT_NEAR(x, 0, 0.01);
+}
+
+TEST(FlowInterval, ABrighteningPictureWithoutTextureFades) {
+  const GreyImage dark{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), 0)};
+  const GreyImage bright{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), 255)};
+  const FlowInterval interval(dark, bright);
+  const int half = interval.steps() / 2;
+  const float expected = static_cast<float>(half) / static_cast<float>(interval.steps());
+  for (const float value : interval.render(half)) EXPECT_NEAR(value, expected, 1e-4);
+}
+
+TEST(FlowInterval, TakesTheSmallestAndOddSizes) {
+  for (const ImageSize size : {ImageSize{1, 1}, {1, 40}, {7, 3}, {33, 65}, {200, 5}}) {
+    const FlowInterval interval(textured_picture(size), textured_picture(size, 2));
+    for (int step = 0; step <= interval.steps(); ++step) {
+      const std::vector<float> rendered = interval.render(step);
+      ASSERT_EQ(rendered.size(), size.pixel_count());
+      for (const float value : rendered) EXPECT_TRUE(value >= 0 && value <= 1) << value;
+    }
+  }
+}
+
+TEST(FlowInterval, DoesNotDependOnTheNumberOfThreads) {
+  const auto picture_at = [](int threads) {
+    const int before = cv::getNumThreads();
+    cv::setNumThreads(threads);
+    const FlowInterval interval(textured_picture(kSize), textured_picture(kSize, 5, 2));
+    const std::vector<float> rendered = interval.render(2);
+    cv::setNumThreads(before);
+    return rendered;
+  };
+  EXPECT_EQ(picture_at(1), picture_at(3));
+}
+
+TEST(FlowInterval, RefusesFramesOfTwoSizesAndNone) {
+  EXPECT_THROW(FlowInterval(textured_picture({9, 8}), textured_picture({8, 9})),
+               std::invalid_argument);
+  EXPECT_THROW(FlowInterval(GreyImage{}, GreyImage{}), std::invalid_argument);
+}
 
 TEST(SimulateInterval, AnAffinelyMovedEdgeFiresAlongItsWay) {
   // Bright (255) up to x = 7, dark (51) right of it, moved right by 4 px in 0.4 s: pixels 8..11

@@ -5,12 +5,15 @@
 
 #include <iostream>
 #include <opencv2/imgproc.hpp>
+#include <set>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <vector>
 
-#include "stages/frames/decoding/picture_file.h"
-#include "tests/stages/frames/decoding/test_pictures.h"
+#include "stages/base/pictures/picture_file.h"
+#include "stages/frames/decoding/video_frames.h"
+#include "tests/stages/base/pictures/test_pictures.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -19,12 +22,48 @@ namespace eventgan {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::EndsWith;
 using testing::gradient_picture;
 using ::testing::HasSubstr;
 using testing::opencv_read;
 using testing::same_pixels;
+using ::testing::StartsWith;
 using testing::TemporaryFolder;
 using testing::write_file;
+
+TEST(ImageSizeProbe, PicturesAndVideos) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.png", "b.jpg", "c.bmp"}) {
+    cv::imwrite((folder / name).string(), gradient_picture({31, 57}));
+    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{31, 57})) << name;
+  }
+  testing::write_counting_video(folder / "clip.avi", 3);
+  EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / "clip.avi")), (ImageSize{48, 64}));
+}
+
+TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.png", "b.jpg"}) {
+    cv::imwrite((folder / name).string(), gradient_picture({120, 160}));
+    const auto size = std::filesystem::file_size(folder / name);
+    std::filesystem::resize_file(folder / name, size * 3 / 4);
+    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{120, 160})) << name;
+  }
+}
+
+TEST(ImageSizeProbe, FaultsNameTheFile) {
+  const TemporaryFolder folder;
+  write_file(folder / "empty.png", "");
+  write_file(folder / "words.txt", "no picture");
+  write_file(folder / "zeros.mp4", std::string(4096, '\0'));
+  for (const std::string name : {"empty.png", "words.txt", "zeros.mp4", "none.jpg"}) {
+    const auto outcome = probe_image_size(folder / name);
+    ASSERT_TRUE(is_fault(outcome)) << name;
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason, StartsWith("expected a "));
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason,
+                EndsWith(", in " + (folder / name).string()));
+  }
+}
 
 FrameRef picture_ref(const std::string& path) {
   FrameRef frame;
@@ -180,6 +219,73 @@ TEST(FrameDecoder, VideoFaults) {
             "expected a file, got none, in none.mp4");
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("words.txt", 0))),
             "expected a video, got a file that cannot be read as one, in words.txt");
+}
+
+/// A window of numbers, as counted, that also notes which frames it was shown.
+class VideoWindowTest : public ::testing::Test {
+ protected:
+  VideoWindowTest() { testing::write_counting_video(clip_, 100); }
+
+  VideoWindow<int> window(int most) {
+    return {clip_, most, [this](const ColourView& frame) {
+              const int number = testing::counted(
+                  ColourFrame{frame.size, {frame.bgr, frame.bgr + 3 * frame.size.pixel_count()}});
+              if (unwelcome_.contains(number)) throw std::runtime_error("unwelcome");
+              shown_.push_back(number);
+              return number;
+            }};
+  }
+
+  const TemporaryFolder folder_;
+  const std::filesystem::path clip_ = folder_ / "clip.avi";
+  std::vector<int> shown_;
+  std::set<int> unwelcome_;
+};
+
+TEST_F(VideoWindowTest, LooksOnlyAtFramesThatStayInTheWindow) {
+  auto frames = window(3);
+  EXPECT_EQ(frames.frame(50), 50);
+  EXPECT_EQ(frames.frame(48), 48);
+  EXPECT_EQ(frames.frame(52), 52);
+  EXPECT_EQ(frames.frame(99), 99);
+  EXPECT_EQ(shown_, (std::vector<int>{48, 49, 50, 51, 52, 97, 98, 99}));
+}
+
+TEST_F(VideoWindowTest, AnEarlierFrameOpensTheVideoAnew) {
+  auto frames = window(3);
+  EXPECT_EQ(frames.frame(50), 50);
+  EXPECT_EQ(frames.frame(47), 47);
+  EXPECT_EQ(frames.frame(45), 45);
+  EXPECT_EQ(frames.frame(46), 46);
+}
+
+TEST_F(VideoWindowTest, AFailedOpeningLeavesTheWindowAsItWas) {
+  auto frames = window(3);
+  EXPECT_EQ(frames.frame(50), 50);
+  std::filesystem::remove(clip_);
+  EXPECT_THROW(frames.frame(10), std::runtime_error);
+  EXPECT_EQ(frames.frame(49), 49);
+  EXPECT_EQ(frames.frame(51), 51);
+}
+
+TEST_F(VideoWindowTest, AFrameThatCannotBeKeptShiftsNoOther) {
+  unwelcome_ = {20};
+  auto frames = window(5);
+  EXPECT_THROW(frames.frame(21), std::runtime_error);
+  EXPECT_EQ(frames.frame(22), 22);
+  EXPECT_EQ(frames.frame(21), 21);
+  EXPECT_THROW(frames.frame(20), std::runtime_error);
+  EXPECT_EQ(frames.frame(19), 19);
+}
+
+TEST_F(VideoWindowTest, BeyondTheEndIsRefusedAndTheLastFramesStay) {
+  auto frames = window(5);
+  EXPECT_THROW(frames.frame(100), std::runtime_error);
+  EXPECT_EQ(frames.frame(99), 99);
+  EXPECT_EQ(frames.frame(96), 96);
+  EXPECT_EQ(shown_, (std::vector<int>{96, 97, 98, 99}));
+  EXPECT_THROW(frames.frame(5000), std::runtime_error);
+  EXPECT_EQ(frames.frame(99), 99);
 }
 
 }  // namespace

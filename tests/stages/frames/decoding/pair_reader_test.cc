@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/stages/frames/decoding/test_pictures.h"
+#include "tests/stages/base/pictures/test_pictures.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"

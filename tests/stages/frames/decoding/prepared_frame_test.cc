@@ -5,10 +5,57 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "tests/stages/frames/decoding/test_pictures.h"
+#include "tests/stages/base/pictures/test_pictures.h"
 
 namespace eventgan {
 namespace {
+
+ColourFrame plain_frame(ImageSize size, std::uint8_t value) {
+  return {size, std::vector<std::uint8_t>(3 * size.pixel_count(), value)};
+}
+
+TEST(PlacedPicture, BordersAreBlack) {
+  // 2x2 enlarged to 4x4 in the middle of 4x8.
+  const Placement placement{{2, 2}, {4, 4}, {4, 8}, /*offset_x=*/2, /*offset_y=*/0};
+  const auto placed = place_colour(plain_frame({2, 2}, 200), placement);
+  ASSERT_EQ(placed.size(), 3u * 4 * 8);
+  for (int x = 0; x < 8; ++x) {
+    EXPECT_EQ(placed[3 * (8 * 3 + x)], x >= 2 && x < 6 ? 200 : 0) << "column " << x;
+  }
+}
+
+TEST(PlacedPicture, CropKeepsTheMiddle) {
+  ColourFrame frame = plain_frame({1, 4}, 0);
+  for (int x = 0; x < 4; ++x) frame.bgr[3 * x + 1] = static_cast<std::uint8_t>(10 * x);
+  const Placement placement{{1, 4}, {1, 4}, {1, 2}, /*offset_x=*/-1, /*offset_y=*/0};
+  EXPECT_EQ(place_colour(frame, placement), (std::vector<std::uint8_t>{0, 10, 0, 0, 20, 0}));
+}
+
+TEST(PlacedPicture, RefusesAFrameOfAnotherSize) {
+  const Placement placement{{2, 2}, {2, 2}, {2, 2}, 0, 0};
+  EXPECT_THROW(place_colour(plain_frame({2, 3}, 0), placement), std::invalid_argument);
+}
+
+TEST(VisiblePart, StretchIsTheWholeVolume) {
+  const VisiblePart part = visible_part({{10, 20}, {5, 7}, {5, 7}, 0, 0});
+  EXPECT_EQ(part.size, (ImageSize{5, 7}));
+  EXPECT_EQ(part.volume_x + part.volume_y + part.scaled_x + part.scaled_y, 0);
+}
+
+TEST(VisiblePart, LetterboxIsTheWholePicture) {
+  const VisiblePart part = visible_part({{10, 20}, {5, 10}, {9, 10}, 0, 2});
+  EXPECT_EQ(part.size, (ImageSize{5, 10}));
+  EXPECT_EQ(part.volume_y, 2);
+  EXPECT_EQ(part.scaled_y, 0);
+}
+
+TEST(VisiblePart, CropIsTheWholeVolumeCutFromTheMiddle) {
+  // floor((5 - 10) / 2) = -3: three columns are cut on the left, two on the right.
+  const VisiblePart part = visible_part({{10, 20}, {5, 10}, {5, 5}, -3, 0});
+  EXPECT_EQ(part.size, (ImageSize{5, 5}));
+  EXPECT_EQ(part.scaled_x, 3);
+  EXPECT_EQ(part.volume_x, 0);
+}
 
 ColourView view_of(const cv::Mat& picture) { return {{picture.rows, picture.cols}, picture.data}; }
 

@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "manifests/pairs.h"
-#include "stages/frames/decoding/colour_frame.h"
+#include "manifests/values/frames.h"
+#include "stages/base/pictures/picture_file.h"
 
 namespace eventgan::testing {
 

@@ -6,8 +6,10 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
+#include "stages/frames/human36m/extracted_layout_internal.h"
 #include "stages/frames/human36m/human36m_dataset.h"
 #include "stages/labels/label_mapping.h"
 #include "tests/testing/npy_bytes.h"
@@ -24,6 +26,30 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
+
+TEST(ExtractedNameTest, ReadsABareName) {
+  const ExtractedName name = parse_extracted_name("S11_SittingDown 1.54138969_002061.jpg");
+  EXPECT_EQ(name.folder, "S11/S11_SittingDown 1.54138969");
+  EXPECT_EQ(name.sequence, "S11_SittingDown 1.54138969");
+  EXPECT_EQ(name.subject, "S11");
+  EXPECT_EQ(name.camera, "54138969");
+  EXPECT_EQ(name.number, 2061);
+}
+
+TEST(ExtractedNameTest, TakesTheFolderFromAPath) {
+  EXPECT_EQ(parse_extracted_name("images/S1_A.7_000001.jpg").folder, "images");
+  EXPECT_EQ(parse_extracted_name("./a//b/S1_A.7_000001.jpg").folder, "a/b");
+}
+
+TEST(ExtractedNameTest, RefusesOtherNames) {
+  for (const char* name :
+       {"", "S1_A.7", "S1_A.7_.jpg", "S1_A.7_00000a.jpg", "S1_A_000001.jpg", "S1_A.x_000001.jpg",
+        "S1_A._000001.jpg", "_A.7_000001.jpg", "S1.7_000001.jpg", "S1_A.7_0000000001.jpg",
+        "/S1/S1_A.7_000001.jpg", "../S1_A.7_000001.jpg", "a/../S1_A.7_000001.jpg"}) {
+    EXPECT_THROW(parse_extracted_name(name), std::invalid_argument) << name;
+  }
+}
+
 using State = Neighbour::State;
 
 const std::string kVideo = "S1_Walking_1.7";

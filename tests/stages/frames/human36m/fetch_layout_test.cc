@@ -6,7 +6,7 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "stages/frames/human36m/human36m_dataset.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"
 #include "tests/testing/shared_data.h"

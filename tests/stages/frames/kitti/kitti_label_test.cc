@@ -15,6 +15,64 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+std::vector<std::string_view> bytes_of(std::string_view text) {
+  std::vector<std::string_view> bytes;
+  int number = 0;
+  for (const TextLine& line : split_lines(text)) {
+    EXPECT_EQ(line.number, ++number);
+    bytes.push_back(line.bytes);
+  }
+  return bytes;
+}
+
+TEST(SplitLines, KeepsEveryByte) {
+  EXPECT_THAT(bytes_of(""), IsEmpty());
+  EXPECT_THAT(bytes_of("a b"), ElementsAre("a b"));
+  EXPECT_THAT(bytes_of("a\n"), ElementsAre("a\n"));
+  EXPECT_THAT(bytes_of("a\r\n\n\nb"), ElementsAre("a\r\n", "\n", "\n", "b"));
+}
+
+TEST(SplitColumns, SeparatesAtSpacesTabsAndLineEnds) {
+  EXPECT_THAT(split_columns("  a\tb   c \r\n"), ElementsAre("a", "b", "c"));
+  EXPECT_THAT(split_columns("a"), ElementsAre("a"));
+  EXPECT_THAT(split_columns(" \r\n"), IsEmpty());
+  EXPECT_THAT(split_columns(""), IsEmpty());
+}
+
+TEST(ParseNumber, TakesTheWholeTokenOnly) {
+  EXPECT_EQ(parse_number<double>("-1.50"), -1.5);
+  EXPECT_EQ(parse_number<double>("7.2e+02"), 720.0);
+  EXPECT_EQ(parse_number<int>("0012"), 12);
+  for (const char* token : {"", "1.5x", "x", "1,5", "+1", " 1", "nan", "inf", "-inf", "1e999"}) {
+    EXPECT_FALSE(parse_number<double>(token)) << token;
+  }
+  for (const char* token : {"", "1.0", "99999999999", "1 "}) {
+    EXPECT_FALSE(parse_number<int>(token)) << token;
+  }
+}
+
+TEST(ParseNumber, RefusesWhatAFloatCannotHold) {
+  EXPECT_FALSE(parse_number<float>("1e300"));
+  EXPECT_TRUE(parse_number<double>("1e300"));
+}
+
+TEST(ParseNumber, WhatIsTooSmallIsZero) {
+  EXPECT_EQ(parse_number<float>("1e-50"), 0.0f);
+  EXPECT_EQ(parse_number<float>("1e-400"), 0.0f);
+  EXPECT_EQ(parse_number<double>("1e-50"), 1e-50);
+  EXPECT_EQ(parse_number<double>("-1e-400"), 0.0);
+  EXPECT_EQ(parse_number<double>("0." + std::string(400, '0') + "1"), 0.0);
+  EXPECT_FALSE(parse_number<double>("1e-400x"));
+  EXPECT_FALSE(parse_number<double>("1" + std::string(400, '0')));
+}
+
+TEST(InQuotes, ShowsForeignBytesAsOneLineOfPlainText) {
+  EXPECT_EQ(in_quotes("Car"), "'Car'");
+  EXPECT_EQ(in_quotes(std::string_view("a\0\xff\nb", 5)), "'a???b'");
+  EXPECT_EQ(in_quotes(std::string(41, 'x')), "'" + std::string(40, 'x') + "...'");
+}
 
 constexpr const char* kCar =
     "Car 0.88 3 -0.69 0.00 192.37 402.31 374.00 1.60 1.57 3.23 -2.70 1.74 3.68 -1.29";

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "manifests/faults.h"
+#include "manifests/values/faults.h"
 #include "tests/stages/frames/kitti/raw_fixture.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -12,7 +12,6 @@
 namespace eventgan {
 namespace {
 
-using State = Neighbour::State;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -20,6 +19,8 @@ using testing::pose_xml;
 using ::testing::SizeIs;
 using testing::tracklet_xml;
 using testing::write_file;
+
+using State = Neighbour::State;
 
 const std::string kFirst = "2011_09_26/2011_09_26_drive_0001_sync";
 const std::string kSecond = "2011_09_28/2011_09_28_drive_0002_sync";

@@ -1,18 +1,98 @@
 #include "stages/frames/kitti/raw_drive.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
+#include "manifests/values/faults.h"
+#include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
 
-using State = Neighbour::State;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
 using testing::TemporaryFolder;
 using testing::write_file;
+
+std::vector<double> parse(const std::string& text) {
+  const auto outcome = parse_timestamps(text, "t.txt");
+  if (is_fault(outcome)) ADD_FAILURE() << std::get<SampleFault>(outcome).reason;
+  return is_fault(outcome) ? std::vector<double>() : std::get<std::vector<double>>(outcome);
+}
+
+std::string fault(const std::string& text) {
+  const auto outcome = parse_timestamps(text, "t.txt");
+  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "";
+}
+
+TEST(Timestamps, CountsFromTheFirstLine) {
+  const auto seconds = parse(
+      "2011-09-26 13:02:25.594360375\n"
+      "2011-09-26 13:02:25.694360380\r\n"
+      "2011-09-26 13:03:26.500000000");
+  ASSERT_EQ(seconds.size(), 3u);
+  EXPECT_EQ(seconds[0], 0);
+  EXPECT_DOUBLE_EQ(seconds[1], 0.100000005);
+  EXPECT_DOUBLE_EQ(seconds[2], 60.905639625);  // 61 s on, 0.594360375 - 0.5 back
+}
+
+TEST(Timestamps, RunsOnOverMidnightAndNewYear) {
+  const auto seconds = parse(
+      "2011-12-31 23:59:59.9\n"
+      "2012-01-01 00:00:00\n");
+  EXPECT_DOUBLE_EQ(seconds.at(1), 0.1);
+}
+
+TEST(Timestamps, ABlankLineIsAnUnknownTime) {
+  const auto seconds = parse("\n2011-09-26 13:02:25\n\n2011-09-26 13:02:26\n");
+  ASSERT_EQ(seconds.size(), 4u);
+  EXPECT_TRUE(std::isnan(seconds[0]));
+  EXPECT_EQ(seconds[1], 0);
+  EXPECT_TRUE(std::isnan(seconds[2]));
+  EXPECT_EQ(seconds[3], 1);
+}
+
+TEST(Timestamps, AnEmptyFileHasNone) { EXPECT_TRUE(parse("").empty()); }
+
+TEST(Timestamps, AnythingElseIsAFaultThatNamesTheLine) {
+  for (const char* line :
+       {"yesterday", "2011-09-26", "2011-09-26T13:02:25", "2011-13-26 13:02:25",
+        "2011-02-30 13:02:25", "2011-09-26 24:02:25", "2011-09-26 13:02:25.x", "2011-09-26 13:02",
+        "2011-09-26 13:02:-5", "26.09.2011 13:02:25", "2011-09-26 13:02:25 UTC",
+        // Months and days that are September 26 in eight bits.
+        "2011-265-282 13:02:26", "2011-265-26 13:02:26", "2011-09-282 13:02:26",
+        "67547-09-26 13:02:26", "2011-9-26 13:02:26", "2011-09-26 13:02:2",
+        "2011-09-26 13:02:26."}) {
+    EXPECT_THAT(fault(std::string("2011-09-26 13:02:25\n") + line + "\n"),
+                AllOf(HasSubstr("expected a time such as "), HasSubstr("in t.txt:2")))
+        << line;
+  }
+}
+
+TEST(Timestamps, ATimeThatIsNotAfterTheOneBeforeIsAFault) {
+  EXPECT_EQ(
+      fault("2011-09-26 13:02:25.6\n\n2011-09-26 13:02:25.5\n2011-09-26 13:02:26.0\n"),
+      "expected a time after '2011-09-26 13:02:25.6', got '2011-09-26 13:02:25.5', in t.txt:3");
+  EXPECT_THAT(fault("2011-09-26 13:02:25.6\n2011-09-26 13:02:25.6\n"), HasSubstr("in t.txt:2"));
+}
+
+TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
+  const std::string whole =
+      "2011-09-26 13:02:25.594360375\n"
+      "2011-09-26 13:02:26.694360380";
+  EXPECT_EQ(parse(whole).size(), 2u);  // only the line end is missing
+  for (std::size_t length = whole.size() - 1; length > whole.size() - 29; --length) {
+    EXPECT_THAT(fault(whole.substr(0, length)), HasSubstr("in t.txt:2")) << length;
+  }
+}
+
+using State = Neighbour::State;
 
 constexpr const char* kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
 
@@ -102,6 +182,60 @@ TEST_F(RawDriveTest, AnAbsentDriveHasNoFrames) {
   const RawDrive drive(SourceRoot("raw", folder_.path()), "2011_09_26/none");
   EXPECT_TRUE(drive.pictures().empty());
   EXPECT_EQ(drive.frame(0).state, State::kBeyond);
+}
+
+constexpr const char* kMapping =
+    "2011_09_26 2011_09_26_drive_0005_sync 0000000109\n"
+    "2011_09_26 2011_09_26_drive_0052_sync 0000000007\r\n"
+    "2011_09_28 2011_09_28_drive_0222_sync 0000000053";
+
+RawMapping parse(std::string_view rand, std::string_view mapping) {
+  return {rand, "rand.txt", mapping, "mapping.txt"};
+}
+
+TEST(RawMapping, LeadsThroughThePermutationCountedFromOne) {
+  const RawMapping mapping = parse("2,3,1\n", kMapping);
+  EXPECT_EQ(mapping.find(0), (RawFrame{"2011_09_26", "2011_09_26_drive_0052_sync", 7}));
+  EXPECT_EQ(mapping.find(1), (RawFrame{"2011_09_28", "2011_09_28_drive_0222_sync", 53}));
+  EXPECT_EQ(mapping.find(2), (RawFrame{"2011_09_26", "2011_09_26_drive_0005_sync", 109}));
+}
+
+TEST(RawMapping, KnowsNoOtherPictures) {
+  const RawMapping mapping = parse("2,3,1\n", kMapping);
+  EXPECT_EQ(mapping.find(3), std::nullopt);
+  EXPECT_EQ(mapping.find(-1), std::nullopt);
+  EXPECT_EQ(parse("", "").find(0), std::nullopt);
+}
+
+void expect_error(std::string_view rand, std::string_view mapping, const std::string& got,
+                  const std::string& where) {
+  try {
+    parse(rand, mapping);
+    FAIL() << "took " << got;
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr(got), HasSubstr(where)));
+  }
+}
+
+TEST(RawMapping, AnythingElseIsAnErrorThatNamesTheFile) {
+  expect_error("0", kMapping, "expected line numbers from 1 to 3, got '0'", "in rand.txt");
+  expect_error("1,4", kMapping, "got '4'", "in rand.txt");
+  expect_error("1,x", kMapping, "got 'x'", "in rand.txt");
+  expect_error("1", "2011_09_26 drive\n", "expected DATE DRIVE FRAME", "mapping.txt:1");
+  expect_error("1", "a b 1\n\na b 2\n", "got '?'", "mapping.txt:2");
+  expect_error("1", "a b -1\n", "got 'a b -1?'", "mapping.txt:1");
+}
+
+TEST(RawMapping, LeadsToTheFramesTheDevkitNames) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto folder = data / "kitti_object/devkit/mapping";
+  const RawMapping mapping = parse(testing::read_file(folder / "train_rand.txt"),
+                                   testing::read_file(folder / "train_mapping.txt"));
+  const std::string drive = "2011_09_26_drive_0052_sync";
+  EXPECT_EQ(mapping.find(1497), (RawFrame{"2011_09_26", drive, 7}));
+  EXPECT_EQ(mapping.find(4587), (RawFrame{"2011_09_26", drive, 14}));
+  EXPECT_TRUE(mapping.find(7480));
+  EXPECT_FALSE(mapping.find(7481));
 }
 
 }  // namespace

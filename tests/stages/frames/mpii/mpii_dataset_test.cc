@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/frames/mpii/mpii_joints.h"
+#include "stages/frames/mpii/mpii_annotations_internal.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/shared_data.h"
@@ -16,12 +16,13 @@
 namespace eventgan {
 namespace {
 
-using State = Neighbour::State;
+namespace mat = testing::mat;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-namespace mat = testing::mat;
+
+using State = Neighbour::State;
 
 std::vector<std::string> ids(const Dataset& dataset) {
   std::vector<std::string> found;

@@ -15,12 +15,13 @@
 namespace eventgan {
 namespace {
 
-using State = Neighbour::State;
+namespace mat = testing::mat;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
-namespace mat = testing::mat;
+
+using State = Neighbour::State;
 
 class MpiiListDatasetTest : public ::testing::Test {
  protected:

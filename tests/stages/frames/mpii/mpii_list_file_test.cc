@@ -2,8 +2,11 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "manifests/faults.h"
-#include "stages/frames/mpii/mpii_list_file_internal.h"
+#include <cmath>
+#include <stdexcept>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/mpii/mpii_list_dataset_internal.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -12,8 +15,64 @@ namespace eventgan {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
+using testing::write_hdf5;
+
+using Numbers = std::vector<double>;
+using Texts = std::vector<std::string>;
+
+class MpiiTableTest : public ::testing::Test {
+ protected:
+  MpiiList read() const { return read_mpii_table(file_); }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "t.h5";
+};
+
+TEST_F(MpiiTableTest, ReadsColumnsOfAnyRankAsFieldsOfTheRows) {
+  write_hdf5(file_, {{"imgname", {{2}, Texts{"a.jpg", "long.jpg"}, 8}},
+                     {"part", {{2, 1, 2}, Numbers{1, 2, 3, 4}}},
+                     {"scale", {{2}, Numbers{0.5, std::nan("")}}}});
+  const MpiiList list = read();
+  EXPECT_EQ(list.form, MpiiListForm::kTable);
+  ASSERT_EQ(list.rows.size(), 2u);
+  EXPECT_EQ(list.rows[0].dump(), R"({"imgname":"a.jpg","part":[[1.0,2.0]],"scale":0.5})");
+  EXPECT_EQ(list.rows[1].dump(), R"({"imgname":"long.jpg","part":[[3.0,4.0]],"scale":null})");
+  EXPECT_THAT(list.notes, IsEmpty());
+}
+
+TEST_F(MpiiTableTest, NamesMayBeVariableTextOrCodes) {
+  write_hdf5(file_, {{"imgname", {{2}, Texts{"a.jpg", ""}}}});
+  EXPECT_EQ(read().rows[0]["imgname"], "a.jpg");
+  EXPECT_EQ(read().rows[1]["imgname"], "");
+  write_hdf5(file_, {{"imgname", {{2, 3}, Numbers{'a', 'b', 0, 'x', 'y', 'z'}}}});
+  EXPECT_EQ(read().rows[0]["imgname"], "ab");
+  EXPECT_EQ(read().rows[1]["imgname"], "xyz");
+}
+
+TEST_F(MpiiTableTest, NotesColumnsOfAnotherLength) {
+  write_hdf5(file_, {{"imgname", {{2}, Texts{"a.jpg", "b.jpg"}}},
+                     {"latin", {{2}, Texts{"\xe9", ""}}},
+                     {"mean", {{3}, Numbers{1, 2, 3}}}});
+  EXPECT_FALSE(read().rows[0].contains("mean"));
+  EXPECT_THAT(read().notes, ElementsAre(AllOf(HasSubstr("column mean left out"),
+                                              HasSubstr("expected 2 rows"), HasSubstr("got [3]")),
+                                        HasSubstr("column latin left out (expected 2 rows of "
+                                                  "numbers or text, got text that is not UTF-8")));
+}
+
+TEST_F(MpiiTableTest, RefusesDamagedFilesAndTablesWithoutNames) {
+  write_hdf5(file_, {{"scale", {{1}, Numbers{1}}}});
+  EXPECT_THAT([&] { read(); },
+              ThrowsMessage<InputError>(
+                  AllOf(HasSubstr("expected a column imgname, got none"), HasSubstr("t.h5"))));
+  const std::string bytes = testing::read_file(file_);
+  testing::write_file(file_, bytes.substr(0, bytes.size() / 2));
+  EXPECT_THAT([&] { read(); }, ThrowsMessage<InputError>(HasSubstr("expected a whole HDF5 file")));
+}
 
 class MpiiListFileTest : public ::testing::Test {
  protected:
@@ -65,6 +124,93 @@ TEST_F(MpiiListFileTest, TakesRegularFilesOnlyAndNeverWaits) {
   ASSERT_EQ(::mkfifo(file_.c_str(), 0600), 0);
   EXPECT_THAT([&] { read_mpii_list(file_); },
               ThrowsMessage<InputError>(HasSubstr("nothing readable (Not a regular file)")));
+}
+
+using Json = nlohmann::ordered_json;
+
+/// A row whose sixteen joints are all (5, 6) and visible but for joint 3.
+Json row_with(MpiiListForm form, const Json& joint3, const Json& visible3) {
+  Json joints = Json::array(), visible = Json::array();
+  for (int i = 0; i < 16; ++i) {
+    joints.push_back(i == 3 ? joint3 : Json{5, 6});
+    visible.push_back(i == 3 ? visible3 : Json(1));
+  }
+  const bool is_table = form == MpiiListForm::kTable;
+  return {{image_field(form), "a.jpg"},
+          {"center", {966.0, 340.5}},
+          {"scale", 4.7},
+          {is_table ? "part" : "joints", joints},
+          {is_table ? "visible" : "joints_vis", visible}};
+}
+
+TEST(MpiiListRow, EveryCoordinateLosesOne) {
+  for (const auto form : {MpiiListForm::kJsonList, MpiiListForm::kTable}) {
+    const Person person = parse_mpii_list_row(row_with(form, {10.5, 0.5}, 0), form);
+    ASSERT_EQ(person.joints.size(), 16u);
+    EXPECT_EQ(person.joints[0], (Joint{{4, 5}, 1}));
+    EXPECT_EQ(person.joints[3], (Joint{{9.5, -0.5}, 0}));
+    EXPECT_EQ(person.center, (Point{965, 339.5}));
+    EXPECT_EQ(person.scale, 4.7);
+    EXPECT_FALSE(person.head_box);
+  }
+}
+
+TEST(MpiiListRow, EachFormMarksMissingJointsItsOwnWay) {
+  const Joint missing{kMissingPoint, 0};
+  const auto joint3 = [](MpiiListForm form, const Json& at) {
+    return parse_mpii_list_row(row_with(form, at, 0), form).joints[3];
+  };
+  EXPECT_EQ(joint3(MpiiListForm::kJsonList, {-1.0, -1.0}), missing);
+  EXPECT_EQ(joint3(MpiiListForm::kTable, {0.0, 0.0}), missing);
+  // What marks a missing joint in one form is a place in the other; so is a zero in one coordinate.
+  EXPECT_EQ(joint3(MpiiListForm::kTable, {-1.0, -1.0}).at, (Point{-2, -2}));
+  EXPECT_EQ(joint3(MpiiListForm::kTable, {325.0, 0.0}).at, (Point{324, -1}));
+}
+
+TEST(MpiiListRow, AMissingJointIsNeverVisible) {
+  const auto form = MpiiListForm::kTable;
+  EXPECT_EQ(parse_mpii_list_row(row_with(form, {0, 0}, 1), form).joints[3],
+            (Joint{kMissingPoint, 0}));
+}
+
+TEST(MpiiListRow, TestImagesHaveNoJoints) {
+  const Person person = parse_mpii_list_row(
+      {{"image", "a.jpg"}, {"center", {-1, -1}}, {"scale", -1}}, MpiiListForm::kJsonList);
+  EXPECT_EQ(person.joints, std::vector<Joint>(16, Joint{kMissingPoint, 0}));
+  EXPECT_EQ(person.center, kMissingPoint);
+  EXPECT_EQ(person.scale, -1);
+}
+
+TEST(MpiiListRow, JointsWithoutVisibilityAreOfUnknownVisibility) {
+  Json row = row_with(MpiiListForm::kJsonList, {-1, -1}, 0);
+  row.erase("joints_vis");
+  const Person person = parse_mpii_list_row(row, MpiiListForm::kJsonList);
+  EXPECT_EQ(person.joints[0].visible, -1);
+  EXPECT_EQ(person.joints[3].visible, 0);
+}
+
+TEST(MpiiListRow, RefusesMalformedRows) {
+  const auto form = MpiiListForm::kJsonList;
+  const auto expect_refused = [&](const Json& row, const char* message) {
+    EXPECT_THAT([&] { parse_mpii_list_row(row, form); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr(message)));
+  };
+  expect_refused(row_with(form, {1, nullptr}, 1),
+                 "expected two finite numbers, got [1,null] at joints[3]");
+  expect_refused(row_with(form, {1, 2, 3}, 1), "expected two finite numbers");
+  expect_refused(row_with(form, {1, 2}, 0.5), "expected 0 or 1, got 0.5 at joints_vis[3]");
+  Json row = row_with(form, {1, 2}, 1);
+  row["joints"].erase(0);
+  expect_refused(row, "expected 16 elements");
+  row = row_with(form, {1, 2}, 1);
+  row["joints_vis"] = 1;
+  expect_refused(row, "expected 16 elements, got 1 at joints_vis");
+  row = row_with(form, {1, 2}, 1);
+  row["scale"] = "4";
+  expect_refused(row, "expected a finite number, got \"4\" at scale");
+  row["scale"] = 4;
+  row["center"] = 7;
+  expect_refused(row, "expected two finite numbers, got 7 at center");
 }
 
 }  // namespace

@@ -2,7 +2,8 @@
 
 #include <utility>
 
-#include "stages/files/atomic_file.h"
+#include "manifests/documents/marker.h"
+#include "stages/base/files/atomic_file.h"
 #include "tests/stages/shards/example_shard.h"
 
 namespace eventgan::testing {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/shards/view/dataset_view.h"
+#include "stages/shards/dataset_view.h"
 
 namespace eventgan::testing {
 

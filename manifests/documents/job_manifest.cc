@@ -1,0 +1,342 @@
+#include "manifests/documents/job_manifest.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <initializer_list>
+#include <limits>
+
+#include "manifests/documents/job_manifest_internal.h"
+#include "manifests/documents/manifest_file_internal.h"
+#include "manifests/documents/strict_json_internal.h"
+#include "manifests/values/job.h"
+#include "manifests/values/weights.h"
+#include "manifests/values/words.h"
+
+namespace eventgan {
+
+std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
+  std::vector<int> gaps;
+  for (const StrictValue& element : value.elements(1)) {
+    const auto gap = element.sound_integer(1, 6);
+    if (!gap) continue;
+    if (side == PairSide::kAround && *gap % 2 != 0) {
+      element.fault("an even gap (2, 4 or 6), since side is \"around\"");
+    }
+    if (std::find(gaps.begin(), gaps.end(), *gap) != gaps.end()) element.fault("each gap once");
+    gaps.push_back(static_cast<int>(*gap));
+  }
+  std::sort(gaps.begin(), gaps.end());
+  return gaps;
+}
+
+PairSpec read_pairs(const StrictValue& value) {
+  PairSpec spec;
+  StrictObject object = value.object();
+  if (const auto side = object.find("side")) spec.side = side->choice(kSideWords);
+  if (const auto choose = object.find("choose")) spec.choose = choose->choice(kChoiceWords);
+  if (const auto least = object.find("min_pairs")) {
+    spec.min_pairs = least->integer<std::int64_t>(0, 1'000'000'000);
+  }
+  if (const auto most = object.find("max_gap_s")) spec.max_gap_s = most->number(1e-6, 1e6);
+  spec.gaps = read_gaps(object.at("gaps"), spec.side);
+  object.finish();
+  return spec;
+}
+
+namespace {
+
+/// Reads the keys that only some datasets have.
+class SpecialKeys {
+ public:
+  /// `dataset`: none if the manifest's is faulty; then no key is out of place.
+  SpecialKeys(StrictObject& object, std::optional<DatasetKind> dataset)
+      : object_(object), dataset_(dataset) {}
+
+  /// The key's value if it is there. It is a fault where the dataset is not one of `owners`.
+  std::optional<StrictValue> find(std::string_view key, std::initializer_list<DatasetKind> owners) {
+    std::optional<StrictValue> value = object_.find(key);
+    if (!value || !dataset_) return value;
+    if (std::find(owners.begin(), owners.end(), *dataset_) != owners.end()) return value;
+    std::string expected =
+        "no such key for dataset \"" + std::string(to_string(*dataset_)) + "\" (of ";
+    std::string_view separator;
+    for (const DatasetKind owner : owners) {
+      expected.append(separator).append(to_string(owner));
+      separator = ", ";
+    }
+    value->fault(expected + " only)");
+    return std::nullopt;
+  }
+
+  std::optional<std::string> find_path(std::string_view key,
+                                       std::initializer_list<DatasetKind> owners) {
+    const std::optional<StrictValue> value = find(key, owners);
+    return value ? std::optional(read_path(*value)) : std::nullopt;
+  }
+
+ private:
+  StrictObject& object_;
+  std::optional<DatasetKind> dataset_;
+};
+
+}  // namespace
+
+SourceSpec read_source(const StrictValue& value) {
+  using enum DatasetKind;
+  SourceSpec spec;
+  StrictObject object = value.object();
+  const auto dataset = object.at("dataset").sound_choice(kDatasetWords);
+  spec.dataset = dataset.value_or(spec.dataset);
+  spec.root = read_path(object.at("root"));
+  if (const auto split = object.find("split")) spec.split = read_name(*split);
+
+  SpecialKeys keys(object, dataset);
+  spec.raw_root = keys.find_path("raw_root", {kKittiObject});
+  spec.devkit = keys.find_path("devkit", {kKittiObject});
+  // Neither is of use without the other: the devkit's mapping says which raw frame a picture is.
+  if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
+  if (spec.devkit && !spec.raw_root) object.at("raw_root").fault("a path, since devkit is given");
+  spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m});
+  if (dataset == kMpiiList && !spec.annotations)
+    spec.annotations = read_path(object.at("annotations"));
+  spec.sequences = keys.find_path("sequences", {kMpii, kMpiiList});
+  const auto layout = keys.find("layout", {kHuman36m});
+  if (layout || dataset == kHuman36m) spec.layout = object.at("layout").choice(kLayoutWords);
+  if (const auto rate = keys.find("frames_per_second", {kFrames})) {
+    spec.frames_per_second = rate->number(1e-6, 1e6);
+  }
+
+  spec.pairs = read_pairs(object.at("pairs"));
+  object.finish();
+  return spec;
+}
+
+namespace {
+
+// Below 16 pixels a side the network's four halvings leave less than one pixel of the picture at
+// its bottom; above 8192 no camera of these datasets goes, so that a larger number is a slip.
+constexpr int kSmallestSide = 16;
+constexpr int kLargestSide = 8192;
+
+struct Preset {
+  std::string_view name;
+  GreyOrder grey;
+  int blur;
+};
+
+/// DESIGN section 4: the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
+constexpr std::array kPresetWords{Word<Preset>{"kitti", {"kitti", GreyOrder::kBeforeResize, 3}},
+                                  Word<Preset>{"mpii", {"mpii", GreyOrder::kBeforeResize, 0}},
+                                  Word<Preset>{"demo", {"demo", GreyOrder::kAfterResize, 0}}};
+
+int read_blur(const StrictValue& value) {
+  const int blur = value.integer(0, 31);
+  if (blur == 1 || (blur > 0 && blur % 2 == 0)) value.fault("0 (no blur) or an odd integer 3..31");
+  return blur;
+}
+
+}  // namespace
+
+ImageSpec read_image(const StrictValue& value) {
+  ImageSpec spec;
+  StrictObject object = value.object();
+  if (object.find("width") || object.find("height")) {
+    spec.size = {object.at("height").integer(kSmallestSide, kLargestSide),
+                 object.at("width").integer(kSmallestSide, kLargestSide)};
+  }
+  if (const auto fit = object.find("fit")) spec.fit = fit->choice(kFitWords);
+
+  const auto preset = object.find("preset");
+  const auto grey = object.find("grey");
+  const auto blur = object.find("blur");
+  if (preset) {
+    const Preset chosen = preset->choice(kPresetWords);
+    spec.preset = chosen.name;
+    spec.grey = chosen.grey;
+    spec.blur = chosen.blur;
+    if (grey) grey->fault("no such key beside a preset, which decides it");
+    if (blur) blur->fault("no such key beside a preset, which decides it");
+  } else if (!grey && !blur) {
+    object.at("preset").fault("\"kitti\", \"mpii\" or \"demo\", or else the keys grey and blur");
+  } else {
+    spec.grey = object.at("grey").choice(kGreyWords);
+    spec.blur = read_blur(object.at("blur"));
+  }
+  object.finish();
+  return spec;
+}
+
+namespace {
+
+constexpr double kLargestRate_hz = 1e6;
+
+}  // namespace
+
+SensorSpec read_sensor(const StrictValue& value) {
+  SensorSpec spec;
+  StrictObject object = value.object();
+  const auto read = [&](const char* key, double& number, double lowest, double highest) {
+    if (const auto found = object.find(key)) number = found->number(lowest, highest);
+  };
+  read("positive_threshold", spec.positive_threshold, 0.01, 5);
+  read("negative_threshold", spec.negative_threshold, 0.01, 5);
+  read("threshold_spread", spec.threshold_spread, 0, 1);
+  read("refractory_s", spec.refractory_s, 0, 1);
+  read("leak_rate_hz", spec.leak_rate_hz, 0, kLargestRate_hz);
+  read("shot_noise_rate_hz", spec.shot_noise_rate_hz, 0, kLargestRate_hz);
+  read("hot_pixel_fraction", spec.hot_pixel_fraction, 0, 1);
+  read("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, 0, kLargestRate_hz);
+  read("log_epsilon", spec.log_epsilon, 1e-6, 1);
+  object.finish();
+  return spec;
+}
+
+namespace {
+
+/// Reads the keys that only some kinds of generator have.
+class KindKeys {
+ public:
+  /// `kind`: none if the manifest's is faulty; then no key is out of place.
+  KindKeys(StrictObject& object, std::optional<GeneratorKind> kind)
+      : object_(object), kind_(kind) {}
+
+  /// The key's value if it is there. It is a fault where the kind is not one of `owners`.
+  std::optional<StrictValue> find(std::string_view key,
+                                  std::initializer_list<GeneratorKind> owners) {
+    std::optional<StrictValue> value = object_.find(key);
+    if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
+    std::string listed;
+    for (const GeneratorKind owner : owners) {
+      listed.append(listed.empty() ? "" : ", ").append(to_string(owner));
+    }
+    value->fault("no such key for kind \"" + std::string(to_string(*kind_)) + "\" (of " + listed +
+                 " only)");
+    return std::nullopt;
+  }
+
+ private:
+  StrictObject& object_;
+  std::optional<GeneratorKind> kind_;
+};
+
+/// Reads the manifest's `generator`; which keys it may have depends on its kind.
+GeneratorSpec read_generator(const StrictValue& value) {
+  using enum GeneratorKind;
+  GeneratorSpec spec;
+  StrictObject object = value.object();
+  std::optional<GeneratorKind> kind = spec.kind;
+  if (const auto found = object.find("kind")) kind = found->sound_choice(kGeneratorWords);
+  spec.kind = kind.value_or(spec.kind);
+
+  KindKeys keys(object, kind);
+  if (const auto weights = keys.find("weights", {kNetwork})) {
+    spec.weights = weights->text(
+        "the path of a .safetensors file, \"shipped\", or \"shipped:WIDTH\" or "
+        "\"untrained:WIDTH\" with WIDTH in 1..64",
+        [](std::string_view text) { return parse_weights_name(text).has_value(); });
+  }
+  if (const auto engine = keys.find("engine", {kNetwork})) {
+    spec.engine = engine->choice(kEngineWords);
+  }
+  if (const auto precision = keys.find("precision", {kNetwork})) {
+    spec.precision = precision->choice(kPrecisionWords);
+  }
+  if (const auto sensor = keys.find("sensor", {kEsim, kDifference})) {
+    spec.sensor = read_sensor(*sensor);
+  }
+  if (const auto duration = keys.find("duration_s", {kEsim, kDifference})) {
+    spec.duration_s = duration->number(1e-4, 10);
+  }
+  if (const auto displacement = keys.find("max_displacement_px", {kEsim})) {
+    spec.max_displacement_px = displacement->number(0.1, 100);
+  }
+  object.finish();
+  return spec;
+}
+
+constexpr std::string_view kFormat = "eventgan-manifest";
+constexpr int kVersion = 1;
+
+VolumeSpec read_volume(const StrictValue& value) {
+  VolumeSpec spec;
+  StrictObject object = value.object();
+  if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
+  if (const auto normalize = object.find("normalize")) {
+    spec.normalize = normalize->choice(kNormalizationWords);
+  }
+  object.finish();
+  return spec;
+}
+
+OutputSpec read_output(const StrictValue& value) {
+  OutputSpec spec;
+  StrictObject object = value.object();
+  spec.directory = read_path(object.at("directory"));
+  if (const auto count = object.find("samples_per_shard")) {
+    spec.samples_per_shard = count->integer(1, 65536);
+  }
+  if (const auto dtype = object.find("dtype")) spec.dtype = dtype->choice(kStoredTypeWords);
+  if (const auto level = object.find("deflate_level")) spec.deflate_level = level->integer(0, 9);
+  object.finish();
+  return spec;
+}
+
+ErrorSpec read_errors(const StrictValue& value) {
+  ErrorSpec spec;
+  StrictObject object = value.object();
+  if (const auto policy = object.find("policy")) spec.policy = policy->choice(kPolicyWords);
+  if (const auto count = object.find("max_count")) {
+    spec.max_count = count->integer<std::int64_t>(0, 1'000'000'000);
+  }
+  if (const auto fraction = object.find("max_fraction")) {
+    spec.max_fraction = fraction->number(0, 1);
+  }
+  object.finish();
+  return spec;
+}
+
+/// A volume is one chunk of its shard, and HDF5's chunks stay below 4 GiB.
+void check_chunk(const JobManifest& manifest, const StrictValue& image) {
+  if (!manifest.image.size) return;
+  const ImageSize size = *manifest.image.size;
+  const std::uint64_t bytes = std::uint64_t{2} * manifest.volume.bins * size.pixel_count() *
+                              stored_size(manifest.output.dtype);
+  if (bytes <= std::numeric_limits<std::uint32_t>::max()) return;
+  image.fault("volumes below 4 GiB (2 x bins x height x width x bytes of dtype)",
+              std::to_string(bytes) + " bytes");
+}
+
+JobManifest read_document(const StrictValue& document) {
+  JobManifest manifest;
+  StrictObject object = document.object();
+  if (!object.has_format(kFormat, kVersion)) return manifest;
+  manifest.name = read_name(object.at("name"));
+  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
+  for (const StrictValue& source : object.at("sources").elements(1)) {
+    manifest.sources.push_back(read_source(source));
+  }
+  const StrictValue image = object.at("image");
+  manifest.image = read_image(image);
+  if (const auto generator = object.find("generator")) {
+    manifest.generator = read_generator(*generator);
+  }
+  if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
+  manifest.output = read_output(object.at("output"));
+  if (const auto errors = object.find("errors")) manifest.errors = read_errors(*errors);
+  object.finish();
+  check_chunk(manifest, image);
+  return manifest;
+}
+
+}  // namespace
+
+JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
+                               const std::string& name) {
+  return parse_manifest<JobManifest>(text, directory, name, read_document);
+}
+
+JobManifest read_job_manifest(const std::filesystem::path& file) {
+  return parse_job_manifest(read_manifest_text(file), manifest_folder(file), file.string());
+}
+
+}  // namespace eventgan

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "manifests/values/job.h"
+
+namespace eventgan {
+
+/// Reads a manifest. Throws UsageError listing *every* fault, one per line as
+/// "PATH: $.json.path: expected X, got Y"; InputError if the file cannot be read.
+JobManifest read_job_manifest(const std::filesystem::path& file);
+
+/// The same from text; `name` stands for the file in messages. `directory` is made absolute.
+JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
+                               const std::string& name);
+
+}  // namespace eventgan

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <vector>
+
+#include "manifests/documents/strict_json_internal.h"
+#include "manifests/values/events.h"
+#include "manifests/values/job.h"
+
+namespace eventgan {
+
+/// Reads one of the manifest's sources.
+SourceSpec read_source(const StrictValue& value);
+
+/// Reads a source's `pairs`.
+PairSpec read_pairs(const StrictValue& value);
+
+/// Reads gaps, 1..6, each once, even with kAround; ascending, whatever order they are written in.
+std::vector<int> read_gaps(const StrictValue& value, PairSide side);
+
+/// Reads the manifest's `image`; the preset, if one is named, fills in `grey` and `blur`.
+ImageSpec read_image(const StrictValue& value);
+
+/// Reads a manifest's `sensor`, whose keys are SensorSpec's.
+SensorSpec read_sensor(const StrictValue& value);
+
+}  // namespace eventgan

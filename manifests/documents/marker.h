@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "manifests/values/shard.h"
+
+namespace eventgan {
+
+/// Canonical JSON (sorted keys, two-space indent but an array of numbers on one line, newline at
+/// the end). Throws std::invalid_argument for seconds that are negative or no number.
+std::string to_json(const ShardMarker& marker);
+
+/// Throws std::runtime_error listing every fault ("PATH: $.key: expected X, got Y"); strict as
+/// manifests are.
+ShardMarker parse_marker(std::string_view text, const std::string& name);
+
+/// Name of the marker that belongs to a shard file: the same name with ".h5" replaced by ".json".
+std::string marker_name(const std::string& shard_name);
+
+}  // namespace eventgan

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+#include "manifests/values/frames.h"
+
+namespace eventgan {
+
+/// One event of a recording.
+struct Event {
+  int x = 0;  ///< column, 0-based
+  int y = 0;  ///< row, 0-based
+  double t_s = 0;
+  bool positive = true;
+  bool operator==(const Event&) const = default;
+};
+
+/// The model of an event camera's pixel that the simulators share: it signals when the logarithm of
+/// its intensity has moved by a contrast threshold since its last event (Rebecq et al., ESIM, 2018;
+/// noise as in Hu et al., v2e, 2021). Logarithms are natural, of the linear intensity u/255 + ε.
+struct SensorSpec {
+  double positive_threshold = 0.2;  ///< mean contrast threshold of positive events, 0.01..5
+  double negative_threshold = 0.2;  ///< the same of negative events, as a positive number
+  double threshold_spread = 0.03;   ///< standard deviation over the pixels, log units, 0..1; drawn
+                                    ///< per polarity; a pixel's threshold is never below 0.01
+  double refractory_s = 0;          ///< a pixel is silent so long after an event, 0..1; what it
+                                    ///< passes by then is lost, its level follows
+  double leak_rate_hz = 0;          ///< positive events per pixel and second without any motion
+  double shot_noise_rate_hz = 0;    ///< events of either polarity per pixel and second, Poisson;
+                                    ///< the rate of one polarity is half of it
+  double hot_pixel_fraction = 0;    ///< share of pixels that are hot, 0..1
+  double hot_pixel_rate_hz = 0;     ///< events per second of a hot pixel, Poisson, one polarity
+  double log_epsilon = 0.001;       ///< ε, 1e-6..1: keeps the logarithm of black finite
+  bool operator==(const SensorSpec&) const = default;
+};
+
+/// Shape of an event volume: [2 bins, height, width], C order. Channels 0..bins-1 are the positive
+/// polarity in time order, bins..2 bins-1 the negative one.
+struct VolumeShape {
+  int bins = 0;
+  ImageSize size;
+
+  int channels() const { return 2 * bins; }
+  std::size_t value_count() const {
+    return static_cast<std::size_t>(channels()) * size.pixel_count();
+  }
+  bool operator==(const VolumeShape&) const = default;
+};
+
+/// What was noteworthy about a stored volume; bits of `/events/statistics/flags`.
+enum VolumeFlag : std::uint32_t {
+  kFlagEmpty = 1u << 0,         ///< no value is different from zero
+  kFlagExtrapolated = 1u << 1,  ///< a gap that the generator never saw in training
+  kFlagSaturated = 1u << 2,     ///< values beyond the stored type's range were clipped to it
+  kFlagVanished = 1u << 3,      ///< all values became zeros in the stored type, too small for it
+};
+
+/// Numbers about one volume as generated, before it is quantised for storage.
+struct VolumeStatistics {
+  float eta98 = 0;  ///< 98th percentile of the non-zero values (DESIGN section 5); 0 if empty
+  float max = 0;    ///< largest value
+  float nonzero_fraction = 0;  ///< share of values that are not zero, 0..1
+  double sum_positive = 0;     ///< sum over the positive-polarity channels
+  double sum_negative = 0;     ///< sum over the negative-polarity channels
+  std::uint32_t flags = 0;     ///< VolumeFlag bits
+};
+
+}  // namespace eventgan

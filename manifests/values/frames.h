@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+
+/// Size of a picture or a volume in pixels; always height first, as arrays are laid out.
+struct ImageSize {
+  int height = 0;
+  int width = 0;
+
+  bool operator==(const ImageSize&) const = default;
+  std::size_t pixel_count() const {
+    return static_cast<std::size_t>(height) * static_cast<std::size_t>(width);
+  }
+};
+
+/// A grey picture: [y, x] uint8, C order, 0..255.
+struct GreyImage {
+  ImageSize size;
+  std::vector<std::uint8_t> pixels;
+  bool operator==(const GreyImage&) const = default;
+};
+
+/// One frame of a sequence.
+struct FrameRef {
+  /// The source's root as the manifest writes it, then the path below it, with forward slashes. It
+  /// is relative to the manifest's folder unless the manifest's root is absolute. For a frame of a
+  /// video this is the video's path.
+  std::string path;
+  std::int64_t index = -1;  ///< the frame's own number in its sequence, as the dataset counts
+  std::int64_t video_frame =
+      -1;  ///< position in the video counted from 0; -1 if `path` is a picture
+  double time_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN if unknown
+
+  bool operator==(const FrameRef& other) const {
+    return path == other.path && index == other.index && video_frame == other.video_frame;
+  }
+};
+
+/// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to.
+struct FramePair {
+  FrameRef previous;
+  FrameRef next;
+  int gap_frames = 0;             ///< frames from previous to next, counted in stored frames, 1..6
+  std::int64_t label_index = -1;  ///< FrameRef::index of the labelled frame
+  /// Where the labelled frame lies: 0 = previous frame, 1 = next frame, 0.5 = in the middle.
+  double label_position = 1;
+
+  /// NaN if either time is unknown.
+  double gap_s() const { return next.time_s - previous.time_s; }
+};
+
+}  // namespace eventgan

@@ -1,0 +1,180 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
+
+namespace eventgan {
+
+/// Where a manifest came from; every kind of manifest has it.
+struct ManifestOrigin {
+  std::string text;                 ///< the manifest file, byte for byte
+  std::filesystem::path directory;  ///< absolute folder of the manifest; relative paths start here
+};
+
+/// `path` as the program must open it: below the manifest's folder unless it is absolute.
+inline std::filesystem::path resolve(const ManifestOrigin& manifest, const std::string& path) {
+  return manifest.directory / path;
+}
+
+/// In which numbers the network's convolutions are computed. The volume is float32 always.
+enum class Precision {
+  kFloat32,
+  kBfloat16,  ///< activations and weights bfloat16, sums float32
+  kInt8       ///< activations uint8, weights int8, sums int32; needs a calibration
+};
+
+/// What computes the network.
+enum class Engine { kTorch, kOnednn };
+
+/// The manifest's words for these values.
+std::string_view to_string(Precision precision);
+std::string_view to_string(Engine engine);
+
+enum class DatasetKind {
+  kKittiObject,
+  kKittiTracking,
+  kKittiRaw,
+  kMpii,
+  kMpiiList,
+  kHuman36m,
+  kFrames
+};
+
+/// How the Human3.6M source is laid out on disk (DESIGN section 8).
+enum class Human36mLayout { kFetch, kExtracted };
+
+/// Where the labelled frame lies in its pair: at the end, at the start, or in the middle.
+enum class PairSide { kBefore, kAfter, kAround };
+
+/// One pair a labelled frame, its gap drawn by the seed; or one pair for each gap.
+enum class PairChoice { kOne, kAll };
+
+struct PairSpec {
+  std::vector<int> gaps;  ///< 1..6, ascending, distinct; even only with kAround
+  PairSide side = PairSide::kBefore;
+  PairChoice choose = PairChoice::kOne;
+  std::int64_t min_pairs = 1;  ///< fewer pairs than this from the source is an error
+  /// Frames farther apart in time than this are no partners; > 0. Where times are unknown, and
+  /// without it, all are.
+  std::optional<double> max_gap_s = std::nullopt;
+};
+
+/// One dataset on disk. Paths are as written in the manifest.
+struct SourceSpec {
+  DatasetKind dataset = DatasetKind::kFrames;
+  std::string root;
+  std::string split = "train";          ///< part of file names, as JobManifest::name
+  std::optional<std::string> raw_root;  ///< kitti_object: KITTI raw, for gaps 4-6
+  std::optional<std::string> devkit;    ///< kitti_object: object devkit, whose mapping leads to raw
+  std::optional<std::string>
+      annotations;  ///< mpii, mpii_list, human36m: the annotation file or folder
+  std::optional<std::string> sequences;     ///< mpii, mpii_list: the folder of video frames
+  std::optional<Human36mLayout> layout;     ///< human36m only, and required there
+  std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
+  PairSpec pairs;
+};
+
+enum class ImageFit { kStretch, kLetterbox, kCrop };
+
+/// Whether the picture is made grey before or after it is resized.
+enum class GreyOrder { kBeforeResize, kAfterResize };
+
+/// How a frame becomes the network's input. Presets (DESIGN section 4): kitti = grey before
+/// resizing and a 3x3 blur; mpii = grey before resizing, no blur; demo = grey after resizing, no
+/// blur. A manifest names a preset or gives both `grey` and `blur`, never a mixture.
+struct ImageSpec {
+  std::optional<ImageSize> size;  ///< sides 16..8192; none: every picture keeps its own size
+  ImageFit fit = ImageFit::kStretch;
+  std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
+  GreyOrder grey = GreyOrder::kBeforeResize;
+  int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
+};
+
+/// What makes the volumes: the EventGAN network, or a model to compare it with.
+enum class GeneratorKind {
+  kNetwork,
+  kEsim,       ///< a random affine motion of the previous frame (stages/events/simulation)
+  kDifference  ///< log intensity on a line from the previous frame to the next
+};
+
+struct GeneratorSpec {
+  GeneratorKind kind = GeneratorKind::kNetwork;
+  /// kNetwork: path of a .safetensors file, "shipped" or "shipped:WIDTH" (manifests/weights), or
+  /// "untrained:WIDTH", WIDTH 1..64.
+  std::string weights = "shipped";
+  /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
+  std::optional<Engine> engine;
+  Precision precision = Precision::kFloat32;  ///< kNetwork
+  SensorSpec sensor;                          ///< kEsim, kDifference
+  double duration_s = 0.1;          ///< kEsim, kDifference: time between the two frames, for the
+                                    ///< noise and the refractory time; 1e-4..10
+  double max_displacement_px = 10;  ///< kEsim: of the random motion, 0.1..100
+};
+
+enum class Normalization { kNone, kEta98 };
+
+struct VolumeSpec {
+  int bins = 9;  ///< 1..64
+  Normalization normalize = Normalization::kNone;
+};
+
+enum class StoredType { kFloat32, kFloat16, kUint8 };
+
+struct OutputSpec {
+  std::string directory;
+  int samples_per_shard = 64;  ///< 1..65536
+  StoredType dtype = StoredType::kFloat16;
+  int deflate_level = 1;  ///< 0..9
+};
+
+/// Bytes of one stored value.
+std::size_t stored_size(StoredType type);
+
+enum class ErrorPolicy { kFail, kQuarantine };
+
+struct ErrorSpec {
+  ErrorPolicy policy = ErrorPolicy::kQuarantine;
+  std::int64_t max_count = 100;  ///< ≥ 0
+  double max_fraction = 0.01;    ///< 0..1
+};
+
+/// A conversion job, as manifests/schemas/manifest.schema.json describes it.
+struct JobManifest : ManifestOrigin {
+  /// Part of file names: 1..64 of A-Z a-z 0-9 . _ - and neither "." nor "-" first.
+  std::string name;
+  std::uint64_t seed = 0;  ///< 0..2^63-1
+  std::vector<SourceSpec> sources;
+  ImageSpec image;
+  GeneratorSpec generator;
+  VolumeSpec volume;
+  OutputSpec output;
+  ErrorSpec errors;
+};
+
+/// The manifest's words for these values, and back into text for shards, plans and reports.
+std::string_view to_string(DatasetKind kind);
+std::string_view to_string(Human36mLayout layout);
+std::string_view to_string(PairSide side);
+std::string_view to_string(PairChoice choice);
+std::string_view to_string(ImageFit fit);
+std::string_view to_string(GreyOrder order);
+std::string_view to_string(GeneratorKind kind);
+std::string_view to_string(Normalization normalization);
+std::string_view to_string(StoredType type);
+std::string_view to_string(ErrorPolicy policy);
+
+/// True if so many of a plan's samples are quarantined that its error policy calls the run failed.
+bool beyond_limits(const ErrorSpec& errors, std::int64_t quarantined, std::int64_t planned);
+
+/// What the policy allows, for "expected ..., got ...".
+std::string limits_text(const ErrorSpec& errors);
+
+}  // namespace eventgan

@@ -1,0 +1,130 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+
+/// A point in pixels, x to the right and y down. The centre of the top left pixel is (0, 0), so the
+/// picture covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
+struct Point {
+  double x = 0;
+  double y = 0;
+  bool operator==(const Point&) const = default;
+};
+
+/// What the datasets write where a point is not known; such a point is never moved by geometry.
+inline constexpr Point kMissingPoint{-1, -1};
+
+/// An upright rectangle given by its edges in pixels: an edge at x lies *between* the centres of
+/// the pixels x-1 and x, so a whole picture is {0, 0, width, height}.
+struct Rectangle {
+  double left = 0;
+  double top = 0;
+  double right = 0;
+  double bottom = 0;
+  bool operator==(const Rectangle&) const = default;
+};
+
+/// One object as annotated, in pixels of the source picture. Fields that a dataset does not have
+/// hold KITTI's own values for "unknown".
+struct Box {
+  int class_id = 0;  ///< index into LabelSchema::class_names
+  Rectangle xyxy;
+  float truncation = -1;  ///< 0 whole .. 1 outside the picture; -1 unknown
+  int occlusion = -1;     ///< 0 visible, 1 partly, 2 largely, 3 unknown; -1 not annotated
+  float alpha = -10;      ///< observation angle, rad in [-pi, pi]; -10 unknown
+  /// height, width, length (m), x, y, z (m, camera frame), rotation_y (rad).
+  std::array<float, 7> box3d{-1, -1, -1, -1000, -1000, -1000, -10};
+  std::int64_t track_id = -1;  ///< object's number within its sequence; -1 none
+  bool ignore = false;         ///< a region to leave out of training and scoring (DontCare)
+  bool operator==(const Box&) const = default;
+};
+
+/// A joint as annotated, in pixels of the source picture; kMissingPoint if it was not annotated.
+struct Joint {
+  Point at = kMissingPoint;
+  int visible = -1;  ///< 1 visible; 0 hidden, or not annotated; -1 annotated, visibility unknown
+  bool operator==(const Joint&) const = default;
+};
+
+/// Pinhole camera in pixels: u = focal_x X/Z + centre_x, v = focal_y Y/Z + centre_y.
+struct Intrinsics {
+  double focal_x = 0;
+  double focal_y = 0;
+  double centre_x = 0;
+  double centre_y = 0;
+  bool operator==(const Intrinsics&) const = default;
+};
+
+/// Lens distortion as Human3.6M models it, for a point (a, b) = (X/Z, Y/Z) with r2 = a^2 + b^2:
+///   d = 1 + k1 r2 + k2 r2^2 + k3 r2^3 + p1 b + p2 a,   a' = a d + p2 r2,   b' = b d + p1 r2,
+/// and (a', b') goes through the pinhole camera in place of (a, b). It acts before pixels come in,
+/// so scaling or cutting a picture leaves it as it is. (OpenCV's model has twice this p1 b + p2 a.)
+struct LensDistortion {
+  double k1 = 0;
+  double k2 = 0;
+  double k3 = 0;
+  double p1 = 0;
+  double p2 = 0;
+  bool operator==(const LensDistortion&) const = default;
+};
+
+/// One person as annotated, in pixels of the source picture, 0-based.
+struct Person {
+  std::vector<Joint> joints;     ///< one for each of LabelSchema::joint_names, in that order
+  Point center = kMissingPoint;  ///< kMissingPoint if not annotated
+  double scale = -1;             ///< as annotated (MPII: height / 200 px); -1 if not annotated
+  std::optional<Rectangle> head_box;
+  /// [J][x, y, z] in mm in the camera frame, none for a joint that is not known; empty if no joint
+  /// is.
+  std::vector<std::optional<std::array<double, 3>>> joints3d_mm;
+  std::optional<Intrinsics> camera;
+  std::optional<LensDistortion> distortion;  ///< of `camera`; none if it is not known
+  bool operator==(const Person&) const = default;
+};
+
+/// Everything a dataset says about one frame.
+struct Annotation {
+  /// The annotation as the dataset holds it. Text formats (KITTI): the bytes of the file,
+  /// unchanged. Binary formats (.mat, .h5, .npz): every field of the entry as JSON.
+  std::string original;
+  std::vector<Box> boxes;
+  std::vector<Person> persons;
+  bool operator==(const Annotation&) const = default;
+};
+
+/// What class and joint numbers mean; one for a whole source.
+struct LabelSchema {
+  std::vector<std::string> class_names;
+  std::vector<std::string> joint_names;
+  bool operator==(const LabelSchema&) const = default;
+};
+
+/// A box in volume pixels, beside the annotation it comes from.
+struct VolumeBox {
+  Rectangle clipped;    ///< cut to the volume
+  Rectangle unclipped;  ///< as mapped
+  bool ignore = false;  ///< as annotated, or because a crop left nothing of the box
+};
+
+/// A person in volume pixels; joints and centre that were not annotated stay kMissingPoint.
+struct VolumePerson {
+  std::vector<Point> joints;
+  Point center = kMissingPoint;
+  double scale = -1;  ///< the annotated scale times sqrt(scale_x scale_y); -1 if not annotated
+  std::optional<Rectangle> head_box;
+  std::optional<Intrinsics> camera;
+};
+
+/// An annotation as it lies in the volume; entries in the order of Annotation.
+struct VolumeLabels {
+  std::vector<VolumeBox> boxes;
+  std::vector<VolumePerson> persons;
+};
+
+}  // namespace eventgan

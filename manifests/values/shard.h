@@ -1,0 +1,99 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+
+namespace eventgan {
+
+inline constexpr char kShardFormat[] = "eventgan-shard";
+inline constexpr int kShardFormatVersion = 1;
+
+/// What the values of a volume, as generated, are.
+enum class VolumeUnit {
+  kLearned,  ///< a network's: dimensionless, as the volumes of its training were normalised
+  kEvents    ///< a simulator's: a count of events, each spread over the two bins nearest in time
+};
+
+/// What is true of a whole shard; manifests/guides/shard_format.md says where each field stands.
+struct ShardHeader {
+  std::string name;  ///< file name: NAME-SPLIT-00012-of-01024.h5
+  std::string dataset;
+  std::string split;
+  int sample_count = 0;
+  VolumeShape volume;
+  StoredType dtype = StoredType::kFloat16;
+  int deflate_level = 1;
+  Normalization normalization = Normalization::kNone;
+  VolumeUnit unit = VolumeUnit::kLearned;
+  LabelSchema label_schema;
+  std::string preprocessing;  ///< JSON: fit, grey, blur, preset
+  std::string plan_hash;      ///< SHA-256 of the frozen plan, hex
+  std::string manifest_text;
+  std::string weights_hash;  ///< SHA-256 of the weights (simulators: of `generator`), hex
+  std::string generator;     ///< Generator::description()
+  std::string program_version;
+};
+
+/// One sample but for its volume: one row of everything else in a shard.
+struct ShardSample {
+  bool valid = true;
+  std::string fault;  ///< why not, if not valid; kept in the marker, not in the shard
+  std::string sample_id;
+  std::string sequence;
+  FramePair pair;
+  ImageSize source_size;                     ///< {0, 0} if unknown (quarantined)
+  std::array<double, 6> source_to_volume{};  ///< NaN if unknown (quarantined)
+  VolumeStatistics statistics;
+  float scale = 1;        ///< value = stored code x scale for uint8; 1 for floats
+  Annotation annotation;  ///< empty boxes and persons if the annotation could not be read
+  VolumeLabels labels;    ///< as many entries as `annotation`
+};
+
+/// A sample that a shard keeps a slot for but no volume.
+struct QuarantinedSample {
+  int slot = 0;
+  std::string sample_id;
+  std::string reason;
+  bool operator==(const QuarantinedSample&) const = default;
+};
+
+/// A quarantined sample and the shard it is of.
+struct QuarantinedSlot {
+  std::string shard;  ///< the shard's file name
+  int slot = 0;
+  std::string sample_id;
+  std::string reason;
+};
+
+/// The file SHARD.json beside a shard: written after the shard is whole and in place, so its
+/// existence is what says "done" (DESIGN section 6). A shard is done if its marker parses, names
+/// the plan, and the shard has the marker's size.
+struct ShardMarker {
+  std::string shard;      ///< the shard's file name
+  std::string plan_hash;  ///< hex SHA-256
+  std::string sha256;     ///< of the shard's bytes, hex
+  std::int64_t size_bytes = 0;
+  int samples = 0;
+  int valid = 0;
+  std::vector<QuarantinedSample> quarantined;
+  /// Rows of /labels/boxes and /labels/poses by slot, quarantined samples included: with these the
+  /// whole dataset's offsets follow from the markers alone.
+  std::vector<std::int32_t> boxes;
+  std::vector<std::int32_t> persons;
+  std::map<std::string, std::int64_t> classes;  ///< boxes by class name; only names that occur
+  std::map<int, std::int64_t> gaps;             ///< samples by gap in frames
+  std::vector<std::string> optional_columns;    ///< paths of the optional columns the shard has
+  std::map<std::string, double> stage_seconds;  ///< busy time by stage
+  double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
+  bool operator==(const ShardMarker&) const = default;
+};
+
+}  // namespace eventgan

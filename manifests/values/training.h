@@ -1,0 +1,116 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+
+namespace eventgan {
+
+/// How an event recording lies on disk (manifests/guides/training.md).
+enum class RecordingFormat {
+  kMvsec,     ///< HDF5: davis/left/{events [N,4] x y t p, image_raw, image_raw_ts, ...}
+  kEventgan,  ///< HDF5 of the EventGAN authors: davis/{events/data, image_raw/...}
+  kEcd        ///< folder with images.txt and events.txt
+};
+
+/// A recording that training or validation draws frame pairs from.
+struct RecordingSpec {
+  std::string path;  ///< as written in the manifest
+  RecordingFormat format = RecordingFormat::kMvsec;
+  std::string camera = "left";             ///< kMvsec: "left" or "right"
+  double weight = 1;                       ///< relative chance of a sample to come from here, > 0
+  std::int64_t first_frame = 0;            ///< frames before are not used
+  std::optional<std::int64_t> last_frame;  ///< frames after are not used; none: to the end
+  bool operator==(const RecordingSpec&) const = default;
+};
+
+/// Where the generator has spectral norm: on residual blocks and decoders as in the published code,
+/// on the encoders as the paper says, or nowhere.
+enum class SpectralNormPlace { kDecoders, kEncoders, kNone };
+
+struct NetworkSpec {
+  int generator_channels = 32;      ///< base width, 1..64
+  int discriminator_channels = 64;  ///< first width, 1..128
+  int cycle_channels = 32;          ///< base width of flow and reconstruction network, 1..64
+  SpectralNormPlace spectral_norm = SpectralNormPlace::kDecoders;
+  int bins = 9;  ///< per polarity, 1..64
+};
+
+/// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
+/// first three to 0. `volume` and `count` are not in the paper: the difference to the real volume,
+/// voxel by voxel and summed over time, for short trainings.
+struct LossWeights {
+  double adversarial = 1;
+  double flow = 1;
+  double reconstruction = 1;
+  double volume = 0;
+  double count = 0;
+  double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
+  double smoothness = 0.5;  ///< of the flow loss
+};
+
+struct AugmentationSpec {
+  bool flip = true;                      ///< left-right and up-down, each with probability 1/2
+  std::array<double, 2> gain = {1, 1};   ///< factor on the network's images, drawn uniformly
+  std::array<double, 2> gamma = {1, 1};  ///< exponent on the network's images
+  double static_fraction = 0;  ///< share of samples whose frames are one frame twice and whose
+                               ///< volume is empty, 0..1; not in the paper
+};
+
+struct OptimizerSpec {
+  double generator_rate = 2e-4;
+  double cycle_rate = 2e-4;
+  double discriminator_rate = 5e-5;
+  std::array<double, 2> betas = {0, 0.999};
+  double final_rate_fraction = 1;  ///< rates fall to this share over each phase, by half a cosine;
+                                   ///< 1 = constant, as in the paper
+};
+
+enum class TrainingPrecision { kFloat32, kBfloat16 };
+
+/// The paper's three phases, in this order; each phase's networks are frozen in those after it.
+enum class TrainingPhase { kFlow, kReconstruction, kGenerator };
+
+/// Steps of each phase; a step is one update of one network. In the generator phase
+/// `discriminator_steps` updates of the discriminator go before each update of the generator
+/// (none without adversarial loss), all counted.
+struct PhaseSteps {
+  std::int64_t flow = 0;
+  std::int64_t reconstruction = 0;
+  std::int64_t generator = 0;
+};
+
+/// A job of `eventgan train`, as manifests/schemas/training.schema.json describes it.
+struct TrainingManifest : ManifestOrigin {
+  std::string name;
+  std::uint64_t seed = 0;
+  std::vector<RecordingSpec> recordings;
+  std::vector<RecordingSpec> validation;  ///< may be empty
+  std::vector<int> gaps = {1, 2, 3, 4, 5, 6};
+  ImageSize crop = {256, 256};  ///< sides 16..2048; from 48 with adversarial loss
+  int batch = 8;                ///< 1..512, even with adversarial loss
+  NetworkSpec network;
+  LossWeights losses;
+  double label_flip = 0.1;      ///< probability that a discriminator's label is flipped
+  int discriminator_steps = 2;  ///< 1..10
+  AugmentationSpec augmentation;
+  OptimizerSpec optimizer;
+  TrainingPrecision precision = TrainingPrecision::kFloat32;
+  PhaseSteps steps;
+  std::string output_directory;
+  double checkpoint_minutes = 5;
+  double picture_minutes = 10;
+};
+
+std::string_view to_string(RecordingFormat format);
+std::string_view to_string(SpectralNormPlace place);
+std::string_view to_string(TrainingPrecision precision);
+std::string_view to_string(TrainingPhase phase);
+
+}  // namespace eventgan

@@ -1,0 +1,111 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+
+#include "manifests/values/job.h"
+#include "manifests/values/simulation.h"
+#include "manifests/values/training.h"
+
+namespace eventgan {
+
+/// A value of an enumeration and what a document calls it.
+template <class T>
+struct Word {
+  std::string_view word;
+  T value;
+};
+
+/// The word for `value`. Throws std::invalid_argument for a value that has none, which only a bad
+/// cast can make.
+template <class T, std::size_t N>
+std::string_view word_of(const std::array<Word<T>, N>& words, T value) {
+  for (const Word<T>& entry : words) {
+    if (entry.value == value) return entry.word;
+  }
+  throw std::invalid_argument("expected a value of the enumeration, got another number");
+}
+
+// The manifest's words, in the order in which messages list them.
+
+inline constexpr std::array kDatasetWords{
+    Word<DatasetKind>{"kitti_object", DatasetKind::kKittiObject},
+    Word<DatasetKind>{"kitti_tracking", DatasetKind::kKittiTracking},
+    Word<DatasetKind>{"kitti_raw", DatasetKind::kKittiRaw},
+    Word<DatasetKind>{"mpii", DatasetKind::kMpii},
+    Word<DatasetKind>{"mpii_list", DatasetKind::kMpiiList},
+    Word<DatasetKind>{"human36m", DatasetKind::kHuman36m},
+    Word<DatasetKind>{"frames", DatasetKind::kFrames}};
+
+inline constexpr std::array kLayoutWords{
+    Word<Human36mLayout>{"fetch", Human36mLayout::kFetch},
+    Word<Human36mLayout>{"extracted", Human36mLayout::kExtracted}};
+
+inline constexpr std::array kSideWords{Word<PairSide>{"before", PairSide::kBefore},
+                                       Word<PairSide>{"after", PairSide::kAfter},
+                                       Word<PairSide>{"around", PairSide::kAround}};
+
+inline constexpr std::array kChoiceWords{Word<PairChoice>{"one", PairChoice::kOne},
+                                         Word<PairChoice>{"all", PairChoice::kAll}};
+
+inline constexpr std::array kFitWords{Word<ImageFit>{"stretch", ImageFit::kStretch},
+                                      Word<ImageFit>{"letterbox", ImageFit::kLetterbox},
+                                      Word<ImageFit>{"crop", ImageFit::kCrop}};
+
+inline constexpr std::array kGreyWords{Word<GreyOrder>{"before_resize", GreyOrder::kBeforeResize},
+                                       Word<GreyOrder>{"after_resize", GreyOrder::kAfterResize}};
+
+inline constexpr std::array kGeneratorWords{
+    Word<GeneratorKind>{"network", GeneratorKind::kNetwork},
+    Word<GeneratorKind>{"esim", GeneratorKind::kEsim},
+    Word<GeneratorKind>{"difference", GeneratorKind::kDifference}};
+
+inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std::nullopt},
+                                         Word<std::optional<Engine>>{"torch", Engine::kTorch},
+                                         Word<std::optional<Engine>>{"onednn", Engine::kOnednn}};
+
+inline constexpr std::array kPrecisionWords{Word<Precision>{"float32", Precision::kFloat32},
+                                            Word<Precision>{"bfloat16", Precision::kBfloat16},
+                                            Word<Precision>{"int8", Precision::kInt8}};
+
+inline constexpr std::array kNormalizationWords{
+    Word<Normalization>{"none", Normalization::kNone},
+    Word<Normalization>{"eta98", Normalization::kEta98}};
+
+inline constexpr std::array kStoredTypeWords{Word<StoredType>{"float32", StoredType::kFloat32},
+                                             Word<StoredType>{"float16", StoredType::kFloat16},
+                                             Word<StoredType>{"uint8", StoredType::kUint8}};
+
+inline constexpr std::array kPolicyWords{Word<ErrorPolicy>{"fail", ErrorPolicy::kFail},
+                                         Word<ErrorPolicy>{"quarantine", ErrorPolicy::kQuarantine}};
+
+inline constexpr std::array kSimulationMethodWords{
+    Word<SimulationMethod>{"affine", SimulationMethod::kAffine},
+    Word<SimulationMethod>{"clip", SimulationMethod::kClip},
+    Word<SimulationMethod>{"difference", SimulationMethod::kDifference}};
+
+// The training manifest's words, in the order in which messages list them.
+
+inline constexpr std::array kRecordingFormatWords{
+    Word<RecordingFormat>{"mvsec", RecordingFormat::kMvsec},
+    Word<RecordingFormat>{"eventgan", RecordingFormat::kEventgan},
+    Word<RecordingFormat>{"ecd", RecordingFormat::kEcd}};
+
+inline constexpr std::array kSpectralNormWords{
+    Word<SpectralNormPlace>{"decoders", SpectralNormPlace::kDecoders},
+    Word<SpectralNormPlace>{"encoders", SpectralNormPlace::kEncoders},
+    Word<SpectralNormPlace>{"none", SpectralNormPlace::kNone}};
+
+inline constexpr std::array kTrainingPrecisionWords{
+    Word<TrainingPrecision>{"float32", TrainingPrecision::kFloat32},
+    Word<TrainingPrecision>{"bfloat16", TrainingPrecision::kBfloat16}};
+
+inline constexpr std::array kPhaseWords{
+    Word<TrainingPhase>{"flow", TrainingPhase::kFlow},
+    Word<TrainingPhase>{"reconstruction", TrainingPhase::kReconstruction},
+    Word<TrainingPhase>{"generator", TrainingPhase::kGenerator}};
+
+}  // namespace eventgan

@@ -1,0 +1,114 @@
+#include "pipeline/commands/options.h"
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+#include <system_error>
+
+#include "manifests/values/faults.h"
+#include "pipeline/commands/standard_streams.h"
+#include "pipeline/planning/fingerprint.h"
+#include "pipeline/runtime/trace_watch.h"
+
+namespace eventgan {
+namespace {
+
+const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressStyle::kAuto},
+                                                              {"bar", ProgressStyle::kBar},
+                                                              {"lines", ProgressStyle::kLines},
+                                                              {"json", ProgressStyle::kJson},
+                                                              {"none", ProgressStyle::kNone}};
+
+}  // namespace
+
+void add_progress_option(CLI::App& command, ProgressStyle& style) {
+  command
+      .add_option("--progress", style,
+                  "auto, bar, lines, none; json prints machine-readable lines and report")
+      ->transform(CLI::CheckedTransformer(kProgressStyles).description(""))
+      ->option_text("STYLE");
+}
+
+std::unique_ptr<Progress> show_progress(ProgressStyle style, std::int64_t total,
+                                        const ProgressUnit& unit) {
+  return std::make_unique<Progress>(std::cerr, style, isatty(STDERR_FILENO) != 0, total,
+                                    std::chrono::steady_clock::now, unit);
+}
+
+std::optional<std::filesystem::path> JobOptions::output_folder() const {
+  if (!output) return std::nullopt;
+  if (output->empty()) throw UsageError("--output: expected a folder, got nothing");
+  return *output;
+}
+
+void add_job_options(CLI::App& command, JobOptions& options, const std::string& manifest_text,
+                     const std::string& overwrite_text) {
+  command.add_option("MANIFEST", options.manifest, manifest_text)->required();
+  command.add_option("--output", options.output, "Folder to write to, instead of the manifest's");
+  command.add_option("--threads", options.threads, "Threads to use; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  command.add_flag("--overwrite", options.overwrite, overwrite_text);
+  add_progress_option(command, options.progress);
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void refuse_output_folder(const ProfiledCommand& command) {
+  std::error_code error;  // of a path that leads nowhere; TraceFile has a word for it
+  const fs::path file = fs::weakly_canonical(fs::absolute(command.file.value(), error), error);
+  const fs::path output = fs::weakly_canonical(fs::absolute(command.output, error), error);
+  if (error || file.parent_path() != output) return;
+  throw UsageError("--profile: expected a file outside the folder of the shards, got " +
+                   command.file.value());
+}
+
+void finish(TraceRecorder& trace, const ProfiledCommand& command) {
+  try {
+    trace.finish();
+    tell("trace of every stage and thread: " + *command.file +
+         " (open it in https://ui.perfetto.dev, chrome://tracing or https://www.speedscope.app)");
+  } catch (const std::exception& error) {
+    tell_warning(std::string("no trace: ") + error.what());
+  }
+}
+
+}  // namespace
+
+void add_profile_option(CLI::App& command, std::optional<std::string>& file) {
+  command
+      .add_option("--profile", file,
+                  "Write a trace of every stage and thread, for Perfetto, chrome://tracing or "
+                  "speedscope")
+      ->option_text("FILE");
+}
+
+int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRecorder*)>& work) {
+  if (!command.file) return work(nullptr);
+  refuse_output_folder(command);
+  TraceRecorder trace(*command.file,
+                      {{"program", program_version()}, {"command", "eventgan " + command.name}});
+  int exit_code = 0;
+  try {
+    const TraceWatch watch(trace);
+    exit_code = work(&trace);
+  } catch (...) {
+    finish(trace, command);
+    throw;
+  }
+  finish(trace, command);
+  return exit_code;
+}
+
+void tell_generator(const LoadedGenerator& loaded) {
+  if (!loaded.choice.empty()) tell(loaded.choice);
+  for (const std::string& warning : loaded.warnings) tell_warning(warning);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/progress.h"
+#include "pipeline/runtime/trace.h"
+
+namespace CLI {
+class App;
+}
+
+namespace eventgan {
+
+/// Adds `--progress STYLE` to a command; `style` must outlive its parsing.
+void add_progress_option(CLI::App& command, ProgressStyle& style);
+
+/// Progress on the standard error stream.
+std::unique_ptr<Progress> show_progress(ProgressStyle style, std::int64_t total,
+                                        const ProgressUnit& unit = {});
+
+/// What every command takes that makes a folder of files by a manifest.
+struct JobOptions {
+  std::string manifest;
+  std::optional<std::string> output;
+  int threads = 0;
+  bool overwrite = false;
+  ProgressStyle progress = ProgressStyle::kAuto;
+
+  bool as_json() const { return progress == ProgressStyle::kJson; }
+
+  /// The folder to write to instead of the manifest's. Throws UsageError if it was given empty: a
+  /// script's unset variable, which did not mean the manifest's folder.
+  std::optional<std::filesystem::path> output_folder() const;
+};
+
+/// Adds MANIFEST, --output, --threads, --overwrite and --progress. `options` must outlive the
+/// parsing; the texts are the help of MANIFEST and --overwrite.
+void add_job_options(CLI::App& command, JobOptions& options, const std::string& manifest_text,
+                     const std::string& overwrite_text);
+
+/// Adds `--profile FILE` to a command; `file` must outlive its parsing.
+void add_profile_option(CLI::App& command, std::optional<std::string>& file);
+
+/// What a command is traced as.
+struct ProfiledCommand {
+  std::optional<std::string> file;  ///< of the trace; none: not asked for
+  std::string name;
+  std::filesystem::path output;  ///< the folder of shards, in which no trace may lie
+};
+
+/// Runs a command's work with a trace, or with none (null) if no file was given; its exit code. The
+/// trace is completed also when the work throws or was stopped; where it is, or why there is none,
+/// is told on the standard error stream. A trace that is lost while the work goes on costs nothing
+/// else: the exit code stays. Throws UsageError before the work if the file cannot be.
+int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRecorder*)>& work);
+
+/// Tells on the standard error stream which engine was chosen, and the warnings.
+void tell_generator(const LoadedGenerator& loaded);
+
+}  // namespace eventgan

@@ -1,0 +1,318 @@
+#include "pipeline/conversion/retry.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstddef>
+#include <iterator>
+#include <map>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
+#include "pipeline/conversion/shard_rewrite.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/shard_backup.h"
+#include "pipeline/folder/shard_scan.h"
+#include "pipeline/planning/make_plan.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/runtime/trace.h"
+#include "stages/shards/shard_reader.h"
+
+namespace eventgan {
+
+QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
+                                    const FrozenOutline& frozen) {
+  QuarantinedSamples found;
+  const auto states = scan_shards(folder, frozen.plan.shards, frozen.hash);
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    const ShardState& state = states[i];
+    if (state.condition == ShardCondition::kMissing) ++found.shards_missing;
+    found.damaged.insert(found.damaged.end(), state.faults.begin(), state.faults.end());
+    if (!state.done() || state.marker->quarantined.empty()) continue;
+    found.shards.push_back(i);
+    found.count += std::ssize(state.marker->quarantined);
+    for (const QuarantinedSample& sample : state.marker->quarantined) {
+      found.ids.push_back(sample.sample_id);
+    }
+  }
+  return found;
+}
+
+std::vector<PlannedShard> plan_retry(const std::vector<CommittedShard>& shards) {
+  std::vector<PlannedShard> retried;
+  for (const CommittedShard& committed : shards) {
+    const PlannedShard& whole = *committed.shard;
+    PlannedShard& part = retried.emplace_back(
+        PlannedShard{whole.name, whole.source, whole.volume_size, {}, whole.size_unknown});
+    for (const QuarantinedSample& quarantined : committed.marker.quarantined) {
+      part.samples.push_back(whole.samples.at(static_cast<std::size_t>(quarantined.slot)));
+    }
+  }
+  return retried;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+using Fingerprint = std::map<std::string, std::string>;
+
+RetryReport new_report(const fs::path& folder, const QuarantinedSamples& found,
+                       std::int64_t planned) {
+  RetryReport report;
+  report.folder = folder.string();
+  report.planned = planned;
+  report.quarantined = found.count;
+  report.damaged_shards = found.damaged;
+  report.shards_missing = found.shards_missing;
+  return report;
+}
+
+/// The amendable fields in which the inputs differ now. Throws UsageError if other fields do.
+Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const Fingerprint& now) {
+  Fingerprint changed;
+  for (const auto& [field, value] : now) {
+    if (!is_amendable(field) || accepted[field] == value) continue;
+    changed[field] = accepted[field] = value;
+  }
+  const auto differences = fingerprint_differences(accepted, now);
+  if (differences.empty()) return changed;
+  std::string message = "expected the job that " + (folder / "plan.json").string() +
+                        " was frozen by, its inputs mended, got another one:";
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
+/// Records which inputs have changed, before the samples `ids` are redone, and where the inputs are
+/// now.
+void accept_inputs(const fs::path& folder, const std::string& plan_hash, const Fingerprint& frozen,
+                   const Fingerprint& now, const JobManifest& manifest,
+                   const std::vector<std::string>& ids, RetryReport& report) {
+  const Fingerprint changed =
+      changed_inputs(folder, amended(frozen, read_amendments(folder, plan_hash)), now);
+  if (!changed.empty()) record_amendment(folder, plan_hash, {changed, ids});
+  for (const auto& [field, value] : changed) report.changed_inputs.push_back(field);
+  if (recorded_manifest_folder(folder) != manifest.directory) {
+    record_manifest_folder(folder, manifest);
+  }
+}
+
+PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_hash,
+                      const std::string& engine, const RunOptions& options) {
+  return make_plan(
+      manifest, weights_hash, engine, [&] { return options.stop_requested(); }, options.trace);
+}
+
+/// The shards with quarantined samples that prove whole; the others are reported. After a request
+/// to stop there may be fewer.
+std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenPlan& frozen,
+                                           const QuarantinedSamples& found,
+                                           const RunOptions& options, RetryReport& report) {
+  std::vector<const PlannedShard*> shards;
+  for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
+  EarlierShards earlier = check_earlier_shards(
+      folder, frozen, shards,
+      {thread_count(options.threads), [&] { return options.stop_requested(); }, options.trace});
+  for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
+  if (!options.stop_requested()) {
+    report.quarantined = 0;  // what a damaged shard held does not count
+    for (const CommittedShard& shard : earlier.done) {
+      report.quarantined += std::ssize(shard.marker.quarantined);
+    }
+  }
+  return std::move(earlier.done);
+}
+
+/// Puts redone samples into their committed shards; for each shard once it is through, `report`
+/// gets tried, mended, failed, shards_rewritten and what is quarantined still.
+class RetrySink final : public SampleSink {
+ public:
+  /// Takes what plan_retry made of `shards`, in their order. All must outlive the sink.
+  RetrySink(const fs::path& folder, const std::vector<CommittedShard>& shards, RetryReport& report,
+            TraceRecorder* trace)
+      : folder_(folder), next_(shards.begin()), report_(report), trace_(trace) {}
+
+  void open(const PlannedShard& shard) override {
+    marker_ = &(next_++)->marker;
+    rewrite_ = std::make_unique<ShardRewrite>(
+        folder_, *marker_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
+  }
+
+  void add(const SampleMessage& message) override {
+    const int slot = marker_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
+    rewrite_->redo(slot, message);
+    if (!message.failed()) return;
+    failed_.push_back({marker_->shard, slot, message.sample.sample_id, message.sample.fault});
+  }
+
+  bool commit() override {
+    TraceSpan span(trace_, "commit shard", "shard");
+    span.note("shard", marker_->shard);
+    report_.shards_rewritten += rewrite_->commit();
+    rewrite_.reset();
+    const std::int64_t tried = std::ssize(marker_->quarantined);
+    const std::int64_t mended = tried - std::ssize(failed_);
+    report_.tried += tried;
+    report_.mended += mended;
+    report_.quarantined -= mended;
+    report_.failed.insert(report_.failed.end(), failed_.begin(), failed_.end());
+    failed_.clear();
+    return true;
+  }
+
+  /// The samples of the shard under way do not count as tried.
+  void abandon() override {
+    rewrite_.reset();
+    failed_.clear();
+  }
+
+  bool closed() const override { return false; }
+
+ private:
+  const fs::path& folder_;
+  std::vector<CommittedShard>::const_iterator next_;
+  const ShardMarker* marker_ = nullptr;    // of the shard under way
+  std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
+  std::vector<QuarantinedSlot> failed_;    // of the shard under way
+  RetryReport& report_;
+  TraceRecorder* trace_;
+};
+
+}  // namespace
+
+std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const FrozenOutline& frozen,
+                                            const JobManifest& manifest,
+                                            const RunOptions& options) {
+  restore_shards(folder, frozen);
+  const QuarantinedSamples found = find_quarantined(folder, frozen);
+  if (found.count > 0) return std::nullopt;
+  RetryReport report = new_report(folder, found, frozen.plan.sample_count());
+  const Fingerprint& before = frozen.plan.fingerprint;
+  Fingerprint now = plan_again(manifest, "", "", options).plan.fingerprint;
+  for (auto& [field, value] : now) {
+    const auto known = before.find(field);
+    if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
+    value = known->second;  // weights, processor, libraries: for `convert` to compare
+  }
+  accept_inputs(folder, frozen.hash, before, now, manifest, {}, report);
+  return report;
+}
+
+RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Generator& generator,
+                  const std::string& weights_hash, const RunOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
+  FrozenPlan frozen = read_frozen_plan(folder);
+  const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
+  restore_shards(folder, outline);
+  const QuarantinedSamples found = find_quarantined(folder, outline);
+  RetryReport report = new_report(folder, found, frozen.plan.sample_count());
+
+  PlannedJob job = plan_again(manifest, weights_hash, generator.description(), options);
+  accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
+                found.ids, report);
+  job.plan = {};  // the frozen one counts, and it can be huge
+  complete_plan(manifest, job.datasets, frozen.plan);
+
+  const std::vector<CommittedShard> shards = trusted_shards(folder, frozen, found, options, report);
+  std::vector<PlannedShard> retried = plan_retry(shards);
+  std::vector<const PlannedShard*> to_redo;
+  for (std::size_t i = 0; i < shards.size(); ++i) {
+    to_redo.push_back(&retried[i]);
+    // A shard that has good samples already has the size of these.
+    if (!retried[i].size_unknown || shards[i].marker.valid == 0) continue;
+    retried[i].volume_size = ShardReader(folder / retried[i].name).header().volume.size;
+  }
+  const std::int64_t to_do = report.quarantined;
+  RetrySink sink(folder, shards, report, options.trace);
+  run_conversion("redo samples",
+                 {manifest, job.datasets, generator, weights_hash, folder, frozen, options},
+                 to_redo, sink);
+  report.stopped = options.stop_requested() && report.tried < to_do;
+  report.dataset_outdated = report.shards_rewritten > 0 && fs::exists(folder / "dataset.json");
+  report.too_many_faults = beyond_limits(manifest.errors, report.quarantined, report.planned);
+  report.wall_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return report;
+}
+
+namespace {
+
+constexpr std::size_t kListedSamples = 20;
+
+std::string count(std::int64_t number, const std::string& what) {
+  return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
+}
+
+}  // namespace
+
+std::string to_text(const RetryReport& report) {
+  std::string text;
+  for (const std::string& fault : report.damaged_shards) {
+    text += fault + "; left to convert\n";
+  }
+  if (report.shards_missing > 0) {
+    text += count(report.shards_missing, "shard") + " not made yet: left to convert\n";
+  }
+  if (!report.changed_inputs.empty()) {
+    text += "inputs changed since the plan was frozen (";
+    for (const std::string& field : report.changed_inputs) {
+      text += (field == report.changed_inputs.front() ? "" : ", ") + field;
+    }
+    text += "): recorded, convert goes on with them\n";
+  }
+  if (report.tried == 0 && report.quarantined == 0) {
+    text += "nothing to retry: no sample of a committed shard is quarantined\n";
+  } else {
+    text +=
+        fmt::format("{} of {} mended, {} written again; {} of {} samples are quarantined still\n",
+                    report.mended, count(report.tried, "quarantined sample"),
+                    count(report.shards_rewritten, "shard"), report.quarantined, report.planned);
+  }
+  const std::size_t listed = std::min(report.failed.size(), kListedSamples);
+  for (std::size_t i = 0; i < listed; ++i) {
+    text += "quarantined: " + report.failed[i].reason + "\n";
+  }
+  if (listed < report.failed.size()) {
+    text +=
+        fmt::format("... and {} more (in the shards' markers)\n", report.failed.size() - listed);
+  }
+  if (report.dataset_outdated) {
+    text += "dataset.json tells of the shards as they were: eventgan finalize writes it anew\n";
+  }
+  if (report.stopped) text += "stopped before all were tried: run again\n";
+  return text + report.folder + "\n";
+}
+
+std::string to_json(const RetryReport& report) {
+  nlohmann::json failed = nlohmann::json::array();
+  for (const QuarantinedSlot& sample : report.failed) {
+    failed.push_back({{"sample_id", sample.sample_id},
+                      {"shard", sample.shard},
+                      {"slot", sample.slot},
+                      {"reason", sample.reason}});
+  }
+  const nlohmann::json json = {{"event", "report"},
+                               {"folder", report.folder},
+                               {"planned", report.planned},
+                               {"tried", report.tried},
+                               {"mended", report.mended},
+                               {"failed", failed},
+                               {"quarantined", report.quarantined},
+                               {"shards_rewritten", report.shards_rewritten},
+                               {"damaged_shards", report.damaged_shards},
+                               {"shards_missing", report.shards_missing},
+                               {"changed_inputs", report.changed_inputs},
+                               {"stopped", report.stopped},
+                               {"too_many_faults", report.too_many_faults},
+                               {"dataset_outdated", report.dataset_outdated},
+                               {"wall_seconds", report.wall_seconds}};
+  return dump_json(json) + "\n";
+}
+
+}  // namespace eventgan

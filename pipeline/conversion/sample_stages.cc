@@ -1,0 +1,167 @@
+#include "pipeline/conversion/sample_stages.h"
+
+#include <limits>
+#include <new>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "pipeline/runtime/threads.h"
+#include "stages/events/volume_statistics.h"
+#include "stages/labels/label_mapping.h"
+
+namespace eventgan {
+namespace {
+
+/// Adds the processor time that the calling thread spends in its scope to one stage of a message.
+class Stopwatch {
+ public:
+  Stopwatch(SampleMessage& message, Stage stage)
+      : seconds_(message.seconds[static_cast<std::size_t>(stage)]) {}
+  ~Stopwatch() { seconds_ += 1e-9 * static_cast<double>(thread_processor_ns() - start_ns_); }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  std::int64_t start_ns_ = thread_processor_ns();
+};
+
+std::string frame_names(const FramePair& pair) {
+  return pair.previous.path + " and " + pair.next.path;
+}
+
+std::string size_text(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// Rethrows the current exception as one that says at which sample it was.
+[[noreturn]] void name_sample(const SampleMessage& message, const char* work) {
+  const PlannedSample& planned = message.planned();
+  std::throw_with_nested(std::runtime_error(
+      std::string("cannot ") + work + " a pair of " + size_text(message.shard->volume_size) +
+      ", in " + frame_names(planned.pair) + " (" + planned.sample_id + ")"));
+}
+
+}  // namespace
+
+void SampleMessage::fail(std::string reason) {
+  sample.valid = false;
+  const std::string id = " (" + sample.sample_id + ")";
+  if (!reason.ends_with(id)) reason += id;
+  sample.fault = std::move(reason);
+  prepared = {};
+  volume = {};
+  chunk = {};
+}
+
+SampleStages::SampleStages(const JobManifest& manifest,
+                           const std::vector<std::unique_ptr<Dataset>>& datasets,
+                           const Generator& generator, int in_flight)
+    : manifest_(manifest),
+      datasets_(datasets),
+      generator_(generator),
+      reader_(manifest.directory, manifest.image, in_flight),
+      codec_(manifest.output.dtype, manifest.output.deflate_level) {}
+
+void SampleStages::read(SampleMessage& message) const try {
+  const Stopwatch stopwatch(message, Stage::kRead);
+  const PlannedSample& planned = message.planned();
+  message.sample.sample_id = planned.sample_id;
+  message.sample.sequence = planned.sequence;
+  message.sample.pair = planned.pair;
+  message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
+  if (!planned.fault.empty()) {
+    message.fail(planned.fault);
+  } else {
+    Outcome<PreparedPair> prepared = reader_.read(planned.pair);
+    if (is_fault(prepared)) {
+      message.fail(std::get<SampleFault>(prepared).reason);
+    } else {
+      message.prepared = std::move(std::get<PreparedPair>(prepared));
+      const Placement& placement = message.prepared.placement;
+      message.sample.source_size = placement.source;
+      message.sample.source_to_volume = placement.source_to_volume();
+      if (placement.volume != message.shard->volume_size) {
+        message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
+                     size_text(placement.volume) + ", in " + frame_names(planned.pair) +
+                     " (a plan of today has it in another shard: convert into another folder, or "
+                     "with --overwrite)");
+      }
+    }
+  }
+  read_labels(message, *datasets_[static_cast<std::size_t>(message.shard->source)]);
+} catch (const std::bad_alloc&) {
+  name_sample(message, "read");
+}
+
+void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {
+  const PlannedSample& planned = message.planned();
+  Outcome<Annotation> annotation = dataset.annotation(planned.label_key);
+  if (is_fault(annotation)) {
+    if (!message.failed()) message.fail(std::get<SampleFault>(annotation).reason);
+    return;
+  }
+  message.sample.annotation = std::move(std::get<Annotation>(annotation));
+  if (!message.failed()) {
+    Outcome<VolumeLabels> labels = map_labels(message.sample.annotation, message.prepared.placement,
+                                              dataset.label_place(planned.label_key));
+    if (!is_fault(labels)) {
+      message.sample.labels = std::move(std::get<VolumeLabels>(labels));
+      return;
+    }
+    message.fail(std::get<SampleFault>(labels).reason);
+  }
+  // Without a usable picture or label there is no place in the volume; the original text is kept.
+  message.sample.annotation.boxes.clear();
+  message.sample.annotation.persons.clear();
+}
+
+void SampleStages::generate(SampleMessage& message) const try {
+  if (message.failed()) return;
+  const Stopwatch stopwatch(message, Stage::kGenerate);
+  const PreparedPair& prepared = message.prepared;
+  message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
+  generator_.generate(prepared.input, prepared.content, message.volume);
+  message.prepared.input = {};
+} catch (const std::exception&) {
+  name_sample(message, "generate the volume of");
+}
+
+void SampleStages::finish(SampleMessage& message) const try {
+  if (message.failed()) return;
+  const Stopwatch stopwatch(message, Stage::kFinish);
+  const PreparedPair& prepared = message.prepared;
+  const VolumeShape shape{generator_.bins(), prepared.placement.volume};
+  const std::optional<VolumeStatistics> found = volume_statistics(message.volume, shape);
+  if (!found) {
+    const std::size_t bad = first_unsound_value(message.volume);
+    message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
+                 " in channel " + std::to_string(bad / prepared.content.pixel_count()) +
+                 " of the generated volume, from " + frame_names(message.planned().pair));
+    return;
+  }
+  VolumeStatistics& statistics = message.sample.statistics = *found;
+  const std::optional<GapRange> trained = generator_.training_gaps();
+  if (trained && !trained->contains(message.planned().pair.gap_frames)) {
+    statistics.flags |= kFlagExtrapolated;
+  }
+  float largest = statistics.max;
+  if (manifest_.volume.normalize == Normalization::kEta98) {
+    normalize(message.volume, statistics.eta98);
+    if (largest > 0) largest = 1;
+  }
+  EncodedVolume encoded = codec_.encode(
+      message.volume, {shape, prepared.content, prepared.content_x, prepared.content_y}, largest);
+  if (encoded.saturated) statistics.flags |= kFlagSaturated;
+  if (encoded.vanished) statistics.flags |= kFlagVanished;
+  message.sample.scale = encoded.scale;
+  message.chunk = std::move(encoded.chunk);
+  message.volume = {};
+  message.prepared = {};
+} catch (const std::bad_alloc&) {
+  name_sample(message, "store the volume of");
+}
+
+}  // namespace eventgan

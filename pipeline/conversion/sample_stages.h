@@ -1,0 +1,79 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/documents/plan.h"
+#include "manifests/values/job.h"
+#include "manifests/values/shard.h"
+#include "stages/frames/dataset.h"
+#include "stages/frames/decoding/pair_reader.h"
+#include "stages/generator/generator.h"
+#include "stages/shards/codec/volume_codec.h"
+
+namespace eventgan {
+
+/// The stages whose busy time is reported: the processor time of the threads at work in them, since
+/// waiting for a disk or for another thread is not work.
+enum class Stage { kRead, kGenerate, kFinish, kWrite };
+inline constexpr std::size_t kStageCount = 4;
+inline constexpr std::array<const char*, kStageCount> kStageNames = {"read", "generate", "finish",
+                                                                     "write"};
+using StageSeconds = std::array<double, kStageCount>;
+
+/// One sample on its way through the graph. Each stage fills its part and frees what later stages
+/// do not need; a fault stays in `sample.fault` and later stages pass the message on untouched, so
+/// that it reaches its slot.
+struct SampleMessage {
+  /// Position among all samples of this run, without gaps: the sequencer's key.
+  std::size_t number = 0;
+  const PlannedShard* shard = nullptr;
+  int slot = 0;
+  ShardSample sample;            ///< read: everything but statistics
+  PreparedPair prepared;         ///< read → generate
+  std::vector<float> volume;     ///< generate → finish: [2 bins, H, W] of the content
+  std::vector<std::byte> chunk;  ///< finish → write
+  StageSeconds seconds{};
+  std::int64_t traced_ns = 0;  ///< end of the last stage, by the trace; 0: none, or no trace
+
+  const PlannedSample& planned() const { return shard->samples[static_cast<std::size_t>(slot)]; }
+  bool failed() const { return !sample.valid; }
+  void fail(std::string reason);
+};
+
+/// The work on one sample, stage by stage, as plain functions without a graph. Each adds its busy
+/// time to the message and turns what goes wrong with the sample into its fault. What goes wrong
+/// with the run (memory is short, the generator fails) is thrown as std::runtime_error that names
+/// the sample and its frames. Thread safety: all may run in parallel on different messages.
+class SampleStages {
+ public:
+  /// All references must outlive the stages; `datasets` has one entry for each source of the
+  /// manifest; `in_flight` is the number of samples that may be under way at once (see PairReader).
+  SampleStages(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
+               const Generator& generator, int in_flight);
+
+  /// Decodes and prepares the frames, reads the annotation, maps its labels.
+  void read(SampleMessage& message) const;
+
+  /// Runs the generator on the prepared frames.
+  void generate(SampleMessage& message) const;
+
+  /// Checks the volume and takes its statistics, normalises if asked, encodes it into the volume's
+  /// frame.
+  void finish(SampleMessage& message) const;
+
+ private:
+  void read_labels(SampleMessage& message, const Dataset& dataset) const;
+
+  const JobManifest& manifest_;
+  const std::vector<std::unique_ptr<Dataset>>& datasets_;
+  const Generator& generator_;
+  PairReader reader_;
+  VolumeCodec codec_;
+};
+
+}  // namespace eventgan

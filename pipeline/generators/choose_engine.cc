@@ -1,0 +1,131 @@
+#include "pipeline/generators/choose_engine.h"
+
+#include <string_view>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "stages/generator/onednn/onednn_generator.h"
+
+namespace eventgan {
+namespace {
+
+/// What LibTorch asks of an x86-64 processor before it gives a bfloat16 convolution to its oneDNN
+/// (mkldnn_bf16_device_check); else it takes loops of its own. It does not ask oneDNN, which fails
+/// where ONEDNN_MAX_CPU_ISA forbids it more than the processor does.
+bool has_avx512() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  return __builtin_cpu_supports("avx512bw") && __builtin_cpu_supports("avx512vl") &&
+         __builtin_cpu_supports("avx512dq");
+#else
+  return false;
+#endif
+}
+
+bool has_bfloat16() {
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  return __builtin_cpu_supports("avx512bf16");  // every processor with AMX for it has these too
+#else
+  return false;
+#endif
+}
+
+/// For a program without oneDNN, which has better names.
+std::string processor_name() {
+#if defined(__x86_64__)
+  return has_avx512() ? "x86-64 with AVX-512" : "x86-64 without AVX-512";
+#else
+  return "not x86-64";
+#endif
+}
+
+bool torch_able(Precision precision, const OnednnSupport& onednn) {
+  if (precision != Precision::kBfloat16) return precision == Precision::kFloat32;
+  return has_avx512() && (onednn.able || !onednn.built);
+}
+
+}  // namespace
+
+EngineSupport engine_support(Precision precision) {
+  const OnednnSupport onednn = onednn_support(precision);
+  EngineSupport support;
+  support.onednn_built = onednn.built;
+  support.onednn_able = onednn.able;
+  support.torch_able = torch_able(precision, onednn);
+  support.native =
+      onednn.built ? onednn.native : precision != Precision::kBfloat16 || has_bfloat16();
+  support.processor = onednn.built ? onednn.instruction_set : processor_name();
+  return support;
+}
+
+namespace {
+
+std::string quoted(std::string_view word) { return "\"" + std::string(word) + "\""; }
+
+/// What keeps an engine from the precision; empty if nothing does.
+std::string lack(Engine engine, Precision precision, const EngineSupport& support) {
+  const std::string name(to_string(precision));
+  if (engine == Engine::kTorch) {
+    if (support.torch_able) return "";
+    if (precision == Precision::kInt8) return "LibTorch has no int8 for this network";
+    return "LibTorch has no fast kernels for " + name + " on this processor (" + support.processor +
+           ")";
+  }
+  if (!support.onednn_built) return "this program was built without oneDNN";
+  if (support.onednn_able) return "";
+  return "oneDNN has no compiled kernels for " + name + " on this processor (" + support.processor +
+         ")";
+}
+
+EngineChoice chosen(Engine engine, std::string reason) { return {engine, std::move(reason), ""}; }
+
+[[noreturn]] void refuse_precision(Precision precision, const EngineSupport& support) {
+  throw UsageError("$.generator.precision: expected \"float32\", got " +
+                   quoted(to_string(precision)) + ": " + lack(Engine::kOnednn, precision, support) +
+                   ", and " + lack(Engine::kTorch, precision, support));
+}
+
+EngineChoice asked(Engine engine, Precision precision, const EngineSupport& support) {
+  const std::string missing = lack(engine, precision, support);
+  if (missing.empty()) return chosen(engine, "as the manifest says");
+  const Engine other = engine == Engine::kTorch ? Engine::kOnednn : Engine::kTorch;
+  if (!lack(other, precision, support).empty()) refuse_precision(precision, support);
+  throw UsageError("$.generator.engine: expected \"auto\" or " + quoted(to_string(other)) +
+                   " for " + std::string(to_string(precision)) + ", got " +
+                   quoted(to_string(engine)) + ": " + missing);
+}
+
+EngineChoice fastest(Precision precision, const EngineSupport& support) {
+  const std::string missing = lack(Engine::kOnednn, precision, support);
+  if (missing.empty()) {
+    return chosen(Engine::kOnednn, "auto: the fastest engine for " +
+                                       std::string(to_string(precision)) + " on this processor");
+  }
+  if (!lack(Engine::kTorch, precision, support).empty()) refuse_precision(precision, support);
+  return chosen(Engine::kTorch, "auto: " + missing);
+}
+
+/// Why a precision is a bad bargain on this processor; empty if it is none.
+std::string advice(Precision precision, const EngineSupport& support) {
+  if (precision == Precision::kFloat32 || support.native) return "";
+  return "precision " + std::string(to_string(precision)) + ": this processor (" +
+         support.processor + ") has no instructions for it" +
+         (precision == Precision::kInt8 ? ", so it gains less than elsewhere; float32 is exact"
+                                        : "; float32 is both faster and exact here");
+}
+
+}  // namespace
+
+EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support) {
+  EngineChoice choice = request.engine ? asked(*request.engine, request.precision, support)
+                                       : fastest(request.precision, support);
+  if (request.precision == Precision::kInt8 && !request.calibrated) {
+    throw UsageError("$.generator.weights: expected weights with a calibration for int8, got " +
+                     request.weights + " without one; run eventgan calibrate MANIFEST");
+  }
+  choice.warning = advice(request.precision, support);
+  return choice;
+}
+
+}  // namespace eventgan

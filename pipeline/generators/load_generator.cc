@@ -1,0 +1,111 @@
+#include "pipeline/generators/load_generator.h"
+
+#include <exception>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "manifests/values/weights.h"
+#include "pipeline/generators/choose_engine.h"
+#include "pipeline/generators/simulated_generator.h"
+#include "stages/base/files/sha256.h"
+#include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/shipped_weights.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/weights.h"
+#include "stages/generator/weights_file.h"
+
+namespace eventgan {
+namespace {
+
+/// Weights that untrained_weights made, and what was made of them (a calibration), say so.
+std::string untrained_warning(const Weights& weights, const std::string& name) {
+  const auto origin = weights.metadata.find("origin");
+  if (origin == weights.metadata.end() || !origin->second.starts_with("untrained")) return "";
+  return "the generator is UNTRAINED (" + name +
+         "): its volumes are random patterns, not events. Fit for trying the program, for nothing "
+         "else.";
+}
+
+LoadedWeights named_weights(const JobManifest& manifest) {
+  const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
+  if (!name) {
+    throw UsageError(
+        "$.generator.weights: expected a file, shipped, shipped:WIDTH or untrained:WIDTH with "
+        "WIDTH in 1.." +
+        std::to_string(kLargestNamedWidth) + ", got \"" + manifest.generator.weights + "\"");
+  }
+  if (name->origin == WeightsOrigin::kShipped) {
+    const int width = name->width ? *name->width : default_shipped_width();
+    return {read_shipped_weights(width), sha256_hex(shipped_weights_bytes(width)), ""};
+  }
+  if (name->origin == WeightsOrigin::kUntrained) {
+    Weights weights = untrained_weights(name->width.value(), manifest.volume.bins, manifest.seed);
+    std::string hash = sha256_hex(serialize_weights(weights));
+    return {std::move(weights), std::move(hash), ""};
+  }
+  const auto file = resolve(manifest, name->path);
+  return {read_weights(file), sha256_of_file(file), ""};
+}
+
+}  // namespace
+
+LoadedWeights load_weights(const JobManifest& manifest) {
+  LoadedWeights loaded = named_weights(manifest);
+  if (loaded.weights.bins != manifest.volume.bins) {
+    throw UsageError("$.volume.bins: expected " + std::to_string(loaded.weights.bins) +
+                     " as the weights have, got " + std::to_string(manifest.volume.bins));
+  }
+  loaded.warning = untrained_warning(loaded.weights, manifest.generator.weights);
+  return loaded;
+}
+
+namespace {
+
+LoadedGenerator load_simulator(const JobManifest& manifest) {
+  LoadedGenerator loaded;
+  loaded.generator =
+      make_simulated_generator(manifest.generator, manifest.volume.bins, manifest.seed);
+  loaded.weights_hash = sha256_hex(loaded.generator->description());
+  return loaded;
+}
+
+std::string choice_text(const EngineChoice& choice, Precision precision,
+                        const EngineSupport& support, const std::optional<GapRange>& gaps) {
+  std::string text = "generator: ";
+  text.append(to_string(choice.engine)).append(" ").append(to_string(precision));
+  text += " on " + support.processor + " (" + choice.reason + "), " + describe_training_gaps(gaps);
+  return gaps ? text : text + ", so none is marked as extrapolated";
+}
+
+/// Weights that the engine refuses are an input that cannot be used.
+std::unique_ptr<Generator> make_engine(Engine engine, const Weights& weights,
+                                       const GeneratorSpec& spec) try {
+  return engine == Engine::kOnednn ? make_onednn_generator(weights, spec.precision)
+                                   : make_torch_generator(weights, spec.precision);
+} catch (const std::invalid_argument&) {
+  std::throw_with_nested(InputError("cannot use the weights " + spec.weights + " in " +
+                                    std::string(to_string(spec.precision))));
+}
+
+}  // namespace
+
+LoadedGenerator load_generator(const JobManifest& manifest) {
+  const GeneratorSpec& spec = manifest.generator;
+  if (spec.kind != GeneratorKind::kNetwork) return load_simulator(manifest);
+  LoadedWeights loaded = load_weights(manifest);
+  const EngineSupport support = engine_support(spec.precision);
+  const EngineChoice choice = choose_engine(
+      {spec.engine, spec.precision, loaded.weights.calibration != nullptr, spec.weights}, support);
+  LoadedGenerator result;
+  result.generator = make_engine(choice.engine, loaded.weights, spec);
+  result.weights_hash = std::move(loaded.hash);
+  result.choice = choice_text(choice, spec.precision, support, loaded.weights.training_gaps);
+  for (const std::string& warning : {loaded.warning, choice.warning}) {
+    if (!warning.empty()) result.warnings.push_back(warning);
+  }
+  return result;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "stages/generator/generator.h"
+#include "stages/generator/weights.h"
+
+namespace eventgan {
+
+/// The weights a manifest asks for.
+struct LoadedWeights {
+  Weights weights;
+  std::string hash;     ///< SHA-256 of the weights file; untrained: of what the file would be
+  std::string warning;  ///< not empty: what the user must know before trusting the volumes
+};
+
+/// Loads the weights that a path or "shipped" names, or makes untrained ones for "untrained:WIDTH"
+/// (seeded by the manifest). Throws InputError if the weights cannot be used, UsageError if the
+/// name is none or the weights' bins are not the manifest's.
+LoadedWeights load_weights(const JobManifest& manifest);
+
+/// The generator a manifest asks for.
+struct LoadedGenerator {
+  std::unique_ptr<Generator> generator;
+  /// SHA-256 of the weights file (untrained: of what the file would be; a simulator, which has
+  /// none: of its description).
+  std::string weights_hash;
+  /// The engine that was chosen and why, for people: "generator: onednn float32 on avx2 (auto:
+  /// ...), trained on gaps 1-6"; empty for a simulator.
+  std::string choice;
+  std::vector<std::string> warnings;  ///< what the user must know before trusting the volumes
+};
+
+/// Loads the weights and makes the engine for them (load_weights, choose_engine), or sets up the
+/// manifest's simulator; throws as they do, and InputError if the engine refuses the weights.
+LoadedGenerator load_generator(const JobManifest& manifest);
+
+}  // namespace eventgan

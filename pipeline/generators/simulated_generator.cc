@@ -1,0 +1,102 @@
+#include "pipeline/generators/simulated_generator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <stdexcept>
+
+#include "manifests/documents/manifest_fields.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/frames.h"
+#include "pipeline/runtime/memory.h"
+#include "stages/base/files/sha256.h"
+#include "stages/events/event_volume.h"
+#include "stages/events/simulation/simulate_pair.h"
+#include "stages/generator/generator.h"
+
+namespace eventgan {
+namespace {
+
+/// A frame in [-1, 1] as a picture; what is not a number becomes black.
+GreyImage grey_image(std::span<const float> frame, ImageSize size) {
+  GreyImage image{size, std::vector<std::uint8_t>(frame.size())};
+  std::ranges::transform(frame, image.pixels.begin(), [](float x) {
+    const float u = (x / 2 + 0.5f) * 255;
+    return u > 0 ? static_cast<std::uint8_t>(std::lround(std::min(u, 255.0f))) : std::uint8_t{0};
+  });
+  return image;
+}
+
+/// A key of the two frames' content. Both have one size, and with it the key tells apart pictures
+/// of the same bytes and another shape.
+std::string content_key(const GreyImage& previous, const GreyImage& next) {
+  std::string content = std::to_string(previous.size.width) + '\n';
+  for (const GreyImage* frame : {&previous, &next}) {
+    content.append(frame->pixels.begin(), frame->pixels.end());
+  }
+  return sha256_hex(content);
+}
+
+class SimulatedGenerator final : public Generator {
+ public:
+  SimulatedGenerator(const GeneratorSpec& spec, int bins, std::uint64_t seed)
+      : spec_(spec), bins_(bins), random_(seed), memory_bytes_(memory_limit_bytes()) {}
+
+  int bins() const override { return bins_; }
+
+  /// At most half of the memory, which leaves one call at a time; `generate` says what is too much.
+  std::size_t working_bytes(ImageSize size) const override {
+    const double needed = idle_event_bytes(spec_.sensor, size.pixel_count(), spec_.duration_s);
+    return static_cast<std::size_t>(std::min(needed, static_cast<double>(memory_bytes_) / 2));
+  }
+
+  void generate(std::span<const float> frames, ImageSize size,
+                std::span<float> volume) const override {
+    const VolumeShape shape{bins_, size};
+    const std::size_t pixels = size.pixel_count();
+    check_generator_spans(frames, size, volume, bins_);
+    check_events_fit(spec_.sensor, size, spec_.duration_s, memory_bytes_);
+    const GreyImage previous = grey_image(frames.first(pixels), size);
+    const GreyImage next = grey_image(frames.last(pixels), size);
+    const std::vector<float> values = event_volume(events(previous, next), shape);
+    std::ranges::copy(values, volume.begin());
+  }
+
+  std::string description() const override {
+    nlohmann::json json = {{"model", to_string(spec_.kind)},
+                           {"duration_s", spec_.duration_s},
+                           {"sensor", nlohmann::json::parse(to_json(spec_.sensor))}};
+    if (spec_.kind == GeneratorKind::kEsim) {
+      json["max_displacement_px"] = spec_.max_displacement_px;
+    }
+    return "simulation " + json.dump();
+  }
+
+ private:
+  std::vector<Event> events(const GreyImage& previous, const GreyImage& next) const {
+    const CounterRandom random = random_.keyed(content_key(previous, next));
+    if (spec_.kind == GeneratorKind::kEsim) {
+      return simulate_affine(previous, spec_.max_displacement_px, spec_.sensor, spec_.duration_s,
+                             random);
+    }
+    return simulate_difference(previous, next, spec_.sensor, spec_.duration_s, random);
+  }
+
+  GeneratorSpec spec_;
+  int bins_;
+  CounterRandom random_;
+  std::size_t memory_bytes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Generator> make_simulated_generator(const GeneratorSpec& spec, int bins,
+                                                    std::uint64_t seed) {
+  if (spec.kind == GeneratorKind::kNetwork) {
+    throw std::invalid_argument("expected a kind of simulator, got the network");
+  }
+  return std::make_unique<SimulatedGenerator>(spec, bins, seed);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <memory>
+
+#include "manifests/values/job.h"
+#include "stages/generator/generator.h"
+
+namespace eventgan {
+
+/// A model of the sensor in the network's place (stages/events/simulation), to compare with it:
+/// kEsim or kDifference. Its volumes are event_volume() of the simulated events: counts, not
+/// normalised. Frames are rounded to 8-bit grey again, which they were before they were prepared.
+///
+/// Random numbers come from the seed and the content of the two frames, so a volume depends on
+/// these alone. description() names the model and every parameter. Throws std::invalid_argument for
+/// kNetwork.
+std::unique_ptr<Generator> make_simulated_generator(const GeneratorSpec& spec, int bins,
+                                                    std::uint64_t seed);
+
+}  // namespace eventgan

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+namespace eventgan {
+
+/// Memory that this process may use, in bytes: the machine's, or what its control group of version
+/// 2 (a container, a batch job) or its own limit of address space (ulimit -v) grants if that is
+/// less. Thread safe.
+std::size_t memory_limit_bytes();
+
+/// The least limit among a control group of version 2 and those above it: `group`, a path below
+/// `root`, each with a file memory.max of a number or "max". `most` if none says less. Thread safe.
+std::size_t group_memory_limit_bytes(const std::filesystem::path& root,
+                                     const std::filesystem::path& group, std::size_t most);
+
+/// Lets the process keep the big buffers it frees, for their next use. Without it glibc gives them
+/// back to the system on every free and faults them in again; volumes and LibTorch's tensors are
+/// such buffers. All threads share one arena then: buffers travel from thread to thread here, and
+/// with an arena for each, what is kept grows slowly for thousands of pairs.
+/// Call it first in `main`: what other arenas and mappings hold by then stays there. Never throws.
+void keep_big_buffers();
+
+}  // namespace eventgan

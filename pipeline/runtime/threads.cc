@@ -1,0 +1,40 @@
+#include "pipeline/runtime/threads.h"
+
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <algorithm>
+#include <ctime>
+#include <thread>
+
+namespace eventgan {
+
+int thread_count(int requested) {
+  if (requested > 0) return requested;
+  // The system may not know, and says 0 then.
+  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+}
+
+void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {
+  const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
+                                           static_cast<std::size_t>(threads));
+  oneapi::tbb::task_arena arena(threads);
+  arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, work); });
+}
+
+namespace {
+
+std::int64_t now_ns(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return std::int64_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
+std::int64_t thread_processor_ns() { return now_ns(CLOCK_THREAD_CPUTIME_ID); }
+
+std::int64_t process_processor_ns() { return now_ns(CLOCK_PROCESS_CPUTIME_ID); }
+
+}  // namespace eventgan

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+
+namespace eventgan {
+
+/// Number of threads to use for a request (`--threads`): itself, or all cores for 0.
+int thread_count(int requested);
+
+/// Calls `work` with each of 0 .. count - 1 on up to `threads` threads, the calling one included,
+/// which may be more than there are cores: many waits for a network file system fit side by side.
+/// The first exception that leaves `work` is rethrown; then some indexes have not had their turn.
+void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work);
+
+/// Processor time that the calling thread has used so far, in nanoseconds: waiting is not in it.
+/// Thread safe.
+std::int64_t thread_processor_ns();
+
+/// The same of all threads of the process together.
+std::int64_t process_processor_ns();
+
+}  // namespace eventgan

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "pipeline/training/csv_table.h"
+#include "pipeline/training/training_checkpoint.h"
+
+namespace eventgan {
+
+/// The losses that a training reports, in the columns' order (see StepLosses).
+inline constexpr std::array<std::string_view, 11> kLossNames{"flow",
+                                                             "flow.photometric",
+                                                             "flow.smoothness",
+                                                             "reconstruction",
+                                                             "volume",
+                                                             "count",
+                                                             "generator",
+                                                             "generator.total",
+                                                             "discriminator",
+                                                             "discriminator.real_accuracy",
+                                                             "discriminator.fake_accuracy"};
+
+/// One step as it is logged. NaN: the step did not compute this loss.
+struct LossRow {
+  TrainingPosition position;
+  double seconds = 0;  ///< trained so far, all runs together
+  std::array<double, kLossNames.size()> losses{};
+  double rate = 0;  ///< learning rate of the network that the step updated
+};
+
+/// training.csv: a row a step; columns phase, step, seconds, the losses, learning_rate. The rows
+/// are also kept, for curves and means. Not thread safe.
+class LossLog {
+ public:
+  /// Goes on with FILE after the rows before `next`, which it cuts off with all behind it.
+  LossLog(const std::filesystem::path& file, const TrainingPosition& next);
+
+  /// Losses by name; names that have no column are left out.
+  void add(const TrainingPosition& position, double seconds,
+           const std::map<std::string, double>& losses, double rate);
+  void flush() { table_.flush(); }
+
+  std::span<const LossRow> rows() const { return rows_; }
+
+ private:
+  std::vector<LossRow> rows_;
+  CsvTable table_;
+};
+
+/// Mean of each loss over the last `count` rows of the phase that have it; no entry if none has.
+std::map<std::string, double> mean_losses(std::span<const LossRow> rows, TrainingPhase phase,
+                                          std::size_t count);
+
+/// Draws the losses over the steps, a panel for each that has values, and writes a PNG: phases one
+/// after another on the horizontal axis, the raw values faint and their running mean (over a 50th
+/// of the values) in front. The vertical axis is logarithmic where all values are above 0 and span
+/// more than two decades. No rows give a blank picture. Throws std::runtime_error naming the file.
+void write_loss_curves(std::span<const LossRow> rows, const std::filesystem::path& file);
+
+}  // namespace eventgan

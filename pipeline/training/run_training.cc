@@ -1,0 +1,359 @@
+#include "pipeline/training/run_training.h"
+
+#include <ATen/Parallel.h>
+#include <fmt/core.h>
+#include <omp.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/faults.h"
+#include "pipeline/planning/fingerprint.h"
+#include "pipeline/runtime/threads.h"
+#include "pipeline/training/generator_records.h"
+#include "pipeline/training/loss_log.h"
+#include "pipeline/training/sample_source.h"
+#include "pipeline/training/training_checkpoint.h"
+#include "pipeline/training/training_folder.h"
+#include "stages/training/trainer.h"
+
+namespace eventgan {
+
+std::string precision_advice(TrainingPrecision precision, const std::string& device,
+                             const std::string& instructions) {
+  // Every processor with AMX for bfloat16 has these too.
+  const bool fast = device != "cpu" || instructions.find("avx512bf16") != std::string::npos;
+  if (precision == TrainingPrecision::kFloat32 || fast) return "";
+  return "precision bfloat16 is slower than float32 on this processor, which has no instructions "
+         "for it (" +
+         instructions + ")";
+}
+
+namespace {
+
+/// Sets how many threads LibTorch's operations use when the calling thread runs them; 0: as many as
+/// the machine has cores. The last bits of a training depend on the number. Gives the number.
+int use_training_threads(int requested) {
+  const int threads = thread_count(requested);
+  at::set_num_threads(threads);
+  omp_set_num_threads(threads);  // oneDNN reads OpenMP's
+  return threads;
+}
+
+/// One run of a training: goes on from the folder's checkpoint, takes steps, keeps the records. For
+/// one thread, the one that made it.
+class TrainingRun {
+ public:
+  /// Opens everything, and loads the checkpoint if there is one. Throws as run_training.
+  TrainingRun(const TrainingManifest& manifest, const TrainingOptions& options);
+
+  /// To the end, or until it is asked to stop.
+  TrainingReport run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  bool train_phase();
+  StepLosses take_step(const std::vector<TrainingSample>& batch);
+  void keep_records(const std::vector<TrainingSample>& batch);
+  void save();
+  void resume();
+  void warn(const std::string& text) const;
+  bool asked_to_stop() const;
+  bool has_generator() const;
+  double total_seconds() const;
+
+  const TrainingManifest& manifest_;
+  const TrainingOptions& options_;
+  int threads_;
+  SampleSource source_;
+  Trainer trainer_;
+  TrainingFolder folder_;
+  GeneratorRecords generator_records_;
+  std::map<std::string, std::string> settings_;
+  std::map<std::string, std::string> environment_;
+  TrainingPosition position_;
+  Clock::time_point start_;
+  Clock::time_point saved_;
+  Clock::time_point pictured_;
+  TrainingLock lock_;
+  double seconds_before_ = 0;
+  std::int64_t steps_made_ = 0;
+  std::int64_t steps_unsaved_ = 0;
+  std::optional<LossLog> losses_;
+  std::unique_ptr<TrainingProgress> progress_;
+};
+
+namespace fs = std::filesystem;
+
+constexpr int kBatchesAhead = 2;
+constexpr std::size_t kStepsOfMeans = 100;
+constexpr TrainingPhase kPhases[] = {TrainingPhase::kFlow, TrainingPhase::kReconstruction,
+                                     TrainingPhase::kGenerator};
+
+std::vector<TrainingRecording> open_all(const TrainingManifest& manifest) {
+  const int smallest_gap = *std::min_element(manifest.gaps.begin(), manifest.gaps.end());
+  return open_training_recordings(manifest.recordings, manifest.directory, manifest.crop,
+                                  smallest_gap);
+}
+
+/// Learning rate of the network that a step with these losses has updated.
+double rate_of(const TrainingManifest& manifest, const TrainingPosition& position,
+               const StepLosses& losses) {
+  const OptimizerSpec& spec = manifest.optimizer;
+  const double rate = position.phase != TrainingPhase::kGenerator ? spec.cycle_rate
+                      : losses.contains("discriminator")          ? spec.discriminator_rate
+                                                                  : spec.generator_rate;
+  return learning_rate(rate, spec.final_rate_fraction, position.step,
+                       steps_of(manifest.steps, position.phase));
+}
+
+bool passed(std::chrono::steady_clock::time_point since, double minutes) {
+  return std::chrono::steady_clock::now() - since >= std::chrono::duration<double>(minutes * 60);
+}
+
+}  // namespace
+
+TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions& options)
+    : manifest_(manifest),
+      options_(options),
+      threads_(use_training_threads(options.threads)),
+      source_(manifest, open_all(manifest)),
+      trainer_(manifest, options.device),
+      folder_{options.output.value_or(manifest.directory / manifest.output_directory)},
+      generator_records_(manifest, folder_),
+      settings_(training_settings(manifest, source_.recordings())),
+      environment_(training_environment(options.device)),
+      start_(Clock::now()),
+      saved_(start_),
+      pictured_(start_),
+      lock_(folder_.root) {
+  const std::string advice =
+      precision_advice(manifest.precision, options.device, instruction_sets());
+  if (!advice.empty()) warn(advice);
+  for (const TrainingRecording& recording : source_.recordings()) {
+    for (const std::string& note : recording.recording->notes()) {
+      if (options_.note) options_.note(note);
+    }
+  }
+  if (options.overwrite) folder_.discard();
+  folder_.prepare();
+  resume();
+  losses_.emplace(folder_.losses(), position_);
+  generator_records_.go_on_from(position_);
+  if (options.make_progress) progress_ = options.make_progress();
+}
+
+void TrainingRun::warn(const std::string& text) const {
+  if (options_.warn) options_.warn(text);
+}
+
+void TrainingRun::resume() {
+  const std::optional<TrainingCheckpoint> checkpoint =
+      load_checkpoint(folder_.checkpoints(), [&](const std::string& text) { warn(text); });
+  if (!checkpoint) return;
+  check_resumable(checkpoint->settings, settings_, checkpoint->position, manifest_);
+  for (const auto& difference : fingerprint_differences(checkpoint->environment, environment_)) {
+    warn("the last bits may differ from those of a training that was never stopped: " + difference);
+  }
+  try {
+    trainer_.load(checkpoint->state);
+  } catch (const std::runtime_error&) {
+    std::throw_with_nested(
+        std::runtime_error("expected the state of this training, got another, in " +
+                           last_checkpoint(folder_.checkpoints()).string()));
+  }
+  position_ = checkpoint->position;
+  seconds_before_ = checkpoint->seconds;
+}
+
+TrainingReport TrainingRun::run() {
+  bool complete = true;
+  for (const TrainingPhase phase : kPhases) {
+    if (phase < position_.phase) continue;
+    if (phase > position_.phase) position_ = {phase, 0};
+    complete = train_phase();
+    if (steps_unsaved_ > 0) save();
+    if (!complete) break;
+  }
+  progress_.reset();
+  TrainingReport report;
+  report.folder = folder_.root.string();
+  report.complete = complete;
+  report.position = position_;
+  report.steps_made = steps_made_;
+  report.losses = mean_losses(losses_->rows(), position_.phase, kStepsOfMeans);
+  if (complete && has_generator()) {
+    report.weights = folder_.weights().string();
+    report.weights_sha256 = generator_records_.write_final_weights(
+        trainer_.generator_state(), position_, source_.recordings(), report.losses);
+  }
+  report.run_seconds = std::chrono::duration<double>(Clock::now() - start_).count();
+  report.total_seconds = total_seconds();
+  return report;
+}
+
+/// False if it was asked to stop.
+bool TrainingRun::train_phase() {
+  const std::int64_t end = steps_of(manifest_.steps, position_.phase);
+  if (position_.step >= end) return true;
+  BatchPrefetch batches(
+      [this, phase = position_.phase](std::int64_t step) { return source_.batch(phase, step); },
+      position_.step, end, kBatchesAhead);
+  while (position_.step < end) {
+    if (asked_to_stop()) return false;
+    const std::vector<TrainingSample> batch = batches.next();
+    const StepLosses losses = take_step(batch);
+    losses_->add(position_, total_seconds(), losses, rate_of(manifest_, position_, losses));
+    ++position_.step;
+    ++steps_made_;
+    ++steps_unsaved_;
+    if (progress_) progress_->advance(position_.phase, position_.step, end, losses);
+    keep_records(batch);
+  }
+  return true;
+}
+
+StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
+  try {
+    return trainer_.step(position_.phase, position_.step, batch);
+  } catch (const UnsoundLoss&) {
+    const fs::path good = last_checkpoint(folder_.checkpoints());
+    std::throw_with_nested(std::runtime_error(
+        "the training broke down in phase " + std::string(to_string(position_.phase)) + ", step " +
+        std::to_string(position_.step) +
+        "; last good checkpoint: " + (good.empty() ? "none" : good.string()) +
+        " (a lower learning rate, or other recordings, and --overwrite start again)"));
+  }
+}
+
+void TrainingRun::keep_records(const std::vector<TrainingSample>& batch) {
+  if (has_generator() && passed(pictured_, manifest_.picture_minutes)) {
+    generator_records_.draw(trainer_.generator_state(), position_, batch);
+    use_training_threads(threads_);
+    pictured_ = Clock::now();
+  }
+  if (passed(saved_, manifest_.checkpoint_minutes)) save();
+}
+
+void TrainingRun::save() {
+  losses_->flush();
+  save_checkpoint(folder_.checkpoints(),
+                  {position_, total_seconds(), settings_, environment_, trainer_.state()});
+  write_loss_curves(losses_->rows(), folder_.curves());
+  if (has_generator()) {
+    generator_records_.save(trainer_.generator_state(), position_);
+    use_training_threads(threads_);
+  }
+  steps_unsaved_ = 0;
+  saved_ = Clock::now();
+}
+
+bool TrainingRun::asked_to_stop() const {
+  return (options_.max_steps && steps_made_ >= *options_.max_steps) ||
+         (options_.stop && options_.stop());
+}
+
+bool TrainingRun::has_generator() const {
+  return position_.phase == TrainingPhase::kGenerator && position_.step > 0;
+}
+
+double TrainingRun::total_seconds() const {
+  return seconds_before_ + std::chrono::duration<double>(Clock::now() - start_).count();
+}
+
+TrainingReport run_training(const TrainingManifest& manifest, const TrainingOptions& options) {
+  return TrainingRun(manifest, options).run();
+}
+
+namespace {
+
+constexpr int kBarWidth = 20;
+
+/// The losses of a line in words: more would not fit it.
+constexpr std::array<const char*, 4> kShown{"flow", "reconstruction", "generator.total",
+                                            "discriminator"};
+
+}  // namespace
+
+TrainingProgress::TrainingProgress(std::ostream& stream, ProgressStyle style, bool is_terminal,
+                                   Clock clock)
+    : display_(stream, style, is_terminal, kBarWidth, std::move(clock)), start_(display_.start()) {}
+
+void TrainingProgress::advance(TrainingPhase phase, std::int64_t done, std::int64_t total,
+                               const std::map<std::string, double>& losses) {
+  if (first_ < 0 || phase != phase_) {
+    // The step that was just made belongs to the phase; its time does not: it ran before.
+    start_ = display_.now();
+    first_ = done;
+    losses_.clear();
+  }
+  phase_ = phase;
+  done_ = done;
+  total_ = total;
+  for (const auto& [name, value] : losses) losses_[name] = value;
+  if (display_.is_due() || done == total) show();
+}
+
+void TrainingProgress::show() {
+  const auto now = display_.now();
+  const double seconds = std::chrono::duration<double>(now - start_).count();
+  const double rate = seconds > 0 ? static_cast<double>(done_ - first_) / seconds : 0;
+  std::string line = fmt::format(
+      "{} {}/{}, {:.2f} steps/s, {} left", to_string(phase_), done_, total_, rate,
+      rate > 0 ? duration_text(static_cast<double>(total_ - done_) / rate, "h", 3) : "?");
+  for (const char* name : kShown) {
+    const auto found = losses_.find(name);
+    if (found != losses_.end()) line += fmt::format(", {} {:.4g}", name, found->second);
+  }
+  display_.show(now, done_, total_, line,
+                dump_json(nlohmann::json{{"event", "progress"},
+                                         {"phase", to_string(phase_)},
+                                         {"done", done_},
+                                         {"total", total_},
+                                         {"steps_per_s", rate},
+                                         {"losses", losses_}}));
+}
+
+std::string to_text(const TrainingReport& report) {
+  std::string text = fmt::format(
+      "{}: {}\n"
+      "  next step   {} {}\n"
+      "  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs\n",
+      report.complete ? "complete" : "stopped, run again to go on", report.folder,
+      to_string(report.position.phase), report.position.step, report.steps_made, report.run_seconds,
+      report.total_seconds);
+  for (const auto& [name, value] : report.losses) {
+    text += fmt::format("  {} {:.6g} (mean of the last steps)\n", name, value);
+  }
+  if (!report.weights.empty()) {
+    text +=
+        fmt::format("  weights     {}\n  SHA-256     {}\n", report.weights, report.weights_sha256);
+  }
+  return text;
+}
+
+std::string to_json(const TrainingReport& report) {
+  const nlohmann::json json = {{"event", "report"},
+                               {"folder", report.folder},
+                               {"complete", report.complete},
+                               {"phase", to_string(report.position.phase)},
+                               {"next_step", report.position.step},
+                               {"steps_made", report.steps_made},
+                               {"run_seconds", report.run_seconds},
+                               {"total_seconds", report.total_seconds},
+                               {"losses", report.losses},
+                               {"weights", report.weights},
+                               {"weights_sha256", report.weights_sha256}};
+  return dump_json(json) + "\n";
+}
+
+}  // namespace eventgan

@@ -1,0 +1,118 @@
+#include "pipeline/training/sample_source.h"
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "manifests/values/counter_random.h"
+
+namespace eventgan {
+namespace {
+
+/// Counters of one attempt's draws.
+enum SampleCounter : std::uint64_t { kStatic, kGap, kFirstFrame };
+
+std::size_t by_weight(std::span<const TrainingRecording> recordings, double uniform) {
+  double total = 0;
+  for (const TrainingRecording& recording : recordings) total += recording.weight;
+  double left = uniform * total;
+  for (std::size_t i = 0; i + 1 < recordings.size(); ++i) {
+    left -= recordings[i].weight;
+    if (left < 0) return i;
+  }
+  return recordings.size() - 1;
+}
+
+}  // namespace
+
+SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
+                       const TrainingManifest& manifest, const SamplePlace& place, int attempt) {
+  if (recordings.empty())
+    throw std::invalid_argument("expected a recording to draw from, got none");
+  const CounterRandom sample = CounterRandom(manifest.seed)
+                                   .keyed("sample")
+                                   .keyed(to_string(place.phase))
+                                   .keyed(std::to_string(place.step))
+                                   .keyed(std::to_string(place.index));
+  const CounterRandom random = sample.keyed("attempt " + std::to_string(attempt));
+  SampleDraw draw;
+  draw.recording = by_weight(recordings, sample.keyed("recording").uniform(0));
+  const TrainingRecording& recording = recordings[draw.recording];
+  const std::int64_t span = recording.last_frame - recording.first_frame;
+
+  std::int64_t gap = 0;
+  if (random.uniform(kStatic) >= manifest.augmentation.static_fraction) {
+    std::vector<int> fitting;
+    for (const int each : manifest.gaps) {
+      if (each <= span) fitting.push_back(each);
+    }
+    if (fitting.empty()) throw std::invalid_argument("expected a gap that fits, got none");
+    gap = fitting[random.below(kGap, fitting.size())];
+  }
+  draw.first_frame =
+      recording.first_frame + static_cast<std::int64_t>(random.below(
+                                  kFirstFrame, static_cast<std::uint64_t>(span - gap + 1)));
+  draw.last_frame = draw.first_frame + gap;
+  draw.augmentation = draw_augmentation(recording.recording->size(), manifest.crop,
+                                        manifest.augmentation, random.keyed("augmentation"));
+  return draw;
+}
+
+namespace {
+
+constexpr std::size_t kFewestEvents = 100;
+constexpr int kMostAttempts = 10;
+
+}  // namespace
+
+SampleSource::SampleSource(const TrainingManifest& manifest,
+                           std::vector<TrainingRecording> recordings)
+    : manifest_(manifest), reader_(std::move(recordings), manifest.network.bins) {}
+
+TrainingSample SampleSource::sample(const SamplePlace& place) const {
+  const auto draw_again = [&](const SampleDraw& draw) {
+    return draw.first_frame != draw.last_frame &&
+           reader_.event_count(draw.recording, draw.first_frame) < kFewestEvents;
+  };
+  SampleDraw draw = draw_sample(recordings(), manifest_, place, 0);
+  for (int attempt = 1; attempt < kMostAttempts && draw_again(draw); ++attempt) {
+    draw = draw_sample(recordings(), manifest_, place, attempt);
+  }
+  Augmentation augmentation = draw.augmentation;
+  const CropBox box{augmentation.top, augmentation.left, augmentation.crop};
+  const TrainingSample cut = reader_.read(draw.recording, draw.first_frame, draw.last_frame, box);
+  augmentation.top = augmentation.left = 0;  // it is cut already
+  TrainingSample sample = augment(cut, augmentation);
+  sample.origin = cut.origin;  // augment has added where it cut: nothing of the picture
+  return sample;
+}
+
+std::vector<TrainingSample> SampleSource::batch(TrainingPhase phase, std::int64_t step) const {
+  std::vector<TrainingSample> samples;
+  for (int i = 0; i < manifest_.batch; ++i) samples.push_back(sample({phase, step, i}));
+  return samples;
+}
+
+BatchPrefetch::BatchPrefetch(std::function<Batch(std::int64_t)> make, std::int64_t first,
+                             std::int64_t end, int ahead)
+    : make_(std::move(make)), started_(first), end_(end), ahead_(static_cast<std::size_t>(ahead)) {
+  fill();
+}
+
+BatchPrefetch::Batch BatchPrefetch::next() {
+  if (waiting_.empty()) throw std::out_of_range("expected a step before the last, got none left");
+  std::future<Batch> oldest = std::move(waiting_.front());
+  waiting_.pop_front();
+  Batch batch = oldest.get();
+  fill();
+  return batch;
+}
+
+void BatchPrefetch::fill() {
+  while (waiting_.size() < ahead_ && started_ < end_) {
+    waiting_.push_back(std::async(std::launch::async, make_, started_++));
+  }
+}
+
+}  // namespace eventgan

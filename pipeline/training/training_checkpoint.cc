@@ -1,0 +1,247 @@
+#include "pipeline/training/training_checkpoint.h"
+
+#include <ATen/Parallel.h>
+#include <torch/version.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <span>
+#include <stdexcept>
+#include <string_view>
+#include <utility>
+
+#include "manifests/documents/manifest_fields.h"
+#include "manifests/documents/plan.h"
+#include "manifests/values/faults.h"
+#include "pipeline/planning/fingerprint.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/base/files/sha256.h"
+#include "stages/generator/safetensors.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Bytes of a file, or of all files of a folder.
+std::uintmax_t bytes_of(const fs::path& path) {
+  if (!fs::is_directory(path)) return fs::file_size(path);
+  std::uintmax_t bytes = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(path)) {
+    if (entry.is_regular_file()) bytes += entry.file_size();
+  }
+  return bytes;
+}
+
+std::string description(const TrainingRecording& opened) {
+  const ImageSize size = opened.recording->size();
+  std::error_code absent;
+  const bool there = fs::exists(opened.file, absent);
+  return std::to_string(there ? bytes_of(opened.file) : 0) + " bytes, " +
+         std::to_string(opened.recording->frame_count()) + " frames of " +
+         std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+}  // namespace
+
+std::map<std::string, std::string> training_settings(
+    const TrainingManifest& manifest, std::span<const TrainingRecording> recordings) {
+  std::map<std::string, std::string> settings;
+  for (const auto& [field, value] : manifest_fields(manifest.text)) {
+    if (!field.starts_with("$.output.")) settings["manifest " + field] = value;
+  }
+  for (std::size_t i = 0; i < recordings.size(); ++i) {
+    settings["recording " + std::to_string(i)] = description(recordings[i]);
+  }
+  return settings;
+}
+
+std::map<std::string, std::string> training_environment(const std::string& device) {
+  return {{"threads", std::to_string(at::get_num_threads())},
+          {"device", device},
+          {"cpu", instruction_sets()},
+          {"libtorch", TORCH_VERSION},
+          {"program", program_version()}};
+}
+
+void check_resumable(std::map<std::string, std::string> before,
+                     std::map<std::string, std::string> now, const TrainingPosition& position,
+                     const TrainingManifest& manifest) {
+  for (const auto phase :
+       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
+    const std::int64_t steps = steps_of(manifest.steps, phase);
+    const bool in_progress = phase == position.phase && steps >= position.step &&
+                             manifest.optimizer.final_rate_fraction == 1;
+    if (phase > position.phase || in_progress) {
+      const std::string field = "manifest $.steps." + std::string(to_string(phase));
+      before.erase(field);
+      now.erase(field);
+    }
+  }
+  const auto differences = fingerprint_differences(before, now);
+  if (differences.empty()) return;
+  std::string message =
+      "the training in the output folder began with other settings (--overwrite starts again):";
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
+namespace {
+
+constexpr char kLatest[] = "latest.safetensors";
+constexpr char kPrevious[] = "previous.safetensors";
+constexpr char kDamaged[] = "damaged.safetensors";
+constexpr char kDigest[] = "content_sha256";
+constexpr char kFormat[] = "eventgan-training";
+constexpr char kVersion[] = "1";
+constexpr std::string_view kSettingPrefix = "setting ";
+constexpr std::string_view kEnvironmentPrefix = "environment ";
+
+void check_finite(const StateDict& state) {
+  for (const auto& [name, tensor] : state) {
+    const bool finite = std::all_of(tensor.values.begin(), tensor.values.end(),
+                                    [](float value) { return std::isfinite(value); });
+    if (!finite) throw std::runtime_error("expected finite numbers, got others, in tensor " + name);
+  }
+}
+
+/// SHA-256 of tensors and metadata, the digest itself apart: a flipped bit in a number is a number
+/// too, and nothing else would tell it from the right one.
+std::string digest(const SafetensorsFile& file) {
+  std::string listing;
+  for (const auto& [key, value] : file.metadata) {
+    if (key != kDigest) listing += key + '\0' + value + '\0';
+  }
+  for (const auto& [name, tensor] : file.tensors) {
+    listing += name + '\0';
+    for (const std::int64_t side : tensor.shape) listing += std::to_string(side) + ' ';
+    listing += sha256_hex(std::as_bytes(std::span(tensor.values))) + '\0';
+  }
+  return sha256_hex(listing);
+}
+
+const std::string& text_at(const SafetensorsFile& file, const std::string& key) {
+  const auto found = file.metadata.find(key);
+  if (found == file.metadata.end()) {
+    throw std::runtime_error("expected metadata \"" + key + "\", got none");
+  }
+  return found->second;
+}
+
+template <class Number>
+Number number_at(const SafetensorsFile& file, const std::string& key) {
+  const std::string& text = text_at(file, key);
+  Number number{};
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (error != std::errc{} || end != text.data() + text.size() || !(number >= 0)) {
+    throw std::runtime_error("expected a number at metadata \"" + key + "\", got \"" + text + "\"");
+  }
+  return number;
+}
+
+TrainingPhase phase_at(const SafetensorsFile& file, const std::string& key) {
+  for (const auto phase :
+       {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
+    if (text_at(file, key) == to_string(phase)) return phase;
+  }
+  throw std::runtime_error("expected a training phase, got \"" + text_at(file, key) + "\"");
+}
+
+std::map<std::string, std::string> with_prefix(const SafetensorsFile& file,
+                                               std::string_view prefix) {
+  std::map<std::string, std::string> fields;
+  for (const auto& [key, value] : file.metadata) {
+    if (key.starts_with(prefix)) fields[key.substr(prefix.size())] = value;
+  }
+  return fields;
+}
+
+TrainingCheckpoint read(const fs::path& path) {
+  SafetensorsFile file = read_safetensors(path);
+  if (text_at(file, "format") != kFormat || text_at(file, "format_version") != kVersion) {
+    throw std::runtime_error("expected a training checkpoint of version 1, got another file, in " +
+                             path.string());
+  }
+  if (text_at(file, kDigest) != digest(file)) {
+    throw std::runtime_error("expected content of SHA-256 " + text_at(file, kDigest) + ", got " +
+                             digest(file) + ", in " + path.string());
+  }
+  TrainingCheckpoint checkpoint;
+  checkpoint.position = {phase_at(file, "phase"), number_at<std::int64_t>(file, "step")};
+  checkpoint.seconds = number_at<double>(file, "seconds");
+  checkpoint.settings = with_prefix(file, kSettingPrefix);
+  checkpoint.environment = with_prefix(file, kEnvironmentPrefix);
+  checkpoint.state = std::move(file.tensors);
+  check_finite(checkpoint.state);
+  return checkpoint;
+}
+
+}  // namespace
+
+void save_checkpoint(const fs::path& folder, TrainingCheckpoint checkpoint) {
+  const fs::path latest = folder / kLatest;
+  try {
+    check_finite(checkpoint.state);
+    SafetensorsFile file;
+    file.metadata = {{"format", kFormat},
+                     {"format_version", kVersion},
+                     {"phase", std::string(to_string(checkpoint.position.phase))},
+                     {"step", std::to_string(checkpoint.position.step)},
+                     {"seconds", std::to_string(checkpoint.seconds)}};
+    for (const auto& [key, value] : checkpoint.settings) {
+      file.metadata[std::string(kSettingPrefix) + key] = value;
+    }
+    for (const auto& [key, value] : checkpoint.environment) {
+      file.metadata[std::string(kEnvironmentPrefix) + key] = value;
+    }
+    file.tensors = std::move(checkpoint.state);
+    file.metadata[kDigest] = digest(file);
+    const fs::path next = folder / "next.safetensors";
+    write_file_atomically(next, serialize_safetensors(file));
+    // Between the two renames only the previous one is there, and it is whole.
+    if (fs::exists(latest)) fs::rename(latest, folder / kPrevious);
+    publish(next, latest);
+  } catch (const std::exception&) {
+    std::throw_with_nested(std::runtime_error("cannot save the checkpoint " + latest.string()));
+  }
+}
+
+std::optional<TrainingCheckpoint> load_checkpoint(
+    const fs::path& folder, const std::function<void(const std::string&)>& warn) {
+  const fs::path latest = folder / kLatest;
+  const fs::path previous = folder / kPrevious;
+  if (fs::exists(latest)) {
+    try {
+      return read(latest);
+    } catch (const std::runtime_error& error) {
+      if (!fs::exists(previous)) {
+        std::throw_with_nested(std::runtime_error(
+            "expected a whole checkpoint, got a damaged one and none before it, in " +
+            latest.string() + " (--overwrite starts again)"));
+      }
+      const fs::path damaged = folder / kDamaged;
+      warn("the checkpoint " + latest.string() + " cannot be read (" + error.what() +
+           "); it is now " + damaged.string() + ", and the one before it is gone on from");
+      // Else the next save would put it in the good one's place.
+      fs::rename(latest, damaged);
+    }
+  } else if (!fs::exists(previous)) {
+    return std::nullopt;
+  }
+  try {
+    return read(previous);
+  } catch (const std::runtime_error&) {
+    std::throw_with_nested(std::runtime_error("expected a whole checkpoint, got damaged ones, in " +
+                                              folder.string() + " (--overwrite starts again)"));
+  }
+}
+
+fs::path last_checkpoint(const fs::path& folder) {
+  for (const char* name : {kLatest, kPrevious}) {
+    if (fs::exists(folder / name)) return folder / name;
+  }
+  return {};
+}
+
+}  // namespace eventgan

@@ -1,0 +1,140 @@
+#include "pipeline/training/training_recording.h"
+
+#include <algorithm>
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "stages/events/event_volume.h"
+#include "stages/events/volume_statistics.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+namespace {
+
+std::string size_text(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// What is wrong with the recording; empty if nothing is.
+std::string fault_of(const RecordingSpec& spec, const TrainingRecording& opened, ImageSize smallest,
+                     int smallest_gap) {
+  const Recording& recording = *opened.recording;
+  const ImageSize size = recording.size();
+  const std::string where = ", in " + opened.file.string();
+  if (size.height < smallest.height || size.width < smallest.width) {
+    return "expected pictures of at least " + size_text(smallest) + " (crop), got " +
+           size_text(size) + where;
+  }
+  if (spec.last_frame && *spec.last_frame >= recording.frame_count()) {
+    return "expected last_frame below the number of frames, " +
+           std::to_string(recording.frame_count()) + ", got " + std::to_string(*spec.last_frame) +
+           where;
+  }
+  if (opened.last_frame - opened.first_frame < smallest_gap) {
+    return "expected two frames " + std::to_string(smallest_gap) +
+           " apart (the smallest of gaps), got frames " + std::to_string(opened.first_frame) +
+           " to " + std::to_string(opened.last_frame) + where;
+  }
+  return "";
+}
+
+}  // namespace
+
+std::vector<TrainingRecording> open_training_recordings(std::span<const RecordingSpec> specs,
+                                                        const std::filesystem::path& directory,
+                                                        ImageSize smallest, int smallest_gap) {
+  std::vector<TrainingRecording> recordings;
+  std::string faults;
+  for (const RecordingSpec& spec : specs) {
+    TrainingRecording opened;
+    opened.file = directory / spec.path;
+    opened.recording = open_recording(opened.file, spec.format, spec.camera);
+    opened.weight = spec.weight;
+    opened.first_frame = spec.first_frame;
+    opened.last_frame = spec.last_frame.value_or(opened.recording->frame_count() - 1);
+    const std::string fault = fault_of(spec, opened, smallest, smallest_gap);
+    if (!fault.empty()) faults += (faults.empty() ? "" : "\n  ") + fault;
+    recordings.push_back(std::move(opened));
+  }
+  if (!faults.empty()) throw UsageError(faults);
+  return recordings;
+}
+
+namespace {
+
+constexpr std::size_t kFrameBytes = std::size_t{128} << 20;
+constexpr std::size_t kEventBytes = std::size_t{512} << 20;
+
+void append_cut(const GreyImage& frame, const CropBox& box, std::vector<float>& values) {
+  for (int y = 0; y < box.size.height; ++y) {
+    const auto row = static_cast<std::size_t>(box.top + y) * frame.size.width;
+    for (int x = 0; x < box.size.width; ++x) {
+      const float u = frame.pixels[row + box.left + x];
+      values.push_back((u / 255.0f - 0.5f) * 2.0f);
+    }
+  }
+}
+
+void append_cut(const std::vector<Event>& events, const CropBox& box, std::vector<Event>& cut) {
+  for (Event event : events) {
+    event.x -= box.left;
+    event.y -= box.top;
+    const bool inside =
+        event.x >= 0 && event.x < box.size.width && event.y >= 0 && event.y < box.size.height;
+    if (inside) cut.push_back(event);
+  }
+}
+
+}  // namespace
+
+CropBox centre_crop(ImageSize picture, ImageSize size) {
+  const ImageSize cut{std::min(picture.height, size.height), std::min(picture.width, size.width)};
+  return {(picture.height - cut.height) / 2, (picture.width - cut.width) / 2, cut};
+}
+
+CropReader::CropReader(std::vector<TrainingRecording> recordings, int bins)
+    : recordings_(std::move(recordings)),
+      bins_(bins),
+      frames_(kFrameBytes, [](const GreyImage& frame) { return frame.pixels.size(); }),
+      intervals_(kEventBytes,
+                 [](const std::vector<Event>& events) { return events.size() * sizeof(Event); }) {}
+
+std::shared_ptr<const GreyImage> CropReader::frame(std::size_t recording,
+                                                   std::int64_t index) const {
+  return frames_.get({recording, index},
+                     [&] { return recordings_[recording].recording->frame(index); });
+}
+
+std::shared_ptr<const std::vector<Event>> CropReader::interval(std::size_t recording,
+                                                               std::int64_t index) const {
+  return intervals_.get({recording, index}, [&] {
+    return recordings_[recording].recording->events_between(index, index + 1);
+  });
+}
+
+std::size_t CropReader::event_count(std::size_t recording, std::int64_t frame) const {
+  return interval(recording, frame)->size();
+}
+
+TrainingSample CropReader::read(std::size_t recording, std::int64_t first_frame,
+                                std::int64_t last_frame, const CropBox& box) const {
+  TrainingSample sample;
+  sample.shape = {bins_, box.size};
+  sample.frames.reserve(2 * box.size.pixel_count());
+  append_cut(*frame(recording, first_frame), box, sample.frames);
+  append_cut(*frame(recording, last_frame), box, sample.frames);
+  sample.network_frames = sample.frames;
+
+  std::vector<Event> events;
+  for (std::int64_t i = first_frame; i < last_frame; ++i) {
+    append_cut(*interval(recording, i), box, events);
+  }
+  sample.volume = normalized(event_volume(events, sample.shape));
+
+  sample.origin = recordings_[recording].recording->name() + " frames " +
+                  std::to_string(first_frame) + "-" + std::to_string(last_frame) + " crop " +
+                  std::to_string(box.left) + "," + std::to_string(box.top);
+  return sample;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,141 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <list>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "manifests/values/training.h"
+#include "stages/recordings/recording.h"
+#include "stages/training/training_sample.h"
+
+namespace eventgan {
+
+/// A recording that is open, with the part of it that pairs are drawn from.
+struct TrainingRecording {
+  std::filesystem::path file;  ///< absolute
+  std::shared_ptr<const Recording> recording;
+  double weight = 1;             ///< relative chance of a sample to come from here
+  std::int64_t first_frame = 0;  ///< of the part in use
+  std::int64_t last_frame = 0;   ///< of the part in use, itself included; > first_frame
+};
+
+/// Opens the recordings of a manifest; relative paths start at `directory`. Throws InputError if
+/// one cannot be opened, and UsageError listing every one that is of no use: smaller than
+/// `smallest`, or with a part in use that is not there or has no pair `smallest_gap` frames apart.
+std::vector<TrainingRecording> open_training_recordings(std::span<const RecordingSpec> specs,
+                                                        const std::filesystem::path& directory,
+                                                        ImageSize smallest, int smallest_gap);
+
+/// Values by key, of which the least recently used are forgotten when all together pass a number of
+/// bytes; one that passes it alone is handed out and not kept. Thread safe; two threads that miss
+/// the same key at once both load it, and get equal values.
+template <class Key, class Value>
+class LruCache {
+ public:
+  /// `bytes_of` says what a value costs.
+  LruCache(std::size_t capacity_bytes, std::function<std::size_t(const Value&)> bytes_of)
+      : capacity_bytes_(capacity_bytes), bytes_of_(std::move(bytes_of)) {}
+
+  /// The value kept for the key, or what `load()` gives; its exceptions pass through.
+  template <class Load>
+  std::shared_ptr<const Value> get(const Key& key, const Load& load) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto found = entries_.find(key);
+      if (found != entries_.end()) {
+        order_.splice(order_.begin(), order_, found->second.place);
+        return found->second.value;
+      }
+    }
+    // Not under the lock: reading takes long, and others may find what they need meanwhile.
+    const auto value = std::make_shared<const Value>(load());
+    const std::lock_guard lock(mutex_);
+    keep(key, value);
+    return value;
+  }
+
+  std::size_t kept_bytes() const {
+    const std::lock_guard lock(mutex_);
+    return kept_bytes_;
+  }
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Value> value;
+    std::size_t bytes = 0;
+    typename std::list<Key>::iterator place;
+  };
+
+  void keep(const Key& key, const std::shared_ptr<const Value>& value) {
+    const std::size_t bytes = bytes_of_(*value);
+    if (bytes > capacity_bytes_ || entries_.contains(key)) return;
+    while (kept_bytes_ + bytes > capacity_bytes_) {
+      const auto oldest = entries_.find(order_.back());
+      kept_bytes_ -= oldest->second.bytes;
+      entries_.erase(oldest);
+      order_.pop_back();
+    }
+    order_.push_front(key);
+    entries_[key] = {value, bytes, order_.begin()};
+    kept_bytes_ += bytes;
+  }
+
+  std::size_t capacity_bytes_;
+  std::function<std::size_t(const Value&)> bytes_of_;
+  mutable std::mutex mutex_;
+  std::size_t kept_bytes_ = 0;
+  std::list<Key> order_;  // most recently used first
+  std::map<Key, Entry> entries_;
+};
+
+/// A rectangle of a picture.
+struct CropBox {
+  int top = 0;
+  int left = 0;
+  ImageSize size;
+};
+
+/// The rectangle of this size in a picture's middle, cut down to the picture where it is larger.
+CropBox centre_crop(ImageSize picture, ImageSize size);
+
+/// Reads frame pairs with the events between them, cut to a rectangle. What was read lately is
+/// kept, so that a few recordings are not read again and again. Thread safe.
+class CropReader {
+ public:
+  CropReader(std::vector<TrainingRecording> recordings, int bins);
+
+  const std::vector<TrainingRecording>& recordings() const { return recordings_; }
+
+  /// As the published code does, events are cut first, and the volume is made and normalised by the
+  /// η98 of the events in the rectangle alone: its first and last event, not the picture's, span
+  /// the time bins. Frames are x = (u/255 - 0.5)·2; network_frames are the same. first_frame ==
+  /// last_frame gives one frame twice and an empty volume. Throws InputError naming the recording
+  /// if it cannot be read.
+  TrainingSample read(std::size_t recording, std::int64_t first_frame, std::int64_t last_frame,
+                      const CropBox& box) const;
+
+  /// Events between a frame and the next one, in the whole picture.
+  std::size_t event_count(std::size_t recording, std::int64_t frame) const;
+
+ private:
+  using FrameKey = std::pair<std::size_t, std::int64_t>;  // recording, frame
+
+  std::shared_ptr<const GreyImage> frame(std::size_t recording, std::int64_t index) const;
+  std::shared_ptr<const std::vector<Event>> interval(std::size_t recording,
+                                                     std::int64_t index) const;
+
+  std::vector<TrainingRecording> recordings_;
+  int bins_;
+  mutable LruCache<FrameKey, GreyImage> frames_;
+  mutable LruCache<FrameKey, std::vector<Event>> intervals_;
+};
+
+}  // namespace eventgan

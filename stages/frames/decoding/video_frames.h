@@ -1,0 +1,158 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <filesystem>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "stages/base/pictures/picture_file.h"
+
+namespace eventgan {
+
+/// One video, decoded from its start to its end: seeking in compressed video is not exact, so a
+/// frame is found by counting. All throw std::runtime_error saying what is wrong, without the
+/// file's name. Not thread safe.
+class VideoFile {
+ public:
+  explicit VideoFile(const std::filesystem::path& path);
+  ~VideoFile();
+  VideoFile(VideoFile&&) noexcept;
+  VideoFile& operator=(VideoFile&&) noexcept;
+
+  /// Passes the next frame over, which is cheaper than `next`; false at the video's end.
+  bool skip();
+
+  /// The next frame, valid until the next call; none at the video's end.
+  std::optional<ColourView> next();
+
+  /// Frames behind, skipped ones and those that `next` threw for included.
+  std::int64_t position() const { return position_; }
+
+ private:
+  struct Capture;
+  std::unique_ptr<Capture> capture_;
+  std::int64_t position_ = 0;
+};
+
+/// A window on one video: its latest frames, since pairs of close frames are asked for by turns.
+/// Asking for an earlier one opens the video anew, which costs all the frames before it. What is
+/// kept of a frame (its pixels, or less) is up to `keep`. Not thread safe.
+template <class Kept>
+class VideoWindow {
+ public:
+  using Keep = std::function<Kept(const ColourView&)>;
+
+  /// Keeps the latest `most` frames (at least one). Throws std::runtime_error as VideoFile does.
+  VideoWindow(std::filesystem::path path, int most, Keep keep)
+      : path_(std::move(path)), most_(std::max(most, 1)), keep_(std::move(keep)), file_(path_) {}
+
+  /// The frame at `position`, counted from 0; valid until the next call. Throws std::runtime_error
+  /// as VideoFile does, or if the video ends before it.
+  const Kept& frame(std::int64_t position) {
+    if (position < first_kept()) {
+      file_ = VideoFile(path_);
+      latest_.clear();
+    }
+    // What will have left the window when `position` is reached is not even looked at.
+    const std::int64_t first_wanted = position + 1 - most_;
+    while (file_.position() <= position) {
+      if (!(file_.position() < first_wanted ? skip() : keep_next())) {
+        throw std::runtime_error("expected a frame at position " + std::to_string(position) +
+                                 ", got a video whose frames end after " +
+                                 std::to_string(file_.position()));
+      }
+    }
+    return latest_[static_cast<std::size_t>(position - first_kept())];
+  }
+
+ private:
+  std::int64_t first_kept() const {
+    return file_.position() - static_cast<std::int64_t>(latest_.size());
+  }
+
+  bool skip() {
+    latest_.clear();
+    return file_.skip();
+  }
+
+  bool keep_next() {
+    try {
+      const std::optional<ColourView> frame = file_.next();
+      if (!frame) return false;
+      latest_.push_back(keep_(*frame));
+    } catch (...) {
+      latest_.clear();  // a gap must not shift the frames' numbers
+      throw;
+    }
+    if (std::ssize(latest_) > most_) latest_.pop_front();
+    return true;
+  }
+
+  std::filesystem::path path_;
+  std::int64_t most_;
+  Keep keep_;
+  VideoFile file_;
+  std::deque<Kept> latest_;  ///< the frames just before file_.position(), in order
+};
+
+/// The videos used last, each with its latest frames. Thread safe: frames are decoded, and kept,
+/// one after another under a lock.
+template <class Kept>
+class OpenVideos {
+ public:
+  using Keep = typename VideoWindow<Kept>::Keep;
+
+  /// Of each of the two videos used last, the latest `kept_frames` are kept.
+  OpenVideos(int kept_frames, Keep keep) : kept_frames_(kept_frames), keep_(std::move(keep)) {}
+
+  /// Several frames of one video, with no other thread's frames in between, so that these cannot
+  /// push the first one's neighbours out. Throws std::runtime_error as VideoWindow does.
+  template <std::size_t kCount>
+  std::array<Kept, kCount> frames(const std::filesystem::path& path,
+                                  const std::array<std::int64_t, kCount>& positions) {
+    const std::lock_guard lock(mutex_);
+    VideoWindow<Kept>& video = open(path);
+    std::array<Kept, kCount> frames;
+    std::ranges::transform(positions, frames.begin(),
+                           [&](std::int64_t position) { return video.frame(position); });
+    return frames;
+  }
+
+ private:
+  static constexpr std::size_t kMostOpen = 2;
+
+  struct OpenVideo {
+    OpenVideo(const std::filesystem::path& video_path, int kept_frames, const Keep& keep)
+        : path(video_path), window(video_path, kept_frames, keep) {}
+    std::filesystem::path path;
+    VideoWindow<Kept> window;
+  };
+
+  VideoWindow<Kept>& open(const std::filesystem::path& path) {
+    const auto video = std::ranges::find(videos_, path, &OpenVideo::path);
+    if (video != videos_.end()) {
+      videos_.splice(videos_.begin(), videos_, video);
+    } else {
+      videos_.emplace_front(path, kept_frames_, keep_);
+      if (videos_.size() > kMostOpen) videos_.pop_back();
+    }
+    return videos_.front().window;
+  }
+
+  int kept_frames_;
+  Keep keep_;
+  std::mutex mutex_;
+  std::list<OpenVideo> videos_;  ///< most recently used first
+};
+
+}  // namespace eventgan

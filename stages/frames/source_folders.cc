@@ -1,0 +1,91 @@
+#include "stages/frames/source_folders.h"
+
+#include <algorithm>
+#include <system_error>
+
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
+
+namespace eventgan {
+
+std::string counted(const std::vector<std::string>& names, const std::string& what) {
+  constexpr std::size_t kNamed = 20;
+  std::string text = std::to_string(names.size()) + " " + what;
+  for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i) {
+    text += (i == 0 ? ": " : ", ") + names[i];
+  }
+  return names.size() > kNamed ? text + ", ..." : text;
+}
+
+FolderListing list_folder(const std::filesystem::path& folder) {
+  FolderListing listing;
+  std::error_code error;
+  std::filesystem::directory_iterator entries(folder, error);
+  if (error == std::errc::no_such_file_or_directory) return listing;
+  for (; !error && entries != std::filesystem::directory_iterator(); entries.increment(error)) {
+    std::error_code ignored;  // a dangling link is a file that cannot be read later
+    auto& names = entries->is_directory(ignored) ? listing.folders : listing.files;
+    names.push_back(entries->path().filename().string());
+  }
+  if (error) {
+    throw InputError("expected a readable folder, got '" + error.message() + "', in " +
+                     folder.string());
+  }
+  std::ranges::sort(listing.folders);
+  std::ranges::sort(listing.files);
+  return listing;
+}
+
+SourceRoot::SourceRoot(std::string_view written, const std::filesystem::path& base)
+    : written_(written), on_disk_(base / written) {
+  while (written_.size() > 1 && written_.back() == '/') written_.pop_back();
+}
+
+std::string SourceRoot::written(std::string_view relative) const {
+  if (relative.empty()) return written_;
+  std::string path = written_;
+  if (!path.empty() && path != "/") path += '/';
+  return path.append(relative);
+}
+
+std::filesystem::path SourceRoot::on_disk(std::string_view relative) const {
+  return relative.empty() ? on_disk_ : on_disk_ / relative;
+}
+
+void SourceRoot::require_folder(std::string_view relative) const {
+  std::error_code error;
+  const auto status = std::filesystem::status(on_disk(relative), error);
+  if (std::filesystem::is_directory(status)) return;
+  throw InputError(std::string("expected a folder, got ") +
+                   (std::filesystem::exists(status) ? "a file" : "nothing that can be read") +
+                   ", in " + written(relative));
+}
+
+bool SourceRoot::has_file(std::string_view relative) const {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  if (fs::symlink_status(on_disk(relative), error).type() == fs::file_type::not_found) return false;
+  return !fs::is_directory(fs::status(on_disk(relative), error));
+}
+
+std::vector<std::string> SourceRoot::folders_in(std::string_view relative) const {
+  return list_folder(on_disk(relative)).folders;
+}
+
+std::vector<std::string> SourceRoot::files_in(std::string_view relative) const {
+  return list_folder(on_disk(relative)).files;
+}
+
+Outcome<std::string> SourceRoot::read(std::string_view relative) const {
+  std::string reason;
+  if (auto bytes = try_read_file(on_disk(relative), reason)) return *std::move(bytes);
+  return SampleFault{"expected a readable file, got '" + reason + "', in " + written(relative)};
+}
+
+std::string SourceRoot::read_or_throw(std::string_view relative) const {
+  Outcome<std::string> bytes = read(relative);
+  if (const auto* fault = std::get_if<SampleFault>(&bytes)) throw InputError(fault->reason);
+  return std::get<std::string>(std::move(bytes));
+}
+
+}  // namespace eventgan

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/faults.h"
+
+namespace eventgan {
+
+/// The names in a folder, each list sorted.
+struct FolderListing {
+  std::vector<std::string> folders;
+  std::vector<std::string> files;  ///< all that is no folder, dangling links too
+};
+
+/// What a note says of some files: "2 labels without a picture in clip: a.json, b.json". After
+/// twenty names "..." stands for the others. `what` is what they are, and where.
+std::string counted(const std::vector<std::string>& names, const std::string& what);
+
+/// Lists a folder, once; nothing if it is absent. Throws InputError if it cannot be listed.
+FolderListing list_folder(const std::filesystem::path& folder);
+
+/// A source's root folder under both its names: as the manifest writes it, for records and
+/// messages, and where it lies on disk. Relative paths have forward slashes. A value.
+class SourceRoot {
+ public:
+  SourceRoot(std::string_view written, const std::filesystem::path& base);
+
+  /// As FrameRef::path writes it; the root itself for "".
+  std::string written(std::string_view relative) const;
+  std::filesystem::path on_disk(std::string_view relative) const;
+
+  /// Throws InputError if there is no such folder.
+  void require_folder(std::string_view relative) const;
+  /// True if there is something of that name that is no folder. Whether it can be read shows in
+  /// reading it: a file that is there and unreadable must not pass for one that is absent.
+  bool has_file(std::string_view relative) const;
+
+  /// Names of the folders, or of the other files, in a folder; sorted. None if it is absent.
+  /// Throws InputError if it cannot be listed.
+  std::vector<std::string> folders_in(std::string_view relative) const;
+  std::vector<std::string> files_in(std::string_view relative) const;
+
+  /// A whole regular file, byte for byte. A fault names the file and the reason.
+  Outcome<std::string> read(std::string_view relative) const;
+  /// The same, for files without which the source cannot be opened: throws InputError.
+  std::string read_or_throw(std::string_view relative) const;
+
+ private:
+  std::string written_;
+  std::filesystem::path on_disk_;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+namespace eventgan {
+
+// HDF5's filter shuffle: all first bytes (the lowest, little endian) of a chunk's numbers, then all
+// second bytes, and so on. Here some numbers of a chunk at a time: byte b of numbers[i] goes to
+// planes[b * plane_size + i], plane_size = the number of numbers in the chunk. Thread safe.
+
+void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes,
+                       std::size_t plane_size);
+
+void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
+                       std::size_t plane_size);
+
+/// Compresses into zlib's format with libdeflate, again and again with the same memory. What comes
+/// out depends on the bytes and the level alone, not on what was compressed before. Thread safety:
+/// one thread at a time.
+class Deflater {
+ public:
+  /// `level` 1..9. Throws std::bad_alloc.
+  explicit Deflater(int level);
+  ~Deflater();
+  Deflater(const Deflater&) = delete;
+  Deflater& operator=(const Deflater&) = delete;
+
+  /// The compressed bytes; they stand until the next call.
+  std::span<const std::byte> deflate(std::span<const std::byte> bytes);
+
+ private:
+  struct Compressor;
+  std::unique_ptr<Compressor> compressor_;
+  std::vector<std::byte> buffer_;  ///< as large as the worst case of the largest input so far
+};
+
+/// The checksum of HDF5's filter fletcher32: Fletcher's sums modulo 65535 over big-endian 16-bit
+/// words, an odd last byte taken as the high half of a word; the second sum in the high half of the
+/// result. Thread safe.
+std::uint32_t fletcher32(std::span<const std::byte> bytes);
+
+/// Appends it as the filter does, in little endian.
+void append_fletcher32(std::vector<std::byte>& bytes);
+
+/// Whether `bytes` ends in the checksum of what stands before it.
+bool ends_in_fletcher32(std::span<const std::byte> bytes);
+
+}  // namespace eventgan

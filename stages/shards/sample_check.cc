@@ -1,0 +1,261 @@
+#include "stages/shards/sample_check.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "stages/shards/codec/quantization.h"
+
+namespace eventgan {
+namespace {
+
+constexpr double kTolerance_px = 0.01;
+
+// Far away from the picture rounding alone is more than the tolerance.
+bool near(double a, double b) {  // false for NaN
+  return std::abs(a - b) <= kTolerance_px + 1e-12 * std::abs(b);
+}
+
+bool near(const Point& a, const Point& b) { return near(a.x, b.x) && near(a.y, b.y); }
+
+bool near(const Rectangle& a, const Rectangle& b) {
+  return near(a.left, b.left) && near(a.top, b.top) && near(a.right, b.right) &&
+         near(a.bottom, b.bottom);
+}
+
+/// `/pairs/source_to_volume` as a map of points and of edges (manifests/values/placement.h has the
+/// equations).
+class SourceToVolume {
+ public:
+  explicit SourceToVolume(const std::array<double, 6>& matrix) : m_(matrix) {}
+
+  Point operator()(const Point& p) const {
+    if (p == kMissingPoint) return p;
+    return {m_[0] * p.x + m_[1] * p.y + m_[2], m_[3] * p.x + m_[4] * p.y + m_[5]};
+  }
+
+  /// An edge lies half a pixel before the centre of the pixel with its number, here and there.
+  Rectangle operator()(const Rectangle& r) const {
+    const Point first = (*this)(Point{r.left - 0.5, r.top - 0.5});
+    const Point last = (*this)(Point{r.right - 0.5, r.bottom - 0.5});
+    return {first.x + 0.5, first.y + 0.5, last.x + 0.5, last.y + 0.5};
+  }
+
+ private:
+  const std::array<double, 6>& m_;
+};
+
+Rectangle cut(const Rectangle& box, const ImageSize& size) {
+  const double width = size.width;
+  const double height = size.height;
+  return {std::clamp(box.left, 0.0, width), std::clamp(box.top, 0.0, height),
+          std::clamp(box.right, 0.0, width), std::clamp(box.bottom, 0.0, height)};
+}
+
+std::array<double, 2> numbers(const Point& p) { return {p.x, p.y}; }
+std::array<double, 4> numbers(const Rectangle& r) { return {r.left, r.top, r.right, r.bottom}; }
+std::array<double, 4> numbers(const Intrinsics& camera) {
+  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
+}
+std::array<double, 5> numbers(const LensDistortion& lens) {
+  return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2};
+}
+std::array<double, 1> numbers(double x) { return {x}; }
+template <class Number, std::size_t kCount>
+std::array<Number, kCount> numbers(const std::array<Number, kCount>& all) {
+  return all;
+}
+
+/// Columns in which a number is not finite.
+std::vector<std::string> not_finite(const ShardSample& sample) {
+  std::vector<std::string> faults;
+  std::string whose;
+  const auto expect_finite = [&](const char* column, const auto& value) {
+    for (const double number : numbers(value)) {
+      if (std::isfinite(number)) continue;
+      faults.push_back("expected finite numbers in " + (column + whose) + ", got " +
+                       std::to_string(number));
+      return;
+    }
+  };
+  const auto expect_finite_if_any = [&](const char* column, const auto& value) {
+    if (value) expect_finite(column, *value);
+  };
+  for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
+    whose = " of box " + std::to_string(i);
+    const Box& source = sample.annotation.boxes[i];
+    expect_finite("xyxy_source", source.xyxy);
+    expect_finite("xyxy_unclipped", sample.labels.boxes[i].unclipped);
+    expect_finite("xyxy", sample.labels.boxes[i].clipped);
+    expect_finite("truncation", source.truncation);
+    expect_finite("alpha", source.alpha);
+    expect_finite("box3d", source.box3d);
+  }
+  for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
+    whose = " of person " + std::to_string(i);
+    const Person& source = sample.annotation.persons[i];
+    const VolumePerson& person = sample.labels.persons[i];
+    for (const Joint& joint : source.joints) expect_finite("joints_source", joint.at);
+    for (const Point& joint : person.joints) expect_finite("joints", joint);
+    expect_finite("center_source", source.center);
+    expect_finite("center", person.center);
+    expect_finite("scale", source.scale);
+    expect_finite("scale_volume", person.scale);
+    expect_finite_if_any("head_box_source", source.head_box);
+    expect_finite_if_any("head_box", person.head_box);
+    for (const auto& joint : source.joints3d_mm) expect_finite_if_any("joints3d_mm", joint);
+    expect_finite_if_any("camera_source", source.camera);
+    expect_finite_if_any("camera", person.camera);
+    expect_finite_if_any("camera_distortion", source.distortion);
+  }
+  return faults;
+}
+
+}  // namespace
+
+std::vector<std::string> label_faults(const ShardHeader& header, const ShardSample& sample) {
+  std::vector<std::string> faults = not_finite(sample);
+  if (!faults.empty()) return faults;
+  const auto expect = [&](bool holds, const std::string& what) {
+    if (!holds) faults.push_back("expected " + what + ", got another place");
+  };
+  const SourceToVolume map(sample.source_to_volume);
+
+  for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
+    const VolumeBox& box = sample.labels.boxes[i];
+    const std::string name = " of box " + std::to_string(i);
+    const int class_id = sample.annotation.boxes[i].class_id;
+    if (class_id < 0 || class_id >= static_cast<int>(header.label_schema.class_names.size())) {
+      faults.push_back("expected class_id" + name + " to have a name, got " +
+                       std::to_string(class_id));
+    }
+    expect(near(box.unclipped, map(sample.annotation.boxes[i].xyxy)),
+           "xyxy_unclipped" + name + " where source_to_volume puts xyxy_source");
+    expect(near(box.clipped, cut(box.unclipped, header.volume.size)) &&
+               box.clipped == cut(box.clipped, header.volume.size),
+           "xyxy" + name + " to be xyxy_unclipped cut to the volume");
+  }
+  for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
+    const Person& source = sample.annotation.persons[i];
+    const VolumePerson& person = sample.labels.persons[i];
+    const std::string name = " of person " + std::to_string(i);
+    for (std::size_t j = 0; j < person.joints.size(); ++j) {
+      expect(near(person.joints[j], map(source.joints[j].at)),
+             "joint " + std::to_string(j) + name + " where source_to_volume puts joints_source");
+    }
+    expect(near(person.center, map(source.center)),
+           "center" + name + " where source_to_volume puts center_source");
+    if (person.head_box && source.head_box) {
+      expect(near(*person.head_box, map(*source.head_box)),
+             "head_box" + name + " where source_to_volume puts head_box_source");
+    }
+    expect(person.head_box.has_value() == source.head_box.has_value(),
+           "head_box" + name + " if there is head_box_source");
+  }
+  return faults;
+}
+
+namespace {
+
+struct Found {
+  bool sound = true;
+  double max = 0;
+  double sum_positive = 0;
+  double sum_negative = 0;
+  std::size_t nonzero = 0;
+};
+
+Found look_at(std::span<const float> volume) {
+  Found found;
+  for (std::size_t i = 0; i < volume.size(); ++i) {
+    const float value = volume[i];
+    if (!std::isfinite(value) || value < 0) found.sound = false;
+    found.max = std::max(found.max, static_cast<double>(value));
+    (2 * i < volume.size() ? found.sum_positive : found.sum_negative) += value;
+    found.nonzero += value != 0;
+  }
+  return found;
+}
+
+/// How far a stored value can lie from the generated one: relative (and as much again for the
+/// statistics' own rounding) and absolute.
+struct Error {
+  double relative;
+  double absolute;
+};
+
+Error storage_error(StoredType type, float scale) {
+  constexpr double kFloatStatistics = 1e-6;
+  switch (type) {
+    case StoredType::kFloat32:
+      return {kFloatStatistics, 0};
+    case StoredType::kFloat16:  // 11 bits of mantissa; below 2^-14 steps of 2^-24
+      return {0x1p-11 + kFloatStatistics, 0x1p-25};
+    case StoredType::kUint8:
+      return {kFloatStatistics, 0.5 * scale};
+  }
+  return {0, 0};
+}
+
+std::string text(const char* name, double recorded, double stored) {
+  return fmt::format("expected {} {:g} as recorded, got {:g}", name, recorded, stored);
+}
+
+}  // namespace
+
+std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSample& sample,
+                                        std::span<const float> volume) {
+  const Found found = look_at(volume);
+  if (!found.sound) return "expected finite values >= 0 in the volume, got others";
+  if (!sample.valid) {
+    if (found.nonzero == 0) return std::nullopt;
+    return "expected zeros for a quarantined sample, got other values";
+  }
+
+  const VolumeStatistics& recorded = sample.statistics;
+  const Error error = storage_error(header.dtype, sample.scale);
+  const auto near = [&](double expected, double got, double values) {
+    return std::abs(expected - got) <=
+           error.relative * std::abs(expected) + error.absolute * values;
+  };
+
+  // The statistics are of the volume as generated; normalised by eta98 and clipped, its largest
+  // value is 1.
+  const bool as_generated = header.normalization == Normalization::kNone;
+  const bool saturated = (recorded.flags & kFlagSaturated) != 0;
+  double max = recorded.max;
+  if (!as_generated) max = recorded.max > 0 ? 1 : 0;
+  if (saturated) max = std::min<double>(max, kLargestHalf);
+  if (!near(max, found.max, 1)) return text("largest value", max, found.max);
+
+  const bool vanished = found.nonzero == 0 && recorded.max > 0;
+  if (((recorded.flags & kFlagVanished) != 0) != vanished) {
+    return std::string(
+               "expected the flag \"vanished\" of a volume of zeros alone that was not "
+               "generated so, and of no other, got it ") +
+           (vanished ? "not set" : "set");
+  }
+
+  const auto size = static_cast<double>(volume.size());
+  const double nonzero_fraction = static_cast<double>(found.nonzero) / size;
+  const double recorded_fraction = recorded.nonzero_fraction;
+  // Rounding to coarser numbers can make values zero, never the other way round.
+  const bool exact = header.dtype == StoredType::kFloat32 && as_generated;
+  if (nonzero_fraction > recorded_fraction + 1e-6 ||
+      (exact && nonzero_fraction < recorded_fraction - 1e-6)) {
+    return text("non-zero fraction", recorded_fraction, nonzero_fraction);
+  }
+  if (!as_generated || saturated) return std::nullopt;
+  if (!near(recorded.sum_positive, found.sum_positive, size / 2)) {
+    return text("sum of positive polarity", recorded.sum_positive, found.sum_positive);
+  }
+  if (!near(recorded.sum_negative, found.sum_negative, size / 2)) {
+    return text("sum of negative polarity", recorded.sum_negative, found.sum_negative);
+  }
+  return std::nullopt;
+}
+
+}  // namespace eventgan

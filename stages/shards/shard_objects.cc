@@ -1,0 +1,228 @@
+#include <cstdint>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "stages/shards/codec/quantization.h"
+#include "stages/shards/shard_objects_internal.h"
+
+namespace eventgan {
+
+std::string unit_text(VolumeUnit unit, Normalization normalization) {
+  if (unit == VolumeUnit::kLearned) return "dimensionless, >= 0; not a count of events";
+  return normalization == Normalization::kNone
+             ? "events, >= 0; each spread over the two bins nearest to it in time"
+             : "share of eta98 events, 0..1";
+}
+
+std::string time_axis_text(VolumeUnit unit) {
+  const std::string bins = "bin b of a polarity is centred at time b / (bins - 1), where 0 is the ";
+  return bins + (unit == VolumeUnit::kLearned ? "previous frame and 1 the next one"
+                                              : "first event and 1 the last one");
+}
+
+namespace {
+
+/// IEEE 754 binary16, which HDF5 1.10 has no name for.
+Hdf5Handle half_type() {
+  Hdf5Handle type = number_type(4, true, true);
+  checked(H5Tset_fields(type, 15, 10, 5, 0, 10), "make", "float16");
+  checked(H5Tset_size(type, 2), "make", "float16");
+  checked(H5Tset_ebias(type, 15), "make", "float16");
+  return type;
+}
+
+void write_root_attributes(hid_t file, const ShardHeader& header) {
+  write_attribute(file, "format", std::string(kShardFormat));
+  write_attribute(file, "format_version", std::int32_t{kShardFormatVersion});
+  write_attribute(file, "name", header.name);
+  write_attribute(file, "dataset", header.dataset);
+  write_attribute(file, "split", header.split);
+  describe_origin(file, header);
+}
+
+Hdf5Handle create_volume(hid_t file, const ShardHeader& header) {
+  const Dims dims{static_cast<hsize_t>(header.sample_count),
+                  static_cast<hsize_t>(header.volume.channels()),
+                  static_cast<hsize_t>(header.volume.size.height),
+                  static_cast<hsize_t>(header.volume.size.width)};
+  const Dims chunk{1, dims[1], dims[2], dims[3]};
+  const Hdf5Handle creation = creation_properties(H5P_DATASET_CREATE);
+  set_chunks(creation, chunk, kVolumePath);
+  set_filters(creation, header.deflate_level, kVolumePath);
+  // HDF5's default fill value is zero and its default is to allocate no chunk before it is written:
+  // that is how the slots of quarantined samples read as zeros.
+  return create_dataset(file, kVolumePath, volume_type(header.dtype), space_of(dims, kVolumePath),
+                        creation);
+}
+
+}  // namespace
+
+std::size_t stored_volume_size(const ShardHeader& header) {
+  const VolumeShape& shape = header.volume;
+  const std::size_t size = shape.value_count() * stored_size(header.dtype);
+  if (header.sample_count < 1 || shape.bins < 1 || shape.size.height < 1 || shape.size.width < 1) {
+    throw std::invalid_argument("expected samples and a volume with values, in " + header.name);
+  }
+  if (size > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::invalid_argument("expected volumes below 4 GiB, got " + std::to_string(size) +
+                                " bytes, in " + header.name);
+  }
+  return size;
+}
+
+Hdf5Handle volume_type(StoredType type) {
+  switch (type) {
+    case StoredType::kFloat32:
+      return number_type(4, true, true);
+    case StoredType::kFloat16:
+      return half_type();
+    case StoredType::kUint8:
+      return number_type(1, false, false);
+  }
+  throw std::logic_error("unknown stored type");
+}
+
+void describe_origin(hid_t object, const ShardHeader& header) {
+  write_attribute(object, "plan_hash", header.plan_hash);
+  write_attribute(object, "manifest", header.manifest_text);
+  write_attribute(object, "weights_hash", header.weights_hash);
+  write_attribute(object, "generator", header.generator);
+  write_attribute(object, "program_version", header.program_version);
+  write_attribute(object, "preprocessing", header.preprocessing);
+}
+
+void create_groups(hid_t location) {
+  for (const char* path :
+       {"events", "events/statistics", "pairs", "labels", "labels/boxes", "labels/poses"}) {
+    create_group(location, path).close(path);
+  }
+}
+
+void describe_volume(hid_t volume, const ShardHeader& header) {
+  const int bins = header.volume.bins;
+  write_attribute(volume, "axes", std::string("sample, channel, y, x"));
+  write_attribute(volume, "bins", std::int32_t{bins});
+  write_attribute(volume, "channel_order",
+                  "channels 0.." + std::to_string(bins - 1) + ": positive polarity, channels " +
+                      std::to_string(bins) + ".." + std::to_string(2 * bins - 1) +
+                      ": negative; each in time order");
+  write_attribute(volume, "time_axis", time_axis_text(header.unit));
+  write_attribute(volume, "normalization", std::string(to_string(header.normalization)));
+  write_attribute(volume, "unit", unit_text(header.unit, header.normalization));
+  write_attribute(volume, "scale",
+                  header.dtype == StoredType::kUint8
+                      ? std::string("value = stored number x /events/scale[sample]")
+                      : std::string("value = stored number"));
+}
+
+Hdf5Handle create_objects(hid_t file, const ShardHeader& header) {
+  write_root_attributes(file, header);
+  create_groups(file);
+  Hdf5Handle volume = create_volume(file, header);
+  describe_volume(volume, header);
+  return volume;
+}
+
+void describe_columns(hid_t location, const ShardHeader& header) {
+  const LabelSchema& schema = header.label_schema;
+  write_attribute(open_object(location, "labels/boxes/class_id"), "class_names",
+                  schema.class_names);
+  write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
+  write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
+  write_attribute(open_object(location, "events/statistics/flags"), "bits",
+                  std::vector<std::string>{"empty", "extrapolated", "saturated", "vanished"});
+  write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
+                  std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
+                              "picture to one in the volume; pixel centres are whole numbers"));
+}
+
+namespace {
+
+void check_format(hid_t file) {
+  const std::string format = read_text_attribute(file, "format");
+  if (format != kShardFormat) {
+    throw Hdf5Error("expected format " + std::string(kShardFormat) + ", got " + format);
+  }
+  const int version = read_number_attribute(file, "format_version");
+  if (version != kShardFormatVersion) {
+    throw Hdf5Error("expected format version " + std::to_string(kShardFormatVersion) + ", got " +
+                    std::to_string(version));
+  }
+}
+
+StoredType stored_type(hid_t volume) {
+  const Hdf5Handle type(H5Dget_type(volume), H5Tclose, "read", kVolumePath);
+  for (const StoredType candidate :
+       {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}) {
+    if (checked(H5Tequal(type, volume_type(candidate)), "read", kVolumePath) > 0) return candidate;
+  }
+  throw Hdf5Error("expected float32, float16 or uint8 in /events/volume, got another type");
+}
+
+int deflate_level(hid_t volume) {
+  const Hdf5Handle creation(H5Dget_create_plist(volume), H5Pclose, "read", kVolumePath);
+  unsigned level = 0;
+  unsigned flags = 0;
+  std::size_t count = 1;
+  if (H5Pget_filter_by_id2(creation, H5Z_FILTER_DEFLATE, &flags, &count, &level, 0, nullptr,
+                           nullptr) < 0) {
+    return 0;
+  }
+  return static_cast<int>(level);
+}
+
+Normalization normalization(hid_t volume) {
+  const std::string word = read_text_attribute(volume, "normalization");
+  for (const Normalization candidate : {Normalization::kNone, Normalization::kEta98}) {
+    if (word == to_string(candidate)) return candidate;
+  }
+  throw Hdf5Error("expected a known normalization, got " + word);
+}
+
+VolumeUnit unit(hid_t volume, Normalization normalization) {
+  const std::string text = read_text_attribute(volume, "unit");
+  for (const VolumeUnit candidate : {VolumeUnit::kLearned, VolumeUnit::kEvents}) {
+    if (text == unit_text(candidate, normalization)) return candidate;
+  }
+  throw Hdf5Error("expected a known unit, got " + text);
+}
+
+void read_volume(hid_t file, ShardHeader& header) {
+  const Hdf5Handle volume = open_object(file, kVolumePath);
+  header.dtype = stored_type(volume);
+  header.deflate_level = deflate_level(volume);
+  header.normalization = normalization(volume);
+  header.unit = unit(volume, header.normalization);
+  header.volume.bins = read_number_attribute(volume, "bins");
+  const Dims dims = dims_of(volume, kVolumePath);
+  if (dims.size() != 4 || dims[1] != 2 * static_cast<hsize_t>(header.volume.bins)) {
+    throw Hdf5Error("expected shape [N, 2 bins, H, W] of /events/volume, got another");
+  }
+  header.sample_count = static_cast<int>(dims[0]);
+  header.volume.size = {static_cast<int>(dims[2]), static_cast<int>(dims[3])};
+}
+
+}  // namespace
+
+ShardHeader read_header(hid_t file) {
+  check_format(file);
+  ShardHeader header;
+  header.name = read_text_attribute(file, "name");
+  header.dataset = read_text_attribute(file, "dataset");
+  header.split = read_text_attribute(file, "split");
+  header.plan_hash = read_text_attribute(file, "plan_hash");
+  header.manifest_text = read_text_attribute(file, "manifest");
+  header.weights_hash = read_text_attribute(file, "weights_hash");
+  header.generator = read_text_attribute(file, "generator");
+  header.program_version = read_text_attribute(file, "program_version");
+  header.preprocessing = read_text_attribute(file, "preprocessing");
+  read_volume(file, header);
+  header.label_schema.class_names =
+      read_texts_attribute(open_object(file, "/labels/boxes/class_id"), "class_names");
+  header.label_schema.joint_names =
+      read_texts_attribute(open_object(file, "/labels/poses"), "joint_names");
+  return header;
+}
+
+}  // namespace eventgan

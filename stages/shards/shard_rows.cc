@@ -1,0 +1,315 @@
+#include "stages/shards/shard_rows.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+namespace eventgan {
+namespace {
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+void push(std::vector<double>& column, Point point) {
+  column.insert(column.end(), {point.x, point.y});
+}
+
+void push(std::vector<double>& column, const Rectangle& box) {
+  column.insert(column.end(), {box.left, box.top, box.right, box.bottom});
+}
+
+/// -1 stands for "none", as the datasets write it; no real box has these edges.
+void push(std::vector<double>& column, const std::optional<Rectangle>& box) {
+  push(column, box.value_or(Rectangle{-1, -1, -1, -1}));
+}
+
+/// Makes an optional column as long as if every row before `size` had NaN for "none".
+void pad(std::vector<double>& column, std::size_t size) { column.resize(size, kNan); }
+
+void push_camera(std::vector<double>& column, const std::optional<Intrinsics>& camera,
+                 std::size_t persons_before) {
+  if (!camera) return;
+  pad(column, 4 * persons_before);
+  column.insert(column.end(),
+                {camera->focal_x, camera->focal_y, camera->centre_x, camera->centre_y});
+}
+
+void append_pair(const ShardHeader& header, const ShardSample& sample, PairColumns& to) {
+  const FramePair& pair = sample.pair;
+  to.sample_id.push_back(sample.sample_id);
+  to.dataset.push_back(header.dataset);
+  to.sequence.push_back(sample.sequence);
+  to.prev_path.push_back(pair.previous.path);
+  to.next_path.push_back(pair.next.path);
+  to.prev_index.push_back(pair.previous.index);
+  to.next_index.push_back(pair.next.index);
+  to.prev_video_frame.push_back(pair.previous.video_frame);
+  to.next_video_frame.push_back(pair.next.video_frame);
+  to.gap_frames.push_back(pair.gap_frames);
+  to.gap_s.push_back(pair.gap_s());
+  to.label_index.push_back(pair.label_index);
+  to.label_position.push_back(pair.label_position);
+  to.source_size.insert(to.source_size.end(),
+                        {sample.source_size.height, sample.source_size.width});
+  to.source_to_volume.insert(to.source_to_volume.end(), sample.source_to_volume.begin(),
+                             sample.source_to_volume.end());
+}
+
+void append_events(const ShardSample& sample, EventColumns& to) {
+  const VolumeStatistics& statistics = sample.statistics;
+  to.eta98.push_back(statistics.eta98);
+  to.scale.push_back(sample.scale);
+  to.nonzero_fraction.push_back(statistics.nonzero_fraction);
+  to.max.push_back(statistics.max);
+  to.sum_positive.push_back(statistics.sum_positive);
+  to.sum_negative.push_back(statistics.sum_negative);
+  to.flags.push_back(statistics.flags);
+}
+
+void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
+  push(to.xyxy, mapped.clipped);
+  push(to.xyxy_unclipped, mapped.unclipped);
+  push(to.xyxy_source, box.xyxy);
+  to.class_id.push_back(box.class_id);
+  to.truncation.push_back(box.truncation);
+  to.occlusion.push_back(box.occlusion);
+  to.alpha.push_back(box.alpha);
+  to.box3d.insert(to.box3d.end(), box.box3d.begin(), box.box3d.end());
+  to.ignore.push_back(mapped.ignore);
+  to.ignore_source.push_back(box.ignore);
+  to.track_id.push_back(box.track_id);
+}
+
+void append_person(const Person& person, const VolumePerson& mapped, PoseColumns& to) {
+  const std::size_t persons_before = to.scale.size();
+  for (const Joint& joint : person.joints) {
+    push(to.joints_source, joint.at);
+    to.visible.push_back(static_cast<std::int8_t>(joint.visible));
+  }
+  for (const Point& joint : mapped.joints) push(to.joints, joint);
+  push(to.center, mapped.center);
+  push(to.center_source, person.center);
+  to.scale.push_back(person.scale);
+  to.scale_volume.push_back(mapped.scale);
+  push(to.head_box, mapped.head_box);
+  push(to.head_box_source, person.head_box);
+  if (!person.joints3d_mm.empty()) {
+    pad(to.joints3d_mm, 3 * person.joints3d_mm.size() * persons_before);
+    for (const auto& joint : person.joints3d_mm) {
+      const auto place = joint.value_or(std::array{kNan, kNan, kNan});
+      to.joints3d_mm.insert(to.joints3d_mm.end(), place.begin(), place.end());
+    }
+  }
+  push_camera(to.camera, mapped.camera, persons_before);
+  push_camera(to.camera_source, person.camera, persons_before);
+  if (const auto& lens = person.distortion) {
+    pad(to.camera_distortion, 5 * persons_before);
+    to.camera_distortion.insert(to.camera_distortion.end(),
+                                {lens->k1, lens->k2, lens->k3, lens->p1, lens->p2});
+  }
+}
+
+/// Persons after the last with a 3-D pose or a camera.
+void pad_optional(std::size_t joints, PoseColumns& poses) {
+  const std::size_t persons = poses.scale.size();
+  if (!poses.joints3d_mm.empty()) pad(poses.joints3d_mm, 3 * joints * persons);
+  if (!poses.camera.empty()) pad(poses.camera, 4 * persons);
+  if (!poses.camera_source.empty()) pad(poses.camera_source, 4 * persons);
+  if (!poses.camera_distortion.empty()) pad(poses.camera_distortion, 5 * persons);
+}
+
+void check_labels(const LabelSchema& schema, const ShardSample& sample) {
+  const auto expect = [&](bool holds, const char* what) {
+    if (!holds)
+      throw std::logic_error(std::string("expected ") + what + " (" + sample.sample_id + ")");
+  };
+  const Annotation& annotation = sample.annotation;
+  const VolumeLabels& labels = sample.labels;
+  expect(annotation.boxes.size() == labels.boxes.size(), "a volume box for each annotated box");
+  expect(annotation.persons.size() == labels.persons.size(), "a volume pose for each person");
+  for (const Box& box : annotation.boxes) {
+    expect(box.class_id >= 0 && static_cast<std::size_t>(box.class_id) < schema.class_names.size(),
+           "class ids that the schema names");
+  }
+  const std::size_t joints = schema.joint_names.size();
+  for (const Person& person : annotation.persons) {
+    expect(person.joints.size() == joints, "a joint for each name in the schema");
+    expect(person.joints3d_mm.empty() || person.joints3d_mm.size() == joints,
+           "a 3-D joint for each name in the schema, or none");
+  }
+  for (const VolumePerson& person : labels.persons) {
+    expect(person.joints.size() == joints, "a volume joint for each name in the schema");
+  }
+}
+
+}  // namespace
+
+void append_row(const ShardHeader& header, const ShardSample& sample, ShardTables& tables) {
+  const bool labelled =
+      sample.valid || !sample.labels.boxes.empty() || !sample.labels.persons.empty();
+  if (labelled) check_labels(header.label_schema, sample);
+
+  append_events(sample, tables.events);
+  append_pair(header, sample, tables.pairs);
+  tables.original.emplace_back(sample.annotation.original.begin(),
+                               sample.annotation.original.end());
+  tables.valid.push_back(sample.valid);
+  if (labelled) {
+    for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
+      append_box(sample.annotation.boxes[i], sample.labels.boxes[i], tables.boxes);
+    }
+    for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
+      append_person(sample.annotation.persons[i], sample.labels.persons[i], tables.poses);
+    }
+    pad_optional(header.label_schema.joint_names.size(), tables.poses);
+  }
+  tables.boxes.offsets.push_back(static_cast<std::int64_t>(tables.boxes.class_id.size()));
+  tables.poses.offsets.push_back(static_cast<std::int64_t>(tables.poses.scale.size()));
+}
+
+namespace {
+
+Point point_at(const std::vector<double>& column, std::size_t row) {
+  return {column[2 * row], column[2 * row + 1]};
+}
+
+Rectangle box_at(const std::vector<double>& column, std::size_t row) {
+  const double* edge = &column[4 * row];
+  return {edge[0], edge[1], edge[2], edge[3]};
+}
+
+std::optional<Rectangle> box_if_any(const std::vector<double>& column, std::size_t row) {
+  const Rectangle box = box_at(column, row);
+  return box == Rectangle{-1, -1, -1, -1} ? std::nullopt : std::optional(box);
+}
+
+/// Row `row` of an optional column of `width` numbers; none if the column is absent or all of them
+/// are NaN.
+const double* row_if_any(const std::vector<double>& column, std::size_t width, std::size_t row) {
+  if (column.empty()) return nullptr;
+  const double* first = &column[width * row];
+  const bool any = !std::all_of(first, first + width, [](double x) { return std::isnan(x); });
+  return any ? first : nullptr;
+}
+
+std::optional<Intrinsics> camera_if_any(const std::vector<double>& column, std::size_t row) {
+  const double* number = row_if_any(column, 4, row);
+  if (number == nullptr) return std::nullopt;
+  return Intrinsics{number[0], number[1], number[2], number[3]};
+}
+
+std::optional<LensDistortion> distortion_if_any(const std::vector<double>& column,
+                                                std::size_t row) {
+  const double* number = row_if_any(column, 5, row);
+  if (number == nullptr) return std::nullopt;
+  return LensDistortion{number[0], number[1], number[2], number[3], number[4]};
+}
+
+FramePair pair_at(const PairColumns& from, std::size_t row) {
+  FramePair pair;
+  pair.previous = {from.prev_path[row], from.prev_index[row], from.prev_video_frame[row], 0};
+  pair.next = {from.next_path[row], from.next_index[row], from.next_video_frame[row],
+               from.gap_s[row]};
+  pair.gap_frames = from.gap_frames[row];
+  pair.label_index = from.label_index[row];
+  pair.label_position = from.label_position[row];
+  return pair;
+}
+
+VolumeStatistics statistics_at(const EventColumns& from, std::size_t row) {
+  VolumeStatistics statistics;
+  statistics.eta98 = from.eta98[row];
+  statistics.max = from.max[row];
+  statistics.nonzero_fraction = from.nonzero_fraction[row];
+  statistics.sum_positive = from.sum_positive[row];
+  statistics.sum_negative = from.sum_negative[row];
+  statistics.flags = from.flags[row];
+  return statistics;
+}
+
+Box annotated_box(const BoxColumns& from, std::size_t row) {
+  Box box;
+  box.class_id = from.class_id[row];
+  box.xyxy = box_at(from.xyxy_source, row);
+  box.truncation = from.truncation[row];
+  box.occlusion = from.occlusion[row];
+  box.alpha = from.alpha[row];
+  for (std::size_t i = 0; i < box.box3d.size(); ++i) box.box3d[i] = from.box3d[7 * row + i];
+  box.track_id = from.track_id[row];
+  box.ignore = from.ignore_source[row] != 0;
+  return box;
+}
+
+Person annotated_person(const PoseColumns& from, std::size_t joints, std::size_t row) {
+  Person person;
+  for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
+    person.joints.push_back({point_at(from.joints_source, j), from.visible[j]});
+  }
+  person.center = point_at(from.center_source, row);
+  person.scale = from.scale[row];
+  person.head_box = box_if_any(from.head_box_source, row);
+  if (row_if_any(from.joints3d_mm, 3 * joints, row) != nullptr) {
+    for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
+      const double* mm = row_if_any(from.joints3d_mm, 3, j);
+      auto& joint = person.joints3d_mm.emplace_back();
+      if (mm != nullptr) joint = {mm[0], mm[1], mm[2]};
+    }
+  }
+  person.camera = camera_if_any(from.camera_source, row);
+  person.distortion = distortion_if_any(from.camera_distortion, row);
+  return person;
+}
+
+VolumePerson mapped_person(const PoseColumns& from, std::size_t joints, std::size_t row) {
+  VolumePerson person;
+  for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
+    person.joints.push_back(point_at(from.joints, j));
+  }
+  person.center = point_at(from.center, row);
+  person.scale = from.scale_volume[row];
+  person.head_box = box_if_any(from.head_box, row);
+  person.camera = camera_if_any(from.camera, row);
+  return person;
+}
+
+}  // namespace
+
+ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, int slot) {
+  const auto row = static_cast<std::size_t>(slot);
+  ShardSample sample;
+  sample.valid = tables.valid[row] != 0;
+  sample.sample_id = tables.pairs.sample_id[row];
+  sample.sequence = tables.pairs.sequence[row];
+  sample.pair = pair_at(tables.pairs, row);
+  sample.source_size = {tables.pairs.source_size[2 * row], tables.pairs.source_size[2 * row + 1]};
+  for (std::size_t i = 0; i < sample.source_to_volume.size(); ++i) {
+    sample.source_to_volume[i] = tables.pairs.source_to_volume[6 * row + i];
+  }
+  sample.statistics = statistics_at(tables.events, row);
+  sample.scale = tables.events.scale[row];
+  sample.annotation.original.assign(tables.original[row].begin(), tables.original[row].end());
+
+  const auto rows_of = [row](const std::vector<std::int64_t>& offsets, auto&& each) {
+    for (std::int64_t k = offsets[row]; k < offsets[row + 1]; ++k)
+      each(static_cast<std::size_t>(k));
+  };
+  rows_of(tables.boxes.offsets, [&](std::size_t k) {
+    const BoxColumns& boxes = tables.boxes;
+    sample.annotation.boxes.push_back(annotated_box(boxes, k));
+    sample.labels.boxes.push_back(
+        {box_at(boxes.xyxy, k), box_at(boxes.xyxy_unclipped, k), boxes.ignore[k] != 0});
+  });
+  const std::size_t joints = header.label_schema.joint_names.size();
+  rows_of(tables.poses.offsets, [&](std::size_t k) {
+    sample.annotation.persons.push_back(annotated_person(tables.poses, joints, k));
+    sample.labels.persons.push_back(mapped_person(tables.poses, joints, k));
+  });
+  return sample;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,45 @@
+#include "stages/shards/shard_tables.h"
+
+#include <cstddef>
+#include <utility>
+
+namespace eventgan {
+namespace {
+
+std::vector<std::int32_t> rows_by_slot(const std::vector<std::int64_t>& offsets) {
+  std::vector<std::int32_t> rows;
+  for (std::size_t slot = 0; slot + 1 < offsets.size(); ++slot) {
+    rows.push_back(static_cast<std::int32_t>(offsets[slot + 1] - offsets[slot]));
+  }
+  return rows;
+}
+
+}  // namespace
+
+ShardContents contents_of(const ShardTables& tables, const LabelSchema& schema) {
+  ShardContents contents;
+  contents.boxes = rows_by_slot(tables.boxes.offsets);
+  contents.persons = rows_by_slot(tables.poses.offsets);
+  for (const std::int32_t id : tables.boxes.class_id) {
+    ++contents.classes[schema.class_names.at(static_cast<std::size_t>(id))];
+  }
+  for (const std::int32_t gap : tables.pairs.gap_frames) ++contents.gaps[gap];
+  visit_columns(tables, schema.joint_names.size(), [&](const ColumnSpec& spec, const auto& column) {
+    if (spec.optional && !column.empty()) contents.optional_columns.push_back(spec.path);
+  });
+  return contents;
+}
+
+void enter(ShardContents contents, ShardMarker& marker) {
+  marker.boxes = std::move(contents.boxes);
+  marker.persons = std::move(contents.persons);
+  marker.classes = std::move(contents.classes);
+  marker.gaps = std::move(contents.gaps);
+  marker.optional_columns = std::move(contents.optional_columns);
+}
+
+ShardContents contents_of(const ShardMarker& marker) {
+  return {marker.boxes, marker.persons, marker.classes, marker.gaps, marker.optional_columns};
+}
+
+}  // namespace eventgan

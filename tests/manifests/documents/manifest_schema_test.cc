@@ -1,0 +1,151 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/manifest_fields.h"
+#include "manifests/documents/simulation_manifest.h"
+#include "manifests/documents/training_manifest.h"
+#include "manifests/values/events.h"
+#include "manifests/values/words.h"
+#include "tests/manifests/documents/json_schema.h"
+#include "tests/manifests/documents/manifest_cases.h"
+
+namespace eventgan {
+namespace {
+
+using nlohmann::json;
+constexpr char kSchema[] = "manifest.schema.json";
+
+TEST(ManifestSchema, AcceptsAndRejectsWhatTheProgramDoes) {
+  // The other test of this table holds the program to `faults`.
+  for (const testing::ManifestCase& c : testing::manifest_cases()) {
+    const json document = json::parse(testing::manifest_text(c));
+    EXPECT_EQ(testing::schema_accepts(kSchema, document), c.faults.empty() || c.beyond_schema)
+        << c.name;
+  }
+}
+
+TEST(ManifestSchema, LeavesOnlyTheSizeOfVolumesToTheProgram) {
+  // Double keys and the text's encoding, too, but of these a parsed document shows nothing.
+  std::vector<std::string> beyond;
+  for (const testing::ManifestCase& c : testing::manifest_cases()) {
+    if (c.beyond_schema) beyond.push_back(c.name);
+  }
+  EXPECT_THAT(beyond, ::testing::ElementsAre("volumes of 4 GiB"));
+}
+
+template <class T, std::size_t N>
+json words(const std::array<Word<T>, N>& table) {
+  json list = json::array();
+  for (const Word<T>& entry : table) list.push_back(entry.word);
+  return list;
+}
+
+TEST(ManifestSchema, ListsTheSameWords) {
+  const auto listed = [](const char* pointer) {
+    return testing::schema_document(kSchema).at(json::json_pointer(std::string(pointer) + "/enum"));
+  };
+  EXPECT_EQ(listed("/definitions/source/properties/dataset"), words(kDatasetWords));
+  EXPECT_EQ(listed("/definitions/source/properties/layout"), words(kLayoutWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/side"), words(kSideWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/choose"), words(kChoiceWords));
+  EXPECT_EQ(listed("/definitions/image/properties/fit"), words(kFitWords));
+  EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
+  EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
+  EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
+  EXPECT_EQ(listed("/properties/generator/properties/precision"), words(kPrecisionWords));
+  EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
+  EXPECT_EQ(listed("/properties/output/properties/dtype"), words(kStoredTypeWords));
+  EXPECT_EQ(listed("/properties/errors/properties/policy"), words(kPolicyWords));
+}
+
+TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
+  const auto stated = [](const char* pointer) { return testing::stated_default(kSchema, pointer); };
+  const JobManifest manifest;
+  const SourceSpec source;
+  EXPECT_EQ(stated("/properties/seed"), manifest.seed);
+  EXPECT_EQ(stated("/definitions/source/properties/split"), source.split);
+  EXPECT_EQ(stated("/definitions/pairs/properties/side"), to_string(source.pairs.side));
+  EXPECT_EQ(stated("/definitions/pairs/properties/choose"), to_string(source.pairs.choose));
+  EXPECT_EQ(stated("/definitions/pairs/properties/min_pairs"), source.pairs.min_pairs);
+  EXPECT_EQ(stated("/definitions/image/properties/fit"), to_string(manifest.image.fit));
+  const GeneratorSpec& generator = manifest.generator;
+  EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));
+  EXPECT_EQ(stated("/properties/generator/properties/weights"), generator.weights);
+  EXPECT_EQ(stated("/properties/generator/properties/precision"), to_string(generator.precision));
+  EXPECT_EQ(stated("/properties/generator/properties/engine"),
+            word_of(kEngineWords, generator.engine));
+  EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
+  EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
+            generator.max_displacement_px);
+  EXPECT_EQ(stated("/properties/volume/properties/bins"), manifest.volume.bins);
+  EXPECT_EQ(stated("/properties/volume/properties/normalize"),
+            to_string(manifest.volume.normalize));
+  EXPECT_EQ(stated("/properties/output/properties/samples_per_shard"),
+            manifest.output.samples_per_shard);
+  EXPECT_EQ(stated("/properties/output/properties/dtype"), to_string(manifest.output.dtype));
+  EXPECT_EQ(stated("/properties/output/properties/deflate_level"), manifest.output.deflate_level);
+  EXPECT_EQ(stated("/properties/errors/properties/policy"), to_string(manifest.errors.policy));
+  EXPECT_EQ(stated("/properties/errors/properties/max_count"), manifest.errors.max_count);
+  EXPECT_EQ(stated("/properties/errors/properties/max_fraction"), manifest.errors.max_fraction);
+}
+
+TEST(ManifestSchema, EveryObjectIsClosedAndEveryPropertyDescribed) {
+  EXPECT_EQ(testing::open_or_undescribed(kSchema), "");
+}
+
+TEST(SensorSchema, IsTheSameInBothManifestsAndStatesTheDefaults) {
+  const json& sensor = testing::schema_document(kSchema).at("definitions").at("sensor");
+  EXPECT_EQ(sensor,
+            testing::schema_document("simulation.schema.json").at("definitions").at("sensor"));
+  json defaults;
+  for (const auto& [key, property] : sensor.at("properties").items()) {
+    defaults[key] = property.at("default").get<double>();
+  }
+  EXPECT_EQ(defaults, json::parse(to_json(SensorSpec())));
+}
+
+std::filesystem::path examples() {
+  return std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "examples";
+}
+
+JobManifest example(const std::string& name) { return read_job_manifest(examples() / name); }
+
+TEST(ManifestExamples, AllAreSoundAndMatchTheirSchemas) {
+  const std::map<std::string, std::string> schemas = {
+      {"eventgan-manifest", "manifest.schema.json"},
+      {"eventgan-simulation", "simulation.schema.json"},
+      {"eventgan-training", "training.schema.json"}};
+  std::map<std::string, int> counts;
+  for (const auto& entry : std::filesystem::directory_iterator(examples())) {
+    const nlohmann::json document = testing::read_commented_json(entry.path());
+    const std::string format = document.at("format");
+    ++counts[format];
+    EXPECT_TRUE(testing::schema_accepts(schemas.at(format), document)) << entry.path();
+    if (format == "eventgan-simulation") {
+      EXPECT_NO_THROW(read_simulation_manifest(entry.path())) << entry.path();
+    } else if (format == "eventgan-training") {
+      EXPECT_NO_THROW(read_training_manifest(entry.path())) << entry.path();
+    } else {
+      EXPECT_NO_THROW(read_job_manifest(entry.path())) << entry.path();
+    }
+  }
+  EXPECT_EQ(counts.size(), schemas.size());
+  EXPECT_GE(counts["eventgan-manifest"], 6);
+}
+
+TEST(ManifestExamples, SayWhatTheirNamesSay) {
+  EXPECT_EQ(example("kitti.json").sources.at(0).dataset, DatasetKind::kKittiObject);
+  EXPECT_EQ(example("kitti_raw_gaps.json").sources.at(0).pairs.gaps.size(), 6u);
+  EXPECT_EQ(example("mpii.json").sources.at(0).pairs.side, PairSide::kAround);
+  EXPECT_EQ(example("human36m.json").sources.at(0).layout, Human36mLayout::kFetch);
+  EXPECT_EQ(example("frames.json").image.size, std::nullopt);
+  EXPECT_EQ(example("all.json").sources.size(), 4u);
+}
+
+}  // namespace
+}  // namespace eventgan

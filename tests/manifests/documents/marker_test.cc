@@ -1,0 +1,232 @@
+#include "manifests/documents/marker.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+ShardMarker sample_marker() {
+  return {
+      .shard = "events-train-00000-of-00001.h5",
+      .plan_hash = std::string(64, 'a'),
+      .sha256 = std::string(64, '0'),
+      .size_bytes = 5'000'000'000,
+      .samples = 4,
+      .valid = 2,
+      .quarantined = {{1, "000001", "expected a PNG, got 0 bytes, in a \"b\".png"}, {3, "", ""}},
+      .boxes = {2, 0, 1, 0},
+      .persons = {0, 0, 0, 0},
+      .classes = {{"Car", 2}, {"DontCare", 1}},
+      .gaps = {{1, 3}, {6, 1}},
+      .optional_columns = {"/labels/boxes/alpha"},
+      .stage_seconds = {{"write", 0.1}, {"decode", 1.5}},
+      .wall_seconds = 2.25};
+}
+
+TEST(Marker, TextIsCanonical) {
+  EXPECT_EQ(to_json(sample_marker()), R"({
+  "boxes": [2,0,1,0],
+  "classes": {
+    "Car": 2,
+    "DontCare": 1
+  },
+  "format": "eventgan-marker",
+  "gaps": [
+    {
+      "gap": 1,
+      "samples": 3
+    },
+    {
+      "gap": 6,
+      "samples": 1
+    }
+  ],
+  "optional_columns": [
+    "/labels/boxes/alpha"
+  ],
+  "persons": [0,0,0,0],
+  "plan_hash": ")" + std::string(64, 'a') +
+                                          R"(",
+  "quarantined": [
+    {
+      "reason": "expected a PNG, got 0 bytes, in a \"b\".png",
+      "sample_id": "000001",
+      "slot": 1
+    },
+    {
+      "reason": "",
+      "sample_id": "",
+      "slot": 3
+    }
+  ],
+  "samples": 4,
+  "sha256": ")" + std::string(64, '0') + R"(",
+  "shard": "events-train-00000-of-00001.h5",
+  "size_bytes": 5000000000,
+  "stage_seconds": {
+    "decode": 1.5,
+    "write": 0.1
+  },
+  "valid": 2,
+  "version": 2,
+  "wall_seconds": 2.25
+}
+)");
+}
+
+TEST(Marker, GoesThereAndBack) {
+  ShardMarker marker = sample_marker();
+  EXPECT_EQ(parse_marker(to_json(marker), "m"), marker);
+  marker.quarantined = {};
+  marker.valid = marker.samples = 0;
+  marker.boxes = marker.persons = {};
+  marker.classes = {};
+  marker.gaps = {};
+  marker.optional_columns = {};
+  marker.stage_seconds = {};
+  EXPECT_EQ(parse_marker(to_json(marker), "m"), marker);
+  marker.stage_seconds = {{"odd \"name\"", 1.0 / 3.0}, {"none", 0}, {"tiny", 5e-324}};
+  EXPECT_EQ(parse_marker(to_json(marker), "m"), marker);
+}
+
+TEST(Marker, ReasonsNeedNotBeUtf8) {
+  ShardMarker marker = sample_marker();
+  marker.quarantined[0].reason = std::string(
+      "a\xff"
+      "b\0c",
+      5);  // as a path may be
+  const ShardMarker back = parse_marker(to_json(marker), "m");
+  EXPECT_EQ(back.quarantined[0].reason, std::string("a\xef\xbf\xbd"
+                                                    "b\0c",
+                                                    7));  // U+FFFD
+}
+
+TEST(Marker, SecondsMustBeNumbersThatJsonHas) {
+  for (const double seconds : {std::nan(""), std::numeric_limits<double>::infinity(), -1.0}) {
+    ShardMarker marker = sample_marker();
+    marker.stage_seconds["write"] = seconds;
+    EXPECT_THROW(to_json(marker), std::invalid_argument);
+    marker = sample_marker();
+    marker.wall_seconds = seconds;
+    EXPECT_THROW(to_json(marker), std::invalid_argument);
+  }
+}
+
+TEST(Marker, RowCountsStandOnOneLineHoweverManyTheyAre) {
+  ShardMarker marker = sample_marker();
+  marker.samples = 65536;
+  marker.valid = marker.samples - 2;
+  marker.boxes.assign(65536, 2147483647);
+  marker.persons.assign(65536, 0);
+  marker.classes = {{"a\nname \"quoted\"", 1}};
+  const std::string text = to_json(marker);
+  EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 60);
+  EXPECT_EQ(parse_marker(text, "m"), marker);
+}
+
+struct BadMarker {
+  const char* pointer;
+  const char* value;
+  const char* fault;
+};
+
+TEST(Marker, EveryRuleIsChecked) {
+  const std::vector<BadMarker> table = {
+      {"/format", R"("eventgan-manifest")",
+       R"($.format: expected "eventgan-marker", got "eventgan-manifest")"},
+      {"/version", "1", "$.version: expected 2 (the version that this program reads), got 1"},
+      {"/shard", R"("a.hdf5")", R"($.shard: expected a file name ending in .h5, got "a.hdf5")"},
+      {"/shard", R"("../a.h5")", R"($.shard: expected a file name ending in .h5, got "../a.h5")"},
+      {"/plan_hash", R"("")", R"($.plan_hash: expected a SHA-256 of 64 digits 0-9a-f, got "")"},
+      {"/sha256", "7", "$.sha256: expected a SHA-256 of 64 digits 0-9a-f, got 7"},
+      {"/size_bytes", "1.5", "$.size_bytes: expected an integer 0..9223372036854775807, got 1.5"},
+      {"/samples", "65537", "$.samples: expected an integer 0..65536, got 65537"},
+      {"/valid", "5", "$.valid: expected an integer 0..4, got 5"},
+      {"/valid", "3", "$.valid: expected 2 (samples less quarantined ones), got 3"},
+      {"/quarantined/1/slot", "4", "$.quarantined[1].slot: expected an integer 0..3, got 4"},
+      {"/quarantined/1/slot", "1",
+       "$.quarantined[1].slot: expected slots in ascending order, got 1"},
+      {"/quarantined/0/reason", "null", "$.quarantined[0].reason: expected text, got null"},
+      {"/quarantined/0/slots", "1",
+       R"($.quarantined[0].slots: expected the key "slot" or none, got an unknown key)"},
+      {"/quarantined", "{}", "$.quarantined: expected an array, got an object"},
+      {"/boxes/2", "-1", "$.boxes[2]: expected an integer 0..2147483647, got -1"},
+      {"/boxes/3", "2147483648", "$.boxes[3]: expected an integer 0..2147483647, got 2147483648"},
+      {"/boxes/4", "0",
+       "$.boxes: expected an array of 4 (a number for each sample), got an array of 5"},
+      {"/persons", "[0, 0, 0]",
+       "$.persons: expected an array of 4 (a number for each sample), got an array of 3"},
+      {"/persons", "null", "$.persons: expected an array, got null"},
+      {"/classes/Car", "0", "$.classes.Car: expected an integer 1..9223372036854775807, got 0"},
+      {"/gaps/0/gap", "7", "$.gaps[0].gap: expected an integer 1..6, got 7"},
+      {"/gaps/1/gap", "1", "$.gaps[1].gap: expected gaps in ascending order, got 1"},
+      {"/gaps/1/samples", "5", "$.gaps[1].samples: expected an integer 1..4, got 5"},
+      {"/gaps/0/pairs", "1", "$.gaps[0].pairs: expected one of the keys gap, samples"},
+      {"/optional_columns/0", "3", "$.optional_columns[0]: expected text, got 3"},
+      {"/wall_seconds", "-0.5", "$.wall_seconds: expected a number 0..1e+12, got -0.5"},
+      {"/stage_seconds/write", "-1", "$.stage_seconds.write: expected a number 0..1e+12, got -1"},
+      {"/stage_seconds", "[]", "$.stage_seconds: expected an object, got an array of 0"},
+      {"/host", R"("x")",
+       "$.host: expected one of the keys format, version, shard, plan_hash, sha256, size_bytes, "
+       "samples, valid, quarantined, boxes, persons, classes, gaps, optional_columns, "
+       "stage_seconds, wall_seconds, got an unknown key"},
+  };
+  for (const BadMarker& bad : table) {
+    auto document = nlohmann::json::parse(to_json(sample_marker()));
+    document[nlohmann::json::json_pointer(bad.pointer)] = nlohmann::json::parse(bad.value);
+    const std::string text = document.dump();
+    EXPECT_THAT([&] { parse_marker(text, "m"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr(std::string("m: ") + bad.fault)))
+        << text;
+  }
+}
+
+TEST(Marker, EveryKeyIsRequired) {
+  const auto whole = nlohmann::json::parse(to_json(sample_marker()));
+  for (const auto& [key, value] : whole.items()) {
+    nlohmann::json document = whole;
+    document.erase(key);
+    EXPECT_THAT([&] { parse_marker(document.dump(), "m"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("m: $." + key + ": expected")));
+  }
+}
+
+TEST(Marker, AllFaultsAreReportedAtOnce) {
+  auto document = nlohmann::json::parse(to_json(sample_marker()));
+  document["valid"] = "x";
+  document["sha256"] = "x";
+  document.erase("shard");
+  EXPECT_THAT([&] { parse_marker(document.dump(), "m"); },
+              ThrowsMessage<std::runtime_error>(
+                  "m: $.shard: expected a file name ending in .h5, got nothing\n"
+                  "m: $.sha256: expected a SHA-256 of 64 digits 0-9a-f, got \"x\"\n"
+                  "m: $.valid: expected an integer 0..4, got \"x\""));
+}
+
+TEST(Marker, HalfAFileIsNoMarker) {
+  const std::string text = to_json(sample_marker());
+  // Without the last line feed it is still whole.
+  for (std::size_t size = 0; size + 1 < text.size(); ++size) {
+    EXPECT_THROW(parse_marker(text.substr(0, size), "m"), std::runtime_error) << size;
+  }
+}
+
+TEST(Marker, IsNamedAfterItsShard) {
+  EXPECT_EQ(marker_name("a-00000-of-00001.h5"), "a-00000-of-00001.json");
+  EXPECT_EQ(marker_name("a.h5.h5"), "a.h5.json");
+  EXPECT_THROW(marker_name("a.json"), std::invalid_argument);
+  EXPECT_THROW(marker_name(".h5"), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace eventgan

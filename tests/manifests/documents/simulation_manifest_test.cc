@@ -1,0 +1,159 @@
+#include "manifests/documents/simulation_manifest.h"
+
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "manifests/values/faults.h"
+#include "tests/manifests/documents/json_schema.h"
+#include "tests/manifests/documents/manifest_cases.h"
+
+namespace eventgan {
+namespace {
+
+using testing::ManifestCase;
+
+constexpr char kSimulationSchema[] = "simulation.schema.json";
+
+constexpr char kSoundSimulation[] = R"({
+  "format": "eventgan-simulation", "version": 1, "name": "s",
+  "sources": [{"path": "a/clip.mp4"}, {"path": "drive", "method": "affine"}],
+  "output": {"directory": "out"}
+})";
+
+SimulationManifest parse_simulation(const std::string& text) {
+  return parse_simulation_manifest(text, "/data", "s.json");
+}
+
+const ManifestCase kSimulationCases[] = {
+    {"as it is", {}, {}},
+    {"another format",
+     {{"/format", R"("eventgan-manifest")"}},
+     {R"($.format: expected "eventgan-simulation", got "eventgan-manifest")"}},
+    {"nothing that is required",
+     {{"/name", ""}, {"/sources", ""}, {"/output", ""}},
+     {"$.name: " + testing::kNameRule + "nothing",
+      "$.sources: expected an array of 1 or more, got nothing",
+      "$.output: expected an object, got nothing"}},
+    {"a source of no kind",
+     {{"/sources/0", R"({"path": "", "method": "v2e", "name": "-a", "frames_per_second": 0,
+                         "first_frame": -1, "frame_step": 0, "frame_cont": 3})"}},
+     {R"($.sources[0].path: expected a path, got "")",
+      "$.sources[0].name: " + testing::kNameRule + R"("-a")",
+      R"($.sources[0].method: expected "affine", "clip" or "difference", got "v2e")",
+      "$.sources[0].frames_per_second: expected a number 1e-06..1e+06, got 0",
+      "$.sources[0].first_frame: expected an integer 0..1000000000, got -1",
+      "$.sources[0].frame_step: expected an integer 1..100, got 0",
+      R"($.sources[0].frame_cont: expected the key "frame_count" or none, got an unknown key)"}},
+    {"keys of affine elsewhere",
+     {{"/sources/0/frames_per_picture", "7"}, {"/sources/0/max_displacement_px", "1"}},
+     {R"($.sources[0].frames_per_picture: expected no such key for method "clip" (of affine only), got 7)",
+      R"($.sources[0].max_displacement_px: expected no such key for method "clip" (of affine only), got 1)"}},
+    {"one picture", {{"/sources/1/frame_count", "1"}}, {}},
+    {"a clip of one frame",
+     {{"/sources/0/frame_count", "1"}},
+     {"$.sources[0].frame_count: expected 0 (to the end) or 2 and more frames, since events lie "
+      "between frames, got 1"}},
+    {"a path whose stem is no name",
+     {{"/sources/0/path", R"("my clip.mp4")"}},
+     {"$.sources[0].name: " + testing::kNameRule + "nothing"},
+     true},
+    {"a name twice",
+     {{"/sources/1/name", R"("clip")"}},
+     {R"($.sources[1]: expected a name that no other source has, got "clip" again)"},
+     true},
+    {"the name of an affine recording",
+     {{"/sources/0/name", R"("drive-003")"}},
+     {R"($.sources[0]: expected a name that no recording of an affine source has, got "drive-003")"},
+     true},
+    {"a name with a number", {{"/sources/0/name", R"("clip-003")"}}, {}},
+    {"a size", {{"/size", R"({"width": 16, "height": 8192})"}}, {}},
+    {"a size of one side",
+     {{"/size", R"({"width": 15})"}},
+     {"$.size.height: expected an integer 16..8192, got nothing",
+      "$.size.width: expected an integer 16..8192, got 15"}},
+    {"a sensor out of range",
+     {{"/sensor", R"({"positive_threshold": 0, "refractory_s": "1"})"}},
+     {"$.sensor.positive_threshold: expected a number 0.01..5, got 0",
+      R"($.sensor.refractory_s: expected a number 0..1, got "1")"}},
+};
+
+class SimulationFaults : public ::testing::TestWithParam<ManifestCase> {};
+
+TEST_P(SimulationFaults, AreAllReportedAndSeenByTheSchema) {
+  const std::string text = testing::edited(kSoundSimulation, GetParam().edits);
+  std::string expected, got;
+  for (const std::string& line : GetParam().faults) {
+    expected += (expected.empty() ? "s.json: " : "\ns.json: ") + line;
+  }
+  try {
+    parse_simulation(text);
+  } catch (const UsageError& error) {
+    got = error.what();
+  }
+  EXPECT_EQ(got, expected);
+  EXPECT_EQ(testing::schema_accepts(kSimulationSchema, nlohmann::json::parse(text)),
+            GetParam().faults.empty() || GetParam().beyond_schema);
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, SimulationFaults, ::testing::ValuesIn(kSimulationCases),
+                         [](const auto& entry) { return testing::test_name(entry.param); });
+
+TEST(SimulationManifest, HasTheDefaultsOfItsHeader) {
+  const SimulationManifest manifest = parse_simulation(kSoundSimulation);
+  EXPECT_EQ(manifest.seed, 0u);
+  EXPECT_EQ(manifest.size, std::nullopt);
+  EXPECT_EQ(manifest.sensor, SensorSpec());
+  const SimulationSource& clip = manifest.sources.at(0);
+  EXPECT_EQ(clip.name, "clip");
+  EXPECT_EQ(clip.method, SimulationMethod::kClip);
+  EXPECT_EQ(clip.frames_per_second, std::nullopt);
+  EXPECT_EQ(clip.first_frame, 0);
+  EXPECT_EQ(clip.frame_count, 0);
+  EXPECT_EQ(clip.frame_step, 1);
+  EXPECT_EQ(manifest.sources.at(1).name, "drive");
+  EXPECT_EQ(manifest.sources.at(1).frames_per_picture, 7);
+  EXPECT_EQ(manifest.sources.at(1).max_displacement_px, 5);
+  EXPECT_EQ(resolve(manifest, "a/clip.mp4"), "/data/a/clip.mp4");
+}
+
+TEST(SimulationManifest, HoldsEveryValueGiven) {
+  const SimulationManifest manifest = parse_simulation(R"({
+    "format": "eventgan-simulation", "version": 1, "name": "n", "seed": 9,
+    "sources": [{"path": "p", "name": "q", "method": "affine", "frames_per_second": 29.97,
+      "first_frame": 3, "frame_count": 4, "frame_step": 5, "frames_per_picture": 6,
+      "max_displacement_px": 7.5}],
+    "size": {"width": 346, "height": 260}, "sensor": {"log_epsilon": 0.01},
+    "output": {"directory": "o"}})");
+  EXPECT_EQ(manifest.seed, 9u);
+  const SimulationSource& source = manifest.sources.at(0);
+  EXPECT_EQ(source.path, "p");
+  EXPECT_EQ(source.name, "q");
+  EXPECT_EQ(source.method, SimulationMethod::kAffine);
+  EXPECT_EQ(source.frames_per_second, 29.97);
+  EXPECT_EQ(source.first_frame, 3);
+  EXPECT_EQ(source.frame_count, 4);
+  EXPECT_EQ(source.frame_step, 5);
+  EXPECT_EQ(source.frames_per_picture, 6);
+  EXPECT_EQ(source.max_displacement_px, 7.5);
+  EXPECT_EQ(manifest.size, (ImageSize{.height = 260, .width = 346}));
+  EXPECT_EQ(manifest.sensor.log_epsilon, 0.01);
+  EXPECT_EQ(manifest.output_directory, "o");
+}
+
+TEST(SimulationSchema, IsClosedDescribedAndStatesTheDefaults) {
+  EXPECT_EQ(testing::open_or_undescribed(kSimulationSchema), "");
+  const SimulationSource source;
+  const auto stated = [](const std::string& key) {
+    return testing::stated_default(kSimulationSchema, "/definitions/source/properties/" + key);
+  };
+  EXPECT_EQ(stated("method"), to_string(source.method));
+  EXPECT_EQ(stated("first_frame"), source.first_frame);
+  EXPECT_EQ(stated("frame_count"), source.frame_count);
+  EXPECT_EQ(stated("frame_step"), source.frame_step);
+  EXPECT_EQ(stated("frames_per_picture"), source.frames_per_picture);
+  EXPECT_EQ(stated("max_displacement_px"), source.max_displacement_px);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,198 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "manifests/documents/strict_json_internal.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::array<std::string_view, 4> kWords{"root", "split", "samples_per_shard", "raw_root"};
+
+TEST(NearWord, FindsTheOneFewestEditsAway) {
+  EXPECT_EQ(near_word("rot", kWords), "root");      // inserted
+  EXPECT_EQ(near_word("splitt", kWords), "split");  // deleted
+  EXPECT_EQ(near_word("Root", kWords), "root");     // replaced
+  EXPECT_EQ(near_word("roto", kWords), "root");     // neighbours swapped
+  EXPECT_EQ(near_word("raw_rot", kWords), "raw_root");
+  EXPECT_EQ(near_word("sample_per_shards", kWords), "samples_per_shard");  // two edits
+}
+
+TEST(NearWord, FindsNoneFarAway) {
+  EXPECT_EQ(near_word("rt", kWords), "");  // two edits, but "root" is short
+  EXPECT_EQ(near_word("", kWords), "");
+  EXPECT_EQ(near_word("directory", kWords), "");
+  EXPECT_EQ(near_word("root", {}), "");
+  EXPECT_EQ(near_word(std::string(1'000'000, 'r'), kWords), "");
+}
+
+TEST(NearWord, OfTwoEquallyNearTakesTheFirst) {
+  constexpr std::array<std::string_view, 2> kTwo{"bat", "cat"};
+  EXPECT_EQ(near_word("rat", kTwo), "bat");
+}
+
+enum class Colour { kRed, kGreen };
+constexpr std::array kColours{Word<Colour>{"red", Colour::kRed},
+                              Word<Colour>{"green", Colour::kGreen}};
+
+/// A document with its reader and list.
+struct Reading {
+  explicit Reading(const char* text) : document(nlohmann::json::parse(text)) {}
+  StrictValue value() { return StrictValue(document, faults); }
+  StrictObject object() { return value().object(); }
+
+  nlohmann::json document;
+  FaultList faults{"d"};
+};
+
+TEST(StrictValue, IntegerTakesItsRange) {
+  EXPECT_EQ(Reading("-3").value().integer(-3, 3), -3);
+  EXPECT_EQ(Reading("3").value().integer(-3, 3), 3);
+  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kMost = std::numeric_limits<std::int64_t>::max();
+  EXPECT_EQ(Reading("-9223372036854775808").value().integer(kLeast, kMost), kLeast);
+  EXPECT_EQ(Reading("9223372036854775807").value().integer(kLeast, kMost), kMost);
+}
+
+TEST(StrictValue, IntegerRefusesAllElse) {
+  for (const char* text :
+       {"-4", "4", "2.5", "2.0", "2e0", "\"2\"", "null", "true", "18446744073709551615"}) {
+    Reading reading(text);
+    EXPECT_EQ(reading.value().integer(-3, 3), -3) << text;  // the harmless value
+    EXPECT_THAT(reading.faults.text(),
+                ::testing::StartsWith("d: $: expected an integer -3..3, got "));
+    EXPECT_EQ(reading.value().sound_integer(-3, 3), std::nullopt);
+  }
+}
+
+TEST(StrictValue, AnUnsignedNumberIsNotTakenForANegativeOne) {
+  Reading reading("18446744073709551615");  // as int64 it would be -1
+  EXPECT_EQ(reading.value().sound_integer(-5, 5), std::nullopt);
+}
+
+TEST(StrictValue, NumberTakesWholeOnesToo) {
+  EXPECT_EQ(Reading("1").value().number(0, 1), 1.0);
+  EXPECT_EQ(Reading("0.25").value().number(0, 1), 0.25);
+  Reading high("1.5"), text("\"1\"");
+  EXPECT_EQ(high.value().number(0.5, 1), 0.5);
+  EXPECT_EQ(high.faults.text(), "d: $: expected a number 0.5..1, got 1.5");
+  text.value().number(0, 1);
+  EXPECT_EQ(text.faults.text(), "d: $: expected a number 0..1, got \"1\"");
+}
+
+TEST(StrictValue, Text) {
+  EXPECT_EQ(Reading(R"("a\u0000b")").value().text(), std::string("a\0b", 3));
+  const auto is_a = [](std::string_view text) { return text == "a"; };
+  EXPECT_EQ(Reading(R"("a")").value().text("an a", is_a), "a");
+  Reading wrong(R"("b")");
+  EXPECT_EQ(wrong.value().text("an a", is_a), "");
+  EXPECT_EQ(wrong.faults.text(), "d: $: expected an a, got \"b\"");
+}
+
+TEST(StrictValue, ChoiceListsWhatIsAllowed) {
+  EXPECT_EQ(Reading(R"("green")").value().choice(kColours), Colour::kGreen);
+  Reading wrong(R"("blue")");
+  EXPECT_EQ(wrong.value().sound_choice(kColours), std::nullopt);
+  EXPECT_EQ(wrong.faults.text(), R"(d: $: expected "red" or "green", got "blue")");
+}
+
+TEST(StrictValue, ElementsHaveTheirPaths) {
+  Reading reading(R"([1, [2, "x"]])");
+  const auto elements = reading.value().elements(2);
+  ASSERT_EQ(elements.size(), 2u);
+  EXPECT_EQ(elements[0].integer(0, 9), 1);
+  EXPECT_EQ(reading.faults.text(), "");
+  elements[1].elements()[1].integer(0, 9);
+  EXPECT_EQ(reading.faults.text(), "d: $[1][1]: expected an integer 0..9, got \"x\"");
+}
+
+TEST(StrictValue, ElementsMustBeEnough) {
+  Reading reading("[1]");
+  EXPECT_TRUE(reading.value().elements(2).empty());
+  EXPECT_EQ(reading.faults.text(), "d: $: expected an array of 2 or more, got an array of 1");
+}
+
+TEST(StrictValue, MembersComeSortedWithTheirPaths) {
+  Reading reading(R"({"b c": "x", "a": 1})");
+  const auto members = reading.value().members();
+  ASSERT_EQ(members.size(), 2u);
+  EXPECT_EQ(members[0].first, "a");
+  members[1].second.integer(0, 9);
+  EXPECT_EQ(reading.faults.text(), "d: $[\"b c\"]: expected an integer 0..9, got \"x\"");
+}
+
+TEST(StrictValue, MessagesAreShortAndPrintable) {
+  Reading reading(("\"\\u001b[31m\xc3\xa9" + std::string(1000, 'x') + "\"").c_str());
+  reading.value().integer(0, 9);
+  EXPECT_EQ(reading.faults.text(), "d: $: expected an integer 0..9, got \"\\u001b[31m\\u00e9" +
+                                       std::string(80 - 1 - 16, 'x') + "...");
+}
+
+TEST(StrictObject, ReadsWhatIsThere) {
+  Reading reading(R"({"a": 1, "b": {"c": "x"}})");
+  StrictObject object = reading.object();
+  EXPECT_EQ(object.at("a").integer(0, 9), 1);
+  StrictObject inner = object.at("b").object();
+  EXPECT_EQ(inner.find("c")->text(), "x");
+  EXPECT_FALSE(inner.find("d").has_value());
+  inner.finish();
+  object.finish();
+  EXPECT_EQ(reading.faults.text(), "");
+}
+
+TEST(StrictObject, AMissingMemberIsAFaultThatSaysWhatIsMissing) {
+  Reading reading("{}");
+  StrictObject object = reading.object();
+  object.at("a").integer(0, 9);
+  object.at("b").object().at("c").text();  // below what is missing nothing more is missed
+  object.at("d").elements();
+  EXPECT_EQ(reading.faults.text(),
+            "d: $.a: expected an integer 0..9, got nothing\n"
+            "d: $.b: expected an object, got nothing\n"
+            "d: $.d: expected an array, got nothing");
+}
+
+TEST(StrictObject, WhatIsNoObjectIsOneFault) {
+  Reading reading("[]");
+  StrictObject object = reading.object();
+  object.at("a").integer(0, 9);
+  EXPECT_FALSE(object.find("b").has_value());
+  object.finish();
+  EXPECT_EQ(reading.faults.text(), "d: $: expected an object, got an array of 0");
+}
+
+TEST(StrictObject, EveryUnknownKeyIsAFault) {
+  Reading reading(R"({"widht": 1, "zz": 2, "height": 3})");
+  StrictObject object = reading.object();
+  object.find("width");
+  object.find("width");  // asked for twice, listed once
+  object.find("height");
+  object.finish();
+  EXPECT_EQ(reading.faults.text(),
+            "d: $.widht: expected the key \"width\" or none, got an unknown key\n"
+            "d: $.zz: expected one of the keys width, height, got an unknown key");
+}
+
+TEST(StrictObject, FormatAndVersionMustBeThese) {
+  EXPECT_TRUE(Reading(R"({"format": "f", "version": 2})").object().has_format("f", 2));
+  for (const char* text :
+       {R"({"format": "f", "version": 2.0})", R"({"format": "f", "version": true})",
+        R"({"format": "f"})", R"({"version": 2})", R"({"format": 2, "version": 2})"}) {
+    Reading reading(text);
+    EXPECT_FALSE(reading.object().has_format("f", 2)) << text;
+    EXPECT_FALSE(reading.faults.empty()) << text;
+  }
+  Reading neither("{}");
+  neither.object().has_format("f", 2);
+  EXPECT_EQ(neither.faults.text(),
+            "d: $.format: expected \"f\", got nothing\n"
+            "d: $.version: expected 2 (the version that this program reads), got nothing");
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,105 @@
+#include "manifests/values/job.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "manifests/values/weights.h"
+#include "manifests/values/words.h"
+
+namespace eventgan {
+namespace {
+
+/// Every word names one value, and to_string gives it back.
+template <class T, std::size_t N>
+void expect_one_to_one(const std::array<Word<T>, N>& words) {
+  std::set<std::string_view> names;
+  std::set<T> values;
+  for (const Word<T>& entry : words) {
+    EXPECT_EQ(to_string(entry.value), entry.word);
+    names.insert(entry.word);
+    values.insert(entry.value);
+  }
+  EXPECT_EQ(names.size(), N);
+  EXPECT_EQ(values.size(), N);
+}
+
+TEST(JobWords, GoThereAndBack) {
+  expect_one_to_one(kDatasetWords);
+  expect_one_to_one(kLayoutWords);
+  expect_one_to_one(kSideWords);
+  expect_one_to_one(kChoiceWords);
+  expect_one_to_one(kFitWords);
+  expect_one_to_one(kGreyWords);
+  expect_one_to_one(kGeneratorWords);
+  expect_one_to_one(kPrecisionWords);
+  expect_one_to_one(kNormalizationWords);
+  expect_one_to_one(kStoredTypeWords);
+  expect_one_to_one(kPolicyWords);
+}
+
+TEST(JobWords, NameTheEnginesAndTheProgramsChoice) {
+  EXPECT_EQ(word_of(kEngineWords, std::optional<Engine>()), "auto");
+  EXPECT_EQ(to_string(Engine::kTorch), "torch");
+  EXPECT_EQ(to_string(Engine::kOnednn), "onednn");
+}
+
+TEST(JobWords, AreThoseThatFilesHold) {
+  // Shards and plans hold these; a change is a change of the formats.
+  EXPECT_EQ(to_string(DatasetKind::kKittiObject), "kitti_object");
+  EXPECT_EQ(to_string(DatasetKind::kHuman36m), "human36m");
+  EXPECT_EQ(to_string(PairSide::kAround), "around");
+  EXPECT_EQ(to_string(GreyOrder::kBeforeResize), "before_resize");
+  EXPECT_EQ(to_string(Normalization::kEta98), "eta98");
+  EXPECT_EQ(to_string(StoredType::kFloat16), "float16");
+}
+
+TEST(JobWords, ANumberThatIsNoValueHasNone) {
+  EXPECT_THROW(to_string(static_cast<StoredType>(99)), std::invalid_argument);
+}
+
+TEST(WeightsName, KnowsTheWords) {
+  EXPECT_EQ(parse_weights_name("shipped"), (WeightsName{WeightsOrigin::kShipped, "", {}}));
+  EXPECT_EQ(parse_weights_name("shipped:16"), (WeightsName{WeightsOrigin::kShipped, "", 16}));
+  EXPECT_EQ(parse_weights_name("untrained:1"), (WeightsName{WeightsOrigin::kUntrained, "", 1}));
+  EXPECT_EQ(parse_weights_name("untrained:64"), (WeightsName{WeightsOrigin::kUntrained, "", 64}));
+}
+
+TEST(WeightsName, TakesTheRestForPaths) {
+  for (const char* path : {"w.safetensors", "../a b/w", "shipped.safetensors", "untrained", ":"}) {
+    EXPECT_EQ(parse_weights_name(path), (WeightsName{WeightsOrigin::kFile, path, {}})) << path;
+  }
+}
+
+TEST(WeightsName, RefusesWhatNamesNothing) {
+  using namespace std::string_view_literals;
+  for (const auto text : {""sv, "a\0b"sv, "shipped:"sv, "shipped:0"sv, "shipped:08"sv,
+                          "shipped:8x"sv, "shipped:-8"sv, "shipped:+8"sv, "shipped: 8"sv,
+                          "untrained:"sv, "untrained:65"sv, "untrained:99999999999999999999"sv}) {
+    EXPECT_EQ(parse_weights_name(text), std::nullopt) << text;
+  }
+}
+
+TEST(BeyondLimits, CountAndFractionBothBind) {
+  const ErrorSpec errors{ErrorPolicy::kQuarantine, 3, 0.1};
+  EXPECT_FALSE(beyond_limits(errors, 0, 0));
+  EXPECT_FALSE(beyond_limits(errors, 3, 30));
+  EXPECT_TRUE(beyond_limits(errors, 3, 29));  // 10.3 %
+  EXPECT_TRUE(beyond_limits(errors, 4, 1000));
+}
+
+TEST(BeyondLimits, PolicyFailAllowsNone) {
+  const ErrorSpec errors{ErrorPolicy::kFail, 100, 1};
+  EXPECT_FALSE(beyond_limits(errors, 0, 10));
+  EXPECT_TRUE(beyond_limits(errors, 1, 10));
+}
+
+TEST(LimitsText, SaysWhatThePolicyAllows) {
+  EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}),
+            "at most 3 quarantined pairs and 0.25 of all (errors in the manifest)");
+  EXPECT_EQ(limits_text({ErrorPolicy::kFail, 3, 0.25}),
+            "no quarantined pair (errors.policy in the manifest is \"fail\")");
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,96 @@
+#include "pipeline/conversion/plan_summary.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/small_job.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+class PlanSummary : public ::testing::Test {
+ protected:
+  PlanSummary() {
+    manifest_.sources.resize(1);
+    manifest_.sources[0].root = "kitti/training";
+    manifest_.sources[0].dataset = DatasetKind::kKittiObject;
+    SourceSummary source;
+    source.labelled_frames = 12;
+    source.pairs_by_gap = {{1, 2}, {3, 1}};
+    source.without_partner = 9;
+    source.without_partner_ids = {"a", "b", "c", "d", "e", "f"};
+    source.faults = 1;
+    source.notes = {"2 pictures without labels"};
+    plan_.sources = {source};
+    plan_.shards.resize(1);
+    plan_.shards[0].samples.resize(3);
+  }
+
+  JobManifest manifest_;
+  Plan plan_;
+  const TrialEstimate estimate_{2, 0.5, 90, 4e6};
+};
+
+TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
+  EXPECT_EQ(
+      plan_text(manifest_, plan_, estimate_, 2),
+      "kitti_object kitti/training (train)\n"
+      "  labelled frames  12\n"
+      "  pairs            3  (gap 1: 2, 3: 1)\n"
+      "  without partner  9 pairs of 6 labelled frames  (a, b, c, d, e, ...)\n"
+      "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
+      "  note: 2 pictures without labels\n"
+      "  shards           1\n"
+      "in all 3 pairs in 1 shards, about 4.0 MB and 90 s with 2 threads (0.500 s a pair on one "
+      "thread, measured on 2 pairs)\n");
+}
+
+TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
+  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
+}
+
+TEST_F(PlanSummary, JsonHasTheSameNumbers) {
+  const auto json = nlohmann::json::parse(plan_summary_json(manifest_, plan_, estimate_, 2));
+  EXPECT_EQ(json["pairs"], 3);
+  EXPECT_EQ(json["estimated_bytes"], 4e6);
+  EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
+  EXPECT_EQ(json["sources"][0]["without_partner"], 9);
+  EXPECT_EQ(json["sources"][0]["frames_without_partner"], 6);
+  EXPECT_EQ(json["sources"][0]["without_partner_ids"].size(), 6u);
+}
+
+TEST_F(PlanSummary, WhereEachFrameLacksOnePairOneNumberSaysIt) {
+  plan_.sources[0].without_partner = 6;
+  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1),
+              ::testing::HasSubstr("  without partner  6  (a, b, c, d, e, ...)\n"));
+}
+
+TEST(MeasureTrial, ScalesAFewPairsToTheWholePlan) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 12);
+  const PlannedJob job = make_plan(manifest, "w", "e");
+  const testing::FakeGenerator generator;
+  const TrialEstimate estimate = measure_trial(manifest, job, generator, 2);
+  EXPECT_EQ(estimate.pairs_measured, 4);
+  EXPECT_EQ(generator.calls(), 5);  // one more to warm up
+  EXPECT_GT(estimate.seconds_per_pair, 0);
+  EXPECT_NEAR(estimate.seconds, estimate.seconds_per_pair * 11 / 2, 1e-9);
+  EXPECT_GT(estimate.stored_bytes, 0);
+}
+
+TEST(MeasureTrial, LeavesOutPairsThatFail) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 3);
+  const PlannedJob job = make_plan(manifest, "w", "e");
+  testing::write_file(folder / "clip" / "f_12.png", "");
+  const TrialEstimate estimate = measure_trial(manifest, job, testing::FakeGenerator(), 2);
+  EXPECT_EQ(estimate.pairs_measured, 0);
+  EXPECT_EQ(estimate.seconds, 0);
+}
+
+}  // namespace
+}  // namespace eventgan

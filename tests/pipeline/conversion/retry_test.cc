@@ -1,0 +1,402 @@
+#include "pipeline/conversion/retry.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <map>
+#include <optional>
+#include <sstream>
+
+#include "manifests/values/faults.h"
+#include "pipeline/conversion/convert.h"
+#include "pipeline/folder/amendments.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/finalize.h"
+#include "pipeline/folder/verify_folder.h"
+#include "pipeline/planning/make_plan.h"
+#include "stages/base/files/unfinished_files.h"
+#include "stages/shards/shard_reader.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/small_job.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+/// 12 frames, so 11 pairs in shards of 4, 4 and 3; pair k is of the frames k and k + 1.
+class Retry : public ::testing::Test {
+ protected:
+  Retry() : manifest_(testing::make_small_job(folder_, 12)) {
+    manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0};
+  }
+
+  fs::path picture(int frame) const {
+    return folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png");
+  }
+  void spoil(int frame) const { testing::write_file(picture(frame), "not a picture"); }
+  void mend(int frame) const { testing::write_flat_picture(picture(frame), {20, 30}, 20 * frame); }
+
+  ConversionReport run(const std::string& output = "out") {
+    ConversionOptions options;
+    options.output = folder_ / output;
+    options.threads = 2;
+    return convert(manifest_, generator_, "weights", options);
+  }
+  std::optional<RetryReport> look() {
+    return nothing_to_retry(out_, read_frozen_outline(out_), manifest_, options_);
+  }
+  RetryReport again() { return retry(out_, manifest_, generator_, "weights", options_); }
+
+  std::map<std::string, std::string> shards(const std::string& output) const {
+    std::map<std::string, std::string> bytes;
+    for (const auto& entry : fs::directory_iterator(folder_ / output)) {
+      if (entry.path().extension() == ".h5")
+        bytes[entry.path().filename()] = testing::read_file(entry.path());
+    }
+    return bytes;
+  }
+
+  /// Sample ids and volumes are those of a fresh run; plan hashes differ if pictures had other
+  /// sizes.
+  void expect_sound() const {
+    EXPECT_THAT(verify_folder(out_, {.deep = true, .manifest = {}}).faults, IsEmpty());
+  }
+
+  void expect_sound_after_finalize() const {
+    EXPECT_TRUE(finalize(out_, {}).written);
+    expect_sound();
+  }
+
+  testing::TemporaryFolder folder_;
+  const fs::path out_ = folder_ / "out";
+  JobManifest manifest_;
+  testing::FakeGenerator generator_;
+  RunOptions options_{.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
+};
+
+TEST_F(Retry, RedoesOnlyWhatWasQuarantined) {
+  spoil(5);  // pairs 4 and 5: slots 0 and 1 of the second shard
+  ASSERT_EQ(run().quarantined.size(), 2u);
+  const auto before = shards("out");
+  const int calls = generator_.calls();
+  mend(5);
+  const RetryReport report = again();
+  EXPECT_EQ(report.tried, 2);
+  EXPECT_EQ(report.mended, 2);
+  EXPECT_THAT(report.failed, IsEmpty());
+  EXPECT_EQ(report.quarantined, 0);
+  EXPECT_EQ(report.planned, 11);
+  EXPECT_EQ(report.shards_rewritten, 1);
+  EXPECT_FALSE(report.too_many_faults);
+  EXPECT_EQ(generator_.calls(), calls + 2);
+  const auto after = shards("out");
+  EXPECT_EQ(after.at("job-train-00000-of-00003.h5"), before.at("job-train-00000-of-00003.h5"));
+  EXPECT_NE(after.at("job-train-00001-of-00003.h5"), before.at("job-train-00001-of-00003.h5"));
+  EXPECT_EQ(after.at("job-train-00002-of-00003.h5"), before.at("job-train-00002-of-00003.h5"));
+  expect_sound();
+
+  run("fresh");  // of mended inputs
+  for (int slot = 0; slot < 4; ++slot) {
+    const ShardReader mended(out_ / "job-train-00001-of-00003.h5");
+    const ShardReader fresh(folder_ / "fresh/job-train-00001-of-00003.h5");
+    EXPECT_EQ(mended.stored_chunk(slot), fresh.stored_chunk(slot));
+    EXPECT_EQ(mended.sample(slot).pair.next.path, fresh.sample(slot).pair.next.path);
+  }
+}
+
+TEST_F(Retry, AFileOfTheSameSizeGivesTheShardsOfAFreshRun) {
+  // A picture whose bytes are wrong and whose size is right: the plan is the same, so all is.
+  std::string bytes = testing::read_file(picture(5));
+  const std::string sound = bytes;
+  bytes.replace(8, 8, "damaged!");
+  testing::write_file(picture(5), bytes);
+  ASSERT_EQ(run().quarantined.size(), 2u);
+  testing::write_file(picture(5), sound);
+  EXPECT_EQ(again().mended, 2);
+  EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+  run("fresh");
+  EXPECT_EQ(shards("out"), shards("fresh"));
+}
+
+TEST_F(Retry, AHoleThatWasFilledIsMended) {
+  fs::remove(picture(5));
+  const ConversionReport first = run();
+  // The labelled frame itself is gone with its picture; the pair of the one after it has a hole.
+  ASSERT_EQ(first.quarantined.size(), 1u);
+  mend(5);
+  const RetryReport report = again();
+  EXPECT_EQ(report.mended, 1);
+  EXPECT_EQ(report.quarantined, 0);
+  expect_sound();
+
+  // Made again by convert, the shards have the same bytes.
+  const auto mended = shards("out");
+  for (const auto& [name, bytes] : mended) fs::remove(out_ / name);
+  EXPECT_TRUE(run().complete());
+  EXPECT_TRUE(shards("out") == mended);
+}
+
+TEST_F(Retry, LaterRunsAcceptTheMendedInputs) {
+  spoil(5);
+  run();
+  mend(5);
+  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  again();
+  const auto amendments = read_amendments(out_, read_frozen_plan(out_).hash);
+  ASSERT_EQ(amendments.size(), 1u);
+  EXPECT_EQ(amendments[0].samples.size(), 2u);
+  EXPECT_THAT(amendments[0].fields, ElementsAre(::testing::Key("frames")));
+  const auto mended = shards("out");
+  const int calls = generator_.calls();
+  EXPECT_TRUE(run().complete());
+  EXPECT_EQ(generator_.calls(), calls);
+  EXPECT_EQ(shards("out"), mended);
+}
+
+TEST_F(Retry, WhatStillFailsKeepsItsSlotAndTouchesNothing) {
+  spoil(5);
+  const ConversionReport first = run();
+  const auto before = shards("out");
+  const RetryReport report = again();
+  EXPECT_EQ(report.tried, 2);
+  EXPECT_EQ(report.mended, 0);
+  EXPECT_EQ(report.shards_rewritten, 0);
+  EXPECT_EQ(report.quarantined, 2);
+  ASSERT_EQ(report.failed.size(), 2u);
+  EXPECT_EQ(report.failed[0].shard, "job-train-00001-of-00003.h5");
+  EXPECT_EQ(report.failed[0].slot, 0);
+  EXPECT_EQ(report.failed[0].reason, first.quarantined[0].reason);
+  EXPECT_EQ(shards("out"), before);
+}
+
+TEST_F(Retry, SomeMendedAndSomeNot) {
+  spoil(5);
+  spoil(9);  // pairs 8 and 9 of the last shard
+  ASSERT_EQ(run().quarantined.size(), 4u);
+  mend(9);
+  manifest_.errors = {ErrorPolicy::kQuarantine, 1, 1.0};
+  RetryReport report = again();
+  EXPECT_EQ(report.tried, 4);
+  EXPECT_EQ(report.mended, 2);
+  EXPECT_EQ(report.quarantined, 2);
+  EXPECT_EQ(report.shards_rewritten, 1);
+  EXPECT_TRUE(report.too_many_faults) << "two are left, one is allowed";
+  expect_sound();
+  mend(5);
+  report = again();
+  EXPECT_EQ(report.tried, 2);
+  EXPECT_FALSE(report.too_many_faults);
+  EXPECT_EQ(read_amendments(out_, read_frozen_plan(out_).hash).size(), 2u);
+  expect_sound();
+}
+
+TEST_F(Retry, NothingToDoIsSaid) {
+  run();
+  const auto nothing = look();
+  ASSERT_TRUE(nothing);
+  EXPECT_THAT(nothing->changed_inputs, IsEmpty());
+  EXPECT_EQ(nothing->planned, 11);
+  EXPECT_EQ(nothing->quarantined, 0);
+  const RetryReport report = again();
+  EXPECT_EQ(report.tried, 0);
+  EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+}
+
+TEST_F(Retry, ChangedInputsAreRecordedWhereNothingIsQuarantined) {
+  manifest_.errors = {ErrorPolicy::kFail, 0, 0};
+  spoil(5);
+  EXPECT_THROW(run(), TooManyFaults);
+  mend(5);
+  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  const auto nothing = look();
+  ASSERT_TRUE(nothing);
+  EXPECT_THAT(nothing->changed_inputs, ElementsAre("frames"));
+  EXPECT_EQ(nothing->tried, 0);
+  EXPECT_TRUE(run().complete());
+  expect_sound();
+  EXPECT_THAT(look()->changed_inputs, IsEmpty()) << "once";
+}
+
+TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
+  fs::create_directories(out_);
+  freeze_plan(out_, make_plan(manifest_, "weights", generator_.description()).plan);
+  record_manifest_folder(out_, manifest_);
+  spoil(5);
+  EXPECT_THROW(run(), UsageError);
+  ASSERT_TRUE(look());
+  EXPECT_EQ(run().quarantined.size(), 2u);
+  EXPECT_FALSE(look()) << "samples to redo";
+}
+
+TEST_F(Retry, AHoleThatWasFilledBeforeItsShardWasMadeIsConverted) {
+  manifest_.errors = {ErrorPolicy::kFail, 0, 0};
+  fs::remove(picture(5));
+  EXPECT_THROW(run(), TooManyFaults);
+  mend(5);
+  EXPECT_THROW(run(), UsageError) << "inputs have changed";
+  ASSERT_TRUE(look());
+  const ConversionReport report = run();
+  EXPECT_TRUE(report.complete());
+  EXPECT_THAT(report.quarantined, IsEmpty());
+  expect_sound();
+}
+
+TEST_F(Retry, NothingIsRecordedForAnotherJob) {
+  run();
+  spoil(5);
+  manifest_.text.replace(manifest_.text.find("untrained:1"), 11, "untrained:2");
+  EXPECT_THROW(look(), UsageError);
+  EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+}
+
+TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
+  for (int frame = 0; frame < 12; ++frame) spoil(frame);
+  const ConversionReport first = run();
+  EXPECT_EQ(first.quarantined.size(), 11u);
+  EXPECT_THAT(first.notes, ElementsAre(HasSubstr("size of 11 samples")));
+  finalize(out_, {});
+  for (int frame = 0; frame < 6; ++frame) mend(frame);
+  for (int frame = 6; frame < 12; ++frame) {
+    testing::write_flat_picture(picture(frame), {40, 50}, 20 * frame);
+  }
+  RetryReport report = again();
+  // The pair of the frames 5 and 6 is of two sizes, and never a pair.
+  EXPECT_EQ(report.mended, 10);
+  EXPECT_EQ(report.quarantined, 1);
+  expect_sound_after_finalize();
+  const FrozenOutline frozen = read_frozen_outline(out_);
+  const DatasetParts parts = read_dataset_parts(
+      out_, frozen, scan_shards(out_, frozen.plan.shards, frozen.hash, ScanDepth::kRows));
+  std::map<int, int> heights;
+  for (const ShardState& shard : parts.done) {
+    heights[shard.outline.volume_size.height] += shard.marker->valid;
+  }
+  EXPECT_EQ(heights, (std::map<int, int>{{20, 5}, {40, 5}}));
+
+  // Made again by convert, a shard has the same bytes.
+  fs::remove(out_ / "dataset.h5");
+  const auto mended = shards("out");
+  for (const auto& [name, bytes] : mended) fs::remove(out_ / name);
+  EXPECT_TRUE(run().complete());
+  EXPECT_TRUE(shards("out") == mended);
+}
+
+TEST_F(Retry, APictureOfUnknownSizeMendedWithinItsBytesIsTaken) {
+  const std::string sound = testing::read_file(picture(5));
+  const std::string next = testing::read_file(picture(6));
+  testing::write_file(picture(5), std::string(sound.size(), '?'));
+  testing::write_file(picture(6), std::string(next.size(), '?'));
+  ASSERT_EQ(run().quarantined.size(), 3u);  // pairs 4, 5 and 6
+  testing::write_file(picture(5), sound);
+  testing::write_file(picture(6), next);
+  EXPECT_THAT([&] { run(); },
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` takes them")));
+  EXPECT_EQ(again().mended, 3);
+  EXPECT_TRUE(run().complete());
+  expect_sound_after_finalize();
+}
+
+TEST_F(Retry, IsRefusedForAnotherJobWithoutTouchingAnything) {
+  spoil(5);
+  run();
+  mend(5);
+  const auto before = shards("out");
+  EXPECT_THAT([&] { retry(out_, manifest_, generator_, "other weights", options_); },
+              ::testing::ThrowsMessage<UsageError>(
+                  HasSubstr("weights: expected weights, got other weights")));
+  EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
+  EXPECT_EQ(shards("out"), before);
+}
+
+TEST_F(Retry, NeedsAPlan) { EXPECT_THROW(again(), InputError); }
+
+TEST_F(Retry, LeavesDamagedAndMissingShardsToConvert) {
+  spoil(1);  // pairs 0 and 1 of the first shard
+  spoil(5);
+  run();
+  mend(1);
+  mend(5);
+  std::string bytes = testing::read_file(out_ / "job-train-00001-of-00003.h5");
+  bytes[bytes.size() / 2] ^= 1;
+  testing::write_file(out_ / "job-train-00001-of-00003.h5", bytes);
+  fs::remove(out_ / "job-train-00002-of-00003.h5");
+  fs::remove(out_ / "job-train-00002-of-00003.json");
+  const RetryReport report = again();
+  EXPECT_EQ(report.tried, 2);
+  EXPECT_EQ(report.mended, 2);
+  EXPECT_EQ(report.quarantined, 0);
+  EXPECT_EQ(report.shards_missing, 1);
+  EXPECT_THAT(report.damaged_shards, ElementsAre(HasSubstr("job-train-00001-of-00003.h5")));
+  EXPECT_EQ(testing::read_file(out_ / "job-train-00001-of-00003.h5"), bytes);
+  EXPECT_TRUE(run().complete());
+  expect_sound();
+}
+
+TEST_F(Retry, KilledBetweenShardAndMarkerCostsConvertNothing) {
+  spoil(5);
+  run();
+  mend(5);
+  const std::string name = "job-train-00001-of-00003";
+  const auto before = shards("out");
+  const std::string marker = testing::read_file(out_ / (name + ".json"));
+  again();
+  // The shard is the new one, the marker the old one, the old shard left under a dead one's name.
+  const pid_t dead = ::fork();
+  if (dead == 0) ::_exit(0);
+  ::waitpid(dead, nullptr, 0);
+  testing::write_file(out_ / (name + ".json"), marker);
+  testing::write_file(out_ / to_string(TemporaryName{name + ".h5", host_name(), dead, 0}),
+                      before.at(name + ".h5"));
+  const ConversionReport report = run();
+  EXPECT_EQ(report.shards_done_before, 3);
+  EXPECT_EQ(report.quarantined.size(), 2u);
+  EXPECT_EQ(shards("out"), before);
+  EXPECT_EQ(again().mended, 2);
+  expect_sound();
+}
+
+TEST_F(Retry, ARequestToStopStartsNoShard) {
+  spoil(5);
+  run();
+  mend(5);
+  const auto before = shards("out");
+  std::atomic<bool> asked = false;
+  options_.since_stop_request = [&] { return asked ? std::optional(1.0) : std::nullopt; };
+  options_.make_progress = [&](std::int64_t) {
+    asked = true;
+    return nullptr;
+  };
+  const RetryReport report = again();
+  EXPECT_TRUE(report.stopped);
+  EXPECT_EQ(report.tried, 0);
+  EXPECT_EQ(report.quarantined, 2);
+  EXPECT_EQ(shards("out"), before);
+  EXPECT_THROW(again(), Stopped);  // asked before it has planned
+  EXPECT_EQ(shards("out"), before);
+  options_ = {.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
+  EXPECT_EQ(again().mended, 2);
+}
+
+TEST_F(Retry, ShowsProgress) {
+  spoil(5);
+  run();
+  std::ostringstream shown;
+  options_.make_progress = [&](std::int64_t total) {
+    EXPECT_EQ(total, 2);
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
+  };
+  again();
+  EXPECT_THAT(shown.str(), HasSubstr("2/2 pairs"));
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,246 @@
+#include "pipeline/conversion/sample_stages.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <new>
+#include <stdexcept>
+
+#include "stages/events/volume_statistics.h"
+#include "stages/shards/codec/volume_codec.h"
+#include "tests/testing/fake_dataset.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+/// Two frames of 6x4: 51 and 102 of 255, so x = (0.2 - 0.5) 2 = -0.6 and -0.2, a change of 0.4
+/// everywhere.
+class SampleStagesTest : public ::testing::Test {
+ protected:
+  SampleStagesTest() {
+    testing::write_flat_picture(folder_ / "clip" / "0000.png", {4, 6}, 51);
+    testing::write_flat_picture(folder_ / "clip" / "0001.png", {4, 6}, 102);
+    auto dataset = std::make_unique<testing::FakeDataset>("clip", 2);
+    dataset_ = dataset.get();
+    datasets_.push_back(std::move(dataset));
+    manifest_.directory = folder_.path();
+    manifest_.output.dtype = StoredType::kFloat32;
+    shard_ = {"s.h5", 0, {4, 6}, {}};
+    shard_.samples = {
+        {"0001", "sequence", "1", {{"clip/0000.png", 0}, {"clip/0001.png", 1}, 1, 1, 1.0}, ""}};
+  }
+
+  SampleMessage run() {
+    const SampleStages stages(manifest_, datasets_, generator_, 1);
+    SampleMessage message;
+    message.shard = &shard_;
+    stages.read(message);
+    stages.generate(message);
+    stages.finish(message);
+    return message;
+  }
+
+  testing::TemporaryFolder folder_;
+  JobManifest manifest_;
+  testing::FakeDataset* dataset_;
+  std::vector<std::unique_ptr<Dataset>> datasets_;
+  testing::FakeGenerator generator_;
+  PlannedShard shard_;
+};
+
+TEST_F(SampleStagesTest, MakesAWholeSample) {
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  EXPECT_EQ(message.sample.sample_id, "0001");
+  EXPECT_EQ(message.sample.annotation.original, "label 1");
+  EXPECT_EQ(message.sample.source_size, (ImageSize{4, 6}));
+  ASSERT_EQ(message.sample.labels.boxes.size(), 1u);
+  EXPECT_EQ(message.sample.labels.boxes[0].clipped, (Rectangle{1, 1, 3, 2}));
+  // The fake: 0.4 (b + 1)/9 in each positive channel; the sum over 24 pixels and 9 bins is 0.4 x 24
+  // x 5 = 48.
+  EXPECT_NEAR(message.sample.statistics.sum_positive, 48.0, 1e-4);
+  EXPECT_EQ(message.sample.statistics.sum_negative, 0.0);
+  EXPECT_NEAR(message.sample.statistics.max, 0.4, 1e-6);
+  EXPECT_NEAR(message.sample.statistics.nonzero_fraction, 0.5, 1e-6);
+  EXPECT_FALSE(message.chunk.empty());
+  for (const Stage stage : {Stage::kRead, Stage::kGenerate, Stage::kFinish}) {
+    EXPECT_GT(message.seconds[static_cast<std::size_t>(stage)], 0.0);
+  }
+}
+
+TEST_F(SampleStagesTest, LetterboxBordersHoldNoEvents) {
+  // 6x4 into 12x12: scaled by 2 to 12x8, 2 rows of border above and below, 1/3 of the volume.
+  manifest_.image.size = shard_.volume_size = {12, 12};
+  manifest_.image.fit = ImageFit::kLetterbox;
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  EXPECT_NEAR(message.sample.statistics.nonzero_fraction, 0.5 * 2 / 3, 1e-6);
+  EXPECT_NEAR(message.sample.statistics.sum_positive, 0.4 * 96 * 5, 1e-3);
+  EXPECT_EQ(message.sample.labels.boxes[0].clipped, (Rectangle{2, 4, 6, 6}));
+}
+
+TEST_F(SampleStagesTest, StoresWhatWasGeneratedInItsFrameAndNormalisedIfAsked) {
+  manifest_.image.size = shard_.volume_size = {12, 12};
+  manifest_.image.fit = ImageFit::kLetterbox;
+  for (const Normalization normalization : {Normalization::kNone, Normalization::kEta98}) {
+    for (const StoredType type : {StoredType::kUint8, StoredType::kFloat16, StoredType::kFloat32}) {
+      manifest_.volume.normalize = normalization;
+      manifest_.output.dtype = type;
+      const SampleStages stages(manifest_, datasets_, generator_, 1);
+      SampleMessage message;
+      message.shard = &shard_;
+      stages.read(message);
+      stages.generate(message);
+      std::vector<float> content = message.volume;
+      stages.finish(message);
+      if (normalization == Normalization::kEta98) content = normalized(std::move(content));
+      // 8 rows of 12 pixels a channel, below 2 of 12.
+      std::vector<float> expected;
+      for (auto row = content.begin(); row != content.end(); row += 8 * 12) {
+        expected.resize(expected.size() + 2 * 12);
+        expected.insert(expected.end(), row, row + 8 * 12);
+        expected.resize(expected.size() + 2 * 12);
+      }
+      const VolumeCodec codec(type, manifest_.output.deflate_level);
+      const EncodedVolume encoded = codec.encode(expected);
+      EXPECT_EQ(message.chunk, encoded.chunk);
+      EXPECT_EQ(message.sample.scale, encoded.scale);
+    }
+  }
+}
+
+TEST_F(SampleStagesTest, AGapOutsideThoseTrainedOnIsMarkedAsExtrapolated) {
+  const auto marked = [&](int gap) {
+    shard_.samples[0].pair.gap_frames = gap;
+    return (run().sample.statistics.flags & kFlagExtrapolated) != 0;
+  };
+  EXPECT_FALSE(marked(6)) << "nobody knows what it was trained on";
+  generator_.train_on({1, 5});
+  EXPECT_FALSE(marked(5));
+  EXPECT_TRUE(marked(6));
+  generator_.train_on({1, 6});
+  EXPECT_FALSE(marked(6));
+  generator_.train_on({2, 3});
+  EXPECT_TRUE(marked(1));
+  EXPECT_FALSE(marked(2));
+  EXPECT_TRUE(marked(4));
+}
+
+TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
+  shard_.samples[0].pair.next = shard_.samples[0].pair.previous;
+  manifest_.volume.normalize = Normalization::kEta98;
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed());
+  EXPECT_EQ(message.sample.statistics.flags, kFlagEmpty);
+  EXPECT_EQ(message.sample.statistics.eta98, 0.0f);
+}
+
+/// Gives the same value everywhere, or no memory.
+class FlatGenerator final : public Generator {
+ public:
+  explicit FlatGenerator(float value) : value_(value) {}
+  int bins() const override { return 9; }
+  void generate(std::span<const float>, ImageSize, std::span<float> volume) const override {
+    if (value_ < 0) throw std::bad_alloc();
+    std::ranges::fill(volume, value_);
+  }
+  std::string description() const override { return "flat"; }
+
+ private:
+  float value_;
+};
+
+TEST_F(SampleStagesTest, AVolumeThatIsTooFaintForItsTypeIsMarked) {
+  // Half steps of 2^-24, halves' smallest number, are 2^-25 = 2.98e-8.
+  const auto flags = [&](float value, StoredType type) {
+    const FlatGenerator generator(value);
+    manifest_.output.dtype = type;
+    const SampleStages stages(manifest_, datasets_, generator, 1);
+    SampleMessage message;
+    message.shard = &shard_;
+    stages.read(message);
+    stages.generate(message);
+    stages.finish(message);
+    return message.sample.statistics.flags;
+  };
+  EXPECT_EQ(flags(2.9e-8f, StoredType::kFloat16), kFlagVanished);
+  EXPECT_EQ(flags(3.0e-8f, StoredType::kFloat16), 0u);
+  EXPECT_EQ(flags(0, StoredType::kFloat16), kFlagEmpty);
+  EXPECT_EQ(flags(2.9e-8f, StoredType::kUint8), 0u);
+  EXPECT_EQ(flags(1e-40f, StoredType::kUint8), kFlagVanished);
+  EXPECT_EQ(flags(1e-40f, StoredType::kFloat32), 0u);
+}
+
+TEST_F(SampleStagesTest, WhereMemoryIsShortTheSampleAndItsFramesAreNamed) {
+  const FlatGenerator generator(-1);
+  const SampleStages stages(manifest_, datasets_, generator, 1);
+  SampleMessage message;
+  message.shard = &shard_;
+  stages.read(message);
+  EXPECT_THAT([&] { stages.generate(message); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("of 6x4, in clip/0000.png and clip/0001.png (0001)")));
+}
+
+TEST_F(SampleStagesTest, AFrameThatCannotBeReadKeepsTheOriginalLabel) {
+  testing::write_file(folder_ / "clip" / "0000.png", "");
+  const SampleMessage message = run();
+  EXPECT_TRUE(message.failed());
+  EXPECT_THAT(message.sample.fault, ::testing::AllOf(::testing::HasSubstr("clip/0000.png"),
+                                                     ::testing::HasSubstr("0001")));
+  EXPECT_EQ(message.sample.annotation.original, "label 1");
+  EXPECT_TRUE(message.sample.annotation.boxes.empty());
+  EXPECT_TRUE(std::isnan(message.sample.source_to_volume[0]));
+  EXPECT_EQ(generator_.calls(), 0);
+}
+
+TEST_F(SampleStagesTest, AMalformedLabelIsAFault) {
+  dataset_->break_annotation(1);
+  const SampleMessage message = run();
+  EXPECT_TRUE(message.failed());
+  EXPECT_EQ(message.sample.fault, "expected a label, got rubbish, in label 1 (0001)");
+}
+
+TEST_F(SampleStagesTest, ALabelOutsideThePictureIsAFault) {
+  Annotation annotation;
+  annotation.original = "far away";
+  annotation.boxes.resize(1);
+  annotation.boxes[0].xyxy = {100, 100, 120, 120};
+  dataset_->set_annotation(1, annotation);
+  const SampleMessage message = run();
+  EXPECT_TRUE(message.failed());
+  EXPECT_EQ(message.sample.annotation.original, "far away");
+  EXPECT_THAT(message.sample.fault, ::testing::HasSubstr("in clip/1.txt"));
+}
+
+TEST_F(SampleStagesTest, AVolumeThatIsNotFiniteIsAFaultThatNamesTheFrames) {
+  generator_.fail_on((51 / 255.0f - 0.5f) * 2);
+  const SampleMessage message = run();
+  EXPECT_TRUE(message.failed());
+  EXPECT_THAT(message.sample.fault, ::testing::AllOf(::testing::HasSubstr("got nan in channel 0"),
+                                                     ::testing::HasSubstr("clip/0000.png"),
+                                                     ::testing::HasSubstr("clip/0001.png"),
+                                                     ::testing::HasSubstr("(0001)")));
+  EXPECT_TRUE(message.chunk.empty());
+}
+
+TEST_F(SampleStagesTest, AFaultOfThePlanIsPassedOn) {
+  shard_.samples[0].fault = "expected a frame, got no file, in clip/0007.png (0001)";
+  const SampleMessage message = run();
+  EXPECT_TRUE(message.failed());
+  EXPECT_EQ(message.sample.fault, shard_.samples[0].fault);
+}
+
+TEST_F(SampleStagesTest, AFrameOfAnotherSizeThanPlannedIsAFault) {
+  shard_.volume_size = {5, 6};
+  EXPECT_THAT(run().sample.fault, ::testing::HasSubstr("expected frames of 6x5, got 6x4"));
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,97 @@
+#include "tests/pipeline/folder/converted_folder.h"
+
+#include "manifests/documents/marker.h"
+#include "stages/base/files/atomic_file.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan::testing {
+namespace {
+
+constexpr char kManifest[] = R"({  // manifests may have comments
+  "format": "eventgan-manifest", "version": 1, "name": "demo", "seed": 7,
+  "sources": [
+    {"dataset": "kitti_object", "root": "kitti", "split": "train",
+     "pairs": {"gaps": [2], "side": "before", "choose": "one"}},
+    {"dataset": "kitti_object", "root": "more", "split": "val",
+     "pairs": {"gaps": [2], "side": "before", "choose": "one"}},
+    {"dataset": "kitti_object", "root": "most", "split": "train",
+     "pairs": {"gaps": [2], "side": "before", "choose": "one"}}],
+  "image": {"preset": "kitti"}, "generator": {"weights": "untrained:2"},
+  "output": {"directory": "out", "samples_per_shard": 5},
+  "errors": {"policy": "quarantine", "max_count": 3, "max_fraction": 0.5}
+})";
+
+/// The example's second sample alone, which has no labels.
+ExampleShard last_shard() {
+  ExampleShard shard = example_shard();
+  shard.samples = {shard.samples[1]};
+  shard.volumes = {shard.volumes[1]};
+  shard.header.sample_count = 1;
+  return shard;
+}
+
+PlannedShard planned(const std::string& name, int source, const ExampleShard& example) {
+  PlannedShard shard{name, source, example.header.volume.size, {}};
+  for (const ShardSample& sample : example.samples) {
+    shard.samples.push_back({sample.sample_id, sample.sequence, sample.sample_id, sample.pair, ""});
+  }
+  return shard;
+}
+
+Plan make_demo_plan() {
+  Plan plan;
+  plan.name = "demo";
+  plan.manifest_text = kManifest;
+  plan.fingerprint = {
+      {"cpu", "x86-64 avx2 fma"}, {"annotations", "0123"}, {"manifest $.seed", "7"}};
+  plan.sources.resize(3);
+  plan.sources[0].labelled_frames = 6;
+  plan.sources[0].without_partner = 1;
+  plan.sources[1].notes = {"clip.mp4: 60 of 100 frames"};
+  plan.shards = {planned("demo-train-00000-of-00003.h5", 0, example_shard()),
+                 planned("demo-val-00000-of-00001.h5", 1, example_shard()),
+                 planned("demo-train-00001-of-00003.h5", 2, example_shard()),
+                 planned("demo-train-00002-of-00003.h5", 2, last_shard())};
+  return plan;
+}
+
+}  // namespace
+
+ConvertedFolder::ConvertedFolder(int count) : path_(folder_ / "out") {
+  std::filesystem::create_directories(path_);
+  frozen_ = freeze_plan(path_, make_demo_plan());
+  for (int number = 0; number < count; ++number) add(number);
+}
+
+std::filesystem::path ConvertedFolder::marker_file(int number) const {
+  return path_ / marker_name(plan().shards[at(number)].name);
+}
+
+void ConvertedFolder::add(int number, void (*change)(ExampleShard&)) {
+  const PlannedShard& planned = plan().shards[at(number)];
+  ExampleShard example = number == 3 ? last_shard() : example_shard();
+  example.header.name = planned.name;
+  example.header.split = number == 1 ? "val" : "train";
+  example.header.plan_hash = plan_hash();
+  if (change) change(example);
+  ShardMarker marker = write_shard(path_, example);
+  marker.plan_hash = plan_hash();
+  write_marker(number, marker);
+}
+
+void ConvertedFolder::write_marker(int number, const ShardMarker& marker) const {
+  write_file_atomically(marker_file(number), to_json(marker));
+}
+
+ShardMarker ConvertedFolder::marker(int number) const {
+  return parse_marker(read_file(marker_file(number)), marker_file(number).string());
+}
+
+DatasetParts parts_of(const ConvertedFolder& folder) {
+  const FrozenOutline frozen = read_frozen_outline(folder.path());
+  return read_dataset_parts(
+      folder.path(), frozen,
+      scan_shards(folder.path(), frozen.plan.shards, frozen.hash, ScanDepth::kRows));
+}
+
+}  // namespace eventgan::testing

@@ -1,0 +1,208 @@
+#include "pipeline/folder/dataset_description.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "tests/pipeline/folder/converted_folder.h"
+
+namespace eventgan {
+namespace {
+
+using nlohmann::json;
+using testing::ConvertedFolder;
+using ::testing::ElementsAre;
+using testing::parts_of;
+
+TEST(DatasetCounts, AddUp) {
+  ShardMarker marker;
+  marker.samples = 3;
+  marker.valid = 2;
+  marker.size_bytes = 5'000'000'000;
+  marker.boxes = {2147483647, 0, 2147483647};
+  marker.persons = {1, 0, 4};
+  marker.classes = {{"Car", 4'000'000'000}};
+  marker.gaps = {{1, 3}};
+  DatasetCounts counts;
+  EXPECT_EQ(counts.quarantined(), 0);
+  add(marker, counts);
+  marker.classes = {{"Van", 1}};
+  marker.gaps = {{1, 1}, {6, 2}};
+  add(marker, counts);
+  EXPECT_EQ(counts.shards, 2);
+  EXPECT_EQ(counts.samples, 6);
+  EXPECT_EQ(counts.quarantined(), 2);
+  EXPECT_EQ(counts.boxes, 4LL * 2147483647);
+  EXPECT_EQ(counts.persons, 10);
+  EXPECT_EQ(counts.size_bytes, 10'000'000'000);
+  EXPECT_EQ(counts.classes,
+            (std::map<std::string, std::int64_t>{{"Car", 4'000'000'000}, {"Van", 1}}));
+  EXPECT_EQ(counts.gaps, (std::map<int, std::int64_t>{{1, 4}, {6, 2}}));
+}
+
+/// Adds a shard of one sample.
+void add_shard(DatasetParts& parts, const std::string& name, int source, ImageSize size) {
+  ShardMarker marker;
+  marker.shard = name;
+  marker.samples = 1;
+  marker.valid = 1;
+  marker.boxes = {1};
+  marker.persons = {0};
+  parts.done.push_back({{name, source, size, 1}, ShardCondition::kDone, marker});
+}
+
+/// Three sources, in this order: kitti_object train, kitti_object val, mpii train.
+DatasetParts three_sources() {
+  DatasetParts parts;
+  for (int i = 0; i < 3; ++i) {
+    SourceSpec source;
+    source.dataset = i == 2 ? DatasetKind::kMpii : DatasetKind::kKittiObject;
+    source.split = i == 1 ? "val" : "train";
+    parts.manifest.sources.push_back(source);
+    ShardHeader& header = parts.headers[i];
+    header.dataset = to_string(source.dataset);
+    header.volume = {9, {1, 1}};
+    header.label_schema = i == 2 ? LabelSchema{{}, {"nose"}} : LabelSchema{{"Car"}, {}};
+  }
+  return parts;
+}
+
+std::vector<std::string> groups_of(const DatasetParts& parts) {
+  std::vector<std::string> groups;
+  for (const DatasetView& view : views_of(parts)) groups.push_back(view.group);
+  return groups;
+}
+
+TEST(DatasetViews, ShardsThatAreAlikeAreOneViewAtTheRoot) {
+  DatasetParts parts = three_sources();
+  add_shard(parts, "a", 0, {375, 1242});
+  add_shard(parts, "b", 1, {375, 1242});
+  add_shard(parts, "c", 0, {375, 1242});
+  const std::vector<DatasetView> views = views_of(parts);
+  ASSERT_EQ(views.size(), 1u);
+  EXPECT_EQ(views[0].group, "");
+  EXPECT_EQ(views[0].header.volume, (VolumeShape{9, {375, 1242}}));
+  EXPECT_THAT(views[0].layout.splits,
+              ElementsAre(SplitRange{"train", {0, 2}}, SplitRange{"val", {2, 1}}));
+}
+
+TEST(DatasetViews, OtherSizesAndOtherDatasetsAreOtherViews) {
+  DatasetParts parts = three_sources();
+  add_shard(parts, "a", 0, {375, 1242});
+  add_shard(parts, "b", 0, {370, 1224});
+  add_shard(parts, "c", 1, {375, 1242});
+  add_shard(parts, "d", 2, {375, 1242});
+  EXPECT_THAT(groups_of(parts),
+              ElementsAre("kitti_object-375x1242", "kitti_object-370x1224", "mpii-375x1242"));
+  EXPECT_EQ(views_of(parts)[0].layout.sample_count(), 2);
+}
+
+TEST(DatasetViews, OtherSchemasAreOtherViews) {
+  DatasetParts parts = three_sources();
+  parts.headers[1].label_schema.class_names = {"Van", "Car"};
+  add_shard(parts, "a", 0, {4, 4});
+  add_shard(parts, "b", 1, {4, 4});
+  EXPECT_THAT(groups_of(parts), ElementsAre("kitti_object-4x4", "kitti_object-4x4-2"));
+}
+
+TEST(DatasetViews, NoShardsNoViews) { EXPECT_THAT(groups_of(three_sources()), ElementsAre()); }
+
+json description_of(const ConvertedFolder& folder) {
+  const DatasetParts parts = parts_of(folder);
+  return json::parse(describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
+}
+
+TEST(DatasetDescription, SaysWhatTheDatasetIs) {
+  const ConvertedFolder folder;
+  const json text = description_of(folder);
+  EXPECT_EQ(text["format"], "eventgan-dataset");
+  EXPECT_EQ(text["version"], 1);
+  EXPECT_EQ(text["name"], "demo");
+  EXPECT_EQ(text["complete"], true);
+  EXPECT_EQ(text["missing"], json::array());
+  EXPECT_EQ(text["plan_hash"], folder.plan_hash());
+  EXPECT_EQ(text["weights_hash"], std::string(64, 'b'));
+  EXPECT_EQ(text["generator"], "a fake generator");
+  EXPECT_EQ(text["program_version"], "0.1.0");
+  EXPECT_EQ(text["fingerprint"]["cpu"], "x86-64 avx2 fma");
+  EXPECT_FALSE(text["fingerprint"].contains("manifest $.seed"));  // stands in the settings
+  EXPECT_EQ(text["settings"]["seed"], 7);
+  EXPECT_FALSE(text.contains("amendments"));
+}
+
+TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
+  const ConvertedFolder folder;
+  const json text = description_of(folder);
+  // The example: 5 samples, one in quarantine, 3 boxes (Car, DontCare, Car), 3 persons, gap 2.
+  const json& total = text["counts"]["total"];
+  EXPECT_EQ(total["shards"], 4);
+  EXPECT_EQ(total["samples"], 16);
+  EXPECT_EQ(total["valid"], 13);
+  EXPECT_EQ(total["quarantined"], 3);
+  EXPECT_EQ(total["boxes"], 9);
+  EXPECT_EQ(total["boxes_by_class"], (json{{"Car", 6}, {"DontCare", 3}}));
+  EXPECT_EQ(total["persons"], 9);
+  EXPECT_EQ(total["samples_by_gap"], (json{{"2", 16}}));
+  EXPECT_EQ(text["counts"]["by_dataset"], (json{{"kitti_object", total}}));
+  EXPECT_EQ(text["counts"]["by_split"]["val"]["samples"], 5);
+  EXPECT_EQ(text["counts"]["by_split"]["train"]["samples"], 11);
+  const ShardMarker marker = folder.marker(1);
+  EXPECT_EQ(text["shards"][1], (json{{"name", "demo-val-00000-of-00001.h5"},
+                                     {"split", "val"},
+                                     {"dataset", "kitti_object"},
+                                     {"samples", 5},
+                                     {"valid", 4},
+                                     {"boxes", 3},
+                                     {"persons", 3},
+                                     {"size_bytes", marker.size_bytes},
+                                     {"sha256", marker.sha256}}));
+}
+
+TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
+  const json text = description_of(ConvertedFolder());
+  ASSERT_EQ(text["quarantined"].size(), 3u);
+  EXPECT_EQ(text["quarantined"][1],
+            (json{{"sample_id", "000002"},
+                  {"shard", "demo-val-00000-of-00001.h5"},
+                  {"slot", 2},
+                  {"reason", "cannot decode kitti/image_2/000002.png (000002)"}}));
+}
+
+TEST(DatasetDescription, TellsOfTheViewAndItsSplits) {
+  const json view = description_of(ConvertedFolder())["view"];
+  EXPECT_EQ(view["name"], "dataset.h5");
+  EXPECT_EQ(view["sha256"], std::string(64, 'c'));
+  EXPECT_EQ(view["size_bytes"], 77);
+  EXPECT_EQ(view["views"][0]["group"], "/");
+  EXPECT_EQ(view["views"][0]["volume_shape"], (json{4, 6, 8}));
+  EXPECT_EQ(view["views"][0]["splits"][1], (json{{"name", "val"}, {"first", 11}, {"rows", 5}}));
+}
+
+TEST(DatasetDescription, OfASourceWithoutShardsTheNamesAreUnknown) {
+  const json text = description_of(ConvertedFolder(1));
+  EXPECT_EQ(text["complete"], false);
+  EXPECT_EQ(text["missing"].size(), 3u);
+  EXPECT_EQ(text["sources"][0]["class_names"], (json{"Car", "DontCare"}));
+  EXPECT_EQ(text["sources"][0]["labelled_frames"], 6);
+  EXPECT_EQ(text["sources"][1]["class_names"], json());
+}
+
+TEST(DatasetDescription, AmendmentsAreTold) {
+  const ConvertedFolder folder;
+  record_amendment(folder.path(), folder.plan_hash(), {{{"annotations", "4567"}}, {"000002"}});
+  const json text = description_of(folder);
+  EXPECT_EQ(text["fingerprint"]["annotations"], "4567");
+  EXPECT_EQ(text["amendments"],
+            json::array({{{"fields", {{"annotations", "4567"}}}, {"samples", {"000002"}}}}));
+}
+
+TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {
+  const ConvertedFolder folder;
+  DatasetParts parts = parts_of(folder);
+  parts.done[0].marker->quarantined[0].reason = "cannot read \xff.png";
+  EXPECT_NO_THROW(describe_dataset(parts, views_of(parts), {}));
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,273 @@
+#include "pipeline/folder/verify_folder.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/values/faults.h"
+#include "pipeline/conversion/convert.h"
+#include "pipeline/folder/finalize.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
+#include "stages/base/files/atomic_file.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/small_job.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+TEST(StrayFiles, AreThoseThatLookLikeThePlansAndAreNot) {
+  const testing::TemporaryFolder folder;
+  PlanOutline plan;
+  plan.shards = {{"job-train-00000-of-00001.h5", 0, {2, 2}, 1}};
+  for (const char* name :
+       {"job-train-00000-of-00001.h5", "job-train-00000-of-00001.json", "plan.json", "run.json",
+        "amendments.json", "dataset.json", "dataset.h5", "notes.txt", "pictures/deeper.h5",
+        ".job-train-00000-of-00001.h5.host.1.1.tmp"}) {
+    testing::write_file(folder / name, "");
+  }
+  testing::write_file(folder / "mine.json", R"({ "format": "eventgan-manifest", // a job
+                                                 "version": 1 })");
+  EXPECT_THAT(stray_files(folder.path(), plan), IsEmpty());
+
+  testing::write_file(folder / "old.h5", "");
+  testing::write_file(folder / "job-train-00000-of-00009.json", R"({"format": "eventgan-marker"})");
+  std::filesystem::create_directory(folder / "folder.json");
+  const auto fault = [&](const char* name) {
+    return (folder / name).string() + ": expected files of the plan only, got another file";
+  };
+  EXPECT_THAT(
+      stray_files(folder.path(), plan),
+      ElementsAre(fault("folder.json"), fault("job-train-00000-of-00009.json"), fault("old.h5")));
+}
+
+class DatasetFaults : public ::testing::Test {
+ protected:
+  DatasetFaults() {
+    ConversionOptions options;
+    options.output = out_;
+    options.threads = 1;
+    convert(testing::make_small_job(folder_, 7), testing::FakeGenerator(), "weights", options);
+    finalize(out_, {});
+  }
+
+  /// Changes some bytes of a file.
+  void change(const std::filesystem::path& file, const std::string& from, const std::string& to) {
+    std::string bytes = testing::read_file(file);
+    bytes.replace(bytes.find(from), from.size(), to);
+    testing::write_file(file, bytes);
+  }
+
+  std::vector<std::string> faults(bool sound = true) const {
+    const FrozenOutline frozen = read_frozen_outline(out_);
+    std::vector<ShardState> shards = scan_shards(out_, frozen.plan.shards, frozen.hash);
+    for (ShardState& shard : shards) {
+      if (!sound) shard.faults = {"not what its marker says"};
+    }
+    return dataset_faults(out_, frozen, shards);
+  }
+
+  testing::TemporaryFolder folder_;
+  const std::filesystem::path out_ = folder_ / "out";
+  const std::filesystem::path description_ = out_ / "dataset.json";
+  const std::filesystem::path view_ = out_ / "dataset.h5";
+};
+
+TEST_F(DatasetFaults, AreNoneAfterFinalizeAndBeforeIt) {
+  EXPECT_THAT(faults(), IsEmpty());
+  std::filesystem::remove(description_);
+  std::filesystem::remove(view_);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(DatasetFaults, OneWithoutTheOtherIsNamed) {
+  const std::string bytes = testing::read_file(view_);
+  std::filesystem::remove(view_);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(description_.string()),
+                                          HasSubstr("expected dataset.h5 beside it"))));
+  testing::write_file(view_, bytes);
+  std::filesystem::remove(description_);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(view_.string()),
+                                          HasSubstr("expected dataset.json beside it"))));
+}
+
+TEST_F(DatasetFaults, AViewWithOtherBytesIsNamed) {
+  std::string bytes = testing::read_file(view_);
+  bytes[bytes.size() / 2] ^= 1;
+  testing::write_file(view_, bytes);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(description_.string()), HasSubstr("\"sha256\""),
+                                          HasSubstr("in line"))));
+}
+
+TEST_F(DatasetFaults, ADescriptionThatTheMarkersDoNotGiveIsNamedWithItsFirstDifference) {
+  const std::string text = testing::read_file(description_);
+  change(description_, "\"samples\": 6", "\"samples\": 7");
+  EXPECT_THAT(faults(),
+              ElementsAre(AllOf(HasSubstr("\"samples\": 6"), HasSubstr(", got \"samples"),
+                                HasSubstr("\"samples\": 7"), HasSubstr("eventgan finalize"))));
+  for (const std::string& torn : {text.substr(0, text.size() / 2), std::string(), text + "\n"}) {
+    testing::write_file(description_, torn);
+    EXPECT_THAT(faults(), ElementsAre(HasSubstr(description_.string())));
+  }
+}
+
+TEST_F(DatasetFaults, AShardThatHasChangedSinceIsNamed) {
+  std::filesystem::remove(out_ / "job-train-00001-of-00002.json");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(description_.string())));
+  std::filesystem::remove(out_ / "job-train-00000-of-00002.json");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected committed shards beside it, got none")));
+}
+
+TEST_F(DatasetFaults, WithoutASoundShardThereIsNothingToCompareWith) {
+  EXPECT_THAT(faults(false),
+              ElementsAre(AllOf(HasSubstr(description_.string()),
+                                HasSubstr("expected a sound shard of each source"))));
+}
+
+class VerifyFolder : public ::testing::Test {
+ protected:
+  VerifyFolder() {
+    ConversionOptions options;
+    options.output = out_;
+    options.threads = 1;
+    convert(testing::make_small_job(folder_, 7), testing::FakeGenerator(), "weights", options);
+  }
+
+  std::vector<std::string> faults() const { return verify_folder(out_).faults; }
+
+  testing::TemporaryFolder folder_;
+  const std::filesystem::path out_ = folder_ / "out";
+  const std::filesystem::path shard_ = out_ / "job-train-00001-of-00002.h5";
+  const std::filesystem::path marker_ = out_ / "job-train-00001-of-00002.json";
+};
+
+TEST_F(VerifyFolder, FindsNothingInASoundFolder) {
+  const FolderCheck check = verify_folder(out_);
+  EXPECT_THAT(check.faults, ElementsAre());
+  EXPECT_EQ(check.shards, 2);
+  EXPECT_EQ(check.samples, 6);
+  EXPECT_EQ(check.valid, 6);
+}
+
+TEST_F(VerifyFolder, NamesAMissingMarkerAndAMissingShard) {
+  std::filesystem::remove(marker_);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("not committed")));
+  std::filesystem::remove(shard_);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(marker_.string())));
+}
+
+TEST_F(VerifyFolder, NamesADamagedShard) {
+  std::string bytes = testing::read_file(shard_);
+  bytes[bytes.size() / 2] ^= 1;
+  testing::write_file(shard_, bytes);
+  EXPECT_THAT(faults(), ::testing::Contains(HasSubstr(shard_.string())));
+}
+
+TEST_F(VerifyFolder, NamesATornAndAForeignMarker) {
+  const std::string text = testing::read_file(marker_);
+  testing::write_file(marker_, text.substr(0, text.size() / 2));
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(marker_.string())));
+  testing::write_file(marker_, testing::read_file(out_ / "job-train-00000-of-00002.json"));
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(marker_.string()),
+                                          HasSubstr("got one of job-train-00000-of-00002.h5"))));
+}
+
+TEST_F(VerifyFolder, NamesATruncatedAndAnEmptiedShard) {
+  for (const std::uintmax_t size : {1000, 0}) {
+    std::filesystem::resize_file(shard_, size);
+    EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(shard_.string()),
+                                            HasSubstr("got " + std::to_string(size)))));
+  }
+  std::filesystem::remove(shard_);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(shard_.string()), HasSubstr("got no file"))));
+}
+
+TEST_F(VerifyFolder, NamesAPlanThatIsNotTheMarkers) {
+  std::string plan = testing::read_file(out_ / "plan.json");
+  plan.replace(plan.find("f_10.png"), 8, "f_11.png");
+  testing::write_file(out_ / "plan.json", plan);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr((out_ / "plan.json").string()),
+                                          HasSubstr("that all markers name")),
+                                    HasSubstr("00000-of-00002.json"), HasSubstr(marker_.string())));
+  testing::write_file(out_ / "plan.json", plan.substr(0, plan.size() / 2));
+  EXPECT_THAT([&] { faults(); }, ::testing::ThrowsMessage<std::runtime_error>(
+                                     HasSubstr((out_ / "plan.json").string())));
+}
+
+TEST_F(VerifyFolder, NamesAShardThatIsNotMadeYet) {
+  std::filesystem::remove(shard_);
+  std::filesystem::remove(marker_);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(marker_.string()), HasSubstr("not made yet"))));
+}
+
+TEST_F(VerifyFolder, NamesADatasetThatIsNotOfTheShards) {
+  finalize(out_, {});
+  EXPECT_THAT(faults(), ElementsAre());
+  testing::write_file(out_ / "dataset.json", "{}");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr((out_ / "dataset.json").string())));
+}
+
+TEST_F(VerifyFolder, NamesDamagedAmendments) {
+  testing::write_file(out_ / "amendments.json", "{");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr((out_ / "amendments.json").string())));
+}
+
+TEST_F(VerifyFolder, NotesTemporariesAndIsSoundAllTheSame) {
+  const auto temporary = temporary_beside(shard_);
+  testing::write_file(temporary, "");
+  const FolderCheck check = verify_folder(out_);
+  EXPECT_THAT(check.faults, ElementsAre());
+  EXPECT_THAT(check.notes, ElementsAre(HasSubstr(temporary.string())));
+}
+
+TEST_F(VerifyFolder, DeepComparesWithTheSourcesWhereTheyAreThere) {
+  const VerifyOptions deep{.deep = true, .manifest = {}};
+  FolderCheck check = verify_folder(out_, deep);
+  EXPECT_THAT(check.faults, ElementsAre());
+  EXPECT_THAT(check.notes, ElementsAre());
+  EXPECT_EQ(check.compared, 6);
+  EXPECT_EQ(verify_folder(out_).compared, 0);
+
+  testing::write_flat_picture(folder_ / "clip/f_16.png", {20, 40}, 0);
+  EXPECT_THAT(verify_folder(out_, deep).faults,
+              ElementsAre(AllOf(HasSubstr(shard_.string()), HasSubstr("got 30x20"))));
+
+  std::filesystem::rename(folder_ / "clip", folder_ / "elsewhere");
+  check = verify_folder(out_, deep);
+  EXPECT_THAT(check.faults, ElementsAre());
+  EXPECT_THAT(check.notes, ElementsAre(HasSubstr("not compared")));
+  EXPECT_EQ(check.compared, 0);
+
+  std::filesystem::remove(out_ / "run.json");
+  EXPECT_THAT(verify_folder(out_, deep).notes, ElementsAre(HasSubstr("labels not compared")));
+}
+
+TEST_F(VerifyFolder, DeepFindsSourcesThatHaveMoved) {
+  std::filesystem::create_directory(folder_ / "moved");
+  std::filesystem::rename(folder_ / "clip", folder_ / "moved/clip");
+  testing::write_file(folder_ / "moved/job.json", read_frozen_outline(out_).plan.manifest_text);
+  const FolderCheck check =
+      verify_folder(out_, {.deep = true, .manifest = folder_ / "moved/job.json"});
+  EXPECT_THAT(check.faults, ElementsAre());
+  EXPECT_EQ(check.compared, 6);
+}
+
+TEST_F(VerifyFolder, NamesAFileThatIsNotOfThePlan) {
+  testing::write_file(out_ / "old.h5", "");
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("old.h5")));
+}
+
+TEST_F(VerifyFolder, NeedsAPlan) {
+  std::filesystem::remove(out_ / "plan.json");
+  EXPECT_THROW(faults(), InputError);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,292 @@
+#include "pipeline/generators/load_generator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <memory>
+
+#include "manifests/values/faults.h"
+#include "pipeline/generators/choose_engine.h"
+#include "stages/base/files/sha256.h"
+#include "stages/generator/shipped_weights.h"
+#include "stages/generator/weights.h"
+#include "stages/generator/weights_file.h"
+#include "tests/stages/generator/engine_trials.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+TEST(EngineSupport, LibtorchAlwaysHasFloat32AndNeverInt8) {
+  EXPECT_TRUE(engine_support(Precision::kFloat32).torch_able);
+  EXPECT_FALSE(engine_support(Precision::kInt8).torch_able);
+}
+
+TEST(EngineSupport, IsOfOnePieceForEveryPrecision) {
+  for (const Precision precision : {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8}) {
+    const EngineSupport support = engine_support(precision);
+    EXPECT_NE(support.processor, "");
+    EXPECT_TRUE(support.onednn_built || !support.onednn_able);
+    EXPECT_EQ(support.processor, engine_support(Precision::kFloat32).processor);
+  }
+}
+
+using enum Engine;
+using enum Precision;
+
+/// Everything works, and well.
+EngineSupport all_of(const std::string& processor = "avx512_core_amx") {
+  return {.onednn_built = true,
+          .onednn_able = true,
+          .torch_able = true,
+          .native = true,
+          .processor = processor};
+}
+
+EngineRequest request(std::optional<Engine> engine, Precision precision, bool calibrated = false) {
+  return {engine, precision, calibrated, "w.safetensors"};
+}
+
+std::string refusal(const EngineRequest& request, const EngineSupport& support) {
+  try {
+    choose_engine(request, support);
+    return "";
+  } catch (const UsageError& error) {
+    return error.what();
+  }
+}
+
+TEST(ChooseEngine, AutoTakesOnednnWhereItIsBuiltAndAble) {
+  const EngineChoice choice = choose_engine(request({}, kFloat32), all_of());
+  EXPECT_EQ(choice.engine, kOnednn);
+  EXPECT_EQ(choice.reason, "auto: the fastest engine for float32 on this processor");
+  EXPECT_EQ(choice.warning, "");
+}
+
+TEST(ChooseEngine, AutoTakesLibtorchElseAndSaysWhy) {
+  EngineSupport support = all_of("sse41");
+  support.onednn_able = false;
+  EngineChoice choice = choose_engine(request({}, kFloat32), support);
+  EXPECT_EQ(choice.engine, kTorch);
+  EXPECT_EQ(choice.reason,
+            "auto: oneDNN has no compiled kernels for float32 on this processor (sse41)");
+  support.onednn_built = false;
+  choice = choose_engine(request({}, kFloat32), support);
+  EXPECT_EQ(choice.engine, kTorch);
+  EXPECT_EQ(choice.reason, "auto: this program was built without oneDNN");
+}
+
+TEST(ChooseEngine, AnAskedOneIsTakenWithoutComment) {
+  for (const Engine engine : {kTorch, kOnednn}) {
+    for (const Precision precision : {kFloat32, kBfloat16}) {
+      const EngineChoice choice = choose_engine(request(engine, precision), all_of());
+      EXPECT_EQ(choice.engine, engine);
+      EXPECT_EQ(choice.reason, "as the manifest says");
+      EXPECT_EQ(choice.warning, "");
+    }
+  }
+}
+
+TEST(ChooseEngine, AnAskedOneThatIsNotThereIsRefusedWithWhatWouldWork) {
+  EngineSupport support = all_of();
+  support.onednn_built = support.onednn_able = false;
+  EXPECT_EQ(refusal(request(kOnednn, kFloat32), support),
+            "$.generator.engine: expected \"auto\" or \"torch\" for float32, got \"onednn\": this "
+            "program was built without oneDNN");
+}
+
+TEST(ChooseEngine, Int8IsOnednnsAlone) {
+  EngineSupport support = all_of();
+  support.torch_able = false;
+  EXPECT_EQ(choose_engine(request({}, kInt8, true), support).engine, kOnednn);
+  EXPECT_EQ(choose_engine(request(kOnednn, kInt8, true), support).engine, kOnednn);
+  EXPECT_EQ(refusal(request(kTorch, kInt8, true), support),
+            "$.generator.engine: expected \"auto\" or \"onednn\" for int8, got \"torch\": LibTorch "
+            "has no int8 for this network");
+  support.onednn_built = support.onednn_able = false;
+  for (const std::optional<Engine> engine : {std::optional<Engine>(), {kTorch}, {kOnednn}}) {
+    EXPECT_EQ(refusal(request(engine, kInt8, true), support),
+              "$.generator.precision: expected \"float32\", got \"int8\": this program was built "
+              "without oneDNN, and LibTorch has no int8 for this network");
+  }
+}
+
+TEST(ChooseEngine, Int8NeedsACalibration) {
+  EXPECT_EQ(refusal(request({}, kInt8), all_of()),
+            "$.generator.weights: expected weights with a calibration for int8, got w.safetensors "
+            "without one; run eventgan calibrate MANIFEST");
+  EXPECT_EQ(choose_engine(request({}, kFloat32), all_of()).engine, kOnednn);
+}
+
+TEST(ChooseEngine, WarnsWhereTheProcessorHasNoInstructionsForThePrecision) {
+  EngineSupport support = all_of("avx512_core");
+  support.native = false;
+  EXPECT_EQ(choose_engine(request({}, kBfloat16), support).warning,
+            "precision bfloat16: this processor (avx512_core) has no instructions for it; float32 "
+            "is both faster and exact here");
+  EXPECT_EQ(choose_engine(request({}, kInt8, true), support).warning,
+            "precision int8: this processor (avx512_core) has no instructions for it, so it gains "
+            "less than elsewhere; float32 is exact");
+  EXPECT_EQ(choose_engine(request({}, kFloat32), support).warning, "");
+  EXPECT_NE(choose_engine(request(kTorch, kBfloat16), support).warning, "");
+}
+
+TEST(ChooseEngine, RefusesBfloat16WhereNothingComputesItInReasonableTime) {
+  EngineSupport support = all_of("avx2");
+  support.onednn_able = support.torch_able = support.native = false;
+  for (const std::optional<Engine> engine : {std::optional<Engine>(), {kTorch}, {kOnednn}}) {
+    EXPECT_EQ(refusal(request(engine, kBfloat16), support),
+              "$.generator.precision: expected \"float32\", got \"bfloat16\": oneDNN has no "
+              "compiled kernels for bfloat16 on this processor (avx2), and LibTorch has no fast "
+              "kernels for bfloat16 on this processor (avx2)");
+  }
+}
+
+/// Weights that do not say of themselves that they are untrained.
+Weights trained_weights() {
+  Weights weights = untrained_weights(1, 9, 1);
+  weights.metadata["origin"] = "a test";
+  return weights;
+}
+
+TEST(LoadGenerator, ReadsAFileBesideTheManifest) {
+  const testing::TemporaryFolder folder;
+  const std::string bytes = serialize_weights(trained_weights());
+  testing::write_file(folder / "w.safetensors", bytes);
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.generator->bins(), 9);
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(bytes));
+  EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
+  manifest.volume.bins = 5;
+  EXPECT_THROW(load_generator(manifest), UsageError);
+}
+
+TEST(LoadGenerator, WarnsLoudlyOfAnUntrainedOne) {
+  JobManifest manifest;
+  manifest.generator.weights = "untrained:2";
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_THAT(loaded.warnings, ::testing::ElementsAre(::testing::HasSubstr("UNTRAINED")));
+  manifest.seed = 1;
+  EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
+}
+
+TEST(LoadGenerator, WarnsOfAnUntrainedOneFromAFileToo) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "w.safetensors", serialize_weights(untrained_weights(1, 9, 1)));
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  EXPECT_THAT(load_generator(manifest).warnings,
+              ::testing::ElementsAre(::testing::HasSubstr("UNTRAINED (w.safetensors)")));
+}
+
+TEST(LoadGenerator, MakesTheEngineThatIsAskedForAndSaysWhich) {
+  JobManifest manifest;
+  manifest.generator.weights = "untrained:1";
+  manifest.generator.engine = Engine::kTorch;
+  const LoadedGenerator torch = load_generator(manifest);
+  EXPECT_THAT(torch.choice, ::testing::StartsWith("generator: torch float32 on "));
+  EXPECT_THAT(torch.choice, ::testing::EndsWith(
+                                "(as the manifest says), training gaps unknown, so none is marked "
+                                "as extrapolated"));
+  EXPECT_THAT(torch.generator->description(), ::testing::StartsWith("torch float32"));
+
+  manifest.generator.engine = std::nullopt;
+  const EngineSupport support = engine_support(Precision::kFloat32);
+  const LoadedGenerator fastest = load_generator(manifest);
+  const std::string name = support.onednn_able ? "onednn float32" : "torch float32";
+  EXPECT_THAT(fastest.choice, ::testing::StartsWith("generator: " + name + " on " +
+                                                    support.processor + " (auto: "));
+  EXPECT_THAT(fastest.generator->description(), ::testing::StartsWith(name));
+}
+
+TEST(LoadGenerator, KnowsWhatGapsTheWeightsWereTrainedOn) {
+  const testing::TemporaryFolder folder;
+  Weights weights = trained_weights();
+  weights.training_gaps = GapRange{1, 5};
+  testing::write_file(folder / "w.safetensors", serialize_weights(weights));
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  for (const std::optional<Engine> engine : {std::optional<Engine>(), {Engine::kTorch}}) {
+    manifest.generator.engine = engine;
+    const LoadedGenerator loaded = load_generator(manifest);
+    EXPECT_EQ(loaded.generator->training_gaps(), (GapRange{1, 5}));
+    EXPECT_THAT(loaded.choice, ::testing::EndsWith(", trained on gaps 1-5"));
+    EXPECT_THAT(loaded.generator->description(), ::testing::EndsWith(", trained on gaps 1-5"));
+  }
+}
+
+TEST(LoadGenerator, RefusesInt8WithoutACalibration) {
+  JobManifest manifest;
+  manifest.generator.weights = "untrained:1";
+  manifest.generator.precision = Precision::kInt8;
+  EXPECT_THROW(load_generator(manifest), UsageError);
+}
+
+TEST(LoadGenerator, RefusesWeightsThatInt8CannotServe) {
+  if (!engine_support(Precision::kInt8).onednn_able) GTEST_SKIP() << "no int8 here";
+  const testing::TemporaryFolder folder;
+  Weights weights = trained_weights();
+  weights.calibration = std::make_shared<const Calibration>(testing::sample_calibration(1, 1));
+  JobManifest manifest;
+  manifest.directory = folder.path();
+  manifest.generator.weights = "w.safetensors";
+  manifest.generator.precision = Precision::kInt8;
+  testing::write_file(folder / "w.safetensors", serialize_weights(weights));
+  EXPECT_THAT(load_generator(manifest).choice, ::testing::StartsWith("generator: onednn int8 on "));
+  weights.convolutions[2].bias[0] = std::numeric_limits<float>::max();
+  testing::write_file(folder / "w.safetensors", serialize_weights(weights));
+  EXPECT_THROW(load_generator(manifest), InputError);
+}
+
+TEST(LoadGenerator, SetsUpSimulators) {
+  JobManifest manifest;
+  manifest.volume.bins = 5;
+  manifest.generator.kind = GeneratorKind::kDifference;
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.generator->bins(), 5);
+  EXPECT_EQ(loaded.generator->training_gaps(), std::nullopt);
+  EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
+  EXPECT_EQ(loaded.choice, "");
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(loaded.generator->description()));
+  manifest.generator.kind = GeneratorKind::kEsim;
+  EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
+}
+
+TEST(LoadGenerator, FindsTheShippedWeightsOrSaysThatThereAreNone) {
+  JobManifest manifest;
+  EXPECT_EQ(manifest.generator.weights, "shipped");
+  if (shipped_widths().empty()) {
+    EXPECT_THROW(load_generator(manifest), InputError);
+    return;
+  }
+  const int width = default_shipped_width();
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.weights_hash, sha256_hex(shipped_weights_bytes(width)));
+  EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
+  manifest.generator.weights = "shipped:" + std::to_string(width);
+  EXPECT_EQ(load_generator(manifest).weights_hash, loaded.weights_hash);
+  manifest.generator.weights = "shipped:63";
+  EXPECT_THROW(load_generator(manifest), InputError);
+}
+
+TEST(LoadGenerator, RefusesAMissingFileAndAWidthThatIsNone) {
+  JobManifest manifest;
+  manifest.directory = "/nowhere";
+  manifest.generator.weights = "w.safetensors";
+  EXPECT_THROW(load_generator(manifest), InputError);
+  for (const char* weights :
+       {"untrained:", "untrained:0", "untrained:8x", "untrained:1000", "shipped:", "shipped:0"}) {
+    manifest.generator.weights = weights;
+    EXPECT_THROW(load_generator(manifest), UsageError) << weights;
+  }
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,125 @@
+#include "pipeline/generators/simulated_generator.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <stdexcept>
+
+#include "manifests/values/events.h"
+
+namespace eventgan {
+namespace {
+
+constexpr ImageSize kSize{12, 16};
+
+GeneratorSpec quiet(GeneratorKind kind) {
+  GeneratorSpec spec;
+  spec.kind = kind;
+  spec.sensor.threshold_spread = 0;
+  return spec;
+}
+
+/// A frame in [-1, 1] whose left half has one grey value and whose right half another.
+std::vector<float> halves(int left, int right) {
+  std::vector<float> frame;
+  for (int y = 0; y < kSize.height; ++y) {
+    for (int x = 0; x < kSize.width; ++x) {
+      frame.push_back((static_cast<float>(x < kSize.width / 2 ? left : right) / 255 - 0.5f) * 2);
+    }
+  }
+  return frame;
+}
+
+std::vector<float> volume_of(const Generator& generator, std::vector<float> previous,
+                             const std::vector<float>& next) {
+  previous.insert(previous.end(), next.begin(), next.end());
+  std::vector<float> volume(VolumeShape{generator.bins(), kSize}.value_count(), -1);
+  generator.generate(previous, kSize, volume);
+  return volume;
+}
+
+double sum(const std::vector<float>& volume) {
+  return std::accumulate(volume.begin(), volume.end(), 0.0);
+}
+
+TEST(SimulatedGenerator, DifferenceCountsThresholdsPassed) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kDifference), 9, 1);
+  const std::vector<float> volume = volume_of(*generator, halves(50, 100), halves(200, 100));
+  // ln((200/255 + 0.001)/(50/255 + 0.001)) = 1.382: six thresholds of 0.2 in each pixel of one
+  // half.
+  const double pixels = kSize.height * kSize.width / 2;
+  EXPECT_NEAR(sum(volume), 6 * pixels, 1e-3);
+  double positive_left = 0;
+  for (int bin = 0; bin < 9; ++bin) {
+    for (int y = 0; y < kSize.height; ++y) {
+      for (int x = 0; x < kSize.width / 2; ++x) {
+        positive_left +=
+            volume[static_cast<std::size_t>((bin * kSize.height + y) * kSize.width + x)];
+      }
+    }
+  }
+  EXPECT_NEAR(positive_left, 6 * pixels, 1e-3);
+}
+
+TEST(SimulatedGenerator, AStaticPairIsEmptyForTheDifference) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kDifference), 9, 1);
+  EXPECT_EQ(sum(volume_of(*generator, halves(0, 255), halves(0, 255))), 0);
+}
+
+TEST(SimulatedGenerator, EsimMovesThePreviousFrame) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kEsim), 5, 1);
+  EXPECT_EQ(generator->bins(), 5);
+  EXPECT_GT(sum(volume_of(*generator, halves(50, 200), halves(50, 200))), 0);
+  EXPECT_EQ(sum(volume_of(*generator, halves(50, 50), halves(50, 200))), 0);
+}
+
+TEST(SimulatedGenerator, DependsOnFramesSeedAndSettingsAlone) {
+  const GeneratorSpec spec = quiet(GeneratorKind::kEsim);
+  const auto frames = halves(50, 200);
+  const auto generator = make_simulated_generator(spec, 9, 1);
+  const std::vector<float> volume = volume_of(*generator, frames, frames);
+  volume_of(*generator, halves(10, 20), frames);
+  EXPECT_EQ(volume_of(*generator, frames, frames), volume);
+  EXPECT_EQ(volume_of(*make_simulated_generator(spec, 9, 1), frames, frames), volume);
+  EXPECT_NE(volume_of(*make_simulated_generator(spec, 9, 2), frames, frames), volume);
+  EXPECT_NE(volume_of(*generator, frames, halves(50, 201)), volume);  // another draw
+}
+
+TEST(SimulatedGenerator, IsDescribedWithAllItsParameters) {
+  GeneratorSpec spec = quiet(GeneratorKind::kEsim);
+  const std::string before = make_simulated_generator(spec, 9, 1)->description();
+  EXPECT_THAT(before, ::testing::AllOf(::testing::HasSubstr("\"model\":\"esim\""),
+                                       ::testing::HasSubstr("\"max_displacement_px\":10.0"),
+                                       ::testing::HasSubstr("\"positive_threshold\":0.2")));
+  spec.sensor.hot_pixel_rate_hz = 3;
+  EXPECT_NE(make_simulated_generator(spec, 9, 1)->description(), before);
+}
+
+TEST(SimulatedGenerator, RefusesSpansOfAnotherSizeAndTheNetwork) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kEsim), 9, 1);
+  std::vector<float> frames(2 * kSize.pixel_count()), volume(7);
+  EXPECT_THROW(generator->generate(frames, kSize, volume), std::invalid_argument);
+  EXPECT_THROW(make_simulated_generator({}, 9, 1), std::invalid_argument);
+}
+
+TEST(SimulatedGenerator, RefusesNoiseThatDoesNotFitIntoMemory) {
+  GeneratorSpec spec = quiet(GeneratorKind::kDifference);
+  spec.sensor.shot_noise_rate_hz = 1e6;
+  spec.duration_s = 1e9;  // 2e17 events of 12 x 16 pixels
+  const auto generator = make_simulated_generator(spec, 9, 1);
+  EXPECT_GT(generator->working_bytes(kSize), 0u);
+  EXPECT_THAT([&] { volume_of(*generator, halves(0, 0), halves(0, 0)); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("got about 1.92e+17 events")));
+}
+
+TEST(SimulatedGenerator, TakesWhatIsNoNumberForBlack) {
+  const auto generator = make_simulated_generator(quiet(GeneratorKind::kDifference), 9, 1);
+  const std::vector<float> nan(kSize.pixel_count(), std::nanf(""));
+  EXPECT_EQ(sum(volume_of(*generator, nan, halves(0, 0))), 0);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,116 @@
+#include "pipeline/realism/volume_method.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "manifests/values/faults.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/fake_recording.h"
+#include "tests/testing/temporary_folder.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::FloatEq;
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(NetworkMethod, GivesTheFramesToTheGenerator) {
+  const auto method = make_network_method(std::make_unique<testing::FakeGenerator>(1), "w.st");
+  // The fake's volume of one bin is max(next - previous, 0) and max(previous - next, 0).
+  const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, 0};
+  EXPECT_THAT(method->volume(frames, 0), ElementsAre(2.0f, 0.0f, 0.0f, FloatEq(0.4f)));
+  EXPECT_EQ(method->name(), "network");
+  EXPECT_EQ(method->draws(), 1);
+  EXPECT_THAT(method->settings(), HasSubstr("w.st"));
+}
+
+TEST(OpenRealismGenerator, RefusesNamesAndFilesThatAreNoWeights) {
+  const testing::TemporaryFolder folder;
+  EXPECT_THROW(open_realism_generator((folder / "absent.safetensors").string()), InputError);
+  EXPECT_THROW(open_realism_generator("shipped:"), UsageError);
+  EXPECT_THROW(open_realism_generator("shipped:8x"), UsageError);
+  EXPECT_THROW(open_realism_generator("shipped:12345"), UsageError);
+  EXPECT_THROW(open_realism_generator("shipped:63"), InputError);  // a width that is not shipped
+  EXPECT_THROW(open_realism_generator("untrained:8"), UsageError);
+}
+
+/// Makes round(scale / threshold) events at one pixel.
+SimulatedScene inverse_scene(double scale, int draws = 1) {
+  return {"inverse",
+          [=](const IntervalFrames&, const SensorSpec& sensor, CounterRandom) {
+            const double count = std::round(scale / sensor.positive_threshold);
+            return std::vector<Event>(static_cast<std::size_t>(count), Event{0, 0, 0.0, true});
+          },
+          draws};
+}
+
+std::vector<IntervalFrames> intervals_of(const std::vector<std::int64_t>& event_counts) {
+  std::vector<IntervalFrames> frames;
+  for (const std::int64_t count : event_counts) {
+    frames.push_back({{0, 1}, 0.1, {{1, 1}, {0}}, {{1, 1}, {0}}, count});
+  }
+  return frames;
+}
+
+TEST(FittedThreshold, MakesAsManyEventsAsTheCamera) {
+  // Two intervals of 1000 / threshold events each against 1000 and 7000: threshold 1/4.
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1000, 7000}), 0.02, 0), 0.25,
+              0.25 * 0.006);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000, 3), intervals_of({4000}), 0.02, 0), 0.25,
+              0.25 * 0.006);
+}
+
+TEST(FittedThreshold, StaysInItsRange) {
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({0}), 0.02, 0), 5, 0.01);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1}), 0.02, 0), 5, 0.01);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(0), intervals_of({1000}), 0.02, 0), 0.01, 1e-4);
+}
+
+TEST(RealismSensor, IsWithoutNoise) {
+  const SensorSpec sensor = realism_sensor(0.2, 0.001);
+  EXPECT_EQ(sensor, SensorSpec{});  // 15 % of 0.2 is the default spread of 0.03
+  EXPECT_DOUBLE_EQ(realism_sensor(0.4, 0.02).threshold_spread, 0.06);
+  EXPECT_EQ(realism_sensor(0.4, 0.02).log_epsilon, 0.02);
+  EXPECT_EQ(realism_sensor(0.4, 0.02).negative_threshold, 0.4);
+}
+
+IntervalFrames bar_frames() {
+  return read_frames(testing::moving_bar_recording({16, 24}, 2, 3), {0, 1});
+}
+
+TEST(DifferenceScene, HasEventsWhereTheFramesDiffer) {
+  const auto method =
+      make_simulated_method(difference_scene(), realism_sensor(0.2, 0.02), true, 3, 1);
+  const IntervalFrames frames = bar_frames();
+  const std::vector<float> volume = method->volume(frames, 0);
+  const std::size_t plane = frames.previous.pixels.size();
+  for (std::size_t i = 0; i < plane; ++i) {
+    const float positive = volume[i] + volume[plane + i] + volume[2 * plane + i];
+    EXPECT_EQ(positive > 0, frames.next.pixels[i] > frames.previous.pixels[i]) << i;
+  }
+  EXPECT_THAT(method->settings(), HasSubstr("0.2 (fitted)"));
+}
+
+TEST(EsimScene, DrawsDifferAndComeBack) {
+  const IntervalFrames frames = bar_frames();
+  const auto method =
+      make_simulated_method(esim_scene(5, 2), realism_sensor(0.2, 0.02), false, 3, 1);
+  EXPECT_EQ(method->draws(), 2);
+  const std::vector<float> first = method->volume(frames, 0);
+  EXPECT_EQ(method->volume(frames, 0), first);
+  EXPECT_NE(method->volume(frames, 1), first);
+  EXPECT_GT(std::accumulate(first.begin(), first.end(), 0.0f), 0.0f);
+  EXPECT_NE(make_simulated_method(esim_scene(5, 2), realism_sensor(0.2, 0.02), false, 3, 2)
+                ->volume(frames, 0),
+            first);
+  EXPECT_THAT(method->settings(), HasSubstr("mean of 2 motions"));
+  EXPECT_THAT(method->settings(), Not(HasSubstr("fitted")));
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,132 @@
+#include "pipeline/training/generator_records.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "stages/base/files/sha256.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/training/trainer.h"
+#include "tests/pipeline/training/fake_training_recording.h"
+#include "tests/pipeline/training/small_training.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/fake_recording.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+TEST(TrainedWeights, RunAndSayWhereTheyComeFrom) {
+  const testing::TemporaryFolder folder;
+  for (const char* place : {"decoders", "encoders", "none"}) {
+    const TrainingManifest manifest =
+        testing::small_training(folder.path(), "\"bins\": 3",
+                                "\"bins\": 3, \"spectral_norm\": \"" + std::string(place) + "\"");
+    Weights weights = trained_weights(Trainer(manifest, "cpu").generator_state(), manifest,
+                                      {TrainingPhase::kGenerator, 3});
+    EXPECT_EQ(weights.metadata.at("origin"), "eventgan train");
+    const auto [first, last] = std::ranges::minmax(manifest.gaps);
+    EXPECT_EQ(weights.training_gaps, (GapRange{first, last}));
+    EXPECT_EQ(weights.metadata.at("training_manifest"), manifest.text);
+    EXPECT_EQ(weights.metadata.at("training_manifest_sha256"), sha256_hex(manifest.text));
+    EXPECT_EQ(weights.metadata.at("training_steps"), "flow 2, reconstruction 2, generator 3");
+    EXPECT_EQ(make_torch_generator(weights)->bins(), 3) << place;
+
+    const auto recordings =
+        open_training_recordings(manifest.recordings, manifest.directory, manifest.crop, 1);
+    add_final_origin(weights, manifest, recordings, {{"volume", 0.25}});
+    EXPECT_EQ(weights.metadata.at("training_recordings_sha256"),
+              "bar.hdf5\t" + sha256_of_file(folder / "bar.hdf5") + "\n");
+    EXPECT_EQ(weights.metadata.at("training_losses"), "volume\t0.25\n");
+  }
+}
+
+TEST(TrainedWeights, EqualTheTrainersGenerator) {
+  const testing::TemporaryFolder folder;
+  const TrainingManifest manifest = testing::small_training(folder.path());
+  const Trainer trainer(manifest, "cpu");
+  TrainingSample sample;
+  sample.shape = {3, {19, 23}};
+  for (std::size_t i = 0; i < 2 * sample.shape.size.pixel_count(); ++i) {
+    sample.network_frames.push_back(static_cast<float>(i % 17) / 8.5f - 1);
+  }
+  sample.frames = sample.network_frames;
+  const std::vector<float> expected = trainer.generate(sample);
+  const Weights weights =
+      trained_weights(trainer.generator_state(), manifest, {TrainingPhase::kGenerator, 0});
+  std::vector<float> volume(sample.shape.value_count());
+  make_torch_generator(weights)->generate(sample.network_frames, sample.shape.size, volume);
+  ASSERT_EQ(volume.size(), expected.size());
+  const float largest = *std::max_element(expected.begin(), expected.end());
+  ASSERT_GT(largest, 0);
+  for (std::size_t i = 0; i < volume.size(); ++i) {
+    EXPECT_NEAR(volume[i], expected[i], 1e-4f * largest) << i;
+  }
+}
+
+TEST(TrainedWeights, RefuseAStateThatIsNoGenerators) {
+  const testing::TemporaryFolder folder;
+  EXPECT_THROW(trained_weights({}, testing::small_training(folder.path()), {}), std::runtime_error);
+}
+
+CropReader reader_of(std::vector<int> frame_counts) {
+  std::vector<TrainingRecording> recordings;
+  for (const int count : frame_counts) {
+    recordings.push_back(testing::opened(testing::moving_bar_recording({24, 32}, count)));
+  }
+  return CropReader(std::move(recordings), 3);
+}
+
+TEST(ValidationPairs, AreConsecutiveFramesInTheMiddle) {
+  const CropReader reader = reader_of({3, 2});
+  const ValidationPairs pairs(reader, {16, 16});
+  ASSERT_EQ(pairs.samples().size(), 3u);
+  EXPECT_EQ(pairs.samples()[0].origin, "fake recording frames 0-1 crop 8,4");
+  EXPECT_EQ(pairs.samples()[1].origin, "fake recording frames 1-2 crop 8,4");
+  EXPECT_EQ(pairs.samples()[2].origin, "fake recording frames 0-1 crop 8,4");
+}
+
+TEST(ValidationPairs, AreSpreadEvenlyWhereThereAreMany) {
+  const CropReader reader = reader_of({33});
+  const ValidationPairs pairs(reader, {100, 100});  // larger than the picture: all of it
+  ASSERT_EQ(pairs.samples().size(), 16u);
+  for (int i = 0; i < 16; ++i) {
+    EXPECT_EQ(pairs.samples()[i].origin, "fake recording frames " + std::to_string(2 * i) + "-" +
+                                             std::to_string(2 * i + 1) + " crop 0,0");
+  }
+}
+
+TEST(ValidationPairs, AreJudgedByTheirMeans) {
+  const CropReader reader = reader_of({3});
+  const ValidationPairs pairs(reader, {24, 32});
+  const testing::FakeGenerator generator(3);
+  const ValidationScores scores = pairs.judge(generator);
+  EXPECT_EQ(generator.calls(), 2);
+  // The bar's columns that change have events, and the fake generator's volume is not zero where
+  // the frames differ: the same pixels, the same polarity.
+  EXPECT_DOUBLE_EQ(scores.realism.f1_time, 1);
+  EXPECT_GT(scores.volume_loss, 0);
+}
+
+TEST(ValidationLog, GoesOnAfterTheCheckpoint) {
+  const testing::TemporaryFolder folder;
+  const auto file = folder / "validation.csv";
+  ValidationScores scores;
+  scores.volume_loss = 0.5;
+  {
+    ValidationLog log(file, -1);
+    for (const int step : {10, 20, 30}) log.add(step, scores);
+  }
+  ValidationLog log(file, 20);
+  scores.volume_loss = 0.25;
+  log.add(25, scores);
+  const std::string text = testing::read_file(file);
+  EXPECT_NE(text.find("\n20,0.5,"), std::string::npos);
+  EXPECT_NE(text.find("\n25,0.25,"), std::string::npos);
+  EXPECT_EQ(text.find("\n30,"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,261 @@
+#include "pipeline/training/sample_source.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <stdexcept>
+#include <string>
+
+#include "tests/pipeline/training/fake_training_recording.h"
+#include "tests/testing/fake_recording.h"
+
+namespace eventgan {
+namespace {
+
+constexpr int kDraws = 4000;
+
+TrainingManifest drawing_manifest() {
+  TrainingManifest manifest;
+  manifest.seed = 11;
+  manifest.crop = {16, 16};
+  manifest.gaps = {1, 3};
+  return manifest;
+}
+
+std::vector<TrainingRecording> long_and_short() {
+  std::vector<TrainingRecording> recordings;
+  recordings.push_back(testing::opened(testing::moving_bar_recording({20, 30}, 9), 3));
+  recordings.push_back(testing::opened(testing::moving_bar_recording({16, 16}, 3), 1));
+  return recordings;
+}
+
+SampleDraw draw(const std::vector<TrainingRecording>& recordings, const TrainingManifest& manifest,
+                std::int64_t step, int index = 0, int attempt = 0) {
+  return draw_sample(recordings, manifest, {TrainingPhase::kGenerator, step, index}, attempt);
+}
+
+bool same(const SampleDraw& a, const SampleDraw& b) {
+  return a.recording == b.recording && a.first_frame == b.first_frame &&
+         a.last_frame == b.last_frame && a.augmentation.top == b.augmentation.top &&
+         a.augmentation.left == b.augmentation.left &&
+         a.augmentation.flip_x == b.augmentation.flip_x &&
+         a.augmentation.flip_y == b.augmentation.flip_y;
+}
+
+TEST(DrawSample, DependsOnSeedAndPlaceAlone) {
+  const auto recordings = long_and_short();
+  TrainingManifest manifest = drawing_manifest();
+  int differ_by_index = 0, differ_by_phase = 0, differ_by_seed = 0;
+  TrainingManifest other = manifest;
+  other.seed = 12;
+  for (std::int64_t step = 0; step < 50; ++step) {
+    const SampleDraw first = draw(recordings, manifest, step);
+    EXPECT_TRUE(same(first, draw(recordings, manifest, step)));
+    differ_by_index += !same(first, draw(recordings, manifest, step, 1));
+    differ_by_seed += !same(first, draw(recordings, other, step));
+    differ_by_phase +=
+        !same(first, draw_sample(recordings, manifest, {TrainingPhase::kFlow, step, 0}, 0));
+  }
+  EXPECT_GT(differ_by_index, 40);
+  EXPECT_GT(differ_by_phase, 40);
+  EXPECT_GT(differ_by_seed, 40);
+}
+
+TEST(DrawSample, TakesRecordingsByWeight) {
+  const auto recordings = long_and_short();
+  int first = 0;
+  for (int i = 0; i < kDraws; ++i) first += draw(recordings, drawing_manifest(), i).recording == 0;
+  // Binomial with p = 3/4: five standard deviations.
+  EXPECT_NEAR(first, 0.75 * kDraws, 5 * std::sqrt(kDraws * 0.75 * 0.25));
+}
+
+TEST(DrawSample, TakesGapsThatFitAndFramesInUse) {
+  auto recordings = long_and_short();
+  recordings[0].first_frame = 2;
+  recordings[0].last_frame = 7;
+  std::map<std::int64_t, int> gaps, first_frames;
+  for (int i = 0; i < kDraws; ++i) {
+    const SampleDraw drawn = draw(recordings, drawing_manifest(), i);
+    const std::int64_t gap = drawn.last_frame - drawn.first_frame;
+    if (drawn.recording == 1) {
+      ASSERT_EQ(gap, 1);  // three frames: a gap of 3 does not fit
+      ASSERT_LE(drawn.last_frame, 2);
+      continue;
+    }
+    ASSERT_GE(drawn.first_frame, 2);
+    ASSERT_LE(drawn.last_frame, 7);
+    ++gaps[gap];
+    if (gap == 3) ++first_frames[drawn.first_frame];
+  }
+  ASSERT_EQ(gaps.size(), 2u);
+  EXPECT_NEAR(gaps[1], gaps[3], 5 * std::sqrt(kDraws * 0.75));
+  // A gap of 3 within frames 2..7 begins at 2, 3 or 4, each as likely.
+  ASSERT_EQ(first_frames.size(), 3u);
+  for (const auto& [frame, count] : first_frames) EXPECT_NEAR(count, gaps[3] / 3.0, 150) << frame;
+}
+
+TEST(DrawSample, TakesOneFrameTwiceForTheStaticShare) {
+  const auto recordings = long_and_short();
+  TrainingManifest manifest = drawing_manifest();
+  for (const double share : {0.0, 0.25, 1.0}) {
+    manifest.augmentation.static_fraction = share;
+    int still = 0;
+    for (int i = 0; i < kDraws; ++i) {
+      const SampleDraw drawn = draw(recordings, manifest, i);
+      still += drawn.first_frame == drawn.last_frame;
+    }
+    EXPECT_NEAR(still, share * kDraws, 5 * std::sqrt(kDraws * share * (1 - share)));
+  }
+}
+
+TEST(DrawSample, AnotherAttemptKeepsTheRecording) {
+  const auto recordings = long_and_short();
+  int moved = 0;
+  for (int i = 0; i < 100; ++i) {
+    const SampleDraw first = draw(recordings, drawing_manifest(), i);
+    const SampleDraw second = draw(recordings, drawing_manifest(), i, 0, 1);
+    EXPECT_EQ(first.recording, second.recording);
+    moved += !same(first, second);
+  }
+  EXPECT_GT(moved, 50);
+}
+
+TEST(DrawSample, RefusesNothingToDrawFrom) {
+  EXPECT_THROW(draw({}, drawing_manifest(), 0), std::invalid_argument);
+}
+
+TrainingManifest source_manifest() {
+  TrainingManifest manifest;
+  manifest.seed = 5;
+  manifest.crop = {16, 16};
+  manifest.gaps = {1};
+  manifest.batch = 4;
+  manifest.network.bins = 3;
+  return manifest;
+}
+
+SampleSource source_of(const TrainingManifest& manifest, const testing::FakeRecording& recording) {
+  std::vector<TrainingRecording> recordings;
+  recordings.push_back(testing::opened(recording));
+  return SampleSource(manifest, std::move(recordings));
+}
+
+bool equal(const TrainingSample& a, const TrainingSample& b) {
+  return a.shape == b.shape && a.frames == b.frames && a.network_frames == b.network_frames &&
+         a.volume == b.volume && a.origin == b.origin;
+}
+
+TEST(SampleSource, ASampleDoesNotDependOnWhatWasAskedBefore) {
+  const auto bar = testing::moving_bar_recording({32, 40}, 9);
+  const SampleSource asked = source_of(source_manifest(), bar);
+  const SampleSource fresh = source_of(source_manifest(), bar);
+  for (std::int64_t step = 9; step >= 0; --step) asked.batch(TrainingPhase::kFlow, step);
+  const auto batch = asked.batch(TrainingPhase::kGenerator, 7);
+  ASSERT_EQ(batch.size(), 4u);
+  for (int i = 3; i >= 0; --i) {
+    EXPECT_TRUE(equal(batch[i], fresh.sample({TrainingPhase::kGenerator, 7, i}))) << i;
+  }
+}
+
+TEST(SampleSource, GivesNormalisedVolumesOfTheCrop) {
+  const SampleSource source =
+      source_of(source_manifest(), testing::moving_bar_recording({32, 40}, 9));
+  for (const TrainingSample& sample : source.batch(TrainingPhase::kFlow, 0)) {
+    EXPECT_EQ(sample.shape, (VolumeShape{3, {16, 16}}));
+    EXPECT_EQ(sample.frames.size(), 512u);
+    for (const float value : sample.volume) EXPECT_TRUE(value >= 0 && value <= 1);
+  }
+}
+
+TEST(SampleSource, GainChangesTheNetworksFramesOnly) {
+  TrainingManifest manifest = source_manifest();
+  manifest.augmentation.gain = {0.5, 0.5};
+  const SampleSource source = source_of(manifest, testing::moving_bar_recording({32, 40}, 9));
+  const TrainingSample sample = source.sample({TrainingPhase::kFlow, 0, 0});
+  for (std::size_t i = 0; i < sample.frames.size(); ++i) {
+    EXPECT_NEAR(sample.network_frames[i] + 1, (sample.frames[i] + 1) / 2, 1e-5);
+  }
+}
+
+TEST(SampleSource, StaticPairsAreEmptyAndEqual) {
+  TrainingManifest manifest = source_manifest();
+  manifest.augmentation.static_fraction = 1;
+  const SampleSource source = source_of(manifest, testing::moving_bar_recording({32, 40}, 9));
+  for (const TrainingSample& sample : source.batch(TrainingPhase::kFlow, 0)) {
+    EXPECT_EQ(std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0f), 0);
+    EXPECT_TRUE(std::equal(sample.frames.begin(), sample.frames.begin() + 256,
+                           sample.frames.begin() + 256));
+  }
+}
+
+TEST(SampleSource, DrawsAgainWhereHardlyAnythingMoved) {
+  // Ten frames, events in the last interval only: 200 of them at one pixel.
+  const GreyImage grey{{16, 16}, std::vector<std::uint8_t>(256, 100)};
+  std::vector<double> times(10);
+  std::iota(times.begin(), times.end(), 0.0);
+  const testing::FakeRecording recording(std::vector<GreyImage>(10, grey), times,
+                                         std::vector<Event>(200, {3, 4, 8.5, true}));
+  const SampleSource source = source_of(source_manifest(), recording);
+  int busy = 0;
+  for (int i = 0; i < 200; ++i) {
+    const TrainingSample sample = source.sample({TrainingPhase::kFlow, i, 0});
+    busy += sample.origin.find("frames 8-9") != std::string::npos;
+  }
+  // Of ten attempts one hits with probability 1 - (8/9)^10 = 0.69, not 1/9; five sigma is 0.16.
+  EXPECT_NEAR(busy / 200.0, 0.69, 0.17);
+}
+
+TEST(SampleSource, EndsWhereNothingEverMoves) {
+  const GreyImage grey{{16, 16}, std::vector<std::uint8_t>(256, 100)};
+  const SampleSource source =
+      source_of(source_manifest(), testing::FakeRecording({grey, grey}, {0, 1}, {}));
+  const TrainingSample sample = source.sample({TrainingPhase::kFlow, 0, 0});
+  EXPECT_EQ(std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0f), 0);
+}
+
+BatchPrefetch::Batch batch_of(std::int64_t step) {
+  TrainingSample sample;
+  sample.origin = std::to_string(step);
+  return {sample};
+}
+
+TEST(BatchPrefetch, GivesTheStepsInOrder) {
+  BatchPrefetch batches(batch_of, 3, 7, 2);
+  for (const std::string step : {"3", "4", "5", "6"}) {
+    EXPECT_EQ(batches.next().at(0).origin, step);
+  }
+  EXPECT_THROW(batches.next(), std::out_of_range);
+}
+
+TEST(BatchPrefetch, StartsNoMoreThanItMay) {
+  std::atomic<int> started{0};
+  {
+    BatchPrefetch batches([&](std::int64_t step) { return ++started, batch_of(step); }, 0, 100, 3);
+    batches.next();
+    EXPECT_LE(started, 4);
+  }  // waits for those under way
+  EXPECT_EQ(started, 4);
+}
+
+TEST(BatchPrefetch, HasNothingForNoSteps) {
+  BatchPrefetch batches(batch_of, 5, 5, 2);
+  EXPECT_THROW(batches.next(), std::out_of_range);
+}
+
+TEST(BatchPrefetch, RethrowsAtTheStepThatFailed) {
+  BatchPrefetch batches(
+      [](std::int64_t step) {
+        if (step == 1) throw std::runtime_error("torn file");
+        return batch_of(step);
+      },
+      0, 3, 3);
+  EXPECT_EQ(batches.next().at(0).origin, "0");
+  EXPECT_THROW(batches.next(), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace eventgan

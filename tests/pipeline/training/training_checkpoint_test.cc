@@ -1,0 +1,203 @@
+#include "pipeline/training/training_checkpoint.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "manifests/values/faults.h"
+#include "tests/pipeline/training/small_training.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::SizeIs;
+
+class Resumption : public ::testing::Test {
+ protected:
+  std::map<std::string, std::string> settings(const std::string& replace = "",
+                                              const std::string& with = "") {
+    manifest_ = testing::small_training(folder_.path(), replace, with);
+    const auto recordings =
+        open_training_recordings(manifest_.recordings, manifest_.directory, manifest_.crop, 1);
+    return training_settings(manifest_, recordings);
+  }
+
+  /// The message of the refusal; empty if there is none.
+  std::string refusal(const TrainingPosition& position, const std::string& replace,
+                      const std::string& with) {
+    const auto before = settings();
+    const auto now = settings(replace, with);
+    try {
+      check_resumable(before, now, position, manifest_);
+      return "";
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+  }
+
+  testing::TemporaryFolder folder_;
+  TrainingManifest manifest_;
+};
+
+constexpr TrainingPosition kInReconstruction{TrainingPhase::kReconstruction, 1};
+
+TEST_F(Resumption, NamesTheFieldThatDiffers) {
+  EXPECT_THAT(refusal(kInReconstruction, "\"batch\": 2", "\"batch\": 4"),
+              AllOf(HasSubstr("$.batch: expected 2, got 4"), Not(HasSubstr("$.seed"))));
+}
+
+TEST_F(Resumption, ComparesTheRecordings) {
+  auto before = settings();
+  const auto now = before;
+  EXPECT_THAT(before.at("recording 0"), HasSubstr("9 frames of 64x56"));
+  before["recording 0"] = "1 bytes, 9 frames of 64x56";
+  EXPECT_THROW(check_resumable(before, now, kInReconstruction, manifest_), UsageError);
+}
+
+TEST_F(Resumption, LetsOutputAndCommentsChange) {
+  EXPECT_EQ(refusal(kInReconstruction, "\"picture_minutes\": 1000", "\"picture_minutes\": 1"), "");
+  EXPECT_EQ(refusal(kInReconstruction, "\"directory\": \"out\"", "\"directory\": \"moved\""), "");
+  EXPECT_EQ(refusal(kInReconstruction, "{", "{ // a comment\n"), "");
+}
+
+TEST_F(Resumption, LetsStepsThatAreNotReachedChange) {
+  EXPECT_EQ(refusal(kInReconstruction, "\"generator\": 4", "\"generator\": 9"), "");
+  EXPECT_EQ(refusal(kInReconstruction, "\"reconstruction\": 2", "\"reconstruction\": 5"), "");
+  EXPECT_THAT(refusal(kInReconstruction, "\"flow\": 2", "\"flow\": 3"), HasSubstr("$.steps.flow"));
+  // Fewer than are done.
+  EXPECT_THAT(refusal({TrainingPhase::kGenerator, 4}, "\"generator\": 4", "\"generator\": 3"),
+              HasSubstr("$.steps.generator"));
+}
+
+TEST_F(Resumption, FallingRatesFixThePhaseInProgress) {
+  const std::string rate = "\"generator_rate\": 1e-3";
+  const auto before = settings(rate, rate + ", \"final_rate_fraction\": 0.1");
+  auto now = before;
+  now["manifest $.steps.reconstruction"] = "5";
+  manifest_.steps.reconstruction = 5;
+  EXPECT_THROW(check_resumable(before, now, kInReconstruction, manifest_), UsageError);
+  now = before;
+  now["manifest $.steps.generator"] = "9";
+  EXPECT_NO_THROW(check_resumable(before, now, kInReconstruction, manifest_));
+}
+
+TrainingCheckpoint checkpoint_at(std::int64_t step) {
+  TrainingCheckpoint checkpoint;
+  checkpoint.position = {TrainingPhase::kReconstruction, step};
+  checkpoint.seconds = 12.5;
+  checkpoint.settings = {{"manifest $.batch", "2"}};
+  checkpoint.environment = {{"threads", "1"}};
+  checkpoint.state["flow.head"] = {{2}, {0.5f, -1e-30f}};
+  return checkpoint;
+}
+
+class CheckpointFolder : public ::testing::Test {
+ protected:
+  std::optional<TrainingCheckpoint> load() {
+    return load_checkpoint(folder_.path(),
+                           [&](const std::string& text) { warnings_.push_back(text); });
+  }
+
+  testing::TemporaryFolder folder_;
+  std::vector<std::string> warnings_;
+};
+
+TEST_F(CheckpointFolder, GivesBackWhatWasSaved) {
+  save_checkpoint(folder_.path(), checkpoint_at(7));
+  const auto loaded = load();
+  ASSERT_TRUE(loaded);
+  EXPECT_EQ(loaded->position, (TrainingPosition{TrainingPhase::kReconstruction, 7}));
+  EXPECT_EQ(loaded->seconds, 12.5);
+  EXPECT_EQ(loaded->settings, checkpoint_at(7).settings);
+  EXPECT_EQ(loaded->environment, checkpoint_at(7).environment);
+  EXPECT_EQ(loaded->state.at("flow.head").values, checkpoint_at(7).state.at("flow.head").values);
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+TEST_F(CheckpointFolder, IsEmptyAtFirst) {
+  EXPECT_FALSE(load());
+  EXPECT_TRUE(last_checkpoint(folder_.path()).empty());
+}
+
+TEST_F(CheckpointFolder, KeepsTheOneBefore) {
+  for (const int step : {1, 2, 3}) save_checkpoint(folder_.path(), checkpoint_at(step));
+  EXPECT_EQ(load()->position.step, 3);
+  testing::write_file(folder_ / "latest.safetensors", "damaged");
+  EXPECT_EQ(load()->position.step, 2);
+  ASSERT_THAT(warnings_, SizeIs(1));
+  EXPECT_THAT(warnings_[0], HasSubstr("latest.safetensors"));
+}
+
+TEST_F(CheckpointFolder, GoesOnFromThePreviousWhereASaveWasCutShort) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  std::filesystem::rename(folder_ / "latest.safetensors", folder_ / "previous.safetensors");
+  EXPECT_EQ(load()->position.step, 1);
+  EXPECT_EQ(last_checkpoint(folder_.path()), folder_ / "previous.safetensors");
+}
+
+TEST_F(CheckpointFolder, SaysThatAllAreDamaged) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  testing::write_file(folder_ / "latest.safetensors", "");
+  EXPECT_THROW(load(), std::runtime_error);
+  testing::write_file(folder_ / "previous.safetensors", "x");
+  EXPECT_THROW(load(), std::runtime_error);
+}
+
+TEST_F(CheckpointFolder, ATruncatedFileIsDamaged) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  save_checkpoint(folder_.path(), checkpoint_at(2));
+  const std::string bytes = testing::read_file(folder_ / "latest.safetensors");
+  testing::write_file(folder_ / "latest.safetensors", bytes.substr(0, bytes.size() - 1));
+  EXPECT_EQ(load()->position.step, 1);
+}
+
+TEST_F(CheckpointFolder, OneFlippedBitAnywhereIsDamage) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  save_checkpoint(folder_.path(), checkpoint_at(3));
+  const std::string whole = testing::read_file(folder_ / "latest.safetensors");
+  const auto previous = testing::read_file(folder_ / "previous.safetensors");
+  for (std::size_t i = 0; i < whole.size(); ++i) {
+    std::string bytes = whole;
+    bytes[i] = static_cast<char>(bytes[i] ^ (1 << (i % 8)));
+    testing::write_file(folder_ / "latest.safetensors", bytes);
+    const auto loaded = load();
+    ASSERT_TRUE(loaded);
+    // A blank of the header may become another one: nothing it says has changed.
+    const bool same =
+        loaded->position.step == 3 &&
+        loaded->state.at("flow.head").values == checkpoint_at(3).state.at("flow.head").values;
+    EXPECT_TRUE(loaded->position.step == 1 || (same && whole[i] == ' ')) << "byte " << i;
+  }
+  EXPECT_EQ(testing::read_file(folder_ / "previous.safetensors"), previous);
+}
+
+TEST_F(CheckpointFolder, ADamagedOneNeverTakesTheGoodOnesPlace) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  save_checkpoint(folder_.path(), checkpoint_at(2));
+  testing::write_file(folder_ / "latest.safetensors", "damaged");
+  EXPECT_EQ(load()->position.step, 1);
+  EXPECT_EQ(testing::read_file(folder_ / "damaged.safetensors"), "damaged");
+  save_checkpoint(folder_.path(), checkpoint_at(2));
+  testing::write_file(folder_ / "latest.safetensors", "damaged again");
+  EXPECT_EQ(load()->position.step, 1);
+}
+
+TEST_F(CheckpointFolder, AStateThatIsNotFinitePushesNothingOut) {
+  save_checkpoint(folder_.path(), checkpoint_at(1));
+  TrainingCheckpoint broken = checkpoint_at(2);
+  broken.state["flow.head"].values[1] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(save_checkpoint(folder_.path(), broken), std::runtime_error);
+  EXPECT_EQ(load()->position.step, 1);
+  EXPECT_THAT(warnings_, IsEmpty());
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,174 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "pipeline/training/csv_table.h"
+#include "pipeline/training/loss_log.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+const CsvTable::Row kColumns{"step", "loss"};
+
+bool keep_all(const CsvTable::Row&) { return true; }
+
+TEST(CsvTable, BeginsWithItsColumns) {
+  const testing::TemporaryFolder folder;
+  CsvTable table(folder / "t.csv", kColumns, keep_all);
+  table.add({"0", "1.5"});
+  table.add({"1", ""});
+  table.flush();
+  EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n0,1.5\n1,\n");
+  EXPECT_TRUE(table.kept().empty());
+}
+
+TEST(CsvTable, CutsOffWhatIsNotToBeKept) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "t.csv", "step,loss\n0,1\n1,2\n2,3\n3,4\n");
+  CsvTable table(folder / "t.csv", kColumns,
+                 [](const CsvTable::Row& row) { return csv_value(row[0]) < 2; });
+  EXPECT_EQ(table.kept(), (std::vector<CsvTable::Row>{{"0", "1"}, {"1", "2"}}));
+  table.add({"2", "9"});
+  table.flush();
+  EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n0,1\n1,2\n2,9\n");
+}
+
+TEST(CsvTable, CutsOffATornEnd) {
+  const testing::TemporaryFolder folder;
+  for (const char* torn : {"step,loss\n0,1\n1,2", "step,loss\n0,1\n1\n2,3\n"}) {
+    testing::write_file(folder / "t.csv", torn);
+    const CsvTable table(folder / "t.csv", kColumns, keep_all);
+    EXPECT_EQ(table.kept(), (std::vector<CsvTable::Row>{{"0", "1"}})) << torn;
+  }
+}
+
+TEST(CsvTable, BeginsAnewWhereTheColumnsDiffer) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "t.csv", "step,other\n0,1\n");
+  const CsvTable table(folder / "t.csv", kColumns, keep_all);
+  EXPECT_TRUE(table.kept().empty());
+  EXPECT_EQ(testing::read_file(folder / "t.csv"), "step,loss\n");
+}
+
+TEST(CsvTable, NamesTheFileItCannotWrite) {
+  EXPECT_THROW(CsvTable("/nowhere/t.csv", kColumns, keep_all), std::runtime_error);
+}
+
+TEST(CsvNumber, HasSixDigitsAndIsEmptyForNaN) {
+  EXPECT_EQ(csv_number(1.0 / 3), "0.333333");
+  EXPECT_EQ(csv_number(0), "0");
+  EXPECT_EQ(csv_number(std::numeric_limits<double>::quiet_NaN()), "");
+  EXPECT_EQ(csv_value("0.25"), 0.25);
+  EXPECT_TRUE(std::isnan(csv_value("")));
+  EXPECT_TRUE(std::isnan(csv_value("1x")));
+}
+
+constexpr auto kFlow = TrainingPhase::kFlow;
+constexpr auto kGenerator = TrainingPhase::kGenerator;
+
+TEST(LossLog, WritesARowAStep) {
+  const testing::TemporaryFolder folder;
+  LossLog log(folder / "training.csv", {});
+  log.add({kFlow, 0}, 1.5, {{"flow", 0.25}, {"flow.smoothness", 2}, {"unknown", 7}}, 1e-3);
+  log.flush();
+  EXPECT_EQ(testing::read_file(folder / "training.csv"),
+            "phase,step,seconds,flow,flow.photometric,flow.smoothness,reconstruction,volume,count,"
+            "generator,generator.total,discriminator,discriminator.real_accuracy,"
+            "discriminator.fake_accuracy,learning_rate\n"
+            "flow,0,1.5,0.25,,2,,,,,,,,,0.001\n");
+  ASSERT_EQ(log.rows().size(), 1u);
+  EXPECT_EQ(log.rows()[0].losses[0], 0.25);
+  EXPECT_TRUE(std::isnan(log.rows()[0].losses[1]));
+}
+
+TEST(LossLog, GoesOnAfterTheCheckpointsStep) {
+  const testing::TemporaryFolder folder;
+  const auto file = folder / "training.csv";
+  {
+    LossLog log(file, {});
+    for (int step = 0; step < 3; ++step) log.add({kFlow, step}, step, {{"flow", step}}, 1);
+    for (int step = 0; step < 3; ++step) log.add({kGenerator, step}, step, {{"volume", step}}, 1);
+  }
+  LossLog log(file, {kGenerator, 1});
+  ASSERT_EQ(log.rows().size(), 4u);
+  EXPECT_EQ(log.rows().back().position, (TrainingPosition{kGenerator, 0}));
+  log.add({kGenerator, 1}, 9, {{"volume", 5}}, 1);
+  log.flush();
+  const std::string text = testing::read_file(file);
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
+  EXPECT_EQ(text.find("generator,2,"), std::string::npos);
+}
+
+TEST(LossLog, WithoutACheckpointEverythingGoes) {
+  const testing::TemporaryFolder folder;
+  { LossLog(folder / "training.csv", {}).add({kFlow, 0}, 0, {{"flow", 1}}, 1); }
+  EXPECT_TRUE(LossLog(folder / "training.csv", {}).rows().empty());
+}
+
+TEST(MeanLosses, AreOverTheLastStepsOfThePhaseThatHaveThem) {
+  const testing::TemporaryFolder folder;
+  LossLog log(folder / "training.csv", {});
+  log.add({kFlow, 0}, 0, {{"flow", 100}}, 1);
+  log.add({kGenerator, 0}, 0, {{"volume", 50}}, 1);
+  log.add({kGenerator, 1}, 0, {{"discriminator", 2}}, 1);
+  log.add({kGenerator, 2}, 0, {{"volume", 1}}, 1);
+  log.add({kGenerator, 3}, 0, {{"volume", 3}}, 1);
+  EXPECT_EQ(mean_losses(log.rows(), kGenerator, 3),
+            (std::map<std::string, double>{{"discriminator", 2}, {"volume", 2}}));
+  EXPECT_EQ(mean_losses(log.rows(), kGenerator, 100).at("volume"), 18);
+  EXPECT_TRUE(mean_losses({}, kGenerator, 3).empty());
+}
+
+LossRow row_of(std::int64_t step, std::size_t loss, double value) {
+  LossRow row;
+  row.position = {TrainingPhase::kGenerator, step};
+  row.losses.fill(std::numeric_limits<double>::quiet_NaN());
+  row.losses[loss] = value;
+  return row;
+}
+
+cv::Mat drawn(const std::vector<LossRow>& rows) {
+  const testing::TemporaryFolder folder;
+  write_loss_curves(rows, folder / "curves.png");
+  return cv::imread((folder / "curves.png").string());
+}
+
+int coloured_pixels(const cv::Mat& picture) {
+  int count = 0;
+  for (int i = 0; i < static_cast<int>(picture.total()); ++i) {
+    const auto& pixel = picture.at<cv::Vec3b>(i);
+    count += pixel[0] != pixel[1];
+  }
+  return count;
+}
+
+TEST(WriteLossCurves, HasAPanelForEachLossThatIsThere) {
+  std::vector<LossRow> rows;
+  for (int i = 0; i < 50; ++i) {
+    rows.push_back(row_of(i, static_cast<std::size_t>(i % 3), std::exp(-i / 5.0)));
+  }
+  const cv::Mat picture = drawn(rows);
+  EXPECT_EQ(picture.size(), cv::Size(1040, 480));  // three panels in two lines
+  EXPECT_GT(coloured_pixels(picture), 500);
+}
+
+TEST(WriteLossCurves, DrawsExtremes) {
+  EXPECT_EQ(coloured_pixels(drawn({})), 0);
+  EXPECT_GT(coloured_pixels(drawn({row_of(0, 0, 1)})), 0);  // one value
+  EXPECT_GT(coloured_pixels(drawn({row_of(0, 0, 0), row_of(1, 0, 0)})), 0);
+  EXPECT_GT(coloured_pixels(drawn({row_of(0, 0, -1e30), row_of(1, 0, 1e30)})), 0);
+  EXPECT_GT(coloured_pixels(drawn({row_of(0, 0, 1e-30), row_of(1, 0, 1e30)})), 0);
+}
+
+TEST(WriteLossCurves, NamesTheFileItCannotWrite) {
+  EXPECT_THROW(write_loss_curves({}, "/nowhere/curves.png"), std::runtime_error);
+}
+
+}  // namespace
+}  // namespace eventgan

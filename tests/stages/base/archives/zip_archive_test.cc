@@ -1,0 +1,136 @@
+#include "stages/base/archives/zip_archive.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+#include "tests/testing/zip_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+std::string text(const std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+// Little-endian bytes of a 32-bit number, as zip headers hold sizes.
+std::string u32(std::uint32_t value) {
+  std::string bytes;
+  for (int i = 0; i < 4; ++i) bytes += static_cast<char>(value >> (8 * i));
+  return bytes;
+}
+
+class ZipArchiveTest : public ::testing::Test {
+ protected:
+  testing::TemporaryFolder folder_;
+  std::filesystem::path file_ = folder_ / "some.zip";
+};
+
+TEST_F(ZipArchiveTest, ReadsStoredAndDeflatedMembersInTheirOrder) {
+  const std::string zeros(100000, '\0');
+  testing::write_zip(file_, {{"b.npy", "stored"}, {"a/empty", ""}, {"z", zeros, true}});
+  const ZipArchive archive(file_);
+  EXPECT_THAT(archive.names(), ElementsAre("b.npy", "a/empty", "z"));
+  EXPECT_TRUE(archive.contains("a/empty"));
+  EXPECT_FALSE(archive.contains("a"));
+  EXPECT_EQ(text(archive.read("b.npy")), "stored");
+  EXPECT_TRUE(archive.read("a/empty").empty());
+  EXPECT_EQ(text(archive.read("z")), zeros);
+  EXPECT_EQ(text(archive.read("b.npy")), "stored") << "a member can be read twice";
+}
+
+TEST_F(ZipArchiveTest, NamesTheMissingMember) {
+  testing::write_zip(file_, {{"a", "x"}});
+  const ZipArchive archive(file_);
+  EXPECT_THAT([&] { archive.read("data.pkl"); },
+              ThrowsMessage<std::runtime_error>(
+                  AllOf(HasSubstr("some.zip"), HasSubstr("(member data.pkl)"))));
+}
+
+TEST_F(ZipArchiveTest, RefusesWhatIsNoZipFile) {
+  EXPECT_THAT([&] { ZipArchive(folder_ / "absent.zip"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("absent.zip")));
+  for (const std::string& content : {std::string(), std::string("no zip file at all")}) {
+    testing::write_file(file_, content);
+    EXPECT_THAT([&] { ZipArchive{file_}; },
+                ThrowsMessage<std::runtime_error>(HasSubstr("expected a zip file")));
+  }
+}
+
+TEST_F(ZipArchiveTest, RefusesTruncatedFile) {
+  testing::write_zip(file_, {{"a", std::string(1000, 'x')}});
+  const std::string whole = testing::read_file(file_);
+  testing::write_file(file_, whole.substr(0, whole.size() / 2));
+  EXPECT_THROW(ZipArchive{file_}, std::runtime_error);
+}
+
+TEST_F(ZipArchiveTest, FindsDamageByTheChecksum) {
+  for (const bool deflated : {false, true}) {
+    testing::write_zip(file_, {{"a", "0123456789abcdefghijklmnopqrstuvwxyz", deflated}});
+    std::string whole = testing::read_file(file_);
+    // The content follows the local header of 30 bytes and the name; its 11th byte gets another
+    // bit.
+    whole[30 + 1 + 10] ^= 0x10;
+    testing::write_file(file_, whole);
+    const ZipArchive archive(file_);
+    EXPECT_THAT([&] { archive.read("a"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("(member a)")));
+  }
+}
+
+TEST_F(ZipArchiveTest, ReadsNoMoreBytesThanAllowed) {
+  testing::write_zip(file_, {{"a", "12345"}, {"b", std::string(1000, 'x'), true}});
+  const ZipArchive archive(file_);
+  EXPECT_EQ(text(archive.read("a", 5)), "12345");
+  EXPECT_THAT([&] { archive.read("a", 4); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 4 bytes")));
+  EXPECT_THROW(archive.read("b", 999), std::runtime_error);
+}
+
+TEST_F(ZipArchiveTest, RefusesADirectoryThatWouldFillTheMemory) {
+  std::string signatures;
+  for (int i = 0; i < 65537; ++i) signatures += "PK\1\2 and more than a block of 1 MiB of them";
+  testing::write_file(file_, signatures);
+  EXPECT_THAT([&] { ZipArchive archive(file_); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("at most 65536 members")));
+  testing::write_zip(file_, {{"holds them", signatures.substr(0, 1000)}});
+  EXPECT_EQ(ZipArchive(file_).names().size(), 1u);
+}
+
+TEST_F(ZipArchiveTest, DoesNotTrustTheDeclaredSize) {
+  for (const bool deflated : {false, true}) {
+    const std::string content(1000, 'x');
+    testing::write_zip(file_, {{"a", content, deflated}});
+    std::string whole = testing::read_file(file_);
+    // 1000 is the uncompressed size, in the local and in the central header; make it 2 GiB in both.
+    int changed = 0;
+    for (std::size_t at = 0; (at = whole.find(u32(1000), at)) != std::string::npos; at += 4) {
+      whole.replace(at, 4, u32(0x80000000u));
+      ++changed;
+    }
+    ASSERT_GE(changed, 2);
+    testing::write_file(file_, whole);
+    EXPECT_THAT([&] { ZipArchive(file_).read("a"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("some.zip")));
+  }
+}
+
+TEST_F(ZipArchiveTest, ReadsPyTorchCheckpoint) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const ZipArchive archive(data / "golden" / "checkpoint_zip.pt");
+  EXPECT_EQ(archive.names().size(), 106u);  // data.pkl, version, 104 storages
+  EXPECT_EQ(archive.read("checkpoint_zip/data.pkl").size(), 14495u);
+  EXPECT_EQ(archive.read("checkpoint_zip/data/100").size(), 1048576u);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,130 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <vector>
+
+#include "stages/events/pictures/comparison_picture.h"
+#include "stages/events/pictures/preview_picture.h"
+#include "stages/events/pictures/time_panel_internal.h"
+#include "tests/testing/temporary_folder.h"
+
+namespace eventgan {
+namespace {
+
+TEST(PanelScale, WholeFactorsWithinBounds) {
+  EXPECT_EQ(panel_scale({260, 861}).factor, 1);
+  EXPECT_EQ(panel_scale({260, 346}).factor, 2);  // 692 <= 720 < 1038
+  EXPECT_EQ(panel_scale({240, 96}).factor, 3);
+  EXPECT_EQ(panel_scale({1, 1}).factor, 8);
+  EXPECT_EQ(panel_scale({4000, 4000}).factor, 1);
+}
+
+TEST(PanelScale, APixelsCentreStaysInTheMiddleOfItsSquare) {
+  const PanelScale scale{4};
+  // Volume pixel 3 becomes panel pixels 12..15, with the middle 13.5.
+  EXPECT_EQ(scale.point({3, 0}), (Point{13.5, 1.5}));
+  // The edge at 3 lies before panel pixel 12.
+  EXPECT_EQ(scale.corner(3, 0), (Point{11.5, -0.5}));
+}
+
+constexpr VolumeShape kPixel{9, {1, 1}};
+
+/// The panel's one pixel for a volume of one pixel with `value` in one channel.
+cv::Vec3b pixel_of(int channel, float value) {
+  std::vector<float> volume(kPixel.value_count(), 0.0f);
+  volume[channel] = value;
+  return time_panel(volume, kPixel).at<cv::Vec3b>(0, 0);
+}
+
+int brightest(const cv::Vec3b& pixel) { return std::max({pixel[0], pixel[1], pixel[2]}); }
+
+TEST(TimePanel, EarlyIsBlueAndLateIsRedInEitherPolarity) {
+  for (const int polarity : {0, 9}) {
+    const cv::Vec3b early = pixel_of(polarity + 0, 10);
+    const cv::Vec3b middle = pixel_of(polarity + 4, 10);
+    const cv::Vec3b late = pixel_of(polarity + 8, 10);
+    EXPECT_EQ(brightest(early), early[0]);
+    EXPECT_EQ(brightest(middle), middle[1]);
+    EXPECT_EQ(brightest(late), late[2]);
+  }
+}
+
+TEST(TimePanel, PolaritiesAreWeightedByTheirEvents) {
+  std::vector<float> volume(kPixel.value_count(), 0.0f);
+  volume[0] = 3;      // positive, time 0.1
+  volume[9 + 8] = 1;  // negative, time 1
+  // (3 * 0.1 + 1 * 1) / 4 = 0.325; brightness 1 - exp(-4) = 0.98.
+  const cv::Vec3b expected = time_colour(0.325f);
+  const cv::Vec3b pixel = time_panel(volume, kPixel).at<cv::Vec3b>(0, 0);
+  for (int channel = 0; channel < 3; ++channel) {
+    EXPECT_NEAR(pixel[channel], expected[channel] * 0.98, 2);
+  }
+}
+
+TEST(TimePanel, BrightnessIsAbsolute) {
+  EXPECT_EQ(brightest(pixel_of(4, 0)), 0);
+  // 1 - exp(-0.02) = 2 % of at most 255: noise stays faint.
+  EXPECT_LE(brightest(pixel_of(4, 0.02f)), 6);
+  EXPECT_GT(brightest(pixel_of(4, 0.02f)), 0);
+  EXPECT_GT(brightest(pixel_of(4, 5)), 200);
+  EXPECT_GT(brightest(pixel_of(4, std::numeric_limits<float>::max())), 200);
+}
+
+TEST(TimePanel, UnsoundValuesAreWhite) {
+  const cv::Vec3b white(255, 255, 255);
+  EXPECT_EQ(pixel_of(3, std::numeric_limits<float>::quiet_NaN()), white);
+  EXPECT_EQ(pixel_of(12, std::numeric_limits<float>::infinity()), white);
+}
+
+TEST(TimePanel, OtherNumbersOfBins) {
+  EXPECT_EQ(time_panel(std::vector<float>(2 * 6, 1.0f), {1, {2, 3}}).size(), cv::Size(3, 2));
+}
+
+/// Grey frames, no generated event, and a real one in the last bin at row 1, column 2.
+ComparedPair pair_of(ImageSize size) {
+  ComparedPair pair;
+  pair.shape = {2, size};
+  pair.frames.assign(2 * size.pixel_count(), 0.0f);
+  pair.generated.assign(pair.shape.value_count(), 0.0f);
+  pair.real = pair.generated;
+  pair.real[size.pixel_count() + static_cast<std::size_t>(size.width) + 2] = 5.0f;
+  pair.title = "a pair";
+  return pair;
+}
+
+TEST(WriteComparisonPng, ShowsFramesAndBothVolumes) {
+  const testing::TemporaryFolder folder;
+  const auto file = folder / "pairs.png";
+  write_comparison_png(std::vector{pair_of({8, 160}), pair_of({8, 160})}, file);
+  const cv::Mat picture = cv::imread(file.string());
+  // Panels of 160x8 enlarged twice, 6 pixels between them, 22 above and below each row.
+  EXPECT_EQ(picture.size(), cv::Size(4 * 326 + 6, 2 * (16 + 44)));
+  const auto middle = [&](int panel) {
+    return picture.at<cv::Vec3b>(22 + 3, 6 + panel * 326 + 5);  // row 1, column 2, enlarged
+  };
+  EXPECT_EQ(middle(0), cv::Vec3b(128, 128, 128));
+  EXPECT_EQ(middle(1), cv::Vec3b(128, 128, 128));
+  EXPECT_EQ(middle(2), cv::Vec3b(0, 0, 0));
+  EXPECT_GT(middle(3)[2], 200);  // late: red
+}
+
+TEST(WriteComparisonPng, TakesPairsOfSeveralSizes) {
+  const testing::TemporaryFolder folder;
+  write_comparison_png(std::vector{pair_of({3, 400}), pair_of({3, 3})}, folder / "pairs.png");
+  EXPECT_EQ(cv::imread((folder / "pairs.png").string()).cols, 4 * 406 + 6);
+}
+
+TEST(WriteComparisonPng, RefusesWhatDoesNotFit) {
+  ComparedPair pair = pair_of({4, 4});
+  pair.real.pop_back();
+  EXPECT_THROW(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument);
+  EXPECT_THROW(write_comparison_png({}, "/tmp/never.png"), std::invalid_argument);
+  EXPECT_THROW(write_comparison_png(std::vector{pair_of({4, 4})}, "/nowhere/pairs.png"),
+               std::runtime_error);
+}
+
+}  // namespace
+}  // namespace eventgan

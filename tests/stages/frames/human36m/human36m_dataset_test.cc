@@ -1,0 +1,298 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <set>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/human36m/camera_book_internal.h"
+#include "stages/frames/human36m/human36m_dataset_internal.h"
+#include "stages/frames/human36m/pose_table_internal.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using namespace std::string_literals;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+TEST(Human36mJointsTest, NamesAreDistinctAndAsManyAsAsked) {
+  for (const std::size_t count : {0u, 1u, 17u, 24u, 32u}) {
+    const auto names = human36m_joint_names(count);
+    EXPECT_EQ(names.size(), count);
+    EXPECT_EQ(std::set<std::string>(names.begin(), names.end()).size(), count);
+  }
+  EXPECT_THAT(human36m_joint_names(2), ::testing::ElementsAre("joint_0", "joint_1"));
+}
+
+TEST(Human36mJointsTest, ThirtyTwoJointsHoldTheUsualSeventeenWhereTrainersTakeThem) {
+  const auto names = human36m_joint_names(32);
+  // The choice every trainer makes: 0 1 2 3 6 7 8 12 13 14 15 17 18 19 25 26 27.
+  EXPECT_EQ(names[3], "RightFoot");
+  EXPECT_EQ(names[8], "LeftFoot");
+  EXPECT_EQ(names[12], "Spine1");
+  EXPECT_EQ(names[15], "Head_Site");
+  EXPECT_EQ(names[19], "LeftHand");
+  EXPECT_EQ(names[27], "RightHand");
+}
+
+TEST(Human36mJointsTest, SeventeenJointsHaveTheSidesOfThoseAmongTheThirtyTwo) {
+  const auto all = human36m_joint_names(32);
+  const auto chosen = human36m_joint_names(17);
+  const std::vector<std::size_t> choice = {0,  1,  2,  3,  6,  7,  8,  12, 13,
+                                           14, 15, 17, 18, 19, 25, 26, 27};
+  for (std::size_t i = 0; i < choice.size(); ++i) {
+    EXPECT_EQ(chosen[i].starts_with("right"), all[choice[i]].starts_with("Right")) << i;
+    EXPECT_EQ(chosen[i].starts_with("left"), all[choice[i]].starts_with("Left")) << i;
+  }
+  EXPECT_EQ(chosen[1], "right_hip");
+  EXPECT_EQ(chosen[6], "left_foot");
+}
+
+using State = Neighbour::State;
+
+NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
+  std::vector<NumberedSequence::Frame> frames;
+  for (const std::int64_t number : numbers) {
+    frames.emplace_back(number, "img_00" + std::to_string(number) + ".png");
+  }
+  return NumberedSequence(std::move(frames));
+}
+
+TEST(FrameFolderTest, CountsStoredFramesWhateverTheirNumbers) {
+  // Labels lie farther apart than pictures.
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005, 1006, 1040}), {1000, 1040});
+  const Neighbour next = folder.neighbour(1000, 1);
+  EXPECT_EQ(next.state, State::kPresent);
+  EXPECT_EQ(next.frame.path, "root/7/img_001005.png");
+  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1006);
+  EXPECT_EQ(folder.neighbour(1000, 3).frame.index, 1040);
+  EXPECT_EQ(folder.neighbour(1000, 4).state, State::kBeyond);
+  EXPECT_EQ(folder.neighbour(1040, -3).frame.index, 1000);
+  EXPECT_EQ(folder.neighbour(1040, -4).state, State::kBeyond);
+}
+
+TEST(FrameFolderTest, ALabelledFrameWithoutPictureCountsAsAHole) {
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {1010, 1000, 1003, 1003});
+  const Neighbour hole = folder.neighbour(1000, 1);
+  EXPECT_EQ(hole.state, State::kHole);
+  EXPECT_EQ(hole.frame.path, "root/7/img_001003.png");
+  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1005);
+  EXPECT_EQ(folder.neighbour(1003, 0).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1005, 1).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1005, 2).state, State::kBeyond);
+}
+
+TEST(FrameFolderTest, AFrameThatIsNotThereHasThoseBesideIt) {
+  const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {});
+  EXPECT_EQ(folder.neighbour(1002, 0).state, State::kHole);
+  EXPECT_EQ(folder.neighbour(1002, 1).frame.index, 1005);
+  EXPECT_EQ(folder.neighbour(1002, -1).frame.index, 1000);
+  EXPECT_EQ(folder.neighbour(1002, 2).state, State::kBeyond);
+}
+
+TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
+  EXPECT_EQ(FrameFolder("r", "img_", stored({1000}), {}).frame(1001).path, "r/img_001001.png");
+  EXPECT_EQ(FrameFolder("r", "img_", {}, {}).frame(12).path, "r/img_000012.jpg");
+  EXPECT_EQ(FrameFolder("r", "img_", {}, {}).frame(1234567).path, "r/img_1234567.jpg");
+}
+
+TEST(FrameFolderTest, EmptyFolderHasNoNeighbours) {
+  const FrameFolder folder("r", "img_", {}, {});
+  EXPECT_EQ(folder.neighbour(1, 1).state, State::kBeyond);
+  EXPECT_EQ(folder.neighbour(1, 0).state, State::kHole);
+}
+
+TableColumns columns() {
+  return TableColumns({{"points", {{2, 3, 1}, std::vector<double>{1, 2, 3, 4, 5, 6}}},
+                       {"name", {{2}, std::vector<std::string>{"a", "b"}}},
+                       {"frame", {{2}, std::vector<double>{7, 7.5}}},
+                       {"single", {{}, std::vector<double>{9}}},
+                       {"x/other", {{2}, std::vector<std::int32_t>{1, 2}}}},
+                      "file.h5");
+}
+
+TEST(TableColumnsTest, ComparesShapes) {
+  const TableColumns table = columns();
+  const auto any = std::nullopt;
+  EXPECT_EQ(table.need("points", {2, any, 1}).size(), 6u);
+  EXPECT_EQ(table.need("name", {any}, /*text=*/true).size(), 2u);
+  EXPECT_THAT(
+      [&] {
+        table.need("points", {any, 4, 1});
+      },
+      ThrowsMessage<InputError>("expected numbers [at least 1, 4, 1], got numbers [2, 3, 1], "
+                                "in file.h5 (points)"));
+  EXPECT_THROW(table.need("points", {2, 3}), InputError);
+  EXPECT_THROW(table.need("points", {2, 3, 1, 1}), InputError);
+  EXPECT_THROW(table.need("name", {2}), InputError);
+  EXPECT_THROW(table.need("frame", {2}, /*text=*/true), InputError);
+  EXPECT_THAT(
+      [&] { table.need("absent", {2}); },
+      ThrowsMessage<InputError>("expected numbers [2], got no such array, in file.h5 (absent)"));
+}
+
+TEST(TableColumnsTest, GivesRows) {
+  const TableColumns table = columns();
+  EXPECT_THAT(table.row_of("points", 1), ElementsAre(4, 5, 6));
+  EXPECT_EQ(table.whole_number("frame", 0), 7);
+  EXPECT_THROW(table.whole_number("frame", 1), InputError);
+  EXPECT_EQ(table.fields(1, 2, "x/").dump(),
+            R"({"frame":7.5,"name":"b","points":[[4.0],[5.0],[6.0]]})");
+  EXPECT_EQ(table.fields(0, 2)["x/other"], 1);
+  EXPECT_EQ(table.fields(0, 3).dump(), "{}");
+}
+
+TEST(TableColumnsTest, FindsValuesThatAreNotFinite) {
+  const TableColumns table = columns();
+  EXPECT_FALSE(table.not_finite({0, -1e300}, "points", 0));
+  EXPECT_EQ(table.not_finite({0, -std::numeric_limits<double>::infinity()}, "points", 4)->reason,
+            "expected finite numbers, got -inf, in file.h5 (points, row 4)");
+}
+
+// A pickled numpy array of bytes, shape [n].
+std::string byte_array(const std::string& bytes) {
+  const std::string count(1, static_cast<char>(bytes.size()));
+  return "cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01"s +
+         "b\x87R(K\x01K" + count + "\x85" +
+         "cnumpy\ndtype\nU\x02u1K\x00K\x01\x87R(K\x03U\x01|tb\x89U"s + count + bytes + "tb";
+}
+
+// {("S1", "7"): {CONTENT}}
+std::string book(const std::string& content) {
+  return "}U\x02S1U\x01"
+         "7\x86}(" +
+         content + "us.";
+}
+
+CameraBook read(const std::string& pickle) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "cameras.pkl", pickle);
+  return read_camera_book(folder / "cameras.pkl");
+}
+
+TEST(CameraBookTest, ReadsIntrinsicsAndAllFields) {
+  const CameraBook cameras =
+      read(book("U\x01"
+                "f" +
+                byte_array("\x0b\x0c") +
+                "U\x01"
+                "c" +
+                byte_array("\x05\x06") +
+                "U\x04nameX\x04\x00\x00\x00"
+                "cam1U\x01wM\xe8\x03U\x01oNU\x01xG\x3f\xf0\x00\x00\x00\x00\x00\x00"s));
+  ASSERT_EQ(cameras.size(), 1u);
+  const Human36mCamera& camera = cameras.at({"S1", "7"});
+  EXPECT_EQ(camera.intrinsics, (Intrinsics{11, 12, 5, 6}));
+  EXPECT_EQ(camera.fields.dump(),
+            R"({"f":[11,12],"c":[5,6],"name":"cam1","w":1000,"o":null,"x":1.0})");
+}
+
+TEST(CameraBookTest, ReadsTheLensDistortion) {
+  const std::string intrinsics =
+      "U\x01"
+      "f" +
+      byte_array("\x0b\x0c") +
+      "U\x01"
+      "c" +
+      byte_array("\x05\x06");
+  const std::string k = "U\x01k" + byte_array("\x01\x02\x03");
+  const std::string p = "U\x01p" + byte_array("\x04\x05");
+  EXPECT_EQ(read(book(intrinsics + k + p)).at({"S1", "7"}).distortion,
+            (LensDistortion{.k1 = 1, .k2 = 2, .k3 = 3, .p1 = 4, .p2 = 5}));
+  EXPECT_FALSE(read(book(intrinsics)).at({"S1", "7"}).distortion);
+  EXPECT_THAT([&] { read(book(intrinsics + k)); }, ThrowsMessage<InputError>(HasSubstr("(p)")));
+  EXPECT_THAT([&] { read(book(intrinsics + p + "U\x01k" + byte_array("\x01\x02"))); },
+              ThrowsMessage<InputError>(HasSubstr("expected 3 numbers, got [2]")));
+}
+
+/// One joint at (X, Y, Z) = (500, -250, 1000) mm, so at (a, b) = (0.5, -0.25).
+Person person_seen_at(Point at) {
+  Person person;
+  person.joints = {{at, -1}, {kMissingPoint, 0}, {{9, 9}, -1}};
+  person.joints3d_mm = {std::array{500.0, -250.0, 1000.0}, std::array{1.0, 1.0, 1.0}, std::nullopt};
+  person.camera = Intrinsics{1000, 2000, 500, 600};
+  return person;
+}
+
+TEST(ProjectionErrorTest, IsTheDistanceFromWhereTheCameraProjects) {
+  // Without distortion: 1000 * 0.5 + 500, 2000 * -0.25 + 600.
+  EXPECT_EQ(projection_error_px(person_seen_at({1000, 100})), 0);
+  EXPECT_EQ(projection_error_px(person_seen_at({1003, 96})), 5);
+
+  // r2 = 0.3125; d = 1 + 0.5 * 0.3125 + 0.25 * 0.3125^2 + 2 * 0.3125^3 + 0.2 * -0.25 + 0.4 * 0.5
+  // = 1.39170...; a' = 0.5 d + 0.4 r2, b' = -0.25 d + 0.2 r2.
+  const double d = 1 + 0.15625 + 0.0244140625 + 0.06103515625 - 0.05 + 0.2;
+  Person person =
+      person_seen_at({1000 * (0.5 * d + 0.125) + 500, 2000 * (-0.25 * d + 0.0625) + 600});
+  person.distortion = {.k1 = 0.5, .k2 = 0.25, .k3 = 2, .p1 = 0.2, .p2 = 0.4};
+  EXPECT_NEAR(projection_error_px(person), 0, 1e-9);
+}
+
+TEST(ProjectionErrorTest, OnlyACameraThatFitsIsKept) {
+  for (const double off : {0.0, 19.0, 21.0}) {
+    Person person = person_seen_at({1000 + off, 100});
+    person.distortion = LensDistortion{};
+    take_wrong_camera(person);
+    EXPECT_EQ(person.camera.has_value(), off < kProjectionTolerance_px);
+    EXPECT_EQ(person.distortion.has_value(), off < kProjectionTolerance_px);
+    EXPECT_EQ(person.joints3d_mm.size(), 3u);
+  }
+}
+
+TEST(CameraBookTest, RefusesOtherPickles) {
+  const std::string focal =
+      "U\x01"
+      "f" +
+      byte_array("\x0b\x0c");
+  const std::string centre =
+      "U\x01"
+      "c" +
+      byte_array("\x05\x06");
+  for (const std::string& pickle :
+       {"N."s, "no pickle"s, ""s, "}NNs."s,
+        "}U\x01"
+        "aU\x01"
+        "b\x86Ns."s,
+        book(focal), book(centre),
+        book(focal + "U\x01"
+                     "cN"),
+        book(focal +
+             "U\x01"
+             "c" +
+             byte_array("\x05")),
+        book(focal + centre + "U\x01x]"), "}]]\x86}(" + focal + centre + "us.",
+        "cos\nsystem\n(S'true'\ntR."s}) {
+    EXPECT_THAT([&] { read(pickle); },
+                ThrowsMessage<InputError>(AllOf(HasSubstr("expected "), HasSubstr("cameras.pkl"))))
+        << ::testing::PrintToString(pickle);
+  }
+}
+
+TEST(CameraBookTest, ReadsSharedData) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const CameraBook cameras = read_camera_book(data / "human36m_lists" / "cameras.pkl");
+  EXPECT_EQ(cameras.size(), 44u);  // 11 subjects with 4 cameras
+  const Human36mCamera& camera = cameras.at({"S1", "54138969"});
+  // As Python prints them: f = 1145.04940459, 1143.78109572; c = 512.54150496, 515.45148698.
+  EXPECT_NEAR(camera.intrinsics.focal_x, 1145.04940459, 1e-8);
+  EXPECT_NEAR(camera.intrinsics.focal_y, 1143.78109572, 1e-8);
+  EXPECT_NEAR(camera.intrinsics.centre_x, 512.54150496, 1e-8);
+  EXPECT_NEAR(camera.intrinsics.centre_y, 515.45148698, 1e-8);
+  // k = -0.20709891, 0.24777518, -0.00307515; p = -0.00142447, -0.0009757.
+  ASSERT_TRUE(camera.distortion);
+  EXPECT_NEAR(camera.distortion->k1, -0.20709891, 1e-8);
+  EXPECT_NEAR(camera.distortion->k2, 0.24777518, 1e-8);
+  EXPECT_NEAR(camera.distortion->k3, -0.00307515, 1e-8);
+  EXPECT_NEAR(camera.distortion->p1, -0.00142447, 1e-8);
+  EXPECT_NEAR(camera.distortion->p2, -0.0009757, 1e-8);
+}
+
+}  // namespace
+}  // namespace eventgan

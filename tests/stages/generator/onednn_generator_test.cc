@@ -1,0 +1,167 @@
+#include "stages/generator/onednn/onednn_generator.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "stages/generator/onednn/network_plan_internal.h"
+#include "stages/generator/weights.h"
+#include "tests/stages/generator/engine_trials.h"
+
+namespace eventgan {
+namespace {
+
+constexpr Precision kPrecisions[] = {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8};
+
+TEST(OnednnSupport, IsOfOneProcessorForEveryPrecision) {
+  for (const Precision precision : kPrecisions) {
+    const OnednnSupport support = onednn_support(precision);
+    EXPECT_TRUE(support.built);
+    EXPECT_TRUE(support.able || !support.native);
+    EXPECT_EQ(support.instruction_set, onednn_support(Precision::kFloat32).instruction_set);
+  }
+}
+
+TEST(OnednnSupport, ObeysTheLimitOfTheEnvironment) {
+  const char* variable = std::getenv("ONEDNN_MAX_CPU_ISA");
+  const std::string limit = variable ? variable : "";
+  if (limit != "AVX2" && limit != "AVX512_CORE") GTEST_SKIP() << "no limit that is known here";
+  EXPECT_FALSE(onednn_support(Precision::kBfloat16).native) << limit;
+  EXPECT_FALSE(onednn_support(Precision::kInt8).native) << limit;
+  EXPECT_TRUE(limit != "AVX2" || !onednn_support(Precision::kBfloat16).able);
+}
+
+TEST(OnednnSupport, APrecisionThatIsNotAbleIsRefusedByName) {
+  for (const Precision precision : kPrecisions) {
+    const OnednnSupport support = onednn_support(precision);
+    if (support.able) continue;
+    try {
+      make_onednn_generator(untrained_weights(1, 1, 1), precision);
+      ADD_FAILURE() << to_string(precision);
+    } catch (const std::runtime_error& error) {
+      EXPECT_EQ(std::string(error.what()), "expected a processor on which oneDNN computes " +
+                                               std::string(to_string(precision)) + ", got " +
+                                               support.instruction_set);
+    }
+  }
+}
+
+TEST(OnednnGenerator, SaysWhatChangesItsBytes) {
+  const auto text =
+      make_onednn_generator(untrained_weights(1, 1, 1), Precision::kFloat32)->description();
+  EXPECT_TRUE(text.starts_with("onednn float32, 1 thread, oneDNN ")) << text;
+  EXPECT_NE(text.find(onednn_support(Precision::kFloat32).instruction_set), std::string::npos)
+      << text;
+}
+
+TEST(OnednnGenerator, RefusesInt8WithoutCalibration) {
+  if (!onednn_support(Precision::kInt8).able) GTEST_SKIP() << "no int8 here";
+  EXPECT_THROW(make_onednn_generator(untrained_weights(2, 9, 1), Precision::kInt8),
+               std::invalid_argument);
+}
+
+class NetworkPlans : public ::testing::TestWithParam<Precision> {
+ protected:
+  void SetUp() override {
+    if (!onednn_support(GetParam()).able) {
+      GTEST_SKIP() << "this processor does not compute " << to_string(GetParam());
+    }
+  }
+
+  Weights weights_of(int base_channels) const {
+    const Weights plain = untrained_weights(base_channels, 9, 1);
+    return GetParam() == Precision::kInt8 ? testing::calibrated(plain, {16, 16}) : plain;
+  }
+
+  const dnnl::engine engine_{dnnl::engine::kind::cpu, 0};
+};
+
+TEST_P(NetworkPlans, UseCompiledKernelsOnly) {
+  for (const int base_channels : {8, 32}) {
+    NetworkLayers layers(weights_of(base_channels), GetParam(), engine_);
+    for (const ImageSize size : {ImageSize{260, 861}, ImageSize{53, 75}, ImageSize{1, 1}}) {
+      const auto names = NetworkPlan(layers, size).implementations();
+      // Head, 4 encoders, 4 residual, 4 decoders of two or more, prediction.
+      EXPECT_GE(names.size(), 18u);
+      for (const std::string& name : names) {
+        EXPECT_EQ(name.find("ref"), std::string::npos) << name << ", width " << base_channels;
+        EXPECT_EQ(name.find("gemm"), std::string::npos) << name << ", width " << base_channels;
+      }
+    }
+  }
+}
+
+TEST_P(NetworkPlans, NeedLittleMoreThanTheirActivations) {
+  constexpr ImageSize kUsual{260, 861};
+  NetworkLayers layers(weights_of(32), GetParam(), engine_);
+  const std::size_t value_bytes = dnnl::memory::data_type_size(layers.stored_type());
+  const std::size_t activations = activation_bytes(kUsual, 32, value_bytes);
+  const std::size_t block = NetworkPlan(layers, kUsual).block_bytes();
+  EXPECT_GE(block, activations);
+  EXPECT_LE(block, activations + 40'000'000);  // strips, and what the kernels work with
+}
+
+INSTANTIATE_TEST_SUITE_P(All, NetworkPlans,
+                         ::testing::Values(Precision::kFloat32, Precision::kBfloat16,
+                                           Precision::kInt8),
+                         [](const auto& precision) {
+                           return std::string(to_string(precision.param));
+                         });
+
+using Plan = std::shared_ptr<const NetworkPlan>;
+
+NetworkLayers layers_of(const Weights& weights) {
+  return {weights, Precision::kFloat32, dnnl::engine(dnnl::engine::kind::cpu, 0)};
+}
+
+TEST(PlanCache, KeepsThePlansOfTheLatestSizes) {
+  NetworkLayers layers = layers_of(untrained_weights(1, 1, 1));
+  PlanCache cache(layers);
+  const Plan first = cache.plan({4, 4});
+  for (int width = 5; width < 20; ++width) cache.plan({4, width});  // 16 sizes
+  EXPECT_EQ(cache.plan({4, 4}), first);
+  cache.plan({4, 20});  // and 5 is the one that was not used for longest
+  EXPECT_EQ(cache.plan({4, 4}), first);
+  for (int width = 5; width < 21; ++width) cache.plan({4, width});
+  EXPECT_NE(cache.plan({4, 4}), first) << "a cache without bounds";
+}
+
+TEST(PlanCache, BuildsOnePlanForManyThreads) {
+  NetworkLayers layers = layers_of(untrained_weights(2, 9, 1));
+  PlanCache cache(layers);
+  std::vector<Plan> plans(8);
+  std::vector<std::jthread> threads;
+  for (Plan& plan : plans) threads.emplace_back([&] { plan = cache.plan({30, 41}); });
+  threads.clear();
+  for (const Plan& plan : plans) EXPECT_EQ(plan, plans[0]);
+}
+
+TEST(PlanCache, TellsEveryCallOfAFailureAndTriesAgain) {
+  Weights weights = untrained_weights(1, 1, 1);
+  weights.convolutions.pop_back();  // no plan without a last layer
+  NetworkLayers layers = layers_of(weights);
+  PlanCache cache(layers);
+  std::vector<int> failures(4);
+  std::vector<std::jthread> threads;
+  for (int& count : failures) {
+    threads.emplace_back([&] {
+      for (int call = 0; call < 3; ++call) {
+        try {
+          cache.plan({8, 8});
+        } catch (const std::out_of_range&) {
+          ++count;
+        }
+      }
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(failures, std::vector<int>(4, 3));
+}
+
+}  // namespace
+}  // namespace eventgan

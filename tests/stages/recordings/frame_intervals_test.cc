@@ -1,0 +1,222 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+#include "manifests/values/faults.h"
+#include "stages/recordings/event_check_internal.h"
+#include "stages/recordings/frame_intervals_internal.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+TEST(FrameTimesTest, TakesAscendingTimes) {
+  EXPECT_NO_THROW(check_frame_times({-1}, "f"));
+  EXPECT_NO_THROW(check_frame_times({0, 1, std::nextafter(1.0, 2.0)}, "f"));
+}
+
+TEST(FrameTimesTest, RefusesOthers) {
+  EXPECT_THAT([] { check_frame_times({}, "f"); },
+              ThrowsMessage<InputError>(HasSubstr("at least one frame, got none, in f")));
+  EXPECT_THAT(
+      [] {
+        check_frame_times({0, 1, 1}, "f");
+      },
+      ThrowsMessage<InputError>(HasSubstr("in f (frame 2)")));
+  EXPECT_THAT(
+      [] {
+        check_frame_times({1, 0.5}, "f");
+      },
+      ThrowsMessage<InputError>(HasSubstr("a time after 1.000000 s, got 0.500000 s")));
+  for (const double time_s : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    EXPECT_THAT([&] { check_frame_times({time_s}, "f"); },
+                ThrowsMessage<InputError>(HasSubstr("a finite time")));
+  }
+}
+
+TEST(FrameRangeTest, GivesPositions) {
+  EXPECT_EQ(frame_position(2, 3, "r"), 2u);
+  EXPECT_EQ(frame_range(0, 2, 3, "r").last, 2u);
+  EXPECT_EQ(frame_range(1, 1, 3, "r").first, 1u);
+}
+
+TEST(FrameRangeTest, RefusesFramesThatAreNotThere) {
+  for (const std::int64_t index : {-1, 3}) {
+    EXPECT_THAT([&] { frame_position(index, 3, "r"); },
+                ThrowsMessage<std::out_of_range>(HasSubstr("expected a frame 0..2")));
+    EXPECT_THROW(frame_range(0, index, 3, "r"), std::out_of_range);
+    EXPECT_THROW(frame_range(index, 2, 3, "r"), std::out_of_range);
+  }
+  EXPECT_THAT([] { frame_range(2, 1, 3, "r"); },
+              ThrowsMessage<std::out_of_range>(HasSubstr("got 2 and 1, in r")));
+}
+
+// Looks into a list of times and counts how often.
+class ListedTimes {
+ public:
+  explicit ListedTimes(std::vector<double> times) : times_(std::move(times)) {}
+
+  std::int64_t until(double time_s, std::int64_t guess) {
+    reads_ = 0;
+    return count_events_until(time_s, guess, static_cast<std::int64_t>(times_.size()),
+                              [this](std::int64_t first, std::int64_t count) {
+                                ++reads_;
+                                EXPECT_GT(count, 0);
+                                const auto begin = times_.begin() + first;
+                                return std::vector<double>(begin, begin + count);
+                              });
+  }
+  int reads() const { return reads_; }
+
+ private:
+  std::vector<double> times_;
+  int reads_ = 0;
+};
+
+TEST(CountEventsUntilTest, CountsEventsAtTheTimeItself) {
+  ListedTimes times({1, 2, 2, 3});
+  for (const std::int64_t guess : {-5, 0, 2, 4, 1000}) {
+    EXPECT_EQ(times.until(0.5, guess), 0);
+    EXPECT_EQ(times.until(1, guess), 1);
+    EXPECT_EQ(times.until(2, guess), 3);
+    EXPECT_EQ(times.until(2.5, guess), 3);
+    EXPECT_EQ(times.until(3, guess), 4);
+    EXPECT_EQ(times.until(9, guess), 4);
+  }
+}
+
+TEST(CountEventsUntilTest, NeedsNoEvents) { EXPECT_EQ(ListedTimes({}).until(1, 0), 0); }
+
+TEST(CountEventsUntilTest, NeedsOneReadForAGoodGuessAndFewForABadOne) {
+  constexpr std::int64_t kCount = 1'000'000;
+  std::vector<double> ascending(kCount);
+  for (std::int64_t i = 0; i < kCount; ++i) ascending[static_cast<std::size_t>(i)] = 0.5 * i;
+  ListedTimes times(ascending);
+  EXPECT_EQ(times.until(0.5 * 123'456, 123'400), 123'457);
+  EXPECT_EQ(times.reads(), 1);
+  for (const std::int64_t guess : {std::int64_t{0}, kCount / 2, kCount}) {
+    EXPECT_EQ(times.until(0.5 * 123'456, guess), 123'457);
+    EXPECT_LE(times.reads(), 12);  // 10^6 / 1024 < 2^10
+  }
+}
+
+TEST(CountEventsUntilTest, EndsForTimesOutOfOrder) {
+  std::vector<double> times(10'000);
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    times[i] = i % 7 == 0 ? std::nan("") : static_cast<double>((i * 7919) % 10'000);
+  }
+  ListedTimes listed(times);
+  for (double time_s = -1; time_s < 10'001; time_s += 97) {
+    const std::int64_t count = listed.until(time_s, 5000);
+    EXPECT_GE(count, 0);
+    EXPECT_LE(count, 10'000);
+  }
+}
+
+TEST(EventBoundariesTest, AsksOnceForEachFrame) {
+  const EventBoundaries boundaries(2);
+  int searches = 0;
+  const auto search = [&] {
+    ++searches;
+    return std::int64_t{0};
+  };
+  EXPECT_EQ(boundaries.at(1, search), 0);
+  EXPECT_EQ(boundaries.at(1, search), 0);
+  EXPECT_EQ(searches, 1);
+  EXPECT_EQ(boundaries.at(0, [] { return std::int64_t{5}; }), 5);
+}
+
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+// Pictures of 4x3 (width x height), events in (1, 2].
+EventCheck check() { return {ImageSize{3, 4}, 1.0, 2.0}; }
+
+TEST(EventCheckTest, TakesTheCornersAndBothEndsOfTheTime) {
+  EventCheck events = check();
+  EXPECT_EQ(events.take({0, 0, std::nextafter(1.0, 2.0), 1}),
+            (Event{0, 0, std::nextafter(1.0, 2.0), true}));
+  EXPECT_EQ(events.take({3, 2, 1.5, -1}), (Event{3, 2, 1.5, false}));
+  EXPECT_EQ(events.take({3, 2, 1.5, -1}), (Event{3, 2, 1.5, false}));  // two at one time
+  EXPECT_EQ(events.take({0, 2, 2.0, 1}), (Event{0, 2, 2.0, true}));
+}
+
+TEST(EventCheckTest, TakesZeroForNegativePolarity) {
+  EventCheck events = check();
+  EXPECT_FALSE(events.take({0, 0, 1.5, 0}).positive);
+  EXPECT_TRUE(events.take({0, 0, 1.5, 1}).positive);
+}
+
+TEST(EventCheckTest, RefusesMixedPolarities) {
+  EventCheck events = check();
+  events.take({0, 0, 1.5, 0});
+  EXPECT_THAT(
+      [&] {
+        events.take({0, 0, 1.5, -1});
+      },
+      ThrowsMessage<EventFault>(HasSubstr("got -1 after 0")));
+}
+
+TEST(EventCheckTest, RefusesOtherPolarities) {
+  for (const double polarity : {2.0, -2.0, 0.5, kNan, kInfinity}) {
+    EXPECT_THAT(
+        [&] {
+          check().take({0, 0, 1.5, polarity});
+        },
+        ThrowsMessage<EventFault>(HasSubstr("expected polarities")));
+  }
+}
+
+TEST(EventCheckTest, RefusesPixelsOutsideThePicture) {
+  for (const double x : {-1.0, 4.0, 0.5, 1e300, kNan, kInfinity, -kInfinity}) {
+    EXPECT_THAT(
+        [&] {
+          check().take({x, 0, 1.5, 1});
+        },
+        ThrowsMessage<EventFault>(HasSubstr("expected a pixel of a picture of 4x3")));
+  }
+  EXPECT_THAT(
+      [&] {
+        check().take({0, 3, 1.5, 1});
+      },
+      ThrowsMessage<EventFault>(HasSubstr("got x = 0, y = 3")));
+}
+
+TEST(EventCheckTest, RefusesTimesOutsideTheStretch) {
+  EXPECT_THAT(
+      [&] {
+        check().take({0, 0, 1.0, 1});
+      },
+      ThrowsMessage<EventFault>(HasSubstr("expected a time after 1 s, got the same")));
+  EXPECT_THAT(
+      [&] {
+        check().take({0, 0, 2.5, 1});
+      },
+      ThrowsMessage<EventFault>(HasSubstr("got 2.5 s before an event at or before 2 s")));
+  for (const double time_s : {kNan, kInfinity, -kInfinity}) {
+    EXPECT_THAT(
+        [&] {
+          check().take({0, 0, time_s, 1});
+        },
+        ThrowsMessage<EventFault>(HasSubstr("expected a finite time")));
+  }
+}
+
+TEST(EventCheckTest, RefusesTimesThatFall) {
+  EventCheck events = check();
+  events.take({0, 0, 1.75, 1});
+  EXPECT_THAT(
+      [&] {
+        events.take({0, 0, 1.5, 1});
+      },
+      ThrowsMessage<EventFault>(HasSubstr("got 1.5 s after 1.75 s")));
+}
+
+}  // namespace
+}  // namespace eventgan
