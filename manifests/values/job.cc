@@ -1,7 +1,6 @@
 #include "manifests/values/job.h"
 
-#include <fmt/core.h>
-
+#include <sstream>
 #include <stdexcept>
 
 namespace eventgan {
@@ -28,8 +27,10 @@ std::string limits_text(const ErrorSpec& errors) {
   if (errors.policy == ErrorPolicy::kFail) {
     return "no quarantined pair (errors.policy in the manifest is \"fail\")";
   }
-  return fmt::format("at most {} quarantined pairs and {:g} of all (errors in the manifest)",
-                     errors.max_count, errors.max_fraction);
+  std::ostringstream text;
+  text << "at most " << errors.max_count << " quarantined pairs and " << errors.max_fraction
+       << " of all (errors in the manifest)";
+  return text.str();
 }
 
 }  // namespace eventgan

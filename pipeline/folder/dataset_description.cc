@@ -88,7 +88,7 @@ void name_groups(std::vector<DatasetView>& views) {
   for (DatasetView& view : views) {
     view.group = kind_of(view.header);
     if (const int number = ++seen[view.group]; number > 1) {
-      view.group += "-" + std::to_string(number);
+      view.group.append(1, '-').append(std::to_string(number));
     }
   }
 }

@@ -12,7 +12,7 @@
 namespace eventgan {
 
 // Everything in a shard but the volumes, column by column: a member for each dataset, of the same
-// name and element type; arrays with inner dimensions are flat, in C order. shard_tables.h says
+// name and element type; arrays with inner dimensions are flat, in C order. visit_columns says
 // which is where; manifests/guides/shard_format.md says what each means.
 
 /// `/events/*`, one row a sample.

@@ -7,7 +7,7 @@
 namespace eventgan {
 
 // How every file that this program writes comes to be under its name whole or not at all (DESIGN
-// section 6, manifests/guarantees.md):
+// section 6, manifests/guides/guarantees.md):
 //
 //   1. Create a temporary of a name that no other writer uses, beside the target:
 //      FOLDER/.NAME.HOST.PID.ATTEMPT.tmp.

@@ -1,7 +1,5 @@
 #include "stages/base/pictures/picture_codecs.h"
 
-#include <jerror.h>
-#include <jpeglib.h>
 #include <libdeflate.h>
 #include <png.h>
 
@@ -20,10 +18,11 @@
 #include <string_view>
 #include <utility>
 #include <vector>
+// jpeglib.h needs <cstddef> and <cstdio> above it.
+#include <jerror.h>
+#include <jpeglib.h>
 
 #include "stages/base/pictures/picture_file.h"
-
-// jpeglib.h needs the two above it.
 
 namespace eventgan {
 namespace {

@@ -38,7 +38,7 @@ void silence_decoders();
 /// folder.
 bool is_picture_file(const std::filesystem::path& file);
 
-/// Decodes a picture file: JPEG and PNG strictly (picture_codecs.h, picture_codecs.h), other
+/// Decodes a picture file: JPEG and PNG strictly (picture_codecs.h), other
 /// formats as OpenCV does. Throws std::runtime_error saying what is wrong ("expected a whole PNG,
 /// got ..."), without the file's name. Thread safe.
 ColourFrame decode_picture_file(const std::filesystem::path& file);

@@ -27,7 +27,7 @@ VisiblePart visible_part(const Placement& placement);
 /// One frame as the generator sees it, in 8 bits: what is kept while other pairs may want it, since
 /// it takes a fraction of the colour picture's memory.
 struct PreparedFrame {
-  /// [y, x] uint8, C order, 0..255: the visible part (prepared_frame.h) of the placed picture.
+  /// [y, x] uint8, C order, 0..255: the VisiblePart of the placed picture.
   std::vector<std::uint8_t> grey;
   Placement placement;  ///< placement.source is the frame's own size
 };

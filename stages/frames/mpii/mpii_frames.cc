@@ -90,8 +90,6 @@ bool same_bytes(const std::filesystem::path& a, const std::filesystem::path& b) 
 
 namespace {
 
-namespace fs = std::filesystem;
-
 std::string joined(const std::string& folder, const std::string& name) {
   return (fs::path(folder) / name).generic_string();
 }

@@ -184,8 +184,6 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 
 namespace {
 
-namespace fs = std::filesystem;
-
 class VideoDataset final : public Dataset {
  public:
   VideoDataset(const SourceSpec& spec, const fs::path& base)

@@ -184,8 +184,8 @@ NamedTensor gather(const StoredTensor& tensor, std::span<const std::byte> storag
   const StoredNumber& number = tensor.storage.number;
   if (storage.size() / number.size_bytes < static_cast<std::uint64_t>(tensor.storage.count)) {
     refuse_tensor("a storage of " + std::to_string(tensor.storage.count) + " values of " +
-               std::to_string(number.size_bytes) + " bytes",
-           std::to_string(storage.size()) + " bytes");
+                      std::to_string(number.size_bytes) + " bytes",
+                  std::to_string(storage.size()) + " bytes");
   }
   NamedTensor result{tensor.shape, {}};
   result.values.reserve(static_cast<std::size_t>(tensor.count));

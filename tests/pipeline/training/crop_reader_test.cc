@@ -8,8 +8,8 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/training/training_recording.h"
+#include "tests/pipeline/training/bar_training.h"
 #include "tests/pipeline/training/fake_training_recording.h"
-#include "tests/pipeline/training/small_training.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
 

@@ -13,7 +13,7 @@
 #include "pipeline/training/training_folder.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"
-#include "tests/pipeline/training/small_training.h"
+#include "tests/pipeline/training/bar_training.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

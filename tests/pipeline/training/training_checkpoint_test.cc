@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "tests/pipeline/training/small_training.h"
+#include "tests/pipeline/training/bar_training.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 

@@ -1,4 +1,4 @@
-#include "tests/pipeline/training/small_training.h"
+#include "tests/pipeline/training/bar_training.h"
 
 #include <stdexcept>
 
