@@ -103,14 +103,14 @@ ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
   const StrictValue valid = object.at("valid");
   marker.valid = valid.integer(0, marker.samples);
   marker.quarantined = read_quarantined(object.at("quarantined"), marker.samples);
-  marker.boxes = read_row_counts(object.at("boxes"), marker.samples, faults);
-  marker.persons = read_row_counts(object.at("persons"), marker.samples, faults);
+  marker.contents.boxes = read_row_counts(object.at("boxes"), marker.samples, faults);
+  marker.contents.persons = read_row_counts(object.at("persons"), marker.samples, faults);
   for (const auto& [name, boxes] : object.at("classes").members()) {
-    marker.classes[name] = boxes.integer<std::int64_t>(1, INT64_MAX);
+    marker.contents.classes[name] = boxes.integer<std::int64_t>(1, INT64_MAX);
   }
-  marker.gaps = read_gaps(object.at("gaps"), marker.samples);
+  marker.contents.gaps = read_gaps(object.at("gaps"), marker.samples);
   for (const StrictValue& column : object.at("optional_columns").elements()) {
-    marker.optional_columns.push_back(column.text());
+    marker.contents.optional_columns.push_back(column.text());
   }
   for (const auto& [stage, seconds] : object.at("stage_seconds").members()) {
     marker.stage_seconds[stage] = seconds.number(0, kMostSeconds);
@@ -134,7 +134,7 @@ std::string to_json(const ShardMarker& marker) {
         {{"slot", sample.slot}, {"sample_id", sample.sample_id}, {"reason", sample.reason}});
   }
   nlohmann::json gaps = nlohmann::json::array();
-  for (const auto& [gap, samples] : marker.gaps) {
+  for (const auto& [gap, samples] : marker.contents.gaps) {
     gaps.push_back({{"gap", gap}, {"samples", samples}});
   }
   for (const auto& [stage, seconds] : marker.stage_seconds) {
@@ -150,11 +150,11 @@ std::string to_json(const ShardMarker& marker) {
                    {"samples", marker.samples},
                    {"valid", marker.valid},
                    {"quarantined", quarantined},
-                   {"boxes", marker.boxes},
-                   {"persons", marker.persons},
-                   {"classes", marker.classes},
+                   {"boxes", marker.contents.boxes},
+                   {"persons", marker.contents.persons},
+                   {"classes", marker.contents.classes},
                    {"gaps", gaps},
-                   {"optional_columns", marker.optional_columns},
+                   {"optional_columns", marker.contents.optional_columns},
                    {"stage_seconds", marker.stage_seconds},
                    {"wall_seconds", marker.wall_seconds}});
 }

@@ -73,6 +73,17 @@ struct QuarantinedSlot {
   std::string reason;
 };
 
+/// What a shard holds, quarantined samples included: with this a whole dataset can be laid out, and
+/// its offsets follow, from the markers alone.
+struct ShardContents {
+  std::vector<std::int32_t> boxes;              ///< rows of /labels/boxes by slot
+  std::vector<std::int32_t> persons;            ///< rows of /labels/poses by slot
+  std::map<std::string, std::int64_t> classes;  ///< boxes by class name; only names that occur
+  std::map<int, std::int64_t> gaps;             ///< samples by gap in frames
+  std::vector<std::string> optional_columns;    ///< paths, in the order of the columns
+  bool operator==(const ShardContents&) const = default;
+};
+
 /// The file SHARD.json beside a shard: written after the shard is whole and in place, so its
 /// existence is what says "done" (DESIGN section 6). A shard is done if its marker parses, names
 /// the plan, and the shard has the marker's size.
@@ -84,13 +95,7 @@ struct ShardMarker {
   int samples = 0;
   int valid = 0;
   std::vector<QuarantinedSample> quarantined;
-  /// Rows of /labels/boxes and /labels/poses by slot, quarantined samples included: with these the
-  /// whole dataset's offsets follow from the markers alone.
-  std::vector<std::int32_t> boxes;
-  std::vector<std::int32_t> persons;
-  std::map<std::string, std::int64_t> classes;  ///< boxes by class name; only names that occur
-  std::map<int, std::int64_t> gaps;             ///< samples by gap in frames
-  std::vector<std::string> optional_columns;    ///< paths of the optional columns the shard has
+  ShardContents contents;
   std::map<std::string, double> stage_seconds;  ///< busy time by stage
   double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
   bool operator==(const ShardMarker&) const = default;

@@ -77,7 +77,7 @@ bool ShardRewrite::commit() {
   ShardReceipt receipt = writer_->commit();
   marker_.sha256 = receipt.sha256;
   marker_.size_bytes = receipt.size_bytes;
-  enter(std::move(receipt.contents), marker_);
+  marker_.contents = std::move(receipt.contents);
   const std::string text = to_json(marker_);
   try {
     write_file_atomically(marker_file, text);

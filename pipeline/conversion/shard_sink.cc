@@ -111,7 +111,7 @@ bool ShardSink::commit() {
   marker_.sha256 = receipt.sha256;
   marker_.size_bytes = receipt.size_bytes;
   span.note("bytes", receipt.size_bytes);
-  enter(std::move(receipt.contents), marker_);
+  marker_.contents = std::move(receipt.contents);
   add_write_seconds(start_ns, marker_);
   marker_.wall_seconds = seconds_since(committed_at_);
   {

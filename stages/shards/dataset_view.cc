@@ -66,9 +66,10 @@ ViewLayout lay_out_view(std::vector<ViewShard> shards) {
   for (ViewShard& shard : shards) {
     const ShardMarker& marker = shard.marker;
     const RowRange samples = append_valid(marker, layout.valid);
-    const RowRange boxes = append_offsets(marker, marker.boxes, "boxes", layout.box_offsets);
+    const RowRange boxes =
+        append_offsets(marker, marker.contents.boxes, "boxes", layout.box_offsets);
     const RowRange persons =
-        append_offsets(marker, marker.persons, "persons", layout.person_offsets);
+        append_offsets(marker, marker.contents.persons, "persons", layout.person_offsets);
     if (layout.splits.empty() || layout.splits.back().name != shard.split) {
       layout.splits.push_back({shard.split, {samples.first, 0}});
     }
@@ -142,7 +143,7 @@ const RowRange& rows_of(const PlacedShard& shard, Rows rows) {
 }
 
 bool has_column(const ShardMarker& marker, const ColumnSpec& spec) {
-  return !spec.optional || std::ranges::count(marker.optional_columns, spec.path) > 0;
+  return !spec.optional || std::ranges::count(marker.contents.optional_columns, spec.path) > 0;
 }
 
 /// The view's columns in its group.

@@ -100,7 +100,7 @@ class Check {
       check_sample(reader, slot, sample);
     }
     check_quarantined(invalid);
-    for (const std::string& found : contents_faults(contents_of(marker_), reader.contents())) {
+    for (const std::string& found : contents_faults(marker_.contents, reader.contents())) {
       fault(found);
     }
     return faults_;
@@ -209,7 +209,7 @@ std::vector<std::string> count_faults(const std::filesystem::path& shard,
     faults.push_back("expected the " + std::to_string(invalid.size()) +
                      " samples with valid = 0 as quarantined, got others");
   }
-  for (std::string& fault : contents_faults(contents_of(tables, schema), contents_of(marker))) {
+  for (std::string& fault : contents_faults(contents_of(tables, schema), marker.contents)) {
     faults.push_back(std::move(fault));
   }
   return faults;

@@ -30,16 +30,4 @@ ShardContents contents_of(const ShardTables& tables, const LabelSchema& schema) 
   return contents;
 }
 
-void enter(ShardContents contents, ShardMarker& marker) {
-  marker.boxes = std::move(contents.boxes);
-  marker.persons = std::move(contents.persons);
-  marker.classes = std::move(contents.classes);
-  marker.gaps = std::move(contents.gaps);
-  marker.optional_columns = std::move(contents.optional_columns);
-}
-
-ShardContents contents_of(const ShardMarker& marker) {
-  return {marker.boxes, marker.persons, marker.classes, marker.gaps, marker.optional_columns};
-}
-
 }  // namespace eventgan

@@ -24,11 +24,11 @@ ShardMarker sample_marker() {
       .samples = 4,
       .valid = 2,
       .quarantined = {{1, "000001", "expected a PNG, got 0 bytes, in a \"b\".png"}, {3, "", ""}},
-      .boxes = {2, 0, 1, 0},
-      .persons = {0, 0, 0, 0},
-      .classes = {{"Car", 2}, {"DontCare", 1}},
-      .gaps = {{1, 3}, {6, 1}},
-      .optional_columns = {"/labels/boxes/alpha"},
+      .contents = {.boxes = {2, 0, 1, 0},
+                   .persons = {0, 0, 0, 0},
+                   .classes = {{"Car", 2}, {"DontCare", 1}},
+                   .gaps = {{1, 3}, {6, 1}},
+                   .optional_columns = {"/labels/boxes/alpha"}},
       .stage_seconds = {{"write", 0.1}, {"decode", 1.5}},
       .wall_seconds = 2.25};
 }
@@ -89,10 +89,10 @@ TEST(Marker, GoesThereAndBack) {
   EXPECT_EQ(parse_marker(to_json(marker), "m"), marker);
   marker.quarantined = {};
   marker.valid = marker.samples = 0;
-  marker.boxes = marker.persons = {};
-  marker.classes = {};
-  marker.gaps = {};
-  marker.optional_columns = {};
+  marker.contents.boxes = marker.contents.persons = {};
+  marker.contents.classes = {};
+  marker.contents.gaps = {};
+  marker.contents.optional_columns = {};
   marker.stage_seconds = {};
   EXPECT_EQ(parse_marker(to_json(marker), "m"), marker);
   marker.stage_seconds = {{"odd \"name\"", 1.0 / 3.0}, {"none", 0}, {"tiny", 5e-324}};
@@ -126,9 +126,9 @@ TEST(Marker, RowCountsStandOnOneLineHoweverManyTheyAre) {
   ShardMarker marker = sample_marker();
   marker.samples = 65536;
   marker.valid = marker.samples - 2;
-  marker.boxes.assign(65536, 2147483647);
-  marker.persons.assign(65536, 0);
-  marker.classes = {{"a\nname \"quoted\"", 1}};
+  marker.contents.boxes.assign(65536, 2147483647);
+  marker.contents.persons.assign(65536, 0);
+  marker.contents.classes = {{"a\nname \"quoted\"", 1}};
   const std::string text = to_json(marker);
   EXPECT_LT(std::count(text.begin(), text.end(), '\n'), 60);
   EXPECT_EQ(parse_marker(text, "m"), marker);

@@ -45,7 +45,7 @@ ShardMarker marker(const PlannedShard& shard, const std::vector<int>& quarantine
         {slot, shard.samples[static_cast<std::size_t>(slot)].sample_id, "why"});
   }
   marker.valid = marker.samples - static_cast<int>(quarantined.size());
-  marker.boxes = marker.persons = {0, 0};
+  marker.contents.boxes = marker.contents.persons = {0, 0};
   return marker;
 }
 
@@ -148,7 +148,7 @@ TEST_F(ShardRewriteTest, AMendedSampleGivesTheShardThatWasMeantFromTheStart) {
   EXPECT_EQ(testing::read_file(shard()), testing::read_file(other / expected.shard));
   ShardMarker got = marker();
   EXPECT_EQ(got.quarantined, expected.quarantined);
-  EXPECT_THAT(got.boxes, ElementsAre(2, 0, 0, 1, 0));
+  EXPECT_THAT(got.contents.boxes, ElementsAre(2, 0, 0, 1, 0));
   EXPECT_EQ(got.stage_seconds["read"], 1 + 2 + 2);
   EXPECT_EQ(got.stage_seconds["generate"], 3 + 3);
   EXPECT_EQ(got.wall_seconds, 10);

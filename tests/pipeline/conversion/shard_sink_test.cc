@@ -111,8 +111,9 @@ TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
 TEST_F(EarlierShardsTest, AMarkerWithCountsThatAreNotTheShardsIsNamedAndMadeAgain) {
   const auto whole = shards();
   ShardMarker wrong = parse_marker(testing::read_file(marker(0)), "");
-  std::swap(wrong.gaps.begin()->second, wrong.gaps[6]);  // as many samples, all of another gap
-  wrong.gaps.erase(wrong.gaps.begin());
+  std::swap(wrong.contents.gaps.begin()->second,
+            wrong.contents.gaps[6]);  // as many samples, all of another gap
+  wrong.contents.gaps.erase(wrong.contents.gaps.begin());
   testing::write_file(marker(0), to_json(wrong));
   const EarlierShards earlier = check();
   EXPECT_THAT(earlier.left, ElementsAre(all_[0]));
@@ -220,9 +221,9 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_EQ(marker.sha256, sha256_of_file(folder_ / "a.h5"));
   EXPECT_EQ(marker.valid, 1);
   EXPECT_EQ(marker.quarantined.at(0).slot, 1);
-  EXPECT_EQ(marker.boxes, (std::vector<std::int32_t>{0, 0}));
-  EXPECT_EQ(marker.persons, (std::vector<std::int32_t>{0, 0}));
-  EXPECT_EQ(marker.gaps, (std::map<int, std::int64_t>{{1, 1}, {2, 1}}));
+  EXPECT_EQ(marker.contents.boxes, (std::vector<std::int32_t>{0, 0}));
+  EXPECT_EQ(marker.contents.persons, (std::vector<std::int32_t>{0, 0}));
+  EXPECT_EQ(marker.contents.gaps, (std::map<int, std::int64_t>{{1, 1}, {2, 1}}));
   EXPECT_GT(marker.wall_seconds, 0);
 }
 
@@ -282,7 +283,7 @@ TEST_F(ShardSinkTest, AFileLostUnderWayIsAnErrorUnlessAnotherHasMadeTheShard) {
   marker.sha256 = std::string(64, 'b');
   marker.size_bytes = 4;
   marker.samples = marker.valid = 2;
-  marker.boxes = marker.persons = {0, 0};
+  marker.contents.boxes = marker.contents.persons = {0, 0};
   testing::write_file(folder_ / "a.h5", "made");
   testing::write_file(folder_ / "a.json", to_json(marker));
   EXPECT_FALSE(accept(a, 1));

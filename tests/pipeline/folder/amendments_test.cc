@@ -137,7 +137,7 @@ class ShardBackupTest : public ::testing::Test {
     marker.sha256 = sha256_hex(content);
     marker.size_bytes = static_cast<std::int64_t>(content.size());
     marker.samples = marker.valid = 1;
-    marker.boxes = marker.persons = {0};
+    marker.contents.boxes = marker.contents.persons = {0};
     testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(marker));
   }
 

@@ -20,15 +20,15 @@ TEST(DatasetCounts, AddUp) {
   marker.samples = 3;
   marker.valid = 2;
   marker.size_bytes = 5'000'000'000;
-  marker.boxes = {2147483647, 0, 2147483647};
-  marker.persons = {1, 0, 4};
-  marker.classes = {{"Car", 4'000'000'000}};
-  marker.gaps = {{1, 3}};
+  marker.contents.boxes = {2147483647, 0, 2147483647};
+  marker.contents.persons = {1, 0, 4};
+  marker.contents.classes = {{"Car", 4'000'000'000}};
+  marker.contents.gaps = {{1, 3}};
   DatasetCounts counts;
   EXPECT_EQ(counts.quarantined(), 0);
   add(marker, counts);
-  marker.classes = {{"Van", 1}};
-  marker.gaps = {{1, 1}, {6, 2}};
+  marker.contents.classes = {{"Van", 1}};
+  marker.contents.gaps = {{1, 1}, {6, 2}};
   add(marker, counts);
   EXPECT_EQ(counts.shards, 2);
   EXPECT_EQ(counts.samples, 6);
@@ -47,8 +47,8 @@ void add_shard(DatasetParts& parts, const std::string& name, int source, ImageSi
   marker.shard = name;
   marker.samples = 1;
   marker.valid = 1;
-  marker.boxes = {1};
-  marker.persons = {0};
+  marker.contents.boxes = {1};
+  marker.contents.persons = {0};
   parts.done.push_back({{name, source, size, 1}, ShardCondition::kDone, marker});
 }
 

@@ -91,7 +91,7 @@ TEST(DatasetParts, AShardWithOtherBytesIsMissingAndIsNotOpened) {
 TEST(DatasetParts, AMarkerWithOtherCountsThanItsShardIsNamed) {
   const ConvertedFolder folder;
   ShardMarker marker = folder.marker(0);
-  ++marker.persons[0];
+  ++marker.contents.persons[0];
   testing::write_file(folder.marker_file(0), to_json(marker));
   const DatasetParts parts = parts_of(folder);
   ASSERT_EQ(parts.missing.size(), 1u);

@@ -80,8 +80,8 @@ class FolderStatusTest : public ::testing::Test {
     marker.samples = 2;
     marker.valid = 2 - static_cast<int>(quarantined.size());
     marker.quarantined = std::move(quarantined);
-    marker.boxes = marker.persons = {0, 0};
-    marker.gaps = {{1, 2}};
+    marker.contents.boxes = marker.contents.persons = {0, 0};
+    marker.contents.gaps = {{1, 2}};
     marker.wall_seconds = wall_seconds;
     testing::write_file(folder_ / marker_name(shard), to_json(marker));
   }

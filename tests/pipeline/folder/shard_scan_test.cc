@@ -33,8 +33,8 @@ class ShardStateTest : public ::testing::Test {
     marker_.samples = 2;
     marker_.valid = 1;
     marker_.quarantined = {{1, "b", "why"}};
-    marker_.boxes = {1, 0};
-    marker_.persons = {0, 0};
+    marker_.contents.boxes = {1, 0};
+    marker_.contents.persons = {0, 0};
     write_shard(kContent);
     write_marker(to_json(marker_));
   }
@@ -120,7 +120,7 @@ TEST_F(ShardStateTest, AMarkerOfAnotherPlanShardOrLengthIsForeign) {
   other = marker_;
   other.samples = other.valid = 1;
   other.quarantined.clear();
-  other.boxes = other.persons = {0};
+  other.contents.boxes = other.contents.persons = {0};
   write_marker(to_json(other));
   expect(ShardCondition::kForeignMarker, "expected the marker of 2 samples, got one of 1 samples");
 }
@@ -158,7 +158,7 @@ TEST(ShardStates, AreInTheOrderOfThePlan) {
     marker.sha256 = std::string(64, '0');
     marker.size_bytes = 5;
     marker.samples = marker.valid = 1;
-    marker.boxes = marker.persons = {0};
+    marker.contents.boxes = marker.contents.persons = {0};
     testing::write_file(folder / name, "shard");
     testing::write_file(folder / marker_name(name), i % 3 == 0 ? to_json(marker) : "{");
   }

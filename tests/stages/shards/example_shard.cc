@@ -201,7 +201,7 @@ ShardMarker write_shard(const std::filesystem::path& folder, const ExampleShard&
   ShardReceipt receipt = writer.commit();
   marker.sha256 = receipt.sha256;
   marker.size_bytes = receipt.size_bytes;
-  enter(std::move(receipt.contents), marker);
+  marker.contents = std::move(receipt.contents);
   return marker;
 }
 

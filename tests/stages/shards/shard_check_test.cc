@@ -160,12 +160,13 @@ TEST_F(ShardCheck, CountsOfTheMarkerAreComparedWithTheRows) {
     return count_faults(shard_, marker_);
   };
   // Rows of the example's five samples: boxes 2 0 0 1 0, persons 2 0 0 0 1; slot 2 in quarantine.
-  EXPECT_THAT(found([](auto& marker) { marker.persons[4] = 2; }),
+  EXPECT_THAT(found([](auto& marker) { marker.contents.persons[4] = 2; }),
               ElementsAre("expected number of persons in slot 4: 1, got 2"));
-  EXPECT_THAT(found([](auto& marker) { std::swap(marker.boxes[0], marker.boxes[1]); }),
-              ElementsAre("expected number of boxes in slot 0: 2, got 0"));
+  EXPECT_THAT(
+      found([](auto& marker) { std::swap(marker.contents.boxes[0], marker.contents.boxes[1]); }),
+      ElementsAre("expected number of boxes in slot 0: 2, got 0"));
   EXPECT_THAT(found([](auto& marker) {
-                marker.gaps = {{3, 5}};
+                marker.contents.gaps = {{3, 5}};
               }),
               ElementsAre("expected samples by gap 2: 5, got 3: 5"));
   EXPECT_THAT(found([](auto& marker) { marker.quarantined[0].slot = 1; }),
@@ -233,11 +234,11 @@ TEST_F(ShardCheck, CountsThatDifferAreFound) {
 
 TEST_F(ShardCheck, RowsOtherThanTheMarkerSaysAreFound) {
   write(testing::example_shard());
-  marker_.boxes[0] = 1;
-  marker_.persons[4] = 2;
-  marker_.classes["Car"] = 1;
-  marker_.gaps = {{1, 5}};
-  marker_.optional_columns.clear();
+  marker_.contents.boxes[0] = 1;
+  marker_.contents.persons[4] = 2;
+  marker_.contents.classes["Car"] = 1;
+  marker_.contents.gaps = {{1, 5}};
+  marker_.contents.optional_columns.clear();
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("boxes in slot 0"), HasSubstr("persons in slot 4"),
                                     HasSubstr("boxes by class"), HasSubstr("samples by gap 1: 5"),
                                     HasSubstr("optional columns none")));

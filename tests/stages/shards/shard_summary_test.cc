@@ -34,12 +34,12 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
     }
   }
   EXPECT_EQ(boxes, (std::vector<std::int32_t>{2, 0, 0, 1, 0}));
-  EXPECT_EQ(marker.boxes, boxes);
-  EXPECT_EQ(marker.persons, persons);
-  EXPECT_EQ(marker.classes, classes);
-  EXPECT_EQ(marker.gaps, gaps);
+  EXPECT_EQ(marker.contents.boxes, boxes);
+  EXPECT_EQ(marker.contents.persons, persons);
+  EXPECT_EQ(marker.contents.classes, classes);
+  EXPECT_EQ(marker.contents.gaps, gaps);
   EXPECT_EQ(
-      marker.optional_columns,
+      marker.contents.optional_columns,
       (std::vector<std::string>{"/labels/poses/joints3d_mm", "/labels/poses/camera",
                                 "/labels/poses/camera_source", "/labels/poses/camera_distortion"}));
 }
@@ -47,22 +47,15 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
 TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
   const testing::TemporaryFolder folder;
   const ShardMarker marker = write_shard(folder.path(), testing::unlabelled_shard());
-  EXPECT_EQ(marker.boxes, std::vector<std::int32_t>{0});
-  EXPECT_EQ(marker.persons, std::vector<std::int32_t>{0});
-  EXPECT_TRUE(marker.classes.empty());
-  EXPECT_EQ(marker.gaps.size(), 1u);
-  EXPECT_TRUE(marker.optional_columns.empty());
+  EXPECT_EQ(marker.contents.boxes, std::vector<std::int32_t>{0});
+  EXPECT_EQ(marker.contents.persons, std::vector<std::int32_t>{0});
+  EXPECT_TRUE(marker.contents.classes.empty());
+  EXPECT_EQ(marker.contents.gaps.size(), 1u);
+  EXPECT_TRUE(marker.contents.optional_columns.empty());
 }
 
 TEST(ShardContents, OfNoRowsAreEmpty) {
   EXPECT_EQ(contents_of(ShardTables{}, LabelSchema{}), ShardContents{});
-}
-
-TEST(ShardContents, GoIntoAMarkerAndBack) {
-  const ShardContents contents{{1, 2}, {0, 3}, {{"Car", 3}}, {{1, 2}}, {"/labels/poses/camera"}};
-  ShardMarker marker;
-  enter(contents, marker);
-  EXPECT_EQ(contents_of(marker), contents);
 }
 
 class ShardSummary : public ::testing::Test {

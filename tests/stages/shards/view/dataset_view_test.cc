@@ -31,8 +31,8 @@ ViewShard shard(const std::string& split, const std::string& name, std::vector<s
   result.marker.shard = name;
   result.marker.samples = static_cast<int>(boxes.size());
   result.marker.valid = result.marker.samples;
-  result.marker.boxes = std::move(boxes);
-  result.marker.persons = std::move(persons);
+  result.marker.contents.boxes = std::move(boxes);
+  result.marker.contents.persons = std::move(persons);
   return result;
 }
 
@@ -108,8 +108,8 @@ DatasetView view_of_nothing(int shards) {
     ViewShard shard{i % 2 == 0 ? "train" : "val", {}};
     shard.marker.shard = "demo-" + std::to_string(i) + ".h5";
     shard.marker.samples = 2;
-    shard.marker.boxes = {1, 2};
-    shard.marker.persons = {0, 0};
+    shard.marker.contents.boxes = {1, 2};
+    shard.marker.contents.persons = {0, 0};
     list.push_back(shard);
   }
   view.layout = lay_out_view(std::move(list));
