@@ -59,7 +59,7 @@ class DiskFailure(program.InFolder):
 
     def test_full_at_every_call_that_takes_space(self):
         failing_files.for_each(self.fails_then_resumes,
-                               self.rules("ENOSPC", ["create", "write", "truncate", "rename", "mkdir"], step=5))
+                               self.rules("ENOSPC", ["create", "write", "truncate", "rename", "mkdir"], step=8))
 
     def test_error_at_every_sync_close_and_rename_and_at_some_writes(self):
         failing_files.for_each(self.fails_then_resumes, self.rules("EIO", ["sync", "close", "rename", "create", "write"], step=20))
@@ -122,7 +122,7 @@ class DiskFailure(program.InFolder):
         shutil.rmtree(out)
 
     def rules_for(self, calls):
-        some = [n for n in failing_files.thinned(calls, step=8) if calls[n - 1].kind not in ("unlink", "link")]
+        some = [n for n in failing_files.thinned(calls) if calls[n - 1].kind not in ("unlink", "link")]
         return [f"{'EIO' if calls[n - 1].kind in ('sync', 'close') else 'ENOSPC'} any {n}" for n in some]
 
     def test_finalize_at_every_step(self):

@@ -41,7 +41,7 @@ def for_each(work, items):
         return list(pool.map(work, items))
 
 
-def thinned(calls, step=4):
+def thinned(calls, step=8):
     """Numbers (from 1) of the calls to try: of the many small writes by which HDF5 makes a file every `step`-th, the last one of
     each file, and every other call. A file under its temporary name is as unfinished after one such write as after the next."""
     last = {call.path: n for n, call in enumerate(calls, 1) if call.kind == "write"}

@@ -65,7 +65,7 @@ TEST(FaultList, BeyondAThousandOnlyCounts) {
 }
 
 /// The document's faults; a document must be there exactly if `has_document`.
-std::string faults_of(const std::string& text, bool has_document = false) {
+std::string text_faults(const std::string& text, bool has_document = false) {
   FaultList faults("t");
   EXPECT_EQ(parse_json_text(text, faults).has_value(), has_document);
   return faults.text();
@@ -107,13 +107,13 @@ TEST(JsonText, SyntaxErrorsHaveLineAndColumn) {
       {"/* open", "t:1:8: "},
   };
   for (const auto& [text, place] : table) {
-    EXPECT_THAT(faults_of(text), StartsWith(place + "expected JSON, got an error while parsing"))
+    EXPECT_THAT(text_faults(text), StartsWith(place + "expected JSON, got an error while parsing"))
         << text;
   }
 }
 
 TEST(JsonText, SaysWhatTheErrorIs) {
-  EXPECT_EQ(faults_of("[1,"),
+  EXPECT_EQ(text_faults("[1,"),
             "t:1:4: expected JSON, got an error while parsing value - unexpected end of input; "
             "expected '[', '{', or a literal");
 }
@@ -122,14 +122,14 @@ TEST(JsonText, ErrorsAreShortWhateverWasRead) {
   std::string text = "[\"";
   for (int i = 0; i < 1000; ++i) text += "\xc3\xa9";
   for (const std::string& unfinished : {text, text + "x"}) {
-    const std::string fault = faults_of(unfinished);
+    const std::string fault = text_faults(unfinished);
     EXPECT_LT(fault.size(), 300u);
     EXPECT_THAT(fault, ::testing::EndsWith("\xc3\xa9..."));  // cut between two characters
   }
 }
 
 TEST(JsonText, NumbersBeyondDoubleAreFaults) {
-  EXPECT_THAT(faults_of("[1e999]"),
+  EXPECT_THAT(text_faults("[1e999]"),
               StartsWith("t:1:6: expected JSON, got an error number overflow"));
 }
 
@@ -147,7 +147,7 @@ TEST(JsonText, TextMustBeUtf8Throughout) {
       {std::string("{}\0 lost", 8), "t:1:3: expected UTF-8 text, got the byte 0x00"},
       {std::string("\xff\xfe{\0}\0", 6), "t:1:1: expected UTF-8 text, got the byte 0xff"},
   };
-  for (const auto& [text, fault] : table) EXPECT_EQ(faults_of(text), fault);
+  for (const auto& [text, fault] : table) EXPECT_EQ(text_faults(text), fault);
 }
 
 TEST(JsonText, TakesTheBoundsOfEveryLengthOfUtf8) {
@@ -155,31 +155,32 @@ TEST(JsonText, TakesTheBoundsOfEveryLengthOfUtf8) {
   const std::string text =
       "[\"\x7f\xc2\x80\xdf\xbf\xe0\xa0\x80\xed\x9f\xbf\xee\x80\x80\xef\xbf\xbf\xf0\x90\x80\x80"
       "\xf4\x8f\xbf\xbf\"]";
-  EXPECT_EQ(faults_of(text, true), "");
+  EXPECT_EQ(text_faults(text, true), "");
 }
 
 TEST(JsonText, EveryDoubleKeyIsReportedWithItsPath) {
-  EXPECT_EQ(faults_of(R"({"a": [0, {"b": 1, "b": 2, "b": 3}], "c": {}, "c d": 1, "c d": 1})", true),
-            "t: $.a[1].b: expected the key once, got it a second time\n"
-            "t: $.a[1].b: expected the key once, got it a second time\n"
-            "t: $[\"c d\"]: expected the key once, got it a second time");
+  EXPECT_EQ(
+      text_faults(R"({"a": [0, {"b": 1, "b": 2, "b": 3}], "c": {}, "c d": 1, "c d": 1})", true),
+      "t: $.a[1].b: expected the key once, got it a second time\n"
+      "t: $.a[1].b: expected the key once, got it a second time\n"
+      "t: $[\"c d\"]: expected the key once, got it a second time");
 }
 
 TEST(JsonText, TheSameKeyInTwoObjectsIsFine) {
-  EXPECT_EQ(faults_of(R"({"a": {"a": 1}, "b": [{"a": 1}, {"a": 2}]})", true), "");
+  EXPECT_EQ(text_faults(R"({"a": {"a": 1}, "b": [{"a": 1}, {"a": 2}]})", true), "");
 }
 
 TEST(JsonText, NestingEndsAt32) {
-  EXPECT_EQ(faults_of(nested(32), true), "");
-  EXPECT_THAT(faults_of(nested(33)),
+  EXPECT_EQ(text_faults(nested(32), true), "");
+  EXPECT_THAT(text_faults(nested(33)),
               ::testing::EndsWith("]: expected at most 32 levels of nesting, got more"));
 }
 
 TEST(JsonText, NestingWithoutEndDoesNoHarm) {
-  EXPECT_THAT(faults_of(std::string(5'000'000, '[')), ::testing::HasSubstr("levels of nesting"));
+  EXPECT_THAT(text_faults(std::string(5'000'000, '[')), ::testing::HasSubstr("levels of nesting"));
   std::string objects;
   for (int i = 0; i < 100'000; ++i) objects += "{\"a\":";
-  EXPECT_THAT(faults_of(objects), ::testing::HasSubstr("$.a.a.a"));
+  EXPECT_THAT(text_faults(objects), ::testing::HasSubstr("$.a.a.a"));
 }
 
 TEST(JsonData, KeepsTheOrderOfKeysAndRefusesWhatADocumentMayNotHave) {

@@ -26,21 +26,21 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
-const std::string kPlan(64, 'a');
+const std::string kPlanHash(64, 'a');
 const Amendment kFirst{{{"frames", "f1"}}, {"000001", "000007"}};
 const Amendment kSecond{{{"frames", "f2"}, {"annotations", "a2"}}, {"000003"}};
 
 TEST(Amendments, AreNoneAtFirst) {
   const testing::TemporaryFolder folder;
-  EXPECT_THAT(read_amendments(folder.path(), kPlan), IsEmpty());
+  EXPECT_THAT(read_amendments(folder.path(), kPlanHash), IsEmpty());
 }
 
 TEST(Amendments, AreReadInTheOrderOfTheirRecording) {
   const testing::TemporaryFolder folder;
-  record_amendment(folder.path(), kPlan, kFirst);
-  EXPECT_THAT(read_amendments(folder.path(), kPlan), ElementsAre(kFirst));
-  record_amendment(folder.path(), kPlan, kSecond);
-  EXPECT_THAT(read_amendments(folder.path(), kPlan), ElementsAre(kFirst, kSecond));
+  record_amendment(folder.path(), kPlanHash, kFirst);
+  EXPECT_THAT(read_amendments(folder.path(), kPlanHash), ElementsAre(kFirst));
+  record_amendment(folder.path(), kPlanHash, kSecond);
+  EXPECT_THAT(read_amendments(folder.path(), kPlanHash), ElementsAre(kFirst, kSecond));
 }
 
 TEST(Amendments, RecordedAtOnceAreAllThere) {
@@ -49,12 +49,12 @@ TEST(Amendments, RecordedAtOnceAreAllThere) {
   std::vector<std::thread> writers;
   for (int i = 0; i < kWriters; ++i) {
     writers.emplace_back([&, i] {
-      record_amendment(folder.path(), kPlan, {{{"frames", "f"}}, {std::to_string(i)}});
+      record_amendment(folder.path(), kPlanHash, {{{"frames", "f"}}, {std::to_string(i)}});
     });
   }
   for (std::thread& writer : writers) writer.join();
   std::vector<std::string> samples;
-  for (const Amendment& one : read_amendments(folder.path(), kPlan)) {
+  for (const Amendment& one : read_amendments(folder.path(), kPlanHash)) {
     samples.push_back(one.samples.at(0));
   }
   EXPECT_THAT(samples, ::testing::UnorderedElementsAre("0", "1", "2", "3", "4", "5", "6", "7"));
@@ -64,37 +64,37 @@ TEST(Amendments, OfAnotherPlanDoNotCountAndMakeRoom) {
   const testing::TemporaryFolder folder;
   const std::string other(64, 'b');
   record_amendment(folder.path(), other, kFirst);
-  EXPECT_THAT(read_amendments(folder.path(), kPlan), IsEmpty());
-  record_amendment(folder.path(), kPlan, kSecond);
-  EXPECT_THAT(read_amendments(folder.path(), kPlan), ElementsAre(kSecond));
+  EXPECT_THAT(read_amendments(folder.path(), kPlanHash), IsEmpty());
+  record_amendment(folder.path(), kPlanHash, kSecond);
+  EXPECT_THAT(read_amendments(folder.path(), kPlanHash), ElementsAre(kSecond));
   EXPECT_THAT(read_amendments(folder.path(), other), IsEmpty());
 }
 
 TEST(Amendments, ThatAreDamagedAreAnErrorNamingTheFile) {
   const testing::TemporaryFolder folder;
-  record_amendment(folder.path(), kPlan, kFirst);
+  record_amendment(folder.path(), kPlanHash, kFirst);
   const std::string text = testing::read_file(folder / "amendments.json");
   testing::write_file(folder / "amendments.json", text.substr(0, text.size() / 2));
-  EXPECT_THAT([&] { read_amendments(folder.path(), kPlan); },
+  EXPECT_THAT([&] { read_amendments(folder.path(), kPlanHash); },
               ThrowsMessage<std::runtime_error>(HasSubstr("amendments.json")));
   testing::write_file(folder / "amendments.json", "");
-  EXPECT_THROW(read_amendments(folder.path(), kPlan), std::runtime_error);
-  EXPECT_THROW(record_amendment(folder.path(), kPlan, kSecond), std::runtime_error);
+  EXPECT_THROW(read_amendments(folder.path(), kPlanHash), std::runtime_error);
+  EXPECT_THROW(record_amendment(folder.path(), kPlanHash, kSecond), std::runtime_error);
   std::filesystem::remove(folder / "amendments.json");
   std::filesystem::create_directory(folder / "amendments.json");
-  EXPECT_THAT([&] { read_amendments(folder.path(), kPlan); },
+  EXPECT_THAT([&] { read_amendments(folder.path(), kPlanHash); },
               ThrowsMessage<std::runtime_error>(HasSubstr("amendments.json")));
 }
 
 TEST(Amendments, MayNotChangeWhatTheJobIs) {
   const testing::TemporaryFolder folder;
-  EXPECT_THROW(record_amendment(folder.path(), kPlan, {{{"weights", "w"}}, {}}),
+  EXPECT_THROW(record_amendment(folder.path(), kPlanHash, {{{"weights", "w"}}, {}}),
                std::invalid_argument);
-  record_amendment(folder.path(), kPlan, kFirst);
+  record_amendment(folder.path(), kPlanHash, kFirst);
   std::string text = testing::read_file(folder / "amendments.json");
   text.replace(text.find("frames"), 6, "weights");
   testing::write_file(folder / "amendments.json", text);
-  EXPECT_THAT([&] { read_amendments(folder.path(), kPlan); },
+  EXPECT_THAT([&] { read_amendments(folder.path(), kPlanHash); },
               ThrowsMessage<std::runtime_error>(
                   HasSubstr("expected fields that may change: annotations, frames, got weights")));
 }

@@ -10,7 +10,6 @@
 namespace eventgan {
 namespace {
 
-using nlohmann::json;
 using testing::ConvertedFolder;
 using ::testing::ElementsAre;
 using testing::parts_of;
@@ -108,19 +107,20 @@ TEST(DatasetViews, OtherSchemasAreOtherViews) {
 
 TEST(DatasetViews, NoShardsNoViews) { EXPECT_THAT(groups_of(three_sources()), ElementsAre()); }
 
-json description_of(const ConvertedFolder& folder) {
+nlohmann::json description_of(const ConvertedFolder& folder) {
   const DatasetParts parts = parts_of(folder);
-  return json::parse(describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
+  return nlohmann::json::parse(
+      describe_dataset(parts, views_of(parts), {std::string(64, 'c'), 77}));
 }
 
 TEST(DatasetDescription, SaysWhatTheDatasetIs) {
   const ConvertedFolder folder;
-  const json text = description_of(folder);
+  const nlohmann::json text = description_of(folder);
   EXPECT_EQ(text["format"], "eventgan-dataset");
   EXPECT_EQ(text["version"], 1);
   EXPECT_EQ(text["name"], "demo");
   EXPECT_EQ(text["complete"], true);
-  EXPECT_EQ(text["missing"], json::array());
+  EXPECT_EQ(text["missing"], nlohmann::json::array());
   EXPECT_EQ(text["plan_hash"], folder.plan_hash());
   EXPECT_EQ(text["weights_hash"], std::string(64, 'b'));
   EXPECT_EQ(text["generator"], "a fake generator");
@@ -133,68 +133,70 @@ TEST(DatasetDescription, SaysWhatTheDatasetIs) {
 
 TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
   const ConvertedFolder folder;
-  const json text = description_of(folder);
+  const nlohmann::json text = description_of(folder);
   // The example: 5 samples, one in quarantine, 3 boxes (Car, DontCare, Car), 3 persons, gap 2.
-  const json& total = text["counts"]["total"];
+  const nlohmann::json& total = text["counts"]["total"];
   EXPECT_EQ(total["shards"], 4);
   EXPECT_EQ(total["samples"], 16);
   EXPECT_EQ(total["valid"], 13);
   EXPECT_EQ(total["quarantined"], 3);
   EXPECT_EQ(total["boxes"], 9);
-  EXPECT_EQ(total["boxes_by_class"], (json{{"Car", 6}, {"DontCare", 3}}));
+  EXPECT_EQ(total["boxes_by_class"], (nlohmann::json{{"Car", 6}, {"DontCare", 3}}));
   EXPECT_EQ(total["persons"], 9);
-  EXPECT_EQ(total["samples_by_gap"], (json{{"2", 16}}));
-  EXPECT_EQ(text["counts"]["by_dataset"], (json{{"kitti_object", total}}));
+  EXPECT_EQ(total["samples_by_gap"], (nlohmann::json{{"2", 16}}));
+  EXPECT_EQ(text["counts"]["by_dataset"], (nlohmann::json{{"kitti_object", total}}));
   EXPECT_EQ(text["counts"]["by_split"]["val"]["samples"], 5);
   EXPECT_EQ(text["counts"]["by_split"]["train"]["samples"], 11);
   const ShardMarker marker = folder.marker(1);
-  EXPECT_EQ(text["shards"][1], (json{{"name", "demo-val-00000-of-00001.h5"},
-                                     {"split", "val"},
-                                     {"dataset", "kitti_object"},
-                                     {"samples", 5},
-                                     {"valid", 4},
-                                     {"boxes", 3},
-                                     {"persons", 3},
-                                     {"size_bytes", marker.size_bytes},
-                                     {"sha256", marker.sha256}}));
+  EXPECT_EQ(text["shards"][1], (nlohmann::json{{"name", "demo-val-00000-of-00001.h5"},
+                                               {"split", "val"},
+                                               {"dataset", "kitti_object"},
+                                               {"samples", 5},
+                                               {"valid", 4},
+                                               {"boxes", 3},
+                                               {"persons", 3},
+                                               {"size_bytes", marker.size_bytes},
+                                               {"sha256", marker.sha256}}));
 }
 
 TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
-  const json text = description_of(ConvertedFolder());
+  const nlohmann::json text = description_of(ConvertedFolder());
   ASSERT_EQ(text["quarantined"].size(), 3u);
   EXPECT_EQ(text["quarantined"][1],
-            (json{{"sample_id", "000002"},
-                  {"shard", "demo-val-00000-of-00001.h5"},
-                  {"slot", 2},
-                  {"reason", "cannot decode kitti/image_2/000002.png (000002)"}}));
+            (nlohmann::json{{"sample_id", "000002"},
+                            {"shard", "demo-val-00000-of-00001.h5"},
+                            {"slot", 2},
+                            {"reason", "cannot decode kitti/image_2/000002.png (000002)"}}));
 }
 
 TEST(DatasetDescription, TellsOfTheViewAndItsSplits) {
-  const json view = description_of(ConvertedFolder())["view"];
+  const nlohmann::json view = description_of(ConvertedFolder())["view"];
   EXPECT_EQ(view["name"], "dataset.h5");
   EXPECT_EQ(view["sha256"], std::string(64, 'c'));
   EXPECT_EQ(view["size_bytes"], 77);
   EXPECT_EQ(view["views"][0]["group"], "/");
-  EXPECT_EQ(view["views"][0]["volume_shape"], (json{4, 6, 8}));
-  EXPECT_EQ(view["views"][0]["splits"][1], (json{{"name", "val"}, {"first", 11}, {"rows", 5}}));
+  EXPECT_EQ(view["views"][0]["volume_shape"], (nlohmann::json{4, 6, 8}));
+  EXPECT_EQ(view["views"][0]["splits"][1],
+            (nlohmann::json{{"name", "val"}, {"first", 11}, {"rows", 5}}));
 }
 
 TEST(DatasetDescription, OfASourceWithoutShardsTheNamesAreUnknown) {
-  const json text = description_of(ConvertedFolder(1));
+  const nlohmann::json text = description_of(ConvertedFolder(1));
   EXPECT_EQ(text["complete"], false);
   EXPECT_EQ(text["missing"].size(), 3u);
-  EXPECT_EQ(text["sources"][0]["class_names"], (json{"Car", "DontCare"}));
+  EXPECT_EQ(text["sources"][0]["class_names"], (nlohmann::json{"Car", "DontCare"}));
   EXPECT_EQ(text["sources"][0]["labelled_frames"], 6);
-  EXPECT_EQ(text["sources"][1]["class_names"], json());
+  EXPECT_EQ(text["sources"][1]["class_names"], nlohmann::json());
 }
 
 TEST(DatasetDescription, AmendmentsAreTold) {
   const ConvertedFolder folder;
   record_amendment(folder.path(), folder.plan_hash(), {{{"annotations", "4567"}}, {"000002"}});
-  const json text = description_of(folder);
+  const nlohmann::json text = description_of(folder);
   EXPECT_EQ(text["fingerprint"]["annotations"], "4567");
-  EXPECT_EQ(text["amendments"],
-            json::array({{{"fields", {{"annotations", "4567"}}}, {"samples", {"000002"}}}}));
+  EXPECT_EQ(
+      text["amendments"],
+      nlohmann::json::array({{{"fields", {{"annotations", "4567"}}}, {"samples", {"000002"}}}}));
 }
 
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {

@@ -13,7 +13,7 @@
 namespace eventgan {
 namespace {
 
-constexpr VolumeShape kShape{9, {64, 64}};
+constexpr VolumeShape kMovedShape{9, {64, 64}};
 constexpr double kSpeedPx = 6;
 
 struct Velocity {
@@ -28,7 +28,7 @@ Velocity towards(double angle_deg) {
 
 std::vector<float> volume_of(std::vector<Event> events) {
   std::ranges::sort(events, {}, &Event::t_s);
-  return event_volume(events, kShape);
+  return event_volume(events, kMovedShape);
 }
 
 /// A bright disc of 12 px moves by `velocity` over the interval: a pixel has a positive event when
@@ -36,8 +36,8 @@ std::vector<float> volume_of(std::vector<Event> events) {
 std::vector<float> moving_disc(Velocity velocity) {
   constexpr double kRadius = 12;
   std::vector<Event> events;
-  for (int y = 0; y < kShape.size.height; ++y) {
-    for (int x = 0; x < kShape.size.width; ++x) {
+  for (int y = 0; y < kMovedShape.size.height; ++y) {
+    for (int x = 0; x < kMovedShape.size.width; ++x) {
       const double from_x = x - (31.5 - velocity.x / 2);
       const double from_y = y - (31.5 - velocity.y / 2);
       // |p - c - v t| = r: v² t² - 2 (p - c)·v t + |p - c|² - r² = 0.
@@ -59,8 +59,8 @@ std::vector<float> moving_disc(Velocity velocity) {
 std::vector<float> moving_edge(double angle_deg) {
   const Velocity velocity = towards(angle_deg);
   std::vector<Event> events;
-  for (int y = 0; y < kShape.size.height; ++y) {
-    for (int x = 0; x < kShape.size.width; ++x) {
+  for (int y = 0; y < kMovedShape.size.height; ++y) {
+    for (int x = 0; x < kMovedShape.size.width; ++x) {
       const double t =
           ((x - 31.5) * velocity.x + (y - 31.5) * velocity.y) / (kSpeedPx * kSpeedPx) + 0.5;
       if (t >= 0 && t <= 1) events.push_back({x, y, t, true});
@@ -70,11 +70,12 @@ std::vector<float> moving_edge(double angle_deg) {
 }
 
 std::vector<float> backwards(const std::vector<float>& volume) {
-  const auto plane = static_cast<std::ptrdiff_t>(kShape.size.pixel_count());
+  const auto plane = static_cast<std::ptrdiff_t>(kMovedShape.size.pixel_count());
   std::vector<float> result(volume.size());
-  for (int channel = 0; channel < kShape.channels(); ++channel) {
-    const int polarity = channel / kShape.bins;
-    const int mirrored = polarity * kShape.bins + kShape.bins - 1 - channel % kShape.bins;
+  for (int channel = 0; channel < kMovedShape.channels(); ++channel) {
+    const int polarity = channel / kMovedShape.bins;
+    const int mirrored =
+        polarity * kMovedShape.bins + kMovedShape.bins - 1 - channel % kMovedShape.bins;
     std::copy_n(volume.begin() + channel * plane, plane, result.begin() + mirrored * plane);
   }
   return result;
@@ -82,9 +83,9 @@ std::vector<float> backwards(const std::vector<float>& volume) {
 
 DirectionScore score_of(const std::vector<float>& volume, Velocity flow,
                         const DirectionSettings& settings = {}) {
-  const std::vector<float> x(kShape.size.pixel_count(), static_cast<float>(flow.x));
-  const std::vector<float> y(kShape.size.pixel_count(), static_cast<float>(flow.y));
-  return motion_direction(volume, kShape, x, y, settings);
+  const std::vector<float> x(kMovedShape.size.pixel_count(), static_cast<float>(flow.x));
+  const std::vector<float> y(kMovedShape.size.pixel_count(), static_cast<float>(flow.y));
+  return motion_direction(volume, kMovedShape, x, y, settings);
 }
 
 class MotionDirectionAngles : public ::testing::TestWithParam<int> {};
@@ -135,7 +136,8 @@ TEST(MotionDirection, StillEmptyAndUnknownHaveNoPixels) {
   EXPECT_EQ(score_of(volume, {0.5, 0.5}).pixels, 0);
   EXPECT_EQ(score_of(volume, {std::numeric_limits<double>::quiet_NaN(), 3}).pixels, 0);
   EXPECT_EQ(score_of(volume, {std::numeric_limits<double>::infinity(), 3}).pixels, 0);
-  const DirectionScore empty = score_of(std::vector<float>(kShape.value_count(), 0.0f), towards(0));
+  const DirectionScore empty =
+      score_of(std::vector<float>(kMovedShape.value_count(), 0.0f), towards(0));
   EXPECT_EQ(empty.pixels, 0);
   EXPECT_EQ(empty.fraction(), 0);
 }

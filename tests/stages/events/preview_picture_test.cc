@@ -115,14 +115,14 @@ TEST(Skeleton, UnknownNamesHaveNoLimbs) {
 }
 
 // 720 / 180 = 4: panels of 720x480 between gaps of 6, below a title of 24.
-constexpr ImageSize kSize{120, 180};
+constexpr ImageSize kDrawnSize{120, 180};
 constexpr int kFactor = 4;
 
 PreviewContent content_with(std::uint8_t grey) {
   PreviewContent content;
-  content.shape = {9, kSize};
-  content.previous_bgr.assign(3 * kSize.pixel_count(), grey);
-  content.next_bgr.assign(3 * kSize.pixel_count(), grey);
+  content.shape = {9, kDrawnSize};
+  content.previous_bgr.assign(3 * kDrawnSize.pixel_count(), grey);
+  content.next_bgr.assign(3 * kDrawnSize.pixel_count(), grey);
   content.volume.assign(content.shape.value_count(), 0.0f);
   content.title = "a title";
   return content;
@@ -153,7 +153,7 @@ cv::Mat drawn(const PreviewContent& content) {
 }
 
 cv::Mat panel(const cv::Mat& picture, int number) {
-  const cv::Size size(kFactor * kSize.width, kFactor * kSize.height);
+  const cv::Size size(kFactor * kDrawnSize.width, kFactor * kDrawnSize.height);
   return picture(cv::Rect({6 + number * (size.width + 6), 24}, size));
 }
 

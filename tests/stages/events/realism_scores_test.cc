@@ -39,10 +39,10 @@ void erase_pixel(std::vector<float>& volume, int y, int x) {
   }
 }
 
-constexpr VolumeShape kShape{3, {3, 3}};
+constexpr VolumeShape kSlopeShape{3, {3, 3}};
 
 TEST(TimeSlope, IsOfBothPolaritiesTogether) {
-  const TimeSlope slope = time_slope(sloped_volume(kShape), kShape, 0.1);
+  const TimeSlope slope = time_slope(sloped_volume(kSlopeShape), kSlopeShape, 0.1);
   for (int y = 0; y < 3; ++y) {
     for (int x = 0; x < 3; ++x) {
       EXPECT_EQ(slope.known(y, x), 255);
@@ -53,11 +53,11 @@ TEST(TimeSlope, IsOfBothPolaritiesTogether) {
 }
 
 TEST(TimeSlope, LooksOnlyAtPixelsWithEvents) {
-  std::vector<float> volume = sloped_volume(kShape);
+  std::vector<float> volume = sloped_volume(kSlopeShape);
   erase_pixel(volume, 1, 0);
   erase_pixel(volume, 0, 2);
   erase_pixel(volume, 2, 2);
-  const TimeSlope slope = time_slope(volume, kShape, 0.1);
+  const TimeSlope slope = time_slope(volume, kSlopeShape, 0.1);
   EXPECT_EQ(slope.event(1, 0), 0);
   EXPECT_EQ(slope.known(1, 0), 0);
   EXPECT_NEAR(slope.x(1, 1), 0.2, 1e-6);  // from the right neighbour alone
@@ -67,11 +67,11 @@ TEST(TimeSlope, LooksOnlyAtPixelsWithEvents) {
 }
 
 TEST(TimeSlope, FaintVolumeIsNoEvent) {
-  std::vector<float> volume = sloped_volume(kShape);
+  std::vector<float> volume = sloped_volume(kSlopeShape);
   for (float& value : volume) value *= 0.05f;
-  EXPECT_EQ(cv::countNonZero(time_slope(volume, kShape, 0.1).event), 0);
-  const std::vector<float> empty(kShape.value_count(), 0.0f);
-  EXPECT_EQ(cv::countNonZero(time_slope(empty, kShape, 0).event), 0);
+  EXPECT_EQ(cv::countNonZero(time_slope(volume, kSlopeShape, 0.1).event), 0);
+  const std::vector<float> empty(kSlopeShape.value_count(), 0.0f);
+  EXPECT_EQ(cv::countNonZero(time_slope(empty, kSlopeShape, 0).event), 0);
 }
 
 TEST(TimeSlope, OfOneBinOrOnePixelIsFlat) {

@@ -24,7 +24,7 @@ using testing::pickled_text;
 using testing::raw_bytes;
 
 /// A dict with one network `gen` of one tensor `w`.
-std::string generator_of(const std::string& tensor) {
+std::string legacy_generator(const std::string& tensor) {
   return pickled_dict(pickled_text("gen") + pickled_dict(pickled_text("w") + tensor));
 }
 
@@ -46,7 +46,7 @@ class LegacyCheckpointFile : public ::testing::Test {
 
   testing::TemporaryFolder folder_;
   const std::vector<testing::LegacyStorage> six_ = {{"0", 6, raw_bytes<float>({0, 1, 2, 3, 4, 5})}};
-  const LegacyFile plain_{generator_of(pickled_tensor({})), six_};
+  const LegacyFile plain_{legacy_generator(pickled_tensor({})), six_};
 };
 
 TEST_F(LegacyCheckpointFile, ReadsATensor) {
@@ -77,19 +77,19 @@ TEST_F(LegacyCheckpointFile, ReadsAPartOfAStorage) {
   part.offset = 1;
   part.shape = {2};
   part.stride = {1};
-  EXPECT_THAT(read(LegacyFile(generator_of(pickled_tensor(part)), six_).bytes()).at("w").values,
+  EXPECT_THAT(read(LegacyFile(legacy_generator(pickled_tensor(part)), six_).bytes()).at("w").values,
               ElementsAre(3, 4));
   part.shape = {3};  // ends beyond the part, though inside the storage
-  EXPECT_THAT(refusal(LegacyFile(generator_of(pickled_tensor(part)), six_).bytes()),
+  EXPECT_THAT(refusal(LegacyFile(legacy_generator(pickled_tensor(part)), six_).bytes()),
               HasSubstr("inside its storage of 3 values"));
   part.view = testing::pickled_tuple(pickled_text("9") + pickled_integer(4) + pickled_integer(3));
-  EXPECT_THAT(refusal(LegacyFile(generator_of(pickled_tensor(part)), six_).bytes()),
+  EXPECT_THAT(refusal(LegacyFile(legacy_generator(pickled_tensor(part)), six_).bytes()),
               HasSubstr("a part of a storage of 6 values"));
 }
 
 TEST_F(LegacyCheckpointFile, ReadsTheTextOfPython2) {
   // SHORT_BINSTRING for every text.
-  std::string data = generator_of(pickled_tensor({}));
+  std::string data = legacy_generator(pickled_tensor({}));
   for (const char* word : {"gen", "w", "storage", "0", "cpu"}) {
     const std::string unicode = pickled_text(word);
     const std::string old = std::string("U") + static_cast<char>(std::string(word).size()) + word;
@@ -136,7 +136,7 @@ TEST_F(LegacyCheckpointFile, RefusesATensorThatClaimsMoreThanTheFileHas) {
   huge.count = 2000000000;
   huge.shape = {2000000000};
   huge.stride = {1};
-  LegacyFile file(generator_of(pickled_tensor(huge)), six_);
+  LegacyFile file(legacy_generator(pickled_tensor(huge)), six_);
   EXPECT_THAT(refusal(file.bytes()), HasSubstr("expected 2000000000 values of storage 0"));
   file.storages[0].count = 2000000000;
   EXPECT_THAT(refusal(file.bytes()), HasSubstr("24 bytes left"));

@@ -113,13 +113,13 @@ TEST(FitCalibration, NeedsAPair) {
   EXPECT_THROW(fit_calibration(empty_calibration_sums(1), ""), std::invalid_argument);
 }
 
-constexpr ImageSize kSize{33, 46};
+constexpr ImageSize kTorchSize{33, 46};
 
-std::vector<float> frames(std::uint64_t seed) { return testing::natural_frames(kSize, seed); }
+std::vector<float> frames(std::uint64_t seed) { return testing::natural_frames(kTorchSize, seed); }
 
 Calibration calibrate_on(const Weights& weights, std::initializer_list<std::uint64_t> seeds) {
   Calibrator calibrator(weights);
-  for (const std::uint64_t seed : seeds) calibrator.add(frames(seed), kSize);
+  for (const std::uint64_t seed : seeds) calibrator.add(frames(seed), kTorchSize);
   return calibrator.calibration("frames");
 }
 
@@ -132,7 +132,7 @@ TEST(Calibrator, SeesWhatThePlainNetworkHolds) {
   const Weights weights = untrained_weights(2, 3, 5);
   std::map<std::string, std::vector<double>> tensors;
   testing::plain_network(
-      weights, frames(1), kSize,
+      weights, frames(1), kTorchSize,
       [&](const std::string& name, const std::vector<double>& values) { tensors[name] = values; });
   const Calibration calibration = calibrate_on(weights, {1});
   EXPECT_EQ(calibration.pairs, 1);
@@ -166,10 +166,11 @@ TEST(Calibrator, TheSamePairsGiveTheSameCalibration) {
 TEST(Calibrator, EightBitsStayNearTheFloatNetworkAndTheGuessHelps) {
   const Weights weights = untrained_weights(4, 9, 5);
   Calibration calibration = calibrate_on(weights, {0, 1, 2});
-  const auto reference = testing::plain_network(weights, frames(99), kSize);
+  const auto reference = testing::plain_network(weights, frames(99), kTorchSize);
   const auto error = [&](const Calibration& used) {
     return testing::relative_error(
-        testing::plain_int8_network(with_calibration(weights, used), frames(99), kSize), reference);
+        testing::plain_int8_network(with_calibration(weights, used), frames(99), kTorchSize),
+        reference);
   };
   const double with_guess = error(calibration);
   for (TensorStatistics& statistics : calibration.tensors) {
@@ -211,9 +212,9 @@ TEST(Calibrator, ConstantPicturesAndDeadChannelsAreHarmless) {
   }
   for (const float grey : {-1.0f, 0.0f, 1.0f}) {
     Calibrator calibrator(weights);
-    calibrator.add(std::vector<float>(2 * kSize.pixel_count(), grey), kSize);
+    calibrator.add(std::vector<float>(2 * kTorchSize.pixel_count(), grey), kTorchSize);
     const Weights with = with_calibration(weights, calibrator.calibration("constant"));
-    for (const float value : testing::plain_int8_network(with, frames(1), kSize)) {
+    for (const float value : testing::plain_int8_network(with, frames(1), kTorchSize)) {
       ASSERT_TRUE(std::isfinite(value));
     }
   }
@@ -232,7 +233,7 @@ TEST(Calibrator, RefusesWhatItCannotUseAndAddsNothingOfIt) {
   EXPECT_THROW(calibrator.add({}, {0, 0}), std::invalid_argument);
   auto broken = frames(1);
   broken[100] = std::nanf("");
-  EXPECT_THROW(calibrator.add(broken, kSize), std::runtime_error);
+  EXPECT_THROW(calibrator.add(broken, kTorchSize), std::runtime_error);
   EXPECT_EQ(calibrator.pairs(), 0);
   EXPECT_THROW(calibrator.calibration("no pair"), std::invalid_argument);
 }

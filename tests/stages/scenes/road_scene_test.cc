@@ -100,7 +100,7 @@ TEST(VehicleShape, ShadeLiesUnderIt) {
   EXPECT_FALSE(shape.shades({0, 1.65, 7.5}));
 }
 
-constexpr Intrinsics kCamera{100, 100, 50, 40};
+constexpr Intrinsics kRoadCamera{100, 100, 50, 40};
 constexpr ImageSize kPicture{80, 100};
 
 /// 4 m long and 2 m wide, driving away.
@@ -119,17 +119,17 @@ TEST(VehicleOutline, IsTheNearFacesProjection) {
   // The rear face of the body is at z = 10, x from -1 to 1: u = 50 -+ 100 / 10, edges half a pixel
   // on. The ground under the rear wheels (radius 0.2 x 1.5, their axle 0.62 x 2 m behind the
   // middle) is nearest at z = 12 - 1.24 - 0.3 = 10.46, so v = 40 + 100 x 1.5 / 10.46.
-  const Rectangle outline = whole_outline(car_at(0, 12), kCamera);
+  const Rectangle outline = whole_outline(car_at(0, 12), kRoadCamera);
   EXPECT_NEAR(outline.left, 40.5, 1e-9);
   EXPECT_NEAR(outline.right, 60.5, 1e-9);
   EXPECT_NEAR(outline.bottom, 40.5 + 150 / 10.46, 1e-9);
-  EXPECT_EQ(visible_outline(car_at(0, 12), kCamera, kPicture), outline);
+  EXPECT_EQ(visible_outline(car_at(0, 12), kRoadCamera, kPicture), outline);
 }
 
 TEST(VehicleOutline, EndsAtThePicturesBorder) {
   const VehicleShape car = car_at(7, 12);
-  const Rectangle whole = whole_outline(car, kCamera);
-  const Rectangle seen = visible_outline(car, kCamera, kPicture);
+  const Rectangle whole = whole_outline(car, kRoadCamera);
+  const Rectangle seen = visible_outline(car, kRoadCamera, kPicture);
   EXPECT_NEAR(whole.left, 50.5 + 100 * 6 / 14.0, 1e-9) << "the far end is nearest to the middle";
   EXPECT_NEAR(whole.right, 50.5 + 100 * 8 / 10.0, 1e-9);
   EXPECT_NEAR(seen.left, whole.left, 1e-9);
@@ -139,16 +139,16 @@ TEST(VehicleOutline, EndsAtThePicturesBorder) {
 
 TEST(VehicleOutline, AVehicleBesideTheCameraIsCutBeforeIt) {
   // Its inner side is at x = -3, its far end at z = 5: u = 50 - 60, outside the picture.
-  const Rectangle beside = visible_outline(car_at(-4, 3), kCamera, kPicture);
+  const Rectangle beside = visible_outline(car_at(-4, 3), kRoadCamera, kPicture);
   EXPECT_GT(beside.left, beside.right);
-  const Rectangle nearer = visible_outline(car_at(-3, 5), kCamera, kPicture);
+  const Rectangle nearer = visible_outline(car_at(-3, 5), kRoadCamera, kPicture);
   // Inner side at x = -2, far end at z = 7; its near end is behind the border.
   EXPECT_EQ(nearer.left, 0);
   EXPECT_NEAR(nearer.right, 50.5 - 200 / 7.0, 1e-9);
 }
 
 TEST(VehicleOutline, BehindTheCameraIsEmpty) {
-  const Rectangle outline = whole_outline(car_at(0, -10), kCamera);
+  const Rectangle outline = whole_outline(car_at(0, -10), kRoadCamera);
   EXPECT_GT(outline.left, outline.right);
 }
 

@@ -58,7 +58,7 @@ TEST(PickleLiteralsTest, UnicodeStrings) {
   }
 }
 
-PickleDocument read(const std::string& pickle, const std::set<std::string>& allowed = {}) {
+PickleDocument run(const std::string& pickle, const std::set<std::string>& allowed = {}) {
   return PickleDocument(std::as_bytes(std::span(pickle)), allowed, "evil.pkl");
 }
 
@@ -68,7 +68,7 @@ struct Refusal {
 };
 
 void expect_refused(const Refusal& one, const std::set<std::string>& allowed = {}) {
-  EXPECT_THAT([&] { read(one.pickle, allowed); },
+  EXPECT_THAT([&] { run(one.pickle, allowed); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr(one.why), HasSubstr("in evil.pkl at byte "))))
       << ::testing::PrintToString(one.pickle);
@@ -178,7 +178,7 @@ TEST(PickleMachineTest, DeepNestingNeedsNoRecursion) {
   constexpr int kDepth = 1000000;
   std::string pickle(kDepth, ']');
   pickle.append(kDepth - 1, 'a');
-  const PickleDocument document = read(pickle + ".");
+  const PickleDocument document = run(pickle + ".");
   const PickleNode* node = &document.root();
   int depth = 1;
   for (; !node->items.empty(); node = node->items[0]) ++depth;
@@ -186,14 +186,14 @@ TEST(PickleMachineTest, DeepNestingNeedsNoRecursion) {
 }
 
 TEST(PickleMachineTest, ListMayContainItself) {
-  const PickleDocument document = read(
-      "]q\x01h\x01"
-      "a.");
+  const PickleDocument document =
+      run("]q\x01h\x01"
+          "a.");
   EXPECT_EQ(document.root().items[0], &document.root());
 }
 
 TEST(PickleMachineTest, SurvivesMovingTheDocument) {
-  PickleDocument first = read("(K\x07t.");
+  PickleDocument first = run("(K\x07t.");
   const PickleDocument second = std::move(first);
   EXPECT_EQ(second.root().items[0]->integer, 7);
 }
@@ -211,7 +211,7 @@ TEST(PickleMachineTest, RandomDamageNeverCrashes) {
       "S'old'\n(I1\nL5L\nF1.5\nV\\u00e9\ng1\nlX\x01\x00\x00\x00t\x8a\x02\x10\x20\x8c\x01sC\x02hi"
       "h\x03j\x04\x00\x00\x00u."s;
   const std::set<std::string> allowed = {"collections.OrderedDict", "m.f"};
-  ASSERT_NO_THROW(read(valid, allowed));
+  ASSERT_NO_THROW(run(valid, allowed));
   std::mt19937 random(20191105);
   const auto below = [&](std::size_t limit) { return random() % limit; };
   int refused = 0;
@@ -224,7 +224,7 @@ TEST(PickleMachineTest, RandomDamageNeverCrashes) {
     if (below(4) == 0)
       damaged.insert(below(damaged.size() + 1), valid, below(valid.size()), below(9));
     try {
-      read(damaged, allowed);
+      run(damaged, allowed);
     } catch (const std::runtime_error&) {
       ++refused;
     }

@@ -19,8 +19,8 @@ using ::testing::ElementsAre;
 
 using Kind = PickleNode::Kind;
 
-PickleDocument read(const std::string& pickle, const std::set<std::string>& allowed = {},
-                    std::size_t* used = nullptr) {
+PickleDocument unpickled(const std::string& pickle, const std::set<std::string>& allowed = {},
+                         std::size_t* used = nullptr) {
   return PickleDocument(std::as_bytes(std::span(pickle)), allowed, "test.pkl", used);
 }
 
@@ -50,7 +50,7 @@ TEST(PickleTest, ReadsEveryFormOfInteger) {
       {"\x8b\x03\x00\x00\x00\x00\x00\x01"s, 0x10000},
   };
   for (const NumberCase& one : cases) {
-    const PickleDocument document = read(one.opcodes + ".");
+    const PickleDocument document = unpickled(one.opcodes + ".");
     EXPECT_EQ(document.root().kind, Kind::kInt) << one.value;
     EXPECT_EQ(document.root().integer, one.value);
   }
@@ -59,24 +59,24 @@ TEST(PickleTest, ReadsEveryFormOfInteger) {
 TEST(PickleTest, KeepsTheBytesOfAnIntegerBeyond64Bits) {
   // The magic number of PyTorch's old checkpoints, 0x1950a86a20f9469cfc6c: ten bytes.
   const std::string number = "\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19"s;
-  const PickleDocument document = read("\x80\x02\x8a\x0a" + number + ".");
+  const PickleDocument document = unpickled("\x80\x02\x8a\x0a" + number + ".");
   EXPECT_EQ(document.root().kind, Kind::kLong);
   EXPECT_EQ(document.root().text, number);
 }
 
 TEST(PickleTest, ReadsNoneBoolAndFloat) {
-  EXPECT_EQ(read("N.").root().kind, Kind::kNone);
+  EXPECT_EQ(unpickled("N.").root().kind, Kind::kNone);
   for (const auto& [opcodes, value] :
        {std::pair("\x88."s, 1), {"\x89."s, 0}, {"I01\n."s, 1}, {"I00\n."s, 0}}) {
-    const PickleDocument document = read(opcodes);
+    const PickleDocument document = unpickled(opcodes);
     EXPECT_EQ(document.root().kind, Kind::kBool);
     EXPECT_EQ(document.root().integer, value);
   }
   // 0x3ff8000000000000 is 1.5: exponent 1023, first bit of the fraction set.
-  EXPECT_EQ(read("G\x3f\xf8\x00\x00\x00\x00\x00\x00."s).root().real, 1.5);
-  EXPECT_EQ(read("F-0.1\n.").root().real, -0.1);
-  EXPECT_TRUE(std::isnan(read("Fnan\n.").root().real));
-  EXPECT_EQ(read("F-inf\n.").root().real, -std::numeric_limits<double>::infinity());
+  EXPECT_EQ(unpickled("G\x3f\xf8\x00\x00\x00\x00\x00\x00."s).root().real, 1.5);
+  EXPECT_EQ(unpickled("F-0.1\n.").root().real, -0.1);
+  EXPECT_TRUE(std::isnan(unpickled("Fnan\n.").root().real));
+  EXPECT_EQ(unpickled("F-inf\n.").root().real, -std::numeric_limits<double>::infinity());
 }
 
 TEST(PickleTest, ReadsStringsAndBytes) {
@@ -84,7 +84,7 @@ TEST(PickleTest, ReadsStringsAndBytes) {
   for (const std::string& opcodes :
        {"X\x06\x00\x00\x00"s + word, "\x8c\x06"s + word,
         "\x8d\x06\x00\x00\x00\x00\x00\x00\x00"s + word, "Vgr\xfc\\u00df\n"s}) {
-    const PickleDocument document = read(opcodes + ".");
+    const PickleDocument document = unpickled(opcodes + ".");
     EXPECT_EQ(document.root().kind, Kind::kString);
     EXPECT_EQ(document.root().text, word);
   }
@@ -92,33 +92,33 @@ TEST(PickleTest, ReadsStringsAndBytes) {
   for (const std::string& opcodes :
        {"B\x03\x00\x00\x00"s + raw, "C\x03"s + raw, "\x8e\x03\x00\x00\x00\x00\x00\x00\x00"s + raw,
         "T\x03\x00\x00\x00"s + raw, "U\x03"s + raw, "S'\\xff\\x00\\n'\n"s}) {
-    const PickleDocument document = read(opcodes + ".");
+    const PickleDocument document = unpickled(opcodes + ".");
     EXPECT_EQ(document.root().kind, Kind::kBytes);
     EXPECT_EQ(document.root().text, raw);
   }
 }
 
 TEST(PickleTest, ReadsContainers) {
-  EXPECT_TRUE(read(").").root().items.empty());
-  EXPECT_EQ(read("K\x01\x85.").root().items.size(), 1u);
-  EXPECT_EQ(read("K\x01K\x02\x86.").root().items.size(), 2u);
-  const PickleDocument triple = read("K\x01K\x02K\x03\x87.");
+  EXPECT_TRUE(unpickled(").").root().items.empty());
+  EXPECT_EQ(unpickled("K\x01\x85.").root().items.size(), 1u);
+  EXPECT_EQ(unpickled("K\x01K\x02\x86.").root().items.size(), 2u);
+  const PickleDocument triple = unpickled("K\x01K\x02K\x03\x87.");
   EXPECT_EQ(triple.root().kind, Kind::kTuple);
   ASSERT_EQ(triple.root().items.size(), 3u);
   EXPECT_EQ(triple.root().items[0]->integer, 1);
   EXPECT_EQ(triple.root().items[2]->integer, 3);
-  EXPECT_EQ(read("(K\x01K\x02t.").root().items[1]->integer, 2);
+  EXPECT_EQ(unpickled("(K\x01K\x02t.").root().items[1]->integer, 2);
 
-  const PickleDocument list = read(
+  const PickleDocument list = unpickled(
       "](K\x01K\x02"
       "eK\x03"
       "a.");
   EXPECT_EQ(list.root().kind, Kind::kList);
   ASSERT_EQ(list.root().items.size(), 3u);
   EXPECT_EQ(list.root().items[2]->integer, 3);
-  EXPECT_EQ(read("(K\x01l.").root().items.size(), 1u);
+  EXPECT_EQ(unpickled("(K\x01l.").root().items.size(), 1u);
 
-  const PickleDocument dict = read(
+  const PickleDocument dict = unpickled(
       "}(U\x01"
       "aK\x01U\x01"
       "bK\x02uU\x01"
@@ -127,19 +127,19 @@ TEST(PickleTest, ReadsContainers) {
   EXPECT_EQ(dict.root().find("a")->integer, 3) << "a later value replaces an earlier one";
   EXPECT_EQ(dict.root().find("b")->integer, 2);
   EXPECT_EQ(dict.root().find("c"), nullptr);
-  EXPECT_EQ(read("(S'k'\nI5\nd.").root().find("k")->integer, 5);
+  EXPECT_EQ(unpickled("(S'k'\nI5\nd.").root().find("k")->integer, 5);
 }
 
 TEST(PickleTest, SharesWhatTheMemoRecalls) {
-  const PickleDocument binary = read("]q\x07h\x07\x86.");
+  const PickleDocument binary = unpickled("]q\x07h\x07\x86.");
   EXPECT_EQ(binary.root().items[0], binary.root().items[1]);
-  const PickleDocument wide = read("]r\x00\x01\x00\x00j\x00\x01\x00\x00\x86."s);
+  const PickleDocument wide = unpickled("]r\x00\x01\x00\x00j\x00\x01\x00\x00\x86."s);
   EXPECT_EQ(wide.root().items[0], wide.root().items[1]);
-  const PickleDocument text = read("(lp300\ng300\n\x86.");
+  const PickleDocument text = unpickled("(lp300\ng300\n\x86.");
   EXPECT_EQ(text.root().items[0], text.root().items[1]);
-  const PickleDocument memoized = read("\x80\x04]\x94h\x00\x86."s);
+  const PickleDocument memoized = unpickled("\x80\x04]\x94h\x00\x86."s);
   EXPECT_EQ(memoized.root().items[0], memoized.root().items[1]);
-  const PickleDocument doubled = read("]2\x86.");
+  const PickleDocument doubled = unpickled("]2\x86.");
   EXPECT_EQ(doubled.root().items[0], doubled.root().items[1]);
 }
 
@@ -150,7 +150,7 @@ TEST(PickleTest, KeepsCallsAsData) {
                                     "\x8c\x0b"
                                     "collections\x8c\x0bOrderedDict\x93"s}) {
     for (const char* call : {"R", "\x81"}) {
-      const PickleDocument document = read(global + ")" + call + "(U\x01kK\x01u}b.", allowed);
+      const PickleDocument document = unpickled(global + ")" + call + "(U\x01kK\x01u}b.", allowed);
       const PickleNode& root = document.root();
       ASSERT_EQ(root.kind, Kind::kCall);
       EXPECT_EQ(root.items[0]->kind, Kind::kGlobal);
@@ -161,7 +161,7 @@ TEST(PickleTest, KeepsCallsAsData) {
       EXPECT_EQ(root.state->kind, Kind::kDict);
     }
   }
-  const PickleDocument storage = read(
+  const PickleDocument storage = unpickled(
       "(U\x07storageU\x01"
       "0tQ.");
   EXPECT_EQ(storage.root().kind, Kind::kPersistent);
@@ -170,7 +170,7 @@ TEST(PickleTest, KeepsCallsAsData) {
 
 TEST(PickleTest, TellsHowManyBytesItUsed) {
   std::size_t used = 0;
-  read("\x80\x02N.and more", {}, &used);
+  unpickled("\x80\x02N.and more", {}, &used);
   EXPECT_EQ(used, 4u);
 }
 
@@ -179,7 +179,7 @@ TEST(PickleTest, TakesNoMoreMemoryThanAllowed) {
   const auto run = [&](std::uint64_t most) {
     return PickleDocument(std::as_bytes(std::span(pickle)), {}, "test.pkl", nullptr, most);
   };
-  const std::uint64_t needed = read(pickle).memory_bytes();
+  const std::uint64_t needed = unpickled(pickle).memory_bytes();
   EXPECT_GT(needed, 3 * sizeof(PickleNode) + 11);
   EXPECT_EQ(run(needed).root().items.size(), 2u);
   EXPECT_THROW(run(needed - 1), std::runtime_error);
@@ -187,21 +187,21 @@ TEST(PickleTest, TakesNoMoreMemoryThanAllowed) {
 }
 
 TEST(PickleTest, ListsEveryValueEvenThoseTheRootDoesNotLeadTo) {
-  const PickleDocument document = read("N0K\x07.");
+  const PickleDocument document = unpickled("N0K\x07.");
   ASSERT_EQ(document.nodes().size(), 2u);
   EXPECT_EQ(document.nodes()[0].kind, Kind::kNone);
   EXPECT_EQ(&document.nodes()[1], &document.root());
 }
 
 TEST(PickleTest, PopTakesOffAValueOrAMark) {
-  EXPECT_EQ(read("K\x01K\x02"
-                 "0.")
+  EXPECT_EQ(unpickled("K\x01K\x02"
+                      "0.")
                 .root()
                 .integer,
             1);
-  EXPECT_EQ(read("K\x01(0.").root().integer, 1);
-  EXPECT_EQ(read("K\x01(K\x02K\x03"
-                 "1.")
+  EXPECT_EQ(unpickled("K\x01(0.").root().integer, 1);
+  EXPECT_EQ(unpickled("K\x01(K\x02K\x03"
+                      "1.")
                 .root()
                 .integer,
             1);
@@ -242,7 +242,7 @@ TEST(PickleTest, ReadsDictionaryOfNumpyArrays) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const std::string pickle = testing::read_file(data / "human36m_lists" / "cameras.pkl");
   const PickleDocument document =
-      read(pickle, {"numpy.core.multiarray._reconstruct", "numpy.ndarray", "numpy.dtype"});
+      unpickled(pickle, {"numpy.core.multiarray._reconstruct", "numpy.ndarray", "numpy.dtype"});
   // 11 subjects with 4 cameras each.
   ASSERT_EQ(document.root().items.size(), 2 * 44u);
   const PickleNode& key = *document.root().items[0];

@@ -21,18 +21,18 @@ using testing::TemporaryFolder;
 using testing::with_open;
 using testing::write_file;
 
-std::string why_refused(const std::filesystem::path& file) {
+std::string why_jpeg_refused(const std::filesystem::path& file) {
   return testing::why_refused(file, decode_jpeg);
 }
 
-struct Kind {
+struct JpegKind {
   const char* name;
   ImageSize size;
   int opencv_type;
   std::vector<int> parameters;
 };
 
-class JpegKinds : public ::testing::TestWithParam<Kind> {};
+class JpegKinds : public ::testing::TestWithParam<JpegKind> {};
 
 TEST_P(JpegKinds, DecodesToTheSamePixelsAsOpenCv) {
   const TemporaryFolder folder;
@@ -47,10 +47,12 @@ TEST_P(JpegKinds, DecodesToTheSamePixelsAsOpenCv) {
 
 INSTANTIATE_TEST_SUITE_P(
     , JpegKinds,
-    ::testing::Values(Kind{"colour", {64, 96}, CV_8UC3, {}}, Kind{"one_pixel", {1, 1}, CV_8UC3, {}},
-                      Kind{"odd_size", {13, 17}, CV_8UC3, {}}, Kind{"grey", {33, 20}, CV_8UC1, {}},
-                      Kind{"progressive", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
-                      Kind{"restarts", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}}),
+    ::testing::Values(JpegKind{"colour", {64, 96}, CV_8UC3, {}},
+                      JpegKind{"one_pixel", {1, 1}, CV_8UC3, {}},
+                      JpegKind{"odd_size", {13, 17}, CV_8UC3, {}},
+                      JpegKind{"grey", {33, 20}, CV_8UC1, {}},
+                      JpegKind{"progressive", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_PROGRESSIVE, 1}},
+                      JpegKind{"restarts", {64, 96}, CV_8UC3, {cv::IMWRITE_JPEG_RST_INTERVAL, 2}}),
     [](const auto& param) { return param.param.name; });
 
 TEST(JpegPicture, EveryTruncationIsRefused) {
@@ -64,7 +66,7 @@ TEST(JpegPicture, EveryTruncationIsRefused) {
     // whole.
     for (std::size_t length = bytes.size() - 2; length > 3; length = length * 9 / 10) {
       write_file(file, bytes.substr(0, length));
-      EXPECT_NE(why_refused(file), "") << length << " of " << bytes.size() << " bytes";
+      EXPECT_NE(why_jpeg_refused(file), "") << length << " of " << bytes.size() << " bytes";
     }
   }
 }
@@ -77,7 +79,7 @@ TEST(JpegPicture, AHoleInTheMiddleIsRefused) {
   // Half-written: the last half of the blocks on disk is still zero.
   for (std::size_t i = bytes.size() / 2; i < bytes.size(); ++i) bytes[i] = 0;
   write_file(file, bytes);
-  EXPECT_NE(why_refused(file), "");
+  EXPECT_NE(why_jpeg_refused(file), "");
 }
 
 TEST(JpegPicture, OrientationTagIsNotApplied) {
@@ -110,7 +112,8 @@ TEST(JpegPicture, HugeAnnouncedSizeIsRefusedByName) {
   ASSERT_NE(header, std::string::npos);
   bytes.replace(header + 5, 4, "\xea\x60\xea\x60");  // 60000 x 60000
   write_file(file, bytes);
-  EXPECT_NE(why_refused(file).find("60000x60000"), std::string::npos) << why_refused(file);
+  EXPECT_NE(why_jpeg_refused(file).find("60000x60000"), std::string::npos)
+      << why_jpeg_refused(file);
   EXPECT_THROW(with_open(file, jpeg_size), std::runtime_error);
 }
 

@@ -25,7 +25,7 @@ using testing::TemporaryFolder;
 using testing::with_open;
 using testing::write_file;
 
-std::string why_refused(const std::filesystem::path& file) {
+std::string why_png_refused(const std::filesystem::path& file) {
   return testing::why_refused(file, decode_png);
 }
 
@@ -62,14 +62,14 @@ void write_png(const std::filesystem::path& path, ImageSize size, int kind, int 
   std::fclose(file);
 }
 
-struct Kind {
+struct PngKind {
   const char* name;
   int kind;
   int bits;
   int interlace;
 };
 
-class PngKinds : public ::testing::TestWithParam<Kind> {};
+class PngKinds : public ::testing::TestWithParam<PngKind> {};
 
 TEST_P(PngKinds, DecodesToTheSamePixelsAsOpenCv) {
   const TemporaryFolder folder;
@@ -82,16 +82,16 @@ TEST_P(PngKinds, DecodesToTheSamePixelsAsOpenCv) {
 }
 
 INSTANTIATE_TEST_SUITE_P(, PngKinds,
-                         ::testing::Values(Kind{"colour", PNG_COLOR_TYPE_RGB, 8, 0},
-                                           Kind{"colour_16_bit", PNG_COLOR_TYPE_RGB, 16, 0},
-                                           Kind{"transparent", PNG_COLOR_TYPE_RGBA, 8, 0},
-                                           Kind{"transparent_16", PNG_COLOR_TYPE_RGBA, 16, 0},
-                                           Kind{"grey", PNG_COLOR_TYPE_GRAY, 8, 0},
-                                           Kind{"grey_1_bit", PNG_COLOR_TYPE_GRAY, 1, 0},
-                                           Kind{"grey_16_bit", PNG_COLOR_TYPE_GRAY, 16, 0},
-                                           Kind{"grey_alpha", PNG_COLOR_TYPE_GRAY_ALPHA, 8, 0},
-                                           Kind{"palette", PNG_COLOR_TYPE_PALETTE, 2, 0},
-                                           Kind{"interlaced", PNG_COLOR_TYPE_RGB, 8, 1}),
+                         ::testing::Values(PngKind{"colour", PNG_COLOR_TYPE_RGB, 8, 0},
+                                           PngKind{"colour_16_bit", PNG_COLOR_TYPE_RGB, 16, 0},
+                                           PngKind{"transparent", PNG_COLOR_TYPE_RGBA, 8, 0},
+                                           PngKind{"transparent_16", PNG_COLOR_TYPE_RGBA, 16, 0},
+                                           PngKind{"grey", PNG_COLOR_TYPE_GRAY, 8, 0},
+                                           PngKind{"grey_1_bit", PNG_COLOR_TYPE_GRAY, 1, 0},
+                                           PngKind{"grey_16_bit", PNG_COLOR_TYPE_GRAY, 16, 0},
+                                           PngKind{"grey_alpha", PNG_COLOR_TYPE_GRAY_ALPHA, 8, 0},
+                                           PngKind{"palette", PNG_COLOR_TYPE_PALETTE, 2, 0},
+                                           PngKind{"interlaced", PNG_COLOR_TYPE_RGB, 8, 1}),
                          [](const auto& param) { return param.param.name; });
 
 TEST(PngPicture, EveryTruncationIsRefused) {
@@ -102,7 +102,7 @@ TEST(PngPicture, EveryTruncationIsRefused) {
   // The last 12 bytes are the chunk IEND: without it all pixels are there, the file is not whole.
   for (std::size_t length = bytes.size() - 1; length > 8; length = length * 9 / 10) {
     write_file(file, bytes.substr(0, length));
-    EXPECT_NE(why_refused(file), "") << length << " of " << bytes.size() << " bytes";
+    EXPECT_NE(why_png_refused(file), "") << length << " of " << bytes.size() << " bytes";
   }
 }
 
@@ -116,7 +116,7 @@ TEST(PngPicture, AnyChangedByteOfThePixelDataIsRefused) {
     std::string changed = bytes;
     changed[at] = static_cast<char>(changed[at] ^ 0x10);
     write_file(file, changed);
-    EXPECT_NE(why_refused(file), "") << "byte " << at;
+    EXPECT_NE(why_png_refused(file), "") << "byte " << at;
   }
 }
 
@@ -127,7 +127,7 @@ TEST(PngPicture, AnIndexBeyondThePaletteIsRefused) {
   for (const int interlace : {0, 1}) {
     for (const int bits : {4, 8}) {
       write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, bits, interlace);
-      EXPECT_NE(why_refused(file), "") << bits << " bits";
+      EXPECT_NE(why_png_refused(file), "") << bits << " bits";
     }
     write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, 2, interlace);
     EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
@@ -153,7 +153,7 @@ TEST(PngPicture, HugeAnnouncedSizeIsRefusedByName) {
   write_png(file, {90000, 100000}, PNG_COLOR_TYPE_RGB, 8, 0, /*pixels=*/false);
   // Room for the start of the pixel data, so that the header counts as read.
   write_file(file, read_file(file) + std::string("\0\0\1\0IDAT", 8));
-  EXPECT_NE(why_refused(file).find("100000x90000"), std::string::npos) << why_refused(file);
+  EXPECT_NE(why_png_refused(file).find("100000x90000"), std::string::npos) << why_png_refused(file);
 }
 
 TEST(PngPicture, RealFramesEqualOpenCv) {

@@ -140,16 +140,16 @@ TEST(PixelNoise, ArrivalsRise) {
   }
 }
 
-constexpr ImageSize kSize{30, 40};
+constexpr ImageSize kNoisySize{30, 40};
 
 /// Events of a picture that stays as it is for `duration_s`, shown in `steps` steps from t = 0.
 std::vector<Event> watch_still(const SensorSpec& spec, double duration_s, int steps,
                                std::uint64_t seed = 1) {
-  Sensor sensor(spec, kSize, CounterRandom(seed));
+  Sensor sensor(spec, kNoisySize, CounterRandom(seed));
   std::vector<Event> events;
   for (int step = 0; step <= steps; ++step) {
     for (const Event& event :
-         sensor.step(log_picture(kSize, -1, spec), duration_s * step / steps)) {
+         sensor.step(log_picture(kNoisySize, -1, spec), duration_s * step / steps)) {
       events.push_back(event);
     }
   }
@@ -162,7 +162,7 @@ TEST(SensorNoise, LeakGivesPositiveEventsAtItsRateWhateverTheThreshold) {
   spec.leak_rate_hz = 2;
   for (const int steps : {1, 13}) {
     const std::vector<Event> events = watch_still(spec, 3.2, steps);
-    ASSERT_THAT(events, SizeIs(6 * kSize.pixel_count()));
+    ASSERT_THAT(events, SizeIs(6 * kNoisySize.pixel_count()));
     for (std::size_t i = 0; i < events.size(); ++i) {
       EXPECT_TRUE(events[i].positive);
       EXPECT_NEAR(events[i].t_s, 0.5 * std::round(events[i].t_s / 0.5), 1e-9);
@@ -175,7 +175,7 @@ TEST(SensorNoise, LeakPausesInTheRefractoryTime) {
   spec.leak_rate_hz = 2;
   spec.refractory_s = 0.25;
   const std::vector<Event> events = watch_still(spec, 2.1, 4);
-  ASSERT_THAT(events, SizeIs(3 * kSize.pixel_count()));  // 0.5, 1.25, 2.0
+  ASSERT_THAT(events, SizeIs(3 * kNoisySize.pixel_count()));  // 0.5, 1.25, 2.0
   EXPECT_NEAR(events.front().t_s, 0.5, 1e-9);
   EXPECT_NEAR(events.back().t_s, 2.0, 1e-9);
 }
@@ -199,7 +199,7 @@ TEST(SensorNoise, ShotNoiseHasTheSetRateWithoutMotion) {
   SensorSpec spec;
   spec.shot_noise_rate_hz = 3;
   const std::vector<Event> events = watch_still(spec, 4, 9);
-  const double expected = 3.0 * 4 * static_cast<double>(kSize.pixel_count());
+  const double expected = 3.0 * 4 * static_cast<double>(kNoisySize.pixel_count());
   EXPECT_NEAR(static_cast<double>(events.size()), expected, 4 * std::sqrt(expected));
   double positive = 0;
   for (const Event& event : events) positive += event.positive;
@@ -233,12 +233,12 @@ TEST(SensorNoise, ANoiseEventSetsTheLevelAnew) {
   // resets (0.3 log units at 0.1 a second, 50 resets a second: chance exp(-50 · 3)).
   SensorSpec noisy = exact_sensor(0.3);
   noisy.shot_noise_rate_hz = 50;
-  Sensor moving(noisy, kSize, CounterRandom(1));
-  Sensor still(noisy, kSize, CounterRandom(1));
-  moving.step(log_picture(kSize, -3, noisy), 0);
-  still.step(log_picture(kSize, -3, noisy), 0);
-  const std::vector<Event> while_moving = moving.step(log_picture(kSize, -2.5, noisy), 5);
-  EXPECT_EQ(while_moving, still.step(log_picture(kSize, -3, noisy), 5));
+  Sensor moving(noisy, kNoisySize, CounterRandom(1));
+  Sensor still(noisy, kNoisySize, CounterRandom(1));
+  moving.step(log_picture(kNoisySize, -3, noisy), 0);
+  still.step(log_picture(kNoisySize, -3, noisy), 0);
+  const std::vector<Event> while_moving = moving.step(log_picture(kNoisySize, -2.5, noisy), 5);
+  EXPECT_EQ(while_moving, still.step(log_picture(kNoisySize, -3, noisy), 5));
 }
 
 TEST(SensorNoise, SameSeedSameEventsOtherSeedOthers) {

@@ -207,11 +207,11 @@ TEST(SensorRefractory, DeadTimeLowersTheRateOfNoise) {
   }
 }
 
-constexpr ImageSize kSize{3, 5};
+constexpr ImageSize kPushedSize{3, 5};
 
 TEST(SensorExtremes, BlackToWhiteAndBackIsFinite) {
   const SensorSpec spec = exact_sensor(0.01);
-  Sensor sensor(spec, kSize, CounterRandom(1));
+  Sensor sensor(spec, kPushedSize, CounterRandom(1));
   sensor.step(std::vector<float>(15, 0.0f), 0);
   const std::vector<Event> up = sensor.step(std::vector<float>(15, 1.0f), 1);
   const auto crossings = static_cast<std::size_t>(std::log(1.001 / 0.001) / 0.01);  // 690.9
@@ -229,8 +229,8 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
   // 15 pixels, 10 s: 1.5e8 events.
   const double bytes = idle_event_bytes(spec, 15, 10);
   EXPECT_DOUBLE_EQ(bytes, 1.5e8 * 2 * sizeof(Event));
-  check_events_fit(spec, kSize, 10, static_cast<std::size_t>(bytes));
-  EXPECT_THAT([&] { check_events_fit(spec, kSize, 10, 1000); },
+  check_events_fit(spec, kPushedSize, 10, static_cast<std::size_t>(bytes));
+  EXPECT_THAT([&] { check_events_fit(spec, kPushedSize, 10, 1000); },
               ::testing::ThrowsMessage<std::runtime_error>(::testing::AllOf(
                   ::testing::HasSubstr("(1e+03 bytes), got about 1.5e+08 events"),
                   ::testing::HasSubstr("5x3 pixels in 10 s: shot_noise_rate_hz 1e+06"))));
@@ -240,7 +240,7 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
   // The bound is one of what really comes.
   spec = {};
   spec.shot_noise_rate_hz = 200;
-  Sensor sensor(spec, kSize, CounterRandom(1));
+  Sensor sensor(spec, kPushedSize, CounterRandom(1));
   sensor.step(std::vector<float>(15, 0.5f), 0);
   EXPECT_NEAR(static_cast<double>(sensor.step(std::vector<float>(15, 0.5f), 10).size()), 30000,
               5 * std::sqrt(30000));
@@ -248,7 +248,7 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
 
 TEST(SensorExtremes, BlackAndSaturatedPicturesStaySilent) {
   for (const float value : {0.0f, 1.0f, std::numeric_limits<float>::max()}) {
-    Sensor sensor(SensorSpec{}, kSize, CounterRandom(1));
+    Sensor sensor(SensorSpec{}, kPushedSize, CounterRandom(1));
     sensor.step(std::vector<float>(15, value), 0);
     EXPECT_THAT(sensor.step(std::vector<float>(15, value), 1), IsEmpty());
   }

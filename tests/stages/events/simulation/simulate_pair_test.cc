@@ -137,16 +137,16 @@ TEST(AffineInterval, FlowLeadsFromThePictureToTheLastRendered) {
   }
 }
 
-constexpr ImageSize kSize{90, 120};
+constexpr ImageSize kPairSize{90, 120};
 
 /// PSNR in dB of a rendered picture against the texture moved right by dx, `margin` px inside.
 double psnr(const std::vector<float>& rendered, double dx, int margin) {
   double squares = 0;
   int count = 0;
-  for (int y = margin; y < kSize.height - margin; ++y) {
-    for (int x = margin; x < kSize.width - margin; ++x, ++count) {
+  for (int y = margin; y < kPairSize.height - margin; ++y) {
+    for (int x = margin; x < kPairSize.width - margin; ++x, ++count) {
       const double error =
-          rendered[static_cast<std::size_t>(y * kSize.width + x)] - texture(x - dx, y);
+          rendered[static_cast<std::size_t>(y * kPairSize.width + x)] - texture(x - dx, y);
       squares += error * error;
     }
   }
@@ -154,16 +154,16 @@ double psnr(const std::vector<float>& rendered, double dx, int margin) {
 }
 
 TEST(FlowInterval, BeginsAndEndsWithTheFrames) {
-  const GreyImage previous = textured_picture(kSize);
-  const GreyImage next = textured_picture(kSize, 6);
+  const GreyImage previous = textured_picture(kPairSize);
+  const GreyImage next = textured_picture(kPairSize, 6);
   const FlowInterval interval(previous, next);
-  EXPECT_EQ(interval.size(), kSize);
+  EXPECT_EQ(interval.size(), kPairSize);
   EXPECT_EQ(interval.render(0), linear_intensity(previous));
   EXPECT_EQ(interval.render(interval.steps()), linear_intensity(next));
 }
 
 TEST(FlowInterval, MovesATextureAlongItsShift) {
-  const FlowInterval interval(textured_picture(kSize), textured_picture(kSize, 6));
+  const FlowInterval interval(textured_picture(kPairSize), textured_picture(kPairSize, 6));
   EXPECT_GE(interval.steps(), 6);
   EXPECT_LE(interval.steps(), 8);
   for (int step = 1; step < interval.steps(); ++step) {
@@ -177,11 +177,11 @@ TEST(FlowInterval, MovesATextureAlongItsShift) {
 
 TEST(FlowInterval, FlowIsTheShift) {
   const FlowDisplacement flow =
-      FlowInterval(textured_picture(kSize), textured_picture(kSize, 4, -3)).flow();
+      FlowInterval(textured_picture(kPairSize), textured_picture(kPairSize, 4, -3)).flow();
   double error = 0;
-  for (int y = 15; y < kSize.height - 15; ++y) {
-    for (int x = 15; x < kSize.width - 15; ++x) {
-      const auto i = static_cast<std::size_t>(y * kSize.width + x);
+  for (int y = 15; y < kPairSize.height - 15; ++y) {
+    for (int x = 15; x < kPairSize.width - 15; ++x) {
+      const auto i = static_cast<std::size_t>(y * kPairSize.width + x);
       error = std::max(error, std::hypot(flow.x_px[i] - 4.0, flow.y_px[i] + 3.0));
     }
   }
@@ -189,15 +189,15 @@ TEST(FlowInterval, FlowIsTheShift) {
 }
 
 TEST(FlowInterval, StaysStillBetweenEqualFrames) {
-  const GreyImage picture = textured_picture(kSize);
+  const GreyImage picture = textured_picture(kPairSize);
   const FlowInterval interval(picture, picture);
   EXPECT_EQ(interval.steps(), 1);
   for (const float x : interval.flow().x_px) EXPECT_NEAR(x, 0, 0.01);
 }
 
 TEST(FlowInterval, ABrighteningPictureWithoutTextureFades) {
-  const GreyImage dark{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), 0)};
-  const GreyImage bright{kSize, std::vector<std::uint8_t>(kSize.pixel_count(), 255)};
+  const GreyImage dark{kPairSize, std::vector<std::uint8_t>(kPairSize.pixel_count(), 0)};
+  const GreyImage bright{kPairSize, std::vector<std::uint8_t>(kPairSize.pixel_count(), 255)};
   const FlowInterval interval(dark, bright);
   const int half = interval.steps() / 2;
   const float expected = static_cast<float>(half) / static_cast<float>(interval.steps());
@@ -219,7 +219,7 @@ TEST(FlowInterval, DoesNotDependOnTheNumberOfThreads) {
   const auto picture_at = [](int threads) {
     const int before = cv::getNumThreads();
     cv::setNumThreads(threads);
-    const FlowInterval interval(textured_picture(kSize), textured_picture(kSize, 5, 2));
+    const FlowInterval interval(textured_picture(kPairSize), textured_picture(kPairSize, 5, 2));
     const std::vector<float> rendered = interval.render(2);
     cv::setNumThreads(before);
     return rendered;

@@ -169,14 +169,14 @@ TEST(SharedPictures, ManyThreadsAndTooLittleRoomStillGetTheRightPictures) {
   EXPECT_EQ(wrong, 0);
 }
 
-FramePair pair_of(const std::string& previous, const std::string& next) {
+FramePair shared_pair(const std::string& previous, const std::string& next) {
   FramePair pair;
   pair.previous.path = previous;
   pair.next.path = next;
   return pair;
 }
 
-std::string reason(const Outcome<PreparedPair>& outcome) {
+std::string why_none(const Outcome<PreparedPair>& outcome) {
   return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
 }
 
@@ -186,15 +186,15 @@ TEST(PairSharing, PairsThatShareAFrameDecodeItOnce) {
     cv::imwrite((folder / name).string(), testing::gradient_picture({5, 7}) + name[0]);
   }
   const PairReader reader(folder.path(), {});
-  const auto first = reader.read(pair_of("a.png", "b.png"));
+  const auto first = reader.read(shared_pair("a.png", "b.png"));
   std::filesystem::remove(folder / "a.png");  // a second decoding would fail
   std::filesystem::remove(folder / "b.png");
-  for (const auto& pair : {pair_of("b.png", "c.png"), pair_of("a.png", "c.png")}) {
-    EXPECT_EQ(reason(reader.read(pair)), "no fault");
+  for (const auto& pair : {shared_pair("b.png", "c.png"), shared_pair("a.png", "c.png")}) {
+    EXPECT_EQ(why_none(reader.read(pair)), "no fault");
   }
-  EXPECT_EQ(std::get<PreparedPair>(reader.read(pair_of("a.png", "b.png"))).input,
+  EXPECT_EQ(std::get<PreparedPair>(reader.read(shared_pair("a.png", "b.png"))).input,
             std::get<PreparedPair>(first).input);
-  EXPECT_THAT(reason(PairReader(folder.path(), {}).read(pair_of("a.png", "c.png"))),
+  EXPECT_THAT(why_none(PairReader(folder.path(), {}).read(shared_pair("a.png", "c.png"))),
               HasSubstr("got none, in a.png"));
 }
 
@@ -210,7 +210,8 @@ TEST(PairSharing, SharedFramesMakeTheSameInputsAsUnsharedOnes) {
   const PairReader sharing(folder.path(), spec);
   for (int next = 1; next < 6; ++next) {
     for (int previous = 0; previous < next; ++previous) {
-      const auto pair = pair_of(std::to_string(previous) + ".png", std::to_string(next) + ".png");
+      const auto pair =
+          shared_pair(std::to_string(previous) + ".png", std::to_string(next) + ".png");
       EXPECT_EQ(std::get<PreparedPair>(sharing.read(pair)).input,
                 std::get<PreparedPair>(PairReader(folder.path(), spec).read(pair)).input);
     }
@@ -224,11 +225,11 @@ TEST(PairSharing, ABadFrameIsTheSameFaultForEachOfItsPairs) {
   cv::imwrite((folder / "b.png").string(), testing::gradient_picture({5, 7}));
   std::filesystem::resize_file(folder / "b.png", 60);
   const PairReader reader(folder.path(), {});
-  const std::string first = reason(reader.read(pair_of("a.png", "b.png")));
+  const std::string first = why_none(reader.read(shared_pair("a.png", "b.png")));
   EXPECT_THAT(first, HasSubstr("expected a whole PNG, got "));
   EXPECT_THAT(first, HasSubstr(", in b.png"));
-  EXPECT_EQ(reason(reader.read(pair_of("b.png", "c.png"))), first);
-  EXPECT_EQ(reason(reader.read(pair_of("a.png", "c.png"))), "no fault");
+  EXPECT_EQ(why_none(reader.read(shared_pair("b.png", "c.png"))), first);
+  EXPECT_EQ(why_none(reader.read(shared_pair("a.png", "c.png"))), "no fault");
 }
 
 TEST(PairSharing, ManyThreadsGetTheInputsThatOneThreadGets) {
@@ -241,7 +242,7 @@ TEST(PairSharing, ManyThreadsGetTheInputsThatOneThreadGets) {
     cv::imwrite((folder / name).string(),
                 testing::gradient_picture({30, 40}) + cv::Scalar::all(10 * i));
     for (int gap = 1; gap <= std::min(i, 6); ++gap) {
-      pairs.push_back(pair_of(std::to_string(i - gap) + ".png", name));
+      pairs.push_back(shared_pair(std::to_string(i - gap) + ".png", name));
       pairs.emplace_back();
       pairs.back().previous = testing::video_ref("clip.avi", i - gap);
       pairs.back().next = testing::video_ref("clip.avi", i);

@@ -115,7 +115,7 @@ TEST(TrackingLabels, ALineOfAnUnknownFrameIsAFaultOfAll) {
 
 using State = Neighbour::State;
 
-constexpr const char* kFirst =
+constexpr const char* kFirstLine =
     "0 2 Van 0 1 -1.79 296.7 161.7 455.2 292.3 2 1.8 4.4 -4.5 1.8 13 -2\n";
 constexpr const char* kThird =
     "2 2 Van 0 1 -1.79 290.7 161.7 455.2 292.3 2 1.8 4.4 -4.5 1.8 13 -2\n";
@@ -131,8 +131,8 @@ class KittiTrackingDatasetTest : public ::testing::Test {
          {"0001/000000", "0001/000001", "0001/000002", "0001/000003", "0003/000000"}) {
       write_file(folder_ / ("tracking/image_02/" + std::string(name) + ".png"), "");
     }
-    write_file(folder_ / "tracking/label_02/0001.txt", std::string(kFirst) + kThird + kNinth);
-    write_file(folder_ / "tracking/label_02/0002.txt", kFirst);
+    write_file(folder_ / "tracking/label_02/0001.txt", std::string(kFirstLine) + kThird + kNinth);
+    write_file(folder_ / "tracking/label_02/0002.txt", kFirstLine);
     spec_.root = "tracking";
   }
 
@@ -166,7 +166,7 @@ TEST_F(KittiTrackingDatasetTest, AnnotationsAreTheFramesLines) {
   const auto original = [&](const std::string& key) {
     return std::get<Annotation>(dataset->annotation(key)).original;
   };
-  EXPECT_EQ(original("label_02/0001.txt#0"), kFirst);
+  EXPECT_EQ(original("label_02/0001.txt#0"), kFirstLine);
   EXPECT_EQ(original("label_02/0001.txt#1"), "");
   EXPECT_EQ(original("label_02/0001.txt#2"), kThird);
   EXPECT_EQ(dataset->label_place("label_02/0001.txt#2"), "tracking/label_02/0001.txt#2");

@@ -24,7 +24,7 @@ using ::testing::ThrowsMessage;
 
 using State = Neighbour::State;
 
-std::vector<std::string> ids(const Dataset& dataset) {
+std::vector<std::string> mpii_ids(const Dataset& dataset) {
   std::vector<std::string> found;
   for (const auto& frame : dataset.labelled_frames()) found.push_back(frame.sample_id);
   return found;
@@ -54,15 +54,15 @@ class MpiiDatasetTest : public ::testing::Test {
 TEST_F(MpiiDatasetTest, TheSplitChoosesByImgTrain) {
   write_four();
   spec_.split = "train";
-  EXPECT_THAT(ids(*open()), ElementsAre("a", "b"));
+  EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b"));
   EXPECT_THAT(open()->notes(),
               ElementsAre("1 images without annotation in m/mpii_human_pose_v1_u12_1.mat",
                           "1 annotated images left out, not of split train",
                           "1 annotated images without a sequence folder: they have no neighbours"));
   spec_.split = "test";
-  EXPECT_THAT(ids(*open()), ElementsAre("c"));
+  EXPECT_THAT(mpii_ids(*open()), ElementsAre("c"));
   spec_.split = "everything";
-  EXPECT_THAT(ids(*open()), ElementsAre("a", "b", "c"));
+  EXPECT_THAT(mpii_ids(*open()), ElementsAre("a", "b", "c"));
 }
 
 TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
@@ -192,7 +192,7 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   spec.root = (data / "mpii").string();
   spec.split = "all";
   const auto dataset = open_mpii_dataset(spec, "/");
-  EXPECT_THAT(ids(*dataset), ElementsAre("000000001", "052475643"));
+  EXPECT_THAT(mpii_ids(*dataset), ElementsAre("000000001", "052475643"));
   const LabelledFrame& juggler = dataset->labelled_frames()[0];
   EXPECT_EQ(juggler.frame.path, spec.root + "/sequences/000000001/00000007.jpg");
   // Frames 1..13 are there, 7 is labelled: six on either side.
