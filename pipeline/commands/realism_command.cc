@@ -4,8 +4,12 @@
 #include <iostream>
 #include <map>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
@@ -17,7 +21,7 @@ namespace eventgan {
 namespace {
 
 struct RealismArguments {
-  std::string recording;
+  std::vector<std::string> recordings;
   std::string format;
   std::string camera = "left";
   std::string frames;
@@ -33,13 +37,12 @@ const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::k
                                                     {"esim", RealismMethod::kEsim}};
 
 /// As told, else by what is there: a folder is ECD's, a file is MVSEC's.
-RecordingFormat format_of(const RealismArguments& arguments) {
+RecordingFormat format_of(const RealismArguments& arguments, const std::string& recording) {
   for (const RecordingFormat format :
        {RecordingFormat::kMvsec, RecordingFormat::kEventgan, RecordingFormat::kEcd}) {
     if (arguments.format == to_string(format)) return format;
   }
-  return std::filesystem::is_directory(arguments.recording) ? RecordingFormat::kEcd
-                                                            : RecordingFormat::kMvsec;
+  return std::filesystem::is_directory(recording) ? RecordingFormat::kEcd : RecordingFormat::kMvsec;
 }
 
 template <class Number>
@@ -52,36 +55,71 @@ Number number_in(const std::string& text, const std::string& expected) {
 }
 
 /// "3:8", "3:" or ":8".
-void read_frame_range(const std::string& text, RealismOptions& options) {
+void read_frame_range(const std::string& text, RecordingSpec& spec) {
   const std::string expected = "--frames: expected FIRST:LAST";
   const std::size_t colon = text.find(':');
   if (colon == std::string::npos) throw UsageError(expected + ", got \"" + text + "\"");
   const std::string first = text.substr(0, colon);
   const std::string last = text.substr(colon + 1);
-  if (!first.empty()) options.first_frame = number_in<std::int64_t>(first, expected);
-  if (!last.empty()) options.last_frame = number_in<std::int64_t>(last, expected);
+  if (!first.empty()) spec.first_frame = number_in<std::int64_t>(first, expected);
+  if (!last.empty()) spec.last_frame = number_in<std::int64_t>(last, expected);
+}
+
+/// The parts of recordings to compare: each argument is a recording, of which the options say which
+/// part, or a training's manifest, which has its validation's parts.
+std::vector<RecordingSpec> wanted_parts(const RealismArguments& arguments) {
+  std::vector<RecordingSpec> parts;
+  for (const std::string& argument : arguments.recordings) {
+    if (argument.ends_with(".json")) {
+      const TrainingManifest manifest = read_training_manifest(argument);
+      if (manifest.validation.empty()) {
+        throw UsageError(
+            "expected a training manifest with recordings for validation, got none in " + argument);
+      }
+      for (RecordingSpec part : manifest.validation) {
+        part.path = resolve(manifest, part.path).string();
+        parts.push_back(std::move(part));
+      }
+      continue;
+    }
+    RecordingSpec& part = parts.emplace_back();
+    part.path = argument;
+    part.format = format_of(arguments, argument);
+    part.camera = arguments.camera;
+    if (!arguments.frames.empty()) read_frame_range(arguments.frames, part);
+  }
+  return parts;
 }
 
 int run_realism(const RealismArguments& arguments) {
   RealismOptions options = arguments.options;
-  if (!arguments.frames.empty()) read_frame_range(arguments.frames, options);
   if (arguments.threshold != "fit") {
     options.threshold =
         number_in<double>(arguments.threshold, "--threshold: expected fit or a number");
   }
-  options.pictures = arguments.out;
-  const auto recording =
-      open_recording(arguments.recording, format_of(arguments), arguments.camera);
-  const RealismReport report = measure_realism(*recording, options, [&](std::int64_t total) {
-    return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
-  });
-  for (const std::string& note : recording->notes()) tell_note(note);
-  std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
+  const std::vector<RecordingSpec> parts = wanted_parts(arguments);
+  std::vector<RealismReport> reports;
+  for (const RecordingSpec& part : parts) {
+    options.first_frame = part.first_frame;
+    options.last_frame = part.last_frame;
+    options.pictures = arguments.out;
+    if (parts.size() > 1 && !arguments.out.empty()) {
+      options.pictures /= std::filesystem::path(part.path).stem();
+    }
+    const auto recording = open_recording(part.path, part.format, part.camera);
+    reports.push_back(measure_realism(*recording, options, [&](std::int64_t total) {
+      return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
+    }));
+    for (const std::string& note : recording->notes()) tell_note(note);
+  }
+  std::cout << (arguments.json ? to_json(reports) : to_text(reports)) << std::flush;
   return kComplete;
 }
 
 void add_choices(CLI::App& command, RealismArguments& arguments) {
-  command.add_option("RECORDING", arguments.recording, "A recording of events and frames")
+  command
+      .add_option("RECORDING", arguments.recordings,
+                  "Recordings of events and frames; TRAINING.json: those of its validation")
       ->required();
   command
       .add_option("--format", arguments.format,

@@ -17,29 +17,19 @@
 namespace eventgan {
 namespace {
 
-/// A method's volume [2 bins, y, x] float32, and the method's name.
-struct NamedVolume {
-  std::string method;
-  std::vector<float> volume;
-};
-
-/// Writes FIRST-LAST.png (six digits each) into `folder`, which must exist: a row for each method,
-/// previous frame | next frame | the method's | real, both volumes normalised
-/// as they are compared. Nothing for no methods. Throws std::runtime_error if it cannot be written.
-void write_realism_picture(const RealInterval& real, std::span<const NamedVolume> volumes, int bins,
-                           const std::filesystem::path& folder) {
-  if (volumes.empty()) return;
+/// Writes FIRST-LAST.png (six digits each) into `folder`, which must exist: the frames, the real
+/// volume and the methods', all as they are compared. Throws std::runtime_error if it cannot be
+/// written.
+void write_realism_picture(const RealInterval& real, std::vector<NamedVolume> volumes, int bins,
+                           const std::string& recording, const std::filesystem::path& folder) {
   const FrameInterval interval = real.frames.interval;
-  std::vector<ComparedPair> rows;
-  for (const NamedVolume& named : volumes) {
-    rows.push_back(
-        {{bins, real.frames.previous.size},
-         network_input(real.frames),
-         named.volume,
-         real.volume,
-         fmt::format("{}, frames {} and {}", named.method, interval.first, interval.last)});
-  }
-  write_comparison_png(rows,
+  volumes.insert(volumes.begin(), {"real", real.volume});
+  const ComparedPair pair{
+      {bins, real.frames.previous.size},
+      network_input(real.frames),
+      std::move(volumes),
+      fmt::format("{}, frames {} and {}", recording, interval.first, interval.last)};
+  write_comparison_png({&pair, 1},
                        folder / fmt::format("{:06}-{:06}.png", interval.first, interval.last));
 }
 
@@ -106,7 +96,9 @@ IntervalResult compare_interval(const Recording& recording, const FrameInterval&
     }
     result.methods.push_back(mean_of(draws));
   }
-  if (!run.pictures.empty()) write_realism_picture(real, drawn, run.bins, run.pictures);
+  if (!run.pictures.empty()) {
+    write_realism_picture(real, std::move(drawn), run.bins, recording.name(), run.pictures);
+  }
   return result;
 }
 
@@ -114,11 +106,24 @@ IntervalResult compare_interval(const Recording& recording, const FrameInterval&
 template <class Column>
 MethodSummary summary_of(std::string name, std::string settings,
                          const std::vector<IntervalResult>& results, Column column) {
-  MethodSummary summary{std::move(name), std::move(settings), {}, std::nullopt, {}};
-  for (const IntervalResult& result : results) summary.intervals.push_back(column(result));
+  MethodSummary summary;
+  summary.name = std::move(name);
+  summary.settings = std::move(settings);
+  std::vector<RealismScores> scores;
+  for (const IntervalResult& result : results) {
+    summary.intervals.push_back(column(result));
+    scores.push_back(summary.intervals.back().scores);
+  }
   const IntervalScores mean = mean_of(summary.intervals);
   summary.mean = mean.scores;
+  summary.bounds = mean_bounds(scores);
   summary.direction = mean.direction;
+  summary.direction_bounds =
+      bootstrap_bounds(results.size(), [&](std::span<const std::size_t> drawn) {
+        std::optional<DirectionScore> sum;
+        for (const std::size_t i : drawn) add_direction(sum, summary.intervals[i].direction);
+        return direction_fraction(sum);
+      });
   return summary;
 }
 

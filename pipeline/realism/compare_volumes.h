@@ -19,7 +19,7 @@ struct ComparisonRun {
 
 /// Scores each method's volumes of the intervals against the camera's, intervals in parallel; the
 /// result does not depend on the number of threads. Draws FIRST-LAST.png for each interval
-/// (write_comparison_png): a row for each method, its first draw, volumes as they are compared.
+/// (write_comparison_png): the real volume and each method's first draw, as they are compared.
 ///
 /// Throws InputError if the recording cannot be read, std::runtime_error if a method makes a volume
 /// that is not finite or a picture cannot be written. Fills `intervals`, `real` and `methods` of

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -61,62 +62,86 @@ double shortfall(BetterScore better, double value, double real) {
   return better == BetterScore::kLower ? value : std::abs(value - real);
 }
 
+/// A method's mean, and its bounds, which are not told where they are not known.
+struct Cell {
+  double value = std::numeric_limits<double>::quiet_NaN();
+  Bounds bounds;
+};
+
+std::string cell_text(const Cell& cell, bool best) {
+  if (std::isnan(cell.value)) return fmt::format("{:>18} ", "-");
+  const double half = (cell.bounds.high - cell.bounds.low) / 2;
+  return fmt::format("{:>10.4f}{:<8} ", cell.value,
+                     (best ? "*" : " ") + (std::isnan(half) ? "" : fmt::format("±{:.4f}", half)));
+}
+
 /// "label  symbol  real  method  method*": the real volume's own value (none for scores that
 /// compare it with itself), then the methods', the best marked.
-std::string table_row(const std::string& label, BetterScore better, double real, bool show_real,
-                      const std::vector<double>& values) {
+std::string table_row(const std::string& label, BetterScore better, std::optional<double> real,
+                      const std::vector<Cell>& cells) {
   std::string text = fmt::format("{:28.28} {}", label, symbol(better));
-  const auto cell = [](double value, bool best) {
-    return std::isnan(value) ? fmt::format("{:>11} ", "-")
-                             : fmt::format("{:11.4f}{}", value, best ? '*' : ' ');
-  };
-  text += show_real ? cell(real, false) : std::string(12, ' ');
+  text += real ? cell_text({*real, {}}, false) : std::string(19, ' ');
   double least = std::numeric_limits<double>::infinity();
-  for (const double value : values) {
-    const double distance = shortfall(better, value, real);
+  for (const Cell& cell : cells) {
+    const double distance = shortfall(better, cell.value, real.value_or(0));
     if (!std::isnan(distance)) least = std::min(least, distance);
   }
-  for (const double value : values) {
-    text += cell(value, values.size() > 1 && shortfall(better, value, real) == least);
+  for (const Cell& cell : cells) {
+    text += cell_text(cell,
+                      cells.size() > 1 && shortfall(better, cell.value, real.value_or(0)) == least);
   }
+  while (text.back() == ' ') text.pop_back();
   return text + "\n";
 }
 
-std::vector<double> values_of(const RealismReport& report, double RealismScores::*member) {
-  std::vector<double> values;
-  for (const MethodSummary& method : report.methods) values.push_back(method.mean.*member);
-  return values;
+std::vector<Cell> cells_of(const RealismReport& report, double RealismScores::*member) {
+  std::vector<Cell> cells;
+  for (const MethodSummary& method : report.methods) {
+    Cell& cell = cells.emplace_back();
+    cell.value = method.mean.*member;
+    if (method.bounds) cell.bounds = {method.bounds->low.*member, method.bounds->high.*member};
+  }
+  return cells;
+}
+
+std::optional<double> real_value(const RealismReport& report, const ScoreRow& row) {
+  if (row.better != BetterScore::kLikeReal) return std::nullopt;
+  return report.real.mean.*row.member;
 }
 
 std::string bin_rows(const RealismReport& report) {
   std::string text;
   for (std::size_t bin = 0; bin < report.real.mean.events_per_bin.size(); ++bin) {
-    std::vector<double> values;
+    std::vector<Cell> cells;
     for (const MethodSummary& method : report.methods) {
-      values.push_back(method.mean.events_per_bin[bin]);
+      cells.push_back({method.mean.events_per_bin[bin], {}});
     }
     text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal,
-                      report.real.mean.events_per_bin[bin], true, values);
+                      report.real.mean.events_per_bin[bin], cells);
   }
   return text;
 }
 
-double fraction_of(const std::optional<DirectionScore>& direction) {
-  return direction && direction->pixels > 0 ? direction->fraction()
-                                            : std::numeric_limits<double>::quiet_NaN();
+constexpr const char* kDirectionLabel = "direction within 30 deg";
+
+std::vector<Cell> direction_cells(const RealismReport& report) {
+  std::vector<Cell> cells;
+  for (const MethodSummary& method : report.methods) {
+    cells.push_back({direction_fraction(method.direction), method.direction_bounds});
+  }
+  return cells;
 }
 
 std::string direction_rows(const RealismReport& report) {
   if (!report.real.direction) return {};
-  std::vector<double> values;
   std::string pixels =
-      fmt::format("{:28}  {:11} ", "  pixels that tell it", report.real.direction->pixels);
+      fmt::format("{:28}  {:10}{:9}", "  pixels that tell it", report.real.direction->pixels, "");
   for (const MethodSummary& method : report.methods) {
-    values.push_back(fraction_of(method.direction));
-    pixels += fmt::format("{:11} ", method.direction ? method.direction->pixels : 0);
+    pixels += fmt::format("{:10}{:9}", method.direction ? method.direction->pixels : 0, "");
   }
-  return table_row("direction within 30 deg", BetterScore::kHigher,
-                   fraction_of(report.real.direction), true, values) +
+  while (pixels.back() == ' ') pixels.pop_back();
+  return table_row(kDirectionLabel, BetterScore::kHigher, direction_fraction(report.real.direction),
+                   direction_cells(report)) +
          pixels + "\n";
 }
 
@@ -144,22 +169,97 @@ std::string head(const RealismReport& report) {
 
 }  // namespace
 
-std::string to_text(const RealismReport& report) {
-  std::string text = head(report) + fmt::format("{:28}  {:>11} ", "", "real");
+double direction_fraction(const std::optional<DirectionScore>& direction) {
+  return direction && direction->pixels > 0 ? direction->fraction()
+                                            : std::numeric_limits<double>::quiet_NaN();
+}
+
+namespace {
+
+std::string column_heads(const RealismReport& report) {
+  std::string text = fmt::format("{:28}  {:>10}{:9}", "", "real", "");
   for (const MethodSummary& method : report.methods) {
-    text += fmt::format("{:>11.11} ", method.name);
+    text += fmt::format("{:>10.10}{:9}", method.name, "");
   }
-  text += "\n";
+  while (text.back() == ' ') text.pop_back();
+  return text + "\n";
+}
+
+std::string one_recording(const RealismReport& report) {
+  std::string text;
   for (const ScoreRow& row : kScoreRows) {
-    text += table_row(row.label, row.better, report.real.mean.*row.member,
-                      row.better == BetterScore::kLikeReal, values_of(report, row.member));
+    text += table_row(row.label, row.better, real_value(report, row), cells_of(report, row.member));
     if (row.member == &RealismScores::events_per_pixel) text += bin_rows(report);
   }
-  text += direction_rows(report);
-  text +=
-      "↑ higher is better, ↓ lower, ≈ nearer to the real one; * best. Means over the pairs "
-      "of normalised volumes.\n";
+  return text + direction_rows(report);
+}
+
+/// A method's means over the recordings, each counting alike.
+RealismScores mean_over(std::span<const RealismReport> reports,
+                        const std::function<const MethodSummary&(const RealismReport&)>& method) {
+  std::vector<RealismScores> scores;
+  for (const RealismReport& report : reports) {
+    scores.push_back(method(report).mean);
+    scores.back().events_per_bin.clear();  // of as many bins as the weights have
+  }
+  return mean_scores(scores);
+}
+
+/// A report whose methods have the means over the recordings.
+RealismReport mean_report(std::span<const RealismReport> reports) {
+  RealismReport mean;
+  mean.recording = "mean";
+  mean.real.name = "real";
+  mean.real.mean = mean_over(
+      reports, [](const RealismReport& r) -> const auto& { return r.real; });
+  for (std::size_t i = 0; i < reports.front().methods.size(); ++i) {
+    MethodSummary& method = mean.methods.emplace_back();
+    method.name = reports.front().methods[i].name;
+    method.mean = mean_over(
+        reports, [i](const RealismReport& r) -> const auto& { return r.methods.at(i); });
+  }
+  return mean;
+}
+
+/// The end of a recording's path is what tells it from others.
+std::string short_name(const std::string& recording) {
+  constexpr std::size_t kRoom = 26;
+  return recording.size() > kRoom ? "…" + recording.substr(recording.size() - kRoom + 1)
+                                  : recording;
+}
+
+std::string several_recordings(std::span<const RealismReport> reports) {
+  const RealismReport mean = mean_report(reports);
+  std::string text;
+  for (const ScoreRow& row : kScoreRows) {
+    text += row.label + std::string(" ") + symbol(row.better) + "\n";
+    for (const RealismReport& report : reports) {
+      text += table_row("  " + short_name(report.recording), row.better, real_value(report, row),
+                        cells_of(report, row.member));
+    }
+    text += table_row("  mean", row.better, real_value(mean, row), cells_of(mean, row.member));
+  }
+  std::string directions;
+  for (const RealismReport& report : reports) {
+    if (!report.real.direction) continue;
+    directions += table_row("  " + short_name(report.recording), BetterScore::kHigher,
+                            direction_fraction(report.real.direction), direction_cells(report));
+  }
+  if (!directions.empty()) text += kDirectionLabel + std::string(" ↑\n") + directions;
   return text;
+}
+
+}  // namespace
+
+std::string to_text(std::span<const RealismReport> reports) {
+  std::string text;
+  for (const RealismReport& report : reports) text += head(report);
+  text += column_heads(reports.front());
+  text += reports.size() == 1 ? one_recording(reports.front()) : several_recordings(reports);
+  return text +
+         "↑ higher is better, ↓ lower, ≈ nearer to the real one; * best. Means over the pairs of "
+         "normalised volumes; ± half of the range that holds the mean with a probability of 95 % "
+         "(bootstrap over the pairs).\n";
 }
 
 namespace {
@@ -177,6 +277,24 @@ nlohmann::json scores_json(const RealismScores& scores,
   return json;
 }
 
+/// [low, high] by score.
+nlohmann::json bounds_json(const MethodSummary& method) {
+  if (!method.bounds) return nullptr;
+  const ScoreBounds& bounds = *method.bounds;
+  nlohmann::json json = nlohmann::json::object();
+  for (const ScoreRow& row : kScoreRows) {
+    json[row.key] = {bounds.low.*row.member, bounds.high.*row.member};
+  }
+  for (std::size_t bin = 0; bin < bounds.low.events_per_bin.size(); ++bin) {
+    json["events_per_bin"].push_back(
+        {bounds.low.events_per_bin[bin], bounds.high.events_per_bin[bin]});
+  }
+  if (method.direction) {
+    json["direction"] = {method.direction_bounds.low, method.direction_bounds.high};
+  }
+  return json;
+}
+
 nlohmann::json method_json(const MethodSummary& method,
                            const std::vector<IntervalSummary>& intervals) {
   nlohmann::json pairs = nlohmann::json::array();
@@ -190,12 +308,11 @@ nlohmann::json method_json(const MethodSummary& method,
   return {{"name", method.name},
           {"settings", method.settings},
           {"mean", scores_json(method.mean, method.direction)},
+          {"bounds", bounds_json(method)},
           {"pairs", pairs}};
 }
 
-}  // namespace
-
-std::string to_json(const RealismReport& report) {
+nlohmann::json report_json(const RealismReport& report) {
   nlohmann::json pairs = nlohmann::json::array();
   for (const IntervalSummary& interval : report.intervals) {
     pairs.push_back({{"first_frame", interval.interval.first},
@@ -208,15 +325,28 @@ std::string to_json(const RealismReport& report) {
   for (const MethodSummary& method : report.methods) {
     methods.push_back(method_json(method, report.intervals));
   }
-  const nlohmann::json json = {{"recording", report.recording},
-                               {"height", report.size.height},
-                               {"width", report.size.width},
-                               {"bins", report.bins},
-                               {"seed", report.seed},
-                               {"pairs", pairs},
-                               {"real", method_json(report.real, report.intervals)},
-                               {"methods", methods},
-                               {"wall_seconds", report.wall_seconds}};
+  return {{"recording", report.recording},
+          {"height", report.size.height},
+          {"width", report.size.width},
+          {"bins", report.bins},
+          {"seed", report.seed},
+          {"pairs", pairs},
+          {"real", method_json(report.real, report.intervals)},
+          {"methods", methods},
+          {"wall_seconds", report.wall_seconds}};
+}
+
+}  // namespace
+
+std::string to_json(std::span<const RealismReport> reports) {
+  nlohmann::json recordings = nlohmann::json::array();
+  for (const RealismReport& report : reports) recordings.push_back(report_json(report));
+  const RealismReport mean = mean_report(reports);
+  nlohmann::json means = {{mean.real.name, scores_json(mean.real.mean, std::nullopt)}};
+  for (const MethodSummary& method : mean.methods) {
+    means[method.name] = scores_json(method.mean, std::nullopt);
+  }
+  const nlohmann::json json = {{"recordings", recordings}, {"mean", means}};
   return dump_json(json, JsonLayout::kIndented) + "\n";
 }
 

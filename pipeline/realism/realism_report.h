@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -30,9 +31,14 @@ struct MethodSummary {
   std::string name;
   std::string settings;
   RealismScores mean;                       ///< over the intervals
+  std::optional<ScoreBounds> bounds;        ///< of the means; none: not told
   std::optional<DirectionScore> direction;  ///< summed over the intervals
+  Bounds direction_bounds;                  ///< of its fraction
   std::vector<IntervalScores> intervals;    ///< as many as the report's
 };
+
+/// NaN where no pixel tells the direction.
+double direction_fraction(const std::optional<DirectionScore>& direction);
 
 struct RealismReport {
   std::string recording;
@@ -45,11 +51,14 @@ struct RealismReport {
   double wall_seconds = 0;
 };
 
-/// A table for a person: a row for each score, a column for each method, the best one of a row
-/// marked. UTF-8.
-std::string to_text(const RealismReport& report);
+/// A table for a person, a column for each method, the best one of a row marked: of one recording a
+/// row for each score, with half the width of its bounds; of several, which must have the same
+/// methods, for each score a row for each recording and one for the mean over the recordings.
+/// UTF-8.
+std::string to_text(std::span<const RealismReport> reports);
 
-/// JSON, indented, with the scores of each interval too; null for NaN.
-std::string to_json(const RealismReport& report);
+/// JSON, indented: {"recordings": [...], "mean": ...}, with the bounds, and the scores of each
+/// interval too; null for NaN. The mean is over the recordings, each counting alike.
+std::string to_json(std::span<const RealismReport> reports);
 
 }  // namespace eventgan

@@ -185,8 +185,10 @@ void write_generator_picture(const Generator& generator, std::span<const Trainin
   const std::size_t rows = std::min(samples.size(), kMostRows);
   for (std::size_t i = 0; i < rows; ++i) {
     const TrainingSample& sample = samples[i * samples.size() / rows];
-    pairs.push_back({sample.shape, sample.network_frames, generated_volume(generator, sample),
-                     sample.volume, sample.origin});
+    pairs.push_back({sample.shape,
+                     sample.network_frames,
+                     {{"real", sample.volume}, {"network", generated_volume(generator, sample)}},
+                     sample.origin});
   }
   write_comparison_png(pairs, file);
 }

@@ -54,7 +54,7 @@ def realism(recording, *arguments):
     """Scores of each method: name → score → number."""
     weights = ["--weights", CANDIDATE] if CANDIDATE else []
     out, _ = run("realism", recording, *weights, *arguments, "--json", "--progress", "none")
-    return {method["name"]: method["mean"] for method in json.loads(out)["methods"]}
+    return {method["name"]: method["mean"] for method in json.loads(out)["recordings"][0]["methods"]}
 
 
 class ShippedWeights(program.InFolder):

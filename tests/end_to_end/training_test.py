@@ -285,7 +285,7 @@ class TrainedWeights(program.InFolder):
     def test_realism_scores_the_network_and_both_models(self):
         out, _ = run("realism", work / "recordings" / "clip.hdf5", "--weights", work / "whole" / "weights.safetensors",
                      "--gaps", "1,2", "--esim-draws", "2", "--json", "--progress", "none")
-        report = json.loads(out)
+        report, = json.loads(out)["recordings"]
         count = (FRAMES - 1) + (FRAMES - 2)
         self.assertEqual([method["name"] for method in report["methods"]], ["network", "difference", "esim"])
         self.assertEqual(len(report["pairs"]), count)
@@ -300,6 +300,19 @@ class TrainedWeights(program.InFolder):
         self.assertAlmostEqual(real["time_correlation"], 1)
         # A model that sees both frames finds most of the pixels that a model of the same sensor finds.
         self.assertGreater(difference["f1_time"], 0.5)
+
+    def test_realism_of_several_recordings_ends_with_their_mean(self):
+        arguments = (work / "recordings" / "clip.hdf5", work / "training.json", "--with", "difference", "--progress", "none")
+        report = json.loads(run("realism", *arguments, "--json")[0])
+        self.assertEqual([pathlib.Path(one["recording"]).name for one in report["recordings"]], ["clip.hdf5", "still-001.hdf5"])
+        each = [one["methods"][0] for one in report["recordings"]]
+        for score in SCORES:
+            self.assertAlmostEqual(report["mean"]["difference"][score], np.mean([one["mean"][score] for one in each]))
+            low, high = each[0]["bounds"][score]
+            self.assertTrue(low <= each[0]["mean"][score] <= high, score)
+        text, _ = run("realism", *arguments, "--out", self.folder)
+        self.assertRegex(text, r"(?m)^  mean +↑ ")
+        self.assertEqual({path.parent.name for path in self.folder.glob("*/*.png")}, {"clip", "still-001"})
 
 
 if __name__ == "__main__":

@@ -4,10 +4,12 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <ranges>
 #include <span>
 #include <stdexcept>
 #include <string>
 
+#include "manifests/values/counter_random.h"
 #include "manifests/values/events.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
@@ -226,12 +228,12 @@ constexpr double RealismScores::*kFields[] = {&RealismScores::f1_raw,
                                               &RealismScores::events_per_pixel,
                                               &RealismScores::positive_share};
 
-/// Mean over the pairs where `value_of` gives a number.
-template <class ValueOf>
-double mean_of_numbers(std::span<const RealismScores> scores, ValueOf value_of) {
+/// Mean over those of `pairs`, indices, where `value_of` gives a number.
+template <class Pairs, class ValueOf>
+double mean_of_numbers(const Pairs& pairs, ValueOf value_of) {
   double sum = 0;
   int count = 0;
-  for (const RealismScores& pair : scores) {
+  for (const std::size_t pair : pairs) {
     const double value = value_of(pair);
     if (std::isnan(value)) continue;
     sum += value;
@@ -240,14 +242,15 @@ double mean_of_numbers(std::span<const RealismScores> scores, ValueOf value_of) 
   return count > 0 ? sum / count : std::numeric_limits<double>::quiet_NaN();
 }
 
-}  // namespace
-
-RealismScores mean_scores(std::span<const RealismScores> scores) {
-  RealismScores mean;
+/// What `reduce` makes of each number that scores have, in their place; it is given
+/// value_of(index).
+template <class Reduce>
+RealismScores field_by_field(std::span<const RealismScores> scores, Reduce reduce) {
+  RealismScores result;
   for (const auto field : kFields) {
-    mean.*field = mean_of_numbers(scores, [&](const RealismScores& pair) { return pair.*field; });
+    result.*field = reduce([&, field](std::size_t i) { return scores[i].*field; });
   }
-  if (scores.empty()) return mean;
+  if (scores.empty()) return result;
   const std::size_t bins = scores.front().events_per_bin.size();
   for (const RealismScores& pair : scores) {
     if (pair.events_per_bin.size() != bins) {
@@ -257,10 +260,63 @@ RealismScores mean_scores(std::span<const RealismScores> scores) {
     }
   }
   for (std::size_t bin = 0; bin < bins; ++bin) {
-    mean.events_per_bin.push_back(mean_of_numbers(
-        scores, [&](const RealismScores& pair) { return pair.events_per_bin[bin]; }));
+    result.events_per_bin.push_back(
+        reduce([&, bin](std::size_t i) { return scores[i].events_per_bin[bin]; }));
   }
-  return mean;
+  return result;
+}
+
+}  // namespace
+
+RealismScores mean_scores(std::span<const RealismScores> scores) {
+  return field_by_field(scores, [&](const auto& value_of) {
+    return mean_of_numbers(std::views::iota(std::size_t{0}, scores.size()), value_of);
+  });
+}
+
+namespace {
+
+constexpr int kDraws = 1000;
+constexpr std::size_t kFewestPairs = 3;
+
+/// Between the neighbours of rank `share` of 1.
+double quantile(const std::vector<double>& sorted, double share) {
+  const double rank = share * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(rank);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return sorted[below] + (rank - static_cast<double>(below)) * (sorted[above] - sorted[below]);
+}
+
+}  // namespace
+
+Bounds bootstrap_bounds(std::size_t pairs,
+                        const std::function<double(std::span<const std::size_t>)>& statistic) {
+  if (pairs < kFewestPairs) return {};
+  const CounterRandom random = CounterRandom(0).keyed("bootstrap");
+  std::vector<double> values;
+  std::vector<std::size_t> drawn(pairs);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    for (std::size_t i = 0; i < pairs; ++i) {
+      drawn[i] = random.below(static_cast<std::uint64_t>(draw) * pairs + i, pairs);
+    }
+    if (const double value = statistic(drawn); !std::isnan(value)) values.push_back(value);
+  }
+  if (values.empty()) return {};
+  std::ranges::sort(values);
+  return {quantile(values, 0.025), quantile(values, 0.975)};
+}
+
+ScoreBounds mean_bounds(std::span<const RealismScores> scores) {
+  const auto end_of = [&](double Bounds::*end) {
+    return field_by_field(scores, [&](const auto& value_of) {
+      return bootstrap_bounds(scores.size(),
+                              [&](std::span<const std::size_t> drawn) {
+                                return mean_of_numbers(drawn, value_of);
+                              }).*
+             end;
+    });
+  };
+  return {end_of(&Bounds::low), end_of(&Bounds::high)};
 }
 
 }  // namespace eventgan

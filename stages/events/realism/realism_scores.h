@@ -1,5 +1,8 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -43,5 +46,25 @@ RealismScores realism_scores(std::span<const float> volume, std::span<const floa
 /// Means over pairs, field by field; a NaN is left out of its mean (all NaN, or no pairs: NaN).
 /// Throws std::invalid_argument if the numbers of bins differ. Thread safe.
 RealismScores mean_scores(std::span<const RealismScores> scores);
+
+/// Where a number lies with a probability of 95 %. NaN: it cannot be told.
+struct Bounds {
+  double low = std::numeric_limits<double>::quiet_NaN();
+  double high = std::numeric_limits<double>::quiet_NaN();
+};
+
+/// How sure `statistic` of `pairs` pairs is: the percentile bootstrap (Efron 1979). The pairs are
+/// drawn anew a thousand times, as many as there are, with repetition; `statistic` gets the indices
+/// of a draw; the bounds are the middle 95 % of what it gives, NaN left out. Not told for fewer
+/// than three pairs. Always the same draws, so that methods are compared on the same ones.
+/// Neighbouring pairs of a recording are alike, so the truth is less sure than this.
+Bounds bootstrap_bounds(std::size_t pairs,
+                        const std::function<double(std::span<const std::size_t>)>& statistic);
+
+/// Bounds of mean_scores, field by field.
+struct ScoreBounds {
+  RealismScores low, high;
+};
+ScoreBounds mean_bounds(std::span<const RealismScores> scores);
 
 }  // namespace eventgan

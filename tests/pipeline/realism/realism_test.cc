@@ -5,6 +5,8 @@
 
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "pipeline/realism/realism_report.h"
@@ -61,7 +63,7 @@ TEST(MeasureRealism, SameSeedSameReport) {
     RealismReport report = measure_realism(recording, options);
     report.wall_seconds = 0;
     report.seed = 0;
-    return to_json(report);
+    return to_json({&report, 1});
   };
   EXPECT_EQ(scores(1, 1), scores(1, 3));
   EXPECT_NE(scores(1, 1), scores(2, 1));
@@ -146,17 +148,28 @@ RealismReport two_methods() {
   return report;
 }
 
+std::string text_of(const RealismReport& report) { return to_text({&report, 1}); }
+
 TEST(RealismText, MarksTheBestOfEachRow) {
-  const std::string text = to_text(two_methods());
-  EXPECT_THAT(text, ContainsRegex("F1, summed over time +↑ +0.5000\\* +0.2500 \n"));
+  const std::string text = text_of(two_methods());
+  EXPECT_THAT(text, ContainsRegex("F1, summed over time +↑ +0.5000\\* +0.2500\n"));
   EXPECT_THAT(text, ContainsRegex("PoolMSE 2 +↓ +0.0200 +0.0100\\*\n"));
-  EXPECT_THAT(text, ContainsRegex("events per pixel +≈ +0.3000 +0.2500\\* +0.4000 \n"));
-  EXPECT_THAT(text, ContainsRegex("in bin 1 +≈ +0.1500 +0.1250\\* +0.2000 \n"));
-  EXPECT_THAT(text, ContainsRegex("correlation of mean times +↑ +- +- \n"));
+  EXPECT_THAT(text, ContainsRegex("events per pixel +≈ +0.3000 +0.2500\\* +0.4000\n"));
+  EXPECT_THAT(text, ContainsRegex("in bin 1 +≈ +0.1500 +0.1250\\* +0.2000\n"));
+  EXPECT_THAT(text, ContainsRegex("correlation of mean times +↑ +- +-\n"));
+}
+
+TEST(RealismText, SaysHowSureItIs) {
+  RealismReport report = two_methods();
+  report.methods[0].bounds.emplace();
+  report.methods[0].bounds->low.f1_time = 0.44;
+  report.methods[0].bounds->high.f1_time = 0.54;
+  EXPECT_THAT(text_of(report),
+              ContainsRegex("F1, summed over time +↑ +0.5000\\*±0.0500 +0.2500\n"));
 }
 
 TEST(RealismText, SaysWhatWasCompared) {
-  const std::string text = to_text(two_methods());
+  const std::string text = text_of(two_methods());
   EXPECT_THAT(text, HasSubstr("slider: 240x180 pixels, 1 pair of frames (gap 2: 1), 1234 real"));
   EXPECT_THAT(text, HasSubstr("difference: settings of difference"));
   EXPECT_THAT(text, Not(HasSubstr("direction")));
@@ -167,21 +180,51 @@ TEST(RealismText, HasTheDirectionWhereTheFlowIsKnown) {
   report.real.direction = DirectionScore{200, 180};
   report.methods[0].direction = DirectionScore{100, 80};
   report.methods[1].direction = DirectionScore{};
-  const std::string text = to_text(report);
-  EXPECT_THAT(text, ContainsRegex("direction within 30 deg +↑ +0.9000 +0.8000\\* +- \n"));
-  EXPECT_THAT(text, ContainsRegex("pixels that tell it +200 +100 +0 \n"));
+  const std::string text = text_of(report);
+  EXPECT_THAT(text, ContainsRegex("direction within 30 deg +↑ +0.9000 +0.8000\\* +-\n"));
+  EXPECT_THAT(text, ContainsRegex("pixels that tell it +200 +100 +0\n"));
 }
 
 TEST(RealismText, OfOneMethodMarksNothing) {
   RealismReport report = two_methods();
   report.methods.pop_back();
-  EXPECT_THAT(to_text(report), Not(HasSubstr("0.5000*")));
+  EXPECT_THAT(text_of(report), Not(HasSubstr("0.5000*")));
+}
+
+/// As two_methods, another recording, one in which the flow is known.
+RealismReport another_recording() {
+  RealismReport report = two_methods();
+  report.recording = "/recordings/of/a/long/path/drive.hdf5";
+  report.methods[0].mean.f1_time = 0.3;
+  report.methods[1].mean.f1_time = 0.4;
+  report.methods[0].mean.time_correlation = 0.6;
+  report.methods[0].direction = DirectionScore{100, 80};
+  report.methods[1].direction = DirectionScore{100, 20};
+  report.real.direction = DirectionScore{200, 180};
+  return report;
+}
+
+TEST(RealismText, OfSeveralRecordingsHasARowForEachAndTheMean) {
+  const std::string text = to_text(std::vector{two_methods(), another_recording()});
+  EXPECT_THAT(text, HasSubstr("slider: 240x180 pixels"));
+  EXPECT_THAT(text, HasSubstr("F1, summed over time ↑\n"));
+  EXPECT_THAT(text, ContainsRegex("  slider +↑ +0.5000\\* +0.2500\n"));
+  EXPECT_THAT(text, ContainsRegex("  ….+path/drive.hdf5 +↑ +0.3000 +0.4000\\*\n"));
+  EXPECT_THAT(text, ContainsRegex("  mean +↑ +0.4000\\* +0.3250\n"));
+  EXPECT_THAT(text, ContainsRegex("  mean +↑ +0.6000\\* +-\n"));  // over those that have one
+  EXPECT_THAT(text, ContainsRegex("  mean +≈ +0.3000 +0.2500\\* +0.4000\n"));
+  EXPECT_THAT(text, ContainsRegex("30 deg ↑\n  ….+drive.hdf5 +↑ +0.9000 +0.8000\\* +0.2000\n"));
 }
 
 TEST(RealismJson, HasEverything) {
   RealismReport report = two_methods();
   report.methods[0].intervals[0].direction = DirectionScore{7, 3};
-  const auto json = nlohmann::json::parse(to_json(report));
+  report.methods[0].bounds.emplace();
+  report.methods[0].bounds->low.f1_time = 0.44;
+  report.methods[0].bounds->high.f1_time = 0.54;
+  const auto all = nlohmann::json::parse(to_json(std::vector{report, another_recording()}));
+  ASSERT_EQ(all["recordings"].size(), 2u);
+  const auto& json = all["recordings"][0];
   EXPECT_EQ(json["recording"], "slider");
   EXPECT_EQ(json["seed"], 5);
   EXPECT_EQ(json["pairs"][0]["gap"], 2);
@@ -190,11 +233,14 @@ TEST(RealismJson, HasEverything) {
   const auto& network = json["methods"][0];
   EXPECT_EQ(network["name"], "network");
   EXPECT_EQ(network["mean"]["f1_time"], 0.5);
+  EXPECT_EQ(network["bounds"]["f1_time"], nlohmann::json({0.44, 0.54}));
   EXPECT_TRUE(network["mean"]["time_correlation"].is_null());
   EXPECT_EQ(network["mean"]["events_per_bin"].size(), 2u);
   EXPECT_FALSE(network["mean"].contains("direction"));
   EXPECT_EQ(network["pairs"][0]["first_frame"], 3);
   EXPECT_EQ(network["pairs"][0]["direction"]["within_30_deg"], 3);
+  EXPECT_EQ(all["mean"]["network"]["f1_time"], 0.4);
+  EXPECT_EQ(all["mean"]["real"]["events_per_pixel"], 0.3);
 }
 
 }  // namespace

@@ -88,20 +88,20 @@ ComparedPair pair_of(ImageSize size) {
   ComparedPair pair;
   pair.shape = {2, size};
   pair.frames.assign(2 * size.pixel_count(), 0.0f);
-  pair.generated.assign(pair.shape.value_count(), 0.0f);
-  pair.real = pair.generated;
-  pair.real[size.pixel_count() + static_cast<std::size_t>(size.width) + 2] = 5.0f;
+  pair.volumes.assign(2, {"generated", std::vector<float>(pair.shape.value_count(), 0.0f)});
+  pair.volumes[1].name = "real";
+  pair.volumes[1].volume[size.pixel_count() + static_cast<std::size_t>(size.width) + 2] = 5.0f;
   pair.title = "a pair";
   return pair;
 }
 
-TEST(WriteComparisonPng, ShowsFramesAndBothVolumes) {
+TEST(WriteComparisonPng, ShowsFramesVolumesAndEventsABin) {
   const testing::TemporaryFolder folder;
   const auto file = folder / "pairs.png";
   write_comparison_png(std::vector{pair_of({8, 160}), pair_of({8, 160})}, file);
   const cv::Mat picture = cv::imread(file.string());
   // Panels of 160x8 enlarged twice, 6 pixels between them, 22 above and below each row.
-  EXPECT_EQ(picture.size(), cv::Size(4 * 326 + 6, 2 * (16 + 44)));
+  EXPECT_EQ(picture.size(), cv::Size(5 * 326 + 6, 2 * (16 + 44)));
   const auto middle = [&](int panel) {
     return picture.at<cv::Vec3b>(22 + 3, 6 + panel * 326 + 5);  // row 1, column 2, enlarged
   };
@@ -109,17 +109,26 @@ TEST(WriteComparisonPng, ShowsFramesAndBothVolumes) {
   EXPECT_EQ(middle(1), cv::Vec3b(128, 128, 128));
   EXPECT_EQ(middle(2), cv::Vec3b(0, 0, 0));
   EXPECT_GT(middle(3)[2], 200);  // late: red
+  // Two bins: their middles at a quarter and at three quarters. The real line, the second colour,
+  // rises from nothing to the largest, 95 % of the height; the generated one stays at the bottom.
+  const auto plot = [&](int x, int y) { return picture.at<cv::Vec3b>(22 + y, 6 + 4 * 326 + x); };
+  EXPECT_GT(plot(240, 0)[0], 100);
+  EXPECT_EQ(plot(240, 8), cv::Vec3b(0, 0, 0));
+  EXPECT_GT(plot(240, 15)[0], 100);
+  EXPECT_GT(plot(80, 15)[0], 100);
 }
 
 TEST(WriteComparisonPng, TakesPairsOfSeveralSizes) {
   const testing::TemporaryFolder folder;
   write_comparison_png(std::vector{pair_of({3, 400}), pair_of({3, 3})}, folder / "pairs.png");
-  EXPECT_EQ(cv::imread((folder / "pairs.png").string()).cols, 4 * 406 + 6);
+  EXPECT_EQ(cv::imread((folder / "pairs.png").string()).cols, 5 * 406 + 6);
 }
 
 TEST(WriteComparisonPng, RefusesWhatDoesNotFit) {
   ComparedPair pair = pair_of({4, 4});
-  pair.real.pop_back();
+  pair.volumes[1].volume.pop_back();
+  EXPECT_THROW(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument);
+  pair.volumes.clear();
   EXPECT_THROW(write_comparison_png(std::vector{pair}, "/tmp/never.png"), std::invalid_argument);
   EXPECT_THROW(write_comparison_png({}, "/tmp/never.png"), std::invalid_argument);
   EXPECT_THROW(write_comparison_png(std::vector{pair_of({4, 4})}, "/nowhere/pairs.png"),

@@ -365,5 +365,52 @@ TEST(MeanScores, RefuseDifferentNumbersOfBins) {
   EXPECT_THROW(mean_scores(scores), std::invalid_argument);
 }
 
+TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
+  std::vector<RealismScores> scores(400);
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    scores[i].f1_time = i % 2 == 0 ? 1 : 0;  // standard error 0.5 / sqrt(400) = 0.025
+    scores[i].pool_mse_2 = 0.25;
+    scores[i].time_correlation = i < 2 ? 0.5 : kNoScore;
+    scores[i].positive_share = kNoScore;
+    scores[i].events_per_bin = {1, i % 2 == 0 ? 3.0 : 1.0};
+  }
+  const ScoreBounds bounds = mean_bounds(scores);
+  EXPECT_NEAR(bounds.low.f1_time, 0.5 - 1.96 * 0.025, 0.006);
+  EXPECT_NEAR(bounds.high.f1_time, 0.5 + 1.96 * 0.025, 0.006);
+  EXPECT_EQ(bounds.low.pool_mse_2, 0.25);
+  EXPECT_EQ(bounds.high.pool_mse_2, 0.25);
+  EXPECT_EQ(bounds.high.time_correlation, 0.5);  // draws without a number are left out
+  EXPECT_THAT(bounds.high.positive_share, IsNan());
+  ASSERT_EQ(bounds.low.events_per_bin.size(), 2u);
+  EXPECT_EQ(bounds.low.events_per_bin[0], 1);
+  EXPECT_NEAR(bounds.high.events_per_bin[1], 2 + 1.96 * 0.05, 0.012);
+}
+
+TEST(MeanBounds, AreNotToldOfTwoPairs) {
+  const ScoreBounds bounds = mean_bounds(std::vector<RealismScores>(2));
+  EXPECT_THAT(bounds.low.f1_time, IsNan());
+  EXPECT_THAT(bounds.high.f1_time, IsNan());
+  EXPECT_THAT(mean_bounds({}).low.f1_time, IsNan());
+}
+
+TEST(BootstrapBounds, DrawAsManyPairsAsThereAreAlwaysTheSame) {
+  std::vector<std::vector<std::size_t>> draws;
+  const auto statistic = [&](std::span<const std::size_t> drawn) {
+    draws.emplace_back(drawn.begin(), drawn.end());
+    return static_cast<double>(drawn[0]);
+  };
+  const Bounds bounds = bootstrap_bounds(5, statistic);
+  EXPECT_EQ(bounds.low, 0);  // each of five is the first in far more than 2.5 % of the draws
+  EXPECT_EQ(bounds.high, 4);
+  const std::vector<std::vector<std::size_t>> first = draws;
+  draws.clear();
+  bootstrap_bounds(5, statistic);
+  EXPECT_EQ(draws, first);
+  for (const auto& draw : first) {
+    ASSERT_EQ(draw.size(), 5u);
+    for (const std::size_t pair : draw) ASSERT_LT(pair, 5u);
+  }
+}
+
 }  // namespace
 }  // namespace eventgan
