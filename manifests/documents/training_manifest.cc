@@ -91,6 +91,7 @@ NetworkSpec read_network(const StrictValue& value) {
   if (const auto place = object.find("spectral_norm")) {
     spec.spectral_norm = place->choice(kSpectralNormWords);
   }
+  if (const auto slope = object.find("output_slope")) spec.output_slope = slope->number(0, 1);
   if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
   object.finish();
   return spec;
@@ -117,10 +118,14 @@ AugmentationSpec read_augmentation(const StrictValue& value) {
   AugmentationSpec spec;
   StrictObject object = value.object();
   if (const auto flip = object.find("flip")) spec.flip = flip->boolean();
+  if (const auto reverse = object.find("reverse")) spec.reverse = reverse->boolean();
   if (const auto gain = object.find("gain")) spec.gain = read_range(*gain, 0.1, 10);
   if (const auto gamma = object.find("gamma")) spec.gamma = read_range(*gamma, 0.1, 10);
   if (const auto fraction = object.find("static_fraction")) {
     spec.static_fraction = fraction->number(0, 1);
+  }
+  if (const auto fraction = object.find("event_fraction")) {
+    spec.event_fraction = fraction->number(0, 1);
   }
   object.finish();
   return spec;

@@ -40,6 +40,9 @@ struct NetworkSpec {
   int cycle_channels = 32;          ///< base width of flow and reconstruction network, 1..64
   SpectralNormPlace spectral_norm = SpectralNormPlace::kDecoders;
   int bins = 9;  ///< per polarity, 1..64
+  /// Of the generator's last layer below zero while it learns, 0..1: a channel that gives nothing
+  /// gets no gradient from a slope of 0, as published, and stays dead.
+  double output_slope = 0;
 };
 
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
@@ -57,10 +60,13 @@ struct LossWeights {
 
 struct AugmentationSpec {
   bool flip = true;                      ///< left-right and up-down, each with probability 1/2
+  bool reverse = false;                  ///< time runs backwards, with probability 1/2
   std::array<double, 2> gain = {1, 1};   ///< factor on the network's images, drawn uniformly
   std::array<double, 2> gamma = {1, 1};  ///< exponent on the network's images
   double static_fraction = 0;  ///< share of samples whose frames are one frame twice and whose
                                ///< volume is empty, 0..1; not in the paper
+  double event_fraction = 0;   ///< share of samples whose crop holds an event drawn from all of the
+                               ///< pair's, so that it lies where much happens, 0..1
 };
 
 struct OptimizerSpec {

@@ -1,5 +1,6 @@
 #include "pipeline/training/sample_source.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -11,7 +12,7 @@ namespace eventgan {
 namespace {
 
 /// Counters of one attempt's draws.
-enum SampleCounter : std::uint64_t { kStatic, kGap, kFirstFrame };
+enum SampleCounter : std::uint64_t { kStatic, kGap, kFirstFrame, kAtEvent, kEvent };
 
 std::size_t by_weight(std::span<const TrainingRecording> recordings, double uniform) {
   double total = 0;
@@ -56,6 +57,9 @@ SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
   draw.last_frame = draw.first_frame + gap;
   draw.augmentation = draw_augmentation(recording.recording->size(), manifest.crop,
                                         manifest.augmentation, random.keyed("augmentation"));
+  if (random.uniform(kAtEvent) < manifest.augmentation.event_fraction) {
+    draw.event = random.uniform(kEvent);
+  }
   return draw;
 }
 
@@ -63,6 +67,15 @@ namespace {
 
 constexpr std::size_t kFewestEvents = 100;
 constexpr int kMostAttempts = 10;
+
+/// Where a crop of `cut` pixels that was drawn to begin at `drawn`, uniformly over `picture`
+/// pixels, begins if it is to hold pixel `at`: uniformly over the places where it does.
+int holding(int drawn, int at, int cut, int picture) {
+  if (picture == cut) return drawn;
+  const int first = std::max(0, at - cut + 1);
+  const int last = std::min(at, picture - cut);
+  return first + static_cast<int>(std::int64_t{drawn} * (last - first + 1) / (picture - cut + 1));
+}
 
 }  // namespace
 
@@ -80,6 +93,15 @@ TrainingSample SampleSource::sample(const SamplePlace& place) const {
     draw = draw_sample(recordings(), manifest_, place, attempt);
   }
   Augmentation augmentation = draw.augmentation;
+  if (draw.event && draw.first_frame != draw.last_frame) {
+    const auto event =
+        reader_.event(draw.recording, draw.first_frame, draw.last_frame, *draw.event);
+    const ImageSize size = recordings()[draw.recording].recording->size();
+    if (event) {
+      augmentation.top = holding(augmentation.top, event->y, augmentation.crop.height, size.height);
+      augmentation.left = holding(augmentation.left, event->x, augmentation.crop.width, size.width);
+    }
+  }
   const CropBox box{augmentation.top, augmentation.left, augmentation.crop};
   const TrainingSample cut = reader_.read(draw.recording, draw.first_frame, draw.last_frame, box);
   augmentation.top = augmentation.left = 0;  // it is cut already

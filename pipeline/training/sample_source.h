@@ -5,6 +5,7 @@
 #include <deque>
 #include <functional>
 #include <future>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -26,12 +27,15 @@ struct SampleDraw {
   std::size_t recording = 0;
   std::int64_t first_frame = 0;
   std::int64_t last_frame = 0;  ///< first_frame: one frame twice, without events
+  /// The crop is to hold this event of the pair's, by its share of them all, 0..1 without 1.
+  std::optional<double> event;
   Augmentation augmentation;
 };
 
 /// Draws a sample: recording by weight; then, with probability static_fraction, one frame twice;
 /// else the gap uniformly from those of the manifest that fit the recording's part in use, and the
-/// first frame uniformly; then crop, flips, gain and gamma.
+/// first frame uniformly; then crop, flips, reversal, gain and gamma; and with probability
+/// event_fraction an event.
 ///
 /// A function of (manifest seed, place, attempt) and nothing else, so that a training resumes with
 /// the number of the step alone. `attempt` draws the frames and the rest again, but never the

@@ -116,6 +116,19 @@ std::size_t CropReader::event_count(std::size_t recording, std::int64_t frame) c
   return interval(recording, frame)->size();
 }
 
+std::optional<Event> CropReader::event(std::size_t recording, std::int64_t first_frame,
+                                       std::int64_t last_frame, double place) const {
+  std::size_t count = 0;
+  for (std::int64_t i = first_frame; i < last_frame; ++i) count += event_count(recording, i);
+  auto left = static_cast<std::size_t>(place * static_cast<double>(count));
+  for (std::int64_t i = first_frame; i < last_frame; ++i) {
+    const auto events = interval(recording, i);
+    if (left < events->size()) return (*events)[left];
+    left -= events->size();
+  }
+  return std::nullopt;
+}
+
 TrainingSample CropReader::read(std::size_t recording, std::int64_t first_frame,
                                 std::int64_t last_frame, const CropBox& box) const {
   TrainingSample sample;

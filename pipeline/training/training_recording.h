@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <span>
 #include <utility>
 #include <vector>
@@ -124,6 +125,11 @@ class CropReader {
 
   /// Events between a frame and the next one, in the whole picture.
   std::size_t event_count(std::size_t recording, std::int64_t frame) const;
+
+  /// The event before which the share `place`, 0..1 without 1, of those between two frames lies;
+  /// none if there are none.
+  std::optional<Event> event(std::size_t recording, std::int64_t first_frame,
+                             std::int64_t last_frame, double place) const;
 
  private:
   using FrameKey = std::pair<std::size_t, std::int64_t>;  // recording, frame

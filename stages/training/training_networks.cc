@@ -85,7 +85,8 @@ TrainingNetworks::TrainingNetworks(const TrainingManifest& manifest, c10::Device
     : device(target), bfloat16(manifest.precision == TrainingPrecision::kBfloat16) {
   const NetworkSpec& spec = manifest.network;
   const int channels = 2 * spec.bins;
-  generator = UNet(UNetSettings{2, channels, spec.generator_channels, false, spec.spectral_norm});
+  generator = UNet(UNetSettings{2, channels, spec.generator_channels, false, spec.spectral_norm,
+                                spec.output_slope});
   flow = UNet(cycle_network(spec, channels, 2));
   reconstruction = UNet(cycle_network(spec, 2, 1));
   discriminator = PatchDiscriminator(channels, 2, spec.discriminator_channels);

@@ -1,5 +1,6 @@
 #include "stages/training/training_sample.h"
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <stdexcept>
@@ -9,7 +10,7 @@ namespace eventgan {
 namespace {
 
 /// Counters of the numbers drawn for one sample.
-enum AugmentationDraw : std::uint64_t { kTop, kLeft, kFlipX, kFlipY, kGain, kGamma };
+enum AugmentationDraw : std::uint64_t { kTop, kLeft, kFlipX, kFlipY, kGain, kGamma, kReverse };
 
 constexpr std::size_t kFrames = 2;
 
@@ -61,6 +62,15 @@ std::vector<float> cut(const std::vector<float>& values, std::size_t planes, Ima
   return result;
 }
 
+/// Pictures of `pixels` pixels that lie one after the other: the last comes first.
+void reverse_planes(std::vector<float>& values, std::size_t pixels) {
+  auto low = values.begin();
+  for (auto high = values.end(); high - low >= 2 * static_cast<std::ptrdiff_t>(pixels);) {
+    high -= static_cast<std::ptrdiff_t>(pixels);
+    low = std::swap_ranges(high, high + static_cast<std::ptrdiff_t>(pixels), low);
+  }
+}
+
 /// Not std::min and std::max, which would take a NaN for the bound.
 float relight(float x, float gain, float gamma) {
   const float u = (x + 1) / 2;
@@ -82,6 +92,7 @@ Augmentation draw_augmentation(ImageSize picture, ImageSize crop, const Augmenta
   result.left = place(kLeft, picture.width, crop.width);
   result.flip_x = spec.flip && random.below(kFlipX, 2) == 1;
   result.flip_y = spec.flip && random.below(kFlipY, 2) == 1;
+  result.reverse = spec.reverse && random.below(kReverse, 2) == 1;
   result.gain = uniform(spec.gain, random, kGain);
   result.gamma = uniform(spec.gamma, random, kGamma);
   return result;
@@ -102,6 +113,10 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
   result.frames = cut(sample.frames, kFrames, size, augmentation);
   result.volume =
       cut(sample.volume, static_cast<std::size_t>(sample.shape.channels()), size, augmentation);
+  if (augmentation.reverse) {  // channels are polarity by polarity: turned round, both are reversed
+    reverse_planes(result.frames, augmentation.crop.pixel_count());
+    reverse_planes(result.volume, augmentation.crop.pixel_count());
+  }
   result.network_frames = result.frames;
   if (augmentation.gain != 1 || augmentation.gamma != 1) {
     for (float& x : result.network_frames) x = relight(x, augmentation.gain, augmentation.gamma);
@@ -109,7 +124,8 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
   result.origin =
       sample.origin + ", crop " + text(augmentation.crop) + " at row " +
       std::to_string(augmentation.top) + ", column " + std::to_string(augmentation.left) +
-      (augmentation.flip_x ? ", flipped in x" : "") + (augmentation.flip_y ? ", flipped in y" : "");
+      (augmentation.flip_x ? ", flipped in x" : "") +
+      (augmentation.flip_y ? ", flipped in y" : "") + (augmentation.reverse ? ", reversed" : "");
   return result;
 }
 

@@ -28,10 +28,11 @@ struct Augmentation {
   int top = 0;   ///< crop's first row
   int left = 0;  ///< crop's first column
   ImageSize crop;
-  bool flip_x = false;  ///< left-right
-  bool flip_y = false;  ///< up-down
-  float gain = 1;       ///< ≥ 0
-  float gamma = 1;      ///< > 0
+  bool flip_x = false;   ///< left-right
+  bool flip_y = false;   ///< up-down
+  bool reverse = false;  ///< in time
+  float gain = 1;        ///< ≥ 0
+  float gamma = 1;       ///< > 0
 };
 
 /// Draws crop, flips, gain and gamma, each uniformly over what is possible; a function of its
@@ -40,8 +41,10 @@ struct Augmentation {
 Augmentation draw_augmentation(ImageSize picture, ImageSize crop, const AugmentationSpec& spec,
                                CounterRandom random);
 
-/// Cuts and flips frames and volume. A flip moves pixels only: polarity, time and the order of the
-/// frames stay. The network frames are the cut frames with intensities
+/// Cuts, flips and reverses frames and volume. A flip moves pixels only: polarity, time and the
+/// order of the frames stay. In reversed time the frames change places, and so do the polarities,
+/// since what got brighter gets darker; the first bin is the last. The network frames are the cut
+/// frames with intensities
 ///
 ///   u' = min(1, gain · u^gamma),  u = (x + 1) / 2 in [0, 1],  x' = 2 u' - 1,
 ///

@@ -1,3 +1,4 @@
+#include <ATen/core/grad_mode.h>
 #include <torch/nn/module.h>
 #include <torch/nn/modules/batchnorm.h>
 #include <torch/nn/modules/container/any.h>
@@ -21,6 +22,8 @@ struct ConvLayerSettings {
   bool batch_norm = false;  ///< then the convolution has no bias
   bool spectral_norm = false;
   LayerActivation activation = LayerActivation::kLeakyRelu;
+  double learning_slope =
+      0;  ///< of kRelu below zero, in training mode where gradients are computed
 };
 
 /// `conv2d`, `norm_layer` (momentum 0.01), activation.
@@ -33,6 +36,7 @@ class ConvLayerImpl : public torch::nn::Module {
   torch::nn::AnyModule convolution_;
   torch::nn::BatchNorm2d norm_{nullptr};
   LayerActivation activation_;
+  double learning_slope_;
 };
 TORCH_MODULE(ConvLayer);
 
@@ -79,7 +83,8 @@ ConvLayerImpl::ConvLayerImpl(const ConvLayerSettings& settings)
               .padding((settings.kernel - 1) / 2)
               .bias(!settings.batch_norm),
           settings.spectral_norm)),
-      activation_(settings.activation) {
+      activation_(settings.activation),
+      learning_slope_(settings.learning_slope) {
   register_module("conv2d", convolution_.ptr());
   if (settings.batch_norm) {
     norm_ = register_module(
@@ -91,6 +96,9 @@ ConvLayerImpl::ConvLayerImpl(const ConvLayerSettings& settings)
 at::Tensor ConvLayerImpl::forward(const at::Tensor& input) {
   at::Tensor x = convolution_.forward(input);
   if (norm_) x = norm_->forward(x);
+  if (learning_slope_ > 0 && is_training() && at::GradMode::is_enabled()) {
+    return at::leaky_relu_(x, learning_slope_);
+  }
   return activate(x, activation_);
 }
 
@@ -126,7 +134,8 @@ UNetImpl::UNetImpl(const UNetSettings& settings) {
         .in_channels = in_channels,
         .out_channels = settings.out_channels,
         .kernel = 1,
-        .activation = settings.multi_scale ? LayerActivation::kTanh : LayerActivation::kRelu});
+        .activation = settings.multi_scale ? LayerActivation::kTanh : LayerActivation::kRelu,
+        .learning_slope = settings.multi_scale ? 0 : settings.output_slope});
   };
 
   const ConvLayer head(

@@ -18,6 +18,7 @@ struct UNetSettings {
   /// Cycle networks: a tanh prediction after each decoder, concatenated to its features.
   bool multi_scale = false;
   SpectralNormPlace spectral_norm = SpectralNormPlace::kNone;
+  double output_slope = 0;  ///< below zero, of an output that is not multi-scale, while it learns
 };
 
 /// The U-Net of generator and cycle networks as it is trained (DESIGN section 4): batch norm and
@@ -27,7 +28,8 @@ class UNetImpl : public torch::nn::Module {
  public:
   explicit UNetImpl(const UNetSettings& settings);
 
-  /// [B, in, H, W] float32 → one [B, out, H, W] ≥ 0 (ReLU), or, multi-scale, four [B, out, h, w] in
+  /// [B, in, H, W] float32 → one [B, out, H, W] ≥ 0 (ReLU; in training mode, where gradients are
+  /// computed, with output_slope below zero), or, multi-scale, four [B, out, h, w] in
   /// -1..1 (tanh), coarse to fine: h = H/8, H/4, H/2, H, rounded up. Any H, W. Changes batch norm's
   /// statistics in training mode and spectral norm's vectors always.
   std::vector<at::Tensor> forward(const at::Tensor& input);

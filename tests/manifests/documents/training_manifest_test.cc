@@ -168,12 +168,12 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
     "validation": [{"path": "c", "format": "eventgan"}],
     "gaps": [3, 1], "crop": {"width": 96, "height": 64}, "batch": 4,
     "network": {"generator_channels": 8, "discriminator_channels": 16, "cycle_channels": 4,
-                "spectral_norm": "encoders", "bins": 5},
+                "spectral_norm": "encoders", "output_slope": 0.25, "bins": 5},
     "losses": {"adversarial": 0.5, "flow": 2, "reconstruction": 3, "volume": 4, "count": 6,
                "quantile": 0.7, "smoothness": 5},
     "label_flip": 0.2, "discriminator_steps": 3,
     "augmentation": {"flip": false, "gain": [0.5, 2], "gamma": [0.8, 1.25],
-                     "static_fraction": 0.1},
+                     "reverse": true, "static_fraction": 0.1, "event_fraction": 0.3},
     "optimizer": {"generator_rate": 1e-3, "cycle_rate": 2e-3, "discriminator_rate": 3e-3,
                   "betas": [0.5, 0.9], "final_rate_fraction": 0.01},
     "precision": "bfloat16", "steps": {"flow": 1, "reconstruction": 2, "generator": 3},
@@ -192,6 +192,7 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.network.cycle_channels, 4);
   EXPECT_EQ(manifest.network.spectral_norm, SpectralNormPlace::kEncoders);
   EXPECT_EQ(manifest.network.bins, 5);
+  EXPECT_EQ(manifest.network.output_slope, 0.25);
   EXPECT_EQ(manifest.losses.adversarial, 0.5);
   EXPECT_EQ(manifest.losses.flow, 2);
   EXPECT_EQ(manifest.losses.reconstruction, 3);
@@ -204,7 +205,9 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
   EXPECT_FALSE(manifest.augmentation.flip);
   EXPECT_EQ(manifest.augmentation.gain, (std::array{0.5, 2.0}));
   EXPECT_EQ(manifest.augmentation.gamma, (std::array{0.8, 1.25}));
+  EXPECT_TRUE(manifest.augmentation.reverse);
   EXPECT_EQ(manifest.augmentation.static_fraction, 0.1);
+  EXPECT_EQ(manifest.augmentation.event_fraction, 0.3);
   EXPECT_EQ(manifest.optimizer.generator_rate, 1e-3);
   EXPECT_EQ(manifest.optimizer.cycle_rate, 2e-3);
   EXPECT_EQ(manifest.optimizer.discriminator_rate, 3e-3);
@@ -239,13 +242,16 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("network", "cycle_channels"), manifest.network.cycle_channels);
   EXPECT_EQ(section("network", "spectral_norm"), to_string(manifest.network.spectral_norm));
   EXPECT_EQ(section("network", "bins"), manifest.network.bins);
+  EXPECT_EQ(section("network", "output_slope"), manifest.network.output_slope);
   EXPECT_EQ(section("losses", "adversarial"), manifest.losses.adversarial);
   EXPECT_EQ(section("losses", "volume"), manifest.losses.volume);
   EXPECT_EQ(section("losses", "count"), manifest.losses.count);
   EXPECT_EQ(section("losses", "quantile"), manifest.losses.quantile);
   EXPECT_EQ(section("losses", "smoothness"), manifest.losses.smoothness);
   EXPECT_EQ(section("augmentation", "flip"), manifest.augmentation.flip);
+  EXPECT_EQ(section("augmentation", "reverse"), manifest.augmentation.reverse);
   EXPECT_EQ(section("augmentation", "static_fraction"), manifest.augmentation.static_fraction);
+  EXPECT_EQ(section("augmentation", "event_fraction"), manifest.augmentation.event_fraction);
   EXPECT_EQ(section("optimizer", "generator_rate"), manifest.optimizer.generator_rate);
   EXPECT_EQ(section("optimizer", "cycle_rate"), manifest.optimizer.cycle_rate);
   EXPECT_EQ(section("optimizer", "discriminator_rate"), manifest.optimizer.discriminator_rate);

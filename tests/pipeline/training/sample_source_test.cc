@@ -209,6 +209,37 @@ TEST(SampleSource, DrawsAgainWhereHardlyAnythingMoved) {
   EXPECT_NEAR(busy / 200.0, 0.69, 0.17);
 }
 
+TEST(SampleSource, CropsHoldAnEventInTheShareAskedFor) {
+  // All events of the only pair lie in one pixel of 64 x 48; a crop of 16 x 16 holds it by chance
+  // in 16 x 12 of 49 x 33 places, 12 %.
+  const GreyImage grey{{48, 64}, std::vector<std::uint8_t>(48 * 64, 100)};
+  const testing::FakeRecording recording({grey, grey}, {0, 1},
+                                         std::vector<Event>(200, {50, 11, 0.5, true}));
+  const auto holding = [&](double share) {
+    TrainingManifest manifest = source_manifest();
+    manifest.augmentation.event_fraction = share;
+    const SampleSource source = source_of(manifest, recording);
+    std::map<std::size_t, int> places;  // of the event in the crop
+    for (int i = 0; i < 2000; ++i) {
+      const TrainingSample sample = source.sample({TrainingPhase::kFlow, i, 0});
+      const auto most = std::ranges::max_element(sample.volume);
+      if (*most > 0) {
+        ++places[static_cast<std::size_t>(most - sample.volume.begin()) % (16 * 16)];
+      }
+    }
+    return places;
+  };
+  int by_chance = 0;
+  for (const auto& [place, count] : holding(0)) by_chance += count;
+  EXPECT_NEAR(by_chance, 2000 * 16 * 12 / (49.0 * 33), 75);  // five sigma
+  const auto places = holding(1);
+  int all = 0;
+  for (const auto& [place, count] : places) all += count;
+  EXPECT_EQ(all, 2000);
+  // Without flips it would lie in rows 0..11 and columns 2..15; with them, symmetrically.
+  EXPECT_GT(places.size(), 200u);
+}
+
 TEST(SampleSource, EndsWhereNothingEverMoves) {
   const GreyImage grey{{16, 16}, std::vector<std::uint8_t>(256, 100)};
   const SampleSource source =

@@ -63,6 +63,16 @@ TEST(DrawAugmentation, FlipsEachWayHalfTheTimeIndependently) {
   for (const auto& [flip, count] : flips) EXPECT_NEAR(count, 400, 87);
 }
 
+TEST(DrawAugmentation, ReversesHalfTheTimeWhereAsked) {
+  int reversed = 0;
+  for (int i = 0; i < 1600; ++i) {
+    const AugmentationSpec spec{.reverse = true};
+    reversed += draw_augmentation({4, 4}, {4, 4}, spec, CounterRandom(i)).reverse;
+    EXPECT_FALSE(draw_augmentation({4, 4}, {4, 4}, {}, CounterRandom(i)).reverse);
+  }
+  EXPECT_NEAR(reversed, 800, 100);  // five standard deviations of 20
+}
+
 TEST(DrawAugmentation, DrawsGainAndGammaFromTheirRanges) {
   AugmentationSpec spec;
   spec.gain = {0.5, 1.5};
@@ -134,6 +144,23 @@ TEST_P(AugmentFlips, MovesPixelsOfFramesAndVolumeAlikeAndKeepsChannels) {
 INSTANTIATE_TEST_SUITE_P(AllFour, AugmentFlips,
                          ::testing::Values(std::pair(false, false), std::pair(true, false),
                                            std::pair(false, true), std::pair(true, true)));
+
+TEST(Augment, ReversedFramesAndPolaritiesChangePlacesAndTheFirstBinIsTheLast) {
+  const TrainingSample sample = marked_sample(3, {2, 4});
+  const TrainingSample result = augment(sample, {.crop = {2, 4}, .reverse = true});
+  const auto plane = [](const std::vector<float>& values, std::ptrdiff_t i) {
+    return std::vector<float>(values.begin() + 8 * i, values.begin() + 8 * (i + 1));
+  };
+  EXPECT_EQ(plane(result.frames, 0), plane(sample.frames, 1));
+  EXPECT_EQ(plane(result.frames, 1), plane(sample.frames, 0));
+  EXPECT_EQ(result.network_frames, result.frames);
+  // A positive event of bin b is a negative one of bin 2 - b: channel b becomes 3 + 2 - b.
+  for (std::ptrdiff_t bin = 0; bin < 3; ++bin) {
+    EXPECT_EQ(plane(result.volume, 3 + 2 - bin), plane(sample.volume, bin));
+    EXPECT_EQ(plane(result.volume, 2 - bin), plane(sample.volume, 3 + bin));
+  }
+  EXPECT_TRUE(result.origin.ends_with(", reversed"));
+}
 
 TEST(Augment, KeepsAWholeSampleOfAnySize) {
   for (const ImageSize size : {ImageSize{1, 1}, {1, 7}, {5, 1}, {33, 17}}) {

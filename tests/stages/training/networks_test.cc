@@ -108,6 +108,26 @@ TEST(UNet, GivesThePicturesSizeAndItsRoundedUpHalves) {
   }
 }
 
+TEST(UNet, OutputsHaveASlopeBelowZeroOnlyWhileTheyLearn) {
+  constexpr double kSlope = 0.25;
+  const auto outputs = [&](double slope, bool learns, bool evaluates) {
+    UNetSettings settings{2, 3, 1, false, SpectralNormPlace::kNone};
+    settings.output_slope = slope;
+    UNet network(settings);
+    initialize(*network, 1);
+    network->train(!evaluates);
+    const at::AutoGradMode gradients(learns);
+    return network->forward(picture({2, 2, 32, 32}))[0].detach();
+  };
+  const at::Tensor plain = outputs(0, true, false);
+  const at::Tensor sloped = outputs(kSlope, true, false);
+  EXPECT_EQ(plain.min().item<float>(), 0);
+  EXPECT_LT(sloped.min().item<float>(), 0);
+  EXPECT_TRUE(at::equal(sloped.clamp_min(0), plain));
+  EXPECT_TRUE(at::equal(outputs(kSlope, false, false), plain));
+  EXPECT_GE(outputs(kSlope, true, true).min().item<float>(), 0);
+}
+
 TEST(UNet, TakesASinglePixel) {
   UNet network(UNetSettings{2, 3, 1, false, SpectralNormPlace::kDecoders});
   initialize(*network, 1);
