@@ -92,6 +92,9 @@ NetworkSpec read_network(const StrictValue& value) {
     spec.spectral_norm = place->choice(kSpectralNormWords);
   }
   if (const auto slope = object.find("output_slope")) spec.output_slope = slope->number(0, 1);
+  if (const auto gain = object.find("difference_gain")) {
+    spec.difference_gain = gain->number(0, 1000);
+  }
   if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
   object.finish();
   return spec;
@@ -108,6 +111,7 @@ LossWeights read_losses(const StrictValue& value) {
   read("reconstruction", losses.reconstruction);
   read("volume", losses.volume);
   read("count", losses.count);
+  read("overlap", losses.overlap);
   if (const auto quantile = object.find("quantile")) losses.quantile = quantile->number(0.01, 0.99);
   read("smoothness", losses.smoothness);
   object.finish();

@@ -40,20 +40,29 @@ struct NetworkSpec {
   int cycle_channels = 32;          ///< base width of flow and reconstruction network, 1..64
   SpectralNormPlace spectral_norm = SpectralNormPlace::kDecoders;
   int bins = 9;  ///< per polarity, 1..64
-  /// Of the generator's last layer below zero while it learns, 0..1: a channel that gives nothing
-  /// gets no gradient from a slope of 0, as published, and stays dead.
+  /// Of the generator's last layer below zero as its phase begins, 0..1, falling to 0 until half of
+  /// it: a channel that gives nothing gets no gradient from a slope of 0, as published, and stays
+  /// dead; but with a slope sums over time are none of what `convert` will write.
   double output_slope = 0;
+  /// Above 0 the generator's first layer learns weights of (previous + next) / 2 and of this many
+  /// times next - previous, for those of previous and next. The networks that can be learnt are the
+  /// same, but small changes, which events come of, weigh as much as brightness. Weights are
+  /// written for the frames.
+  double difference_gain = 0;
 };
 
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
-/// first three to 0. `volume` and `count` are not in the paper: the difference to the real volume,
-/// voxel by voxel and summed over time, for short trainings.
+/// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
+/// voxel
+/// (`volume`), summed over time (`count`), and in which pixels have events (`overlap`), for short
+/// trainings.
 struct LossWeights {
   double adversarial = 1;
   double flow = 1;
   double reconstruction = 1;
   double volume = 0;
   double count = 0;
+  double overlap = 0;
   double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
   double smoothness = 0.5;  ///< of the flow loss
 };

@@ -15,12 +15,13 @@
 namespace eventgan {
 
 /// The losses that a training reports, in the columns' order (see StepLosses).
-inline constexpr std::array<std::string_view, 11> kLossNames{"flow",
+inline constexpr std::array<std::string_view, 12> kLossNames{"flow",
                                                              "flow.photometric",
                                                              "flow.smoothness",
                                                              "reconstruction",
                                                              "volume",
                                                              "count",
+                                                             "overlap",
                                                              "generator",
                                                              "generator.total",
                                                              "discriminator",

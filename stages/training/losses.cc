@@ -275,4 +275,16 @@ at::Tensor count_loss(const at::Tensor& generated, const at::Tensor& real, doubl
   return quantile_loss(summed_over_time(generated), summed_over_time(real), quantile);
 }
 
+at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real) {
+  require_alike(generated, real);
+  const auto apart = [](const at::Tensor& values, const at::Tensor& target) {
+    constexpr double kWhole = 0.25;
+    const at::Tensor ours = (values / kWhole).clamp_max(1);
+    const at::Tensor truth = target.gt(0).to(ours.scalar_type());
+    return 1 - (2 * (ours * truth).sum() + 1) / (ours.sum() + truth.sum() + 1);
+  };
+  const at::Tensor events = at::relu(generated);
+  return apart(events, real) + apart(summed_over_time(events), summed_over_time(real));
+}
+
 }  // namespace eventgan

@@ -59,7 +59,7 @@ at::Tensor discriminator_hinge_loss(const at::Tensor& real_logits, const at::Ten
 at::Tensor generator_hinge_loss(const at::Tensor& logits);
 
 // A direct pull towards the real volume, not in the paper: for trainings too short for the others.
-// Both are means of the quantile loss (Koenker and Bassett 1978),
+// The first two are means of the quantile loss (Koenker and Bassett 1978),
 //   ρ_q(d) = 2 max(q d, (q - 1) d),  d = real - generated,  0 < q < 1;
 // q = 0.5 gives |d|. What is best for q = 0.5 is the median, which at most voxels of a sparse
 // volume is nothing; a higher q asks for an event wherever one has a chance above 1 - q.
@@ -73,5 +73,13 @@ at::Tensor volume_loss(const at::Tensor& generated, const at::Tensor& real, doub
 /// Mean over pixels and polarities, of the volumes summed over time: how much happens at a pixel,
 /// whenever it does.
 at::Tensor count_loss(const at::Tensor& generated, const at::Tensor& real, double quantile);
+
+/// Where there are events, however many: 1 - F1 made smooth (Dice loss: Milletari et al. 2016),
+/// over the whole batch, once of the voxels and once of the volumes summed over time, added:
+///   1 - (2 Σ p t + 1) / (Σ p + Σ t + 1),  t = 1 where the real one has any, else 0,
+///   p = min(1, v / 0.25), v the generated one, what is below zero left out: a quarter of an event
+/// is one. In 0..2; 0 where both are empty. What the quantile losses let stand, a little everywhere
+/// that something might happen, it does not. A NaN of the real volume does not pass.
+at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real);
 
 }  // namespace eventgan

@@ -4,6 +4,7 @@
 #include <ATen/core/grad_mode.h>
 #include <torch/nn/module.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string>
@@ -37,7 +38,7 @@ void check_generator_phase(const TrainingManifest& manifest) {
   const LossWeights& weights = manifest.losses;
   if (manifest.steps.generator == 0) return;
   if (weights.adversarial == 0 && weights.flow == 0 && weights.reconstruction == 0 &&
-      weights.volume == 0 && weights.count == 0) {
+      weights.volume == 0 && weights.count == 0 && weights.overlap == 0) {
     throw UsageError("expected a loss for the generator, got weight 0 for all, in " +
                      manifest.name);
   }
@@ -66,6 +67,10 @@ double learning_rate(double rate, double final_fraction, std::int64_t step, std:
   const double progress = step < steps ? double(step) / double(steps) : 1;
   const double fall = (1 + std::cos(std::numbers::pi * progress)) / 2;
   return rate * (final_fraction + (1 - final_fraction) * fall);
+}
+
+double output_slope(double slope, std::int64_t step, std::int64_t steps) {
+  return slope * std::max(0.0, 1 - 2 * double(step) / double(std::max<std::int64_t>(steps, 1)));
 }
 
 /// A network and what changes it.
@@ -184,6 +189,8 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   if (&learner == &discriminator) generator.network->train();
   BufferSnapshot before({generator.network, learner.network});
   learner.optimizer.zero_grad();
+  networks.generator->set_output_slope(
+      output_slope(manifest.network.output_slope, step, manifest.steps.generator));
 
   const std::string where = ", in " + std::string(to_string(phase)) + " step " +
                             std::to_string(step) + " of " + origins(samples);
@@ -233,11 +240,7 @@ void Trainer::load(const StateDict& state) {
   }
 }
 
-StateDict Trainer::generator_state() const {
-  StateDict state;
-  save_network(*learners_->networks.generator, state, "");
-  return state;
-}
+StateDict Trainer::generator_state() const { return learners_->networks.generator_of_frames(); }
 
 std::vector<float> Trainer::generate(const TrainingSample& sample) const {
   try {

@@ -24,8 +24,12 @@ void check_trainable(const TrainingManifest& manifest);
 /// final rate.
 double learning_rate(double rate, double final_fraction, std::int64_t step, std::int64_t steps);
 
+/// The generator's output slope in step 0..steps-1 of its phase, falling from `slope` on a line: to
+/// 0 at half of the steps, so that what it gives then is what `convert` will write.
+double output_slope(double slope, std::int64_t step, std::int64_t steps);
+
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
-/// "volume", "count", "generator" (adversarial), "generator.total", "discriminator",
+/// "volume", "count", "overlap", "generator" (adversarial), "generator.total", "discriminator",
 /// "discriminator.real_accuracy", "discriminator.fake_accuracy"; only those the step computed. Each
 /// before its weight, "flow" and "generator.total" being weighted sums.
 using StepLosses = std::map<std::string, double>;

@@ -82,11 +82,13 @@ UNetSettings cycle_network(const NetworkSpec& spec, int in_channels, int out_cha
 }  // namespace
 
 TrainingNetworks::TrainingNetworks(const TrainingManifest& manifest, c10::Device target)
-    : device(target), bfloat16(manifest.precision == TrainingPrecision::kBfloat16) {
+    : device(target),
+      bfloat16(manifest.precision == TrainingPrecision::kBfloat16),
+      difference_gain(manifest.network.difference_gain) {
   const NetworkSpec& spec = manifest.network;
   const int channels = 2 * spec.bins;
   generator = UNet(UNetSettings{2, channels, spec.generator_channels, false, spec.spectral_norm,
-                                spec.output_slope});
+                                spec.difference_gain});
   flow = UNet(cycle_network(spec, channels, 2));
   reconstruction = UNet(cycle_network(spec, 2, 1));
   discriminator = PatchDiscriminator(channels, 2, spec.discriminator_channels);
@@ -124,6 +126,23 @@ void TrainingNetworks::save(StateDict& state) const {
   save_network(*discriminator, state, "discriminator.");
   save_network(*flow, state, "flow.");
   save_network(*reconstruction, state, "reconstruction.");
+}
+
+StateDict TrainingNetworks::generator_of_frames() const {
+  StateDict state;
+  save_network(*generator, state, "");
+  if (difference_gain == 0) return state;
+  // m (p + n) / 2 + d g (n - p) = (m / 2 - g d) p + (m / 2 + g d) n; of weights [b, 2, 3, 3]
+  NamedTensor& head = state.at("head.conv2d.weight");
+  const std::size_t kernel = std::size_t(head.shape[2] * head.shape[3]);
+  for (std::size_t first = 0; first < head.values.size(); first += 2 * kernel) {
+    for (std::size_t i = first; i < first + kernel; ++i) {
+      const double mean = head.values[i], difference = difference_gain * head.values[i + kernel];
+      head.values[i] = static_cast<float>(mean / 2 - difference);
+      head.values[i + kernel] = static_cast<float>(mean / 2 + difference);
+    }
+  }
+  return state;
 }
 
 void TrainingNetworks::load(const StateDict& state) {

@@ -30,12 +30,16 @@ struct TrainingNetworks {
   void save(StateDict& state) const;
   void load(const StateDict& state);
 
+  /// The generator alone, its first layer of the frames whatever it learnt in.
+  StateDict generator_of_frames() const;
+
   UNet generator{nullptr};       ///< two frames → volume
   UNet flow{nullptr};            ///< volume → flow at four scales
   UNet reconstruction{nullptr};  ///< [sum of the volume, previous frame] → next at four scales
   PatchDiscriminator discriminator{nullptr};
   c10::Device device;
   bool bfloat16;
+  double difference_gain;  ///< of the generator
 };
 
 }  // namespace eventgan

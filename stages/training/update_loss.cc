@@ -104,6 +104,10 @@ UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& bat
     loss.parts["count"] = count_loss(volume, batch.volume, weights.quantile);
     loss.total = loss.total + weights.count * loss.parts["count"];
   }
+  if (weights.overlap != 0) {
+    loss.parts["overlap"] = overlap_loss(volume, batch.volume);
+    loss.total = loss.total + weights.overlap * loss.parts["overlap"];
+  }
   loss.parts["generator.total"] = loss.total;
   return loss;
 }

@@ -22,8 +22,6 @@ struct ConvLayerSettings {
   bool batch_norm = false;  ///< then the convolution has no bias
   bool spectral_norm = false;
   LayerActivation activation = LayerActivation::kLeakyRelu;
-  double learning_slope =
-      0;  ///< of kRelu below zero, in training mode where gradients are computed
 };
 
 /// `conv2d`, `norm_layer` (momentum 0.01), activation.
@@ -31,12 +29,14 @@ class ConvLayerImpl : public torch::nn::Module {
  public:
   explicit ConvLayerImpl(const ConvLayerSettings& settings);
   at::Tensor forward(const at::Tensor& input);
+  /// Of kRelu below zero, in training mode where gradients are computed.
+  void set_learning_slope(double slope) { learning_slope_ = slope; }
 
  private:
   torch::nn::AnyModule convolution_;
   torch::nn::BatchNorm2d norm_{nullptr};
   LayerActivation activation_;
-  double learning_slope_;
+  double learning_slope_ = 0;
 };
 TORCH_MODULE(ConvLayer);
 
@@ -83,8 +83,7 @@ ConvLayerImpl::ConvLayerImpl(const ConvLayerSettings& settings)
               .padding((settings.kernel - 1) / 2)
               .bias(!settings.batch_norm),
           settings.spectral_norm)),
-      activation_(settings.activation),
-      learning_slope_(settings.learning_slope) {
+      activation_(settings.activation) {
   register_module("conv2d", convolution_.ptr());
   if (settings.batch_norm) {
     norm_ = register_module(
@@ -125,7 +124,7 @@ constexpr int kResidualBlocks = 2;
 
 }  // namespace
 
-UNetImpl::UNetImpl(const UNetSettings& settings) {
+UNetImpl::UNetImpl(const UNetSettings& settings) : difference_gain_(settings.difference_gain) {
   const int base = settings.base_channels;
   const bool encoder_norm = settings.spectral_norm == SpectralNormPlace::kEncoders;
   const bool decoder_norm = settings.spectral_norm == SpectralNormPlace::kDecoders;
@@ -134,8 +133,7 @@ UNetImpl::UNetImpl(const UNetSettings& settings) {
         .in_channels = in_channels,
         .out_channels = settings.out_channels,
         .kernel = 1,
-        .activation = settings.multi_scale ? LayerActivation::kTanh : LayerActivation::kRelu,
-        .learning_slope = settings.multi_scale ? 0 : settings.output_slope});
+        .activation = settings.multi_scale ? LayerActivation::kTanh : LayerActivation::kRelu});
   };
 
   const ConvLayer head(
@@ -174,8 +172,15 @@ UNetImpl::UNetImpl(const UNetSettings& settings) {
   if (settings.multi_scale) register_module("pred_layers", pred_layers_);
 }
 
+void UNetImpl::set_output_slope(double slope) { pred_.get<ConvLayer>()->set_learning_slope(slope); }
+
 std::vector<at::Tensor> UNetImpl::forward(const at::Tensor& input) {
-  at::Tensor x = head_.forward(input);
+  at::Tensor x = input;
+  if (difference_gain_ > 0) {
+    const at::Tensor previous = input.narrow(1, 0, 1), next = input.narrow(1, 1, 1);
+    x = at::cat({(previous + next) / 2, difference_gain_ * (next - previous)}, 1);
+  }
+  x = head_.forward(x);
   std::vector<at::Tensor> skips;
   for (const auto& encoder : *encoders_) {
     skips.push_back(x);

@@ -18,7 +18,7 @@ struct UNetSettings {
   /// Cycle networks: a tanh prediction after each decoder, concatenated to its features.
   bool multi_scale = false;
   SpectralNormPlace spectral_norm = SpectralNormPlace::kNone;
-  double output_slope = 0;  ///< below zero, of an output that is not multi-scale, while it learns
+  double difference_gain = 0;  ///< as NetworkSpec says, of a network of two frames
 };
 
 /// The U-Net of generator and cycle networks as it is trained (DESIGN section 4): batch norm and
@@ -29,14 +29,18 @@ class UNetImpl : public torch::nn::Module {
   explicit UNetImpl(const UNetSettings& settings);
 
   /// [B, in, H, W] float32 → one [B, out, H, W] ≥ 0 (ReLU; in training mode, where gradients are
-  /// computed, with output_slope below zero), or, multi-scale, four [B, out, h, w] in
+  /// computed, with the output slope below zero), or, multi-scale, four [B, out, h, w] in
   /// -1..1 (tanh), coarse to fine: h = H/8, H/4, H/2, H, rounded up. Any H, W. Changes batch norm's
   /// statistics in training mode and spectral norm's vectors always.
   std::vector<at::Tensor> forward(const at::Tensor& input);
 
+  /// Of an output that is not multi-scale, below zero, while it learns; 0 at first.
+  void set_output_slope(double slope);
+
  private:
   torch::nn::ModuleList encoders_, resblocks_, decoders_, pred_layers_;
   torch::nn::AnyModule head_, pred_;
+  double difference_gain_;
 };
 TORCH_MODULE(UNet);
 

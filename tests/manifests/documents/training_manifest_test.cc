@@ -168,8 +168,8 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
     "validation": [{"path": "c", "format": "eventgan"}],
     "gaps": [3, 1], "crop": {"width": 96, "height": 64}, "batch": 4,
     "network": {"generator_channels": 8, "discriminator_channels": 16, "cycle_channels": 4,
-                "spectral_norm": "encoders", "output_slope": 0.25, "bins": 5},
-    "losses": {"adversarial": 0.5, "flow": 2, "reconstruction": 3, "volume": 4, "count": 6,
+                "spectral_norm": "encoders", "output_slope": 0.25, "difference_gain": 6, "bins": 5},
+    "losses": {"adversarial": 0.5, "flow": 2, "reconstruction": 3, "volume": 4, "count": 6, "overlap": 7,
                "quantile": 0.7, "smoothness": 5},
     "label_flip": 0.2, "discriminator_steps": 3,
     "augmentation": {"flip": false, "gain": [0.5, 2], "gamma": [0.8, 1.25],
@@ -193,11 +193,13 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.network.spectral_norm, SpectralNormPlace::kEncoders);
   EXPECT_EQ(manifest.network.bins, 5);
   EXPECT_EQ(manifest.network.output_slope, 0.25);
+  EXPECT_EQ(manifest.network.difference_gain, 6);
   EXPECT_EQ(manifest.losses.adversarial, 0.5);
   EXPECT_EQ(manifest.losses.flow, 2);
   EXPECT_EQ(manifest.losses.reconstruction, 3);
   EXPECT_EQ(manifest.losses.volume, 4);
   EXPECT_EQ(manifest.losses.count, 6);
+  EXPECT_EQ(manifest.losses.overlap, 7);
   EXPECT_EQ(manifest.losses.quantile, 0.7);
   EXPECT_EQ(manifest.losses.smoothness, 5);
   EXPECT_EQ(manifest.label_flip, 0.2);
@@ -243,9 +245,11 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("network", "spectral_norm"), to_string(manifest.network.spectral_norm));
   EXPECT_EQ(section("network", "bins"), manifest.network.bins);
   EXPECT_EQ(section("network", "output_slope"), manifest.network.output_slope);
+  EXPECT_EQ(section("network", "difference_gain"), manifest.network.difference_gain);
   EXPECT_EQ(section("losses", "adversarial"), manifest.losses.adversarial);
   EXPECT_EQ(section("losses", "volume"), manifest.losses.volume);
   EXPECT_EQ(section("losses", "count"), manifest.losses.count);
+  EXPECT_EQ(section("losses", "overlap"), manifest.losses.overlap);
   EXPECT_EQ(section("losses", "quantile"), manifest.losses.quantile);
   EXPECT_EQ(section("losses", "smoothness"), manifest.losses.smoothness);
   EXPECT_EQ(section("augmentation", "flip"), manifest.augmentation.flip);

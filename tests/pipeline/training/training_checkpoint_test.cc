@@ -89,6 +89,18 @@ TEST_F(Resumption, FallingRatesFixThePhaseInProgress) {
   EXPECT_NO_THROW(check_resumable(before, now, kInReconstruction, manifest_));
 }
 
+TEST_F(Resumption, AFallingOutputSlopeFixesTheGeneratorsPhaseInProgress) {
+  const TrainingPosition in_generator{TrainingPhase::kGenerator, 1};
+  EXPECT_EQ(refusal(in_generator, "\"generator\": 4", "\"generator\": 9"), "");
+  const auto before = settings();
+  manifest_.network.output_slope = 0.1;
+  auto now = before;
+  now["manifest $.steps.generator"] = "9";
+  manifest_.steps.generator = 9;
+  EXPECT_THROW(check_resumable(before, now, in_generator, manifest_), UsageError);
+  EXPECT_NO_THROW(check_resumable(before, now, kInReconstruction, manifest_));
+}
+
 TrainingCheckpoint checkpoint_at(std::int64_t step) {
   TrainingCheckpoint checkpoint;
   checkpoint.position = {TrainingPhase::kReconstruction, step};

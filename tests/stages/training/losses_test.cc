@@ -316,6 +316,33 @@ TEST(CountLoss, HasTheGradientOfDifferences) {
       random_tensor({2, 4, 3, 2}, 4));
 }
 
+TEST(OverlapLoss, IsOneMinusTheF1OfPixelsThatHaveEvents) {
+  // One bin a polarity, two samples of two pixels. Events are at three of the eight places; of the
+  // generated one full (2), one of half weight (0.125), one where none is (0.25); below zero is
+  // none.
+  const at::Tensor real = tensor_of({2, 2, 1, 2}, {1, 0, 0, 0.3f, 0, 0.02f, 0, 0});
+  const at::Tensor generated = tensor_of({2, 2, 1, 2}, {2, 0, 0, 0.125f, 0, -1, 0.25f, 0});
+  // One bin: voxels are their sums.
+  EXPECT_FLOAT_EQ(overlap_loss(generated, real).item<float>(),
+                  2 * (1 - (2 * 1.5f + 1) / (2.5f + 3 + 1)));
+  const at::Tensor empty = at::zeros({1, 2, 1, 2});
+  EXPECT_EQ(overlap_loss(empty, empty).item<float>(), 0);
+  EXPECT_GT(overlap_loss(generated, at::zeros({2, 2, 1, 2})).item<float>(), 1.4f);
+}
+
+TEST(OverlapLoss, OfAnEventAtAWrongTimeIsThatOfTheVoxelsAlone) {
+  const at::Tensor early = tensor_of({1, 4, 1, 1}, {1, 0, 0, 0});
+  const at::Tensor late = tensor_of({1, 4, 1, 1}, {0, 1, 0, 0});
+  EXPECT_FLOAT_EQ(overlap_loss(early, late).item<float>(), 1 - 1.0f / 3);
+}
+
+TEST(OverlapLoss, HasTheGradientOfDifferences) {
+  const at::Tensor real = random_tensor({2, 4, 3, 2}, 3) - 0.5;
+  testing::expect_gradient_of_differences(
+      [&](const at::Tensor& generated) { return overlap_loss(0.1 * generated, real); },
+      random_tensor({2, 4, 3, 2}, 4));
+}
+
 TEST(VolumeLoss, HasTheGradientOfDifferences) {
   const at::Tensor real = random_tensor({2, 4, 3, 2}, 1);
   testing::expect_gradient_of_differences(
@@ -326,6 +353,8 @@ TEST(VolumeLoss, HasTheGradientOfDifferences) {
 TEST(VolumeLoss, LetsNanThrough) {
   const at::Tensor nan = tensor_of({1, 1, 1, 1}, {std::numeric_limits<float>::quiet_NaN()});
   EXPECT_TRUE(std::isnan(volume_loss(nan, at::zeros({1, 1, 1, 1}), 0.5).item<float>()));
+  const at::Tensor two = at::cat({nan, nan}, 1);
+  EXPECT_TRUE(std::isnan(overlap_loss(two, at::zeros({1, 2, 1, 1})).item<float>()));
 }
 
 TEST(VolumeLoss, RefusesOtherShapesAndSaysWhich) {

@@ -111,9 +111,9 @@ TEST(UNet, GivesThePicturesSizeAndItsRoundedUpHalves) {
 TEST(UNet, OutputsHaveASlopeBelowZeroOnlyWhileTheyLearn) {
   constexpr double kSlope = 0.25;
   const auto outputs = [&](double slope, bool learns, bool evaluates) {
-    UNetSettings settings{2, 3, 1, false, SpectralNormPlace::kNone};
-    settings.output_slope = slope;
+    const UNetSettings settings{2, 3, 1, false, SpectralNormPlace::kNone};
     UNet network(settings);
+    network->set_output_slope(slope);
     initialize(*network, 1);
     network->train(!evaluates);
     const at::AutoGradMode gradients(learns);

@@ -74,6 +74,14 @@ TEST(LearningRate, StaysAtItsEndAndWithoutSteps) {
   EXPECT_DOUBLE_EQ(learning_rate(1, 0, 7, 5), 0);
 }
 
+TEST(OutputSlope, FallsToNothingUntilHalfOfThePhase) {
+  EXPECT_DOUBLE_EQ(output_slope(0.1, 0, 300), 0.1);
+  EXPECT_DOUBLE_EQ(output_slope(0.1, 75, 300), 0.05);
+  EXPECT_DOUBLE_EQ(output_slope(0.1, 150, 300), 0);
+  EXPECT_DOUBLE_EQ(output_slope(0.1, 299, 300), 0);
+  EXPECT_DOUBLE_EQ(output_slope(0.1, 3, 0), 0);
+}
+
 TEST(LearningRate, IsConstantAtFractionOne) {
   for (const int step : {0, 1, 49, 50, 51}) EXPECT_DOUBLE_EQ(learning_rate(3, 1, step, 50), 3);
 }
@@ -200,9 +208,9 @@ TEST(Trainer, ATermOfWeightZeroIsNotComputed) {
     }
     return keys;
   };
-  EXPECT_THAT(names({1, 1, 1, 1, 1}),
+  EXPECT_THAT(names({1, 1, 1, 1, 1, 1}),
               ElementsAre("count", "flow", "flow.photometric", "flow.smoothness", "generator",
-                          "generator.total", "reconstruction", "volume"));
+                          "generator.total", "overlap", "reconstruction", "volume"));
   EXPECT_THAT(names({1, 0, 1, 0}), ElementsAre("generator", "generator.total", "reconstruction"));
   EXPECT_THAT(names({1, 1, 0, 0}), ElementsAre("flow", "flow.photometric", "flow.smoothness",
                                                "generator", "generator.total"));
@@ -284,11 +292,12 @@ TEST(Trainer, LoadNamesWhatIsMissing) {
   }
 }
 
-class TrainedGenerator : public ::testing::TestWithParam<SpectralNormPlace> {};
+class TrainedGenerator : public ::testing::TestWithParam<std::pair<SpectralNormPlace, double>> {};
 
 TEST_P(TrainedGenerator, FoldedEqualsItsOwnPictureWhichChangesNothing) {
   TrainingManifest manifest = testing::small_training();
-  manifest.network.spectral_norm = GetParam();
+  manifest.network.spectral_norm = GetParam().first;
+  manifest.network.difference_gain = GetParam().second;
   Trainer trainer(manifest, "cpu");
   for (int step = 0; step < 6; ++step) {
     trainer.step(TrainingPhase::kGenerator, step, testing::edge_batch(manifest, step));
@@ -311,10 +320,15 @@ TEST_P(TrainedGenerator, FoldedEqualsItsOwnPictureWhichChangesNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(SpectralNorm, TrainedGenerator,
-                         ::testing::Values(SpectralNormPlace::kDecoders,
-                                           SpectralNormPlace::kEncoders, SpectralNormPlace::kNone),
-                         [](const auto& place) { return std::string(to_string(place.param)); });
+INSTANTIATE_TEST_SUITE_P(SpectralNormAndDifferenceGain, TrainedGenerator,
+                         ::testing::Values(std::pair(SpectralNormPlace::kDecoders, 0.0),
+                                           std::pair(SpectralNormPlace::kEncoders, 0.0),
+                                           std::pair(SpectralNormPlace::kNone, 0.0),
+                                           std::pair(SpectralNormPlace::kNone, 8.0)),
+                         [](const auto& each) {
+                           return std::string(to_string(each.param.first)) +
+                                  (each.param.second > 0 ? "OfDifferences" : "");
+                         });
 
 }  // namespace
 }  // namespace eventgan

@@ -108,16 +108,16 @@ TEST(GeneratorUpdate, IsTheWeightedSumAndReachesTheGeneratorThroughTheFrozenNetw
   const TrainingBatch batch = batch_of(manifest);
   TrainingNetworks networks(manifest, c10::kCPU);
   const LossWeights weights{
-      .adversarial = 2, .flow = 3, .reconstruction = 4, .volume = 5, .count = 6};
+      .adversarial = 2, .flow = 3, .reconstruction = 4, .volume = 5, .count = 6, .overlap = 7};
   UpdateLoss loss = generator_update(networks, batch, weights);
   const auto part = [&](const char* name) { return loss.parts.at(name).item<double>(); };
   EXPECT_NEAR(loss.total.item<double>(),
               2 * part("generator") + 3 * part("flow") + 4 * part("reconstruction") +
-                  5 * part("volume") + 6 * part("count"),
+                  5 * part("volume") + 6 * part("count") + 7 * part("overlap"),
               1e-4);
   for (auto term : {&LossWeights::adversarial, &LossWeights::flow, &LossWeights::reconstruction,
-                    &LossWeights::volume, &LossWeights::count}) {
-    LossWeights single{0, 0, 0, 0, 0};
+                    &LossWeights::volume, &LossWeights::count, &LossWeights::overlap}) {
+    LossWeights single{0, 0, 0, 0, 0, 0};
     single.*term = 1;
     for (at::Tensor& parameter : networks.generator->parameters()) {
       parameter.mutable_grad() = at::Tensor();
