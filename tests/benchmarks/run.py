@@ -20,6 +20,7 @@ import engines
 import intra_op
 import pair_counts
 import picture_sizes
+import reading
 import stages
 import storage
 import threads
@@ -30,7 +31,7 @@ from measuring.picture import draw
 from measuring.report import markdown
 
 PARTS = {"engines": engines, "intra_op": intra_op, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
-         "pair_counts": pair_counts, "threads": threads, "storage": storage}
+         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading}
 
 
 def measure_parts(bench, names):

@@ -39,7 +39,7 @@ class Benchmarks(program.InFolder):
         page = self.run_all(environment=DATASET_FREE)
         sections = sections_of(page)
         self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Stages", "The whole conversion",
-                                          "Against the picture's size", "Against the number of pairs", "Against threads", "Storage"])
+                                          "Against the picture's size", "Against the number of pairs", "Against threads", "Storage", "Reading"])
         for title, rows in sections.items():
             with self.subTest(title):
                 self.assertGreater(len(rows), 1)

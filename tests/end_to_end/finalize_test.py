@@ -247,10 +247,9 @@ class Reading(unittest.TestCase):
             import sys, os
             sys.path.insert(0, {str(program.SOURCE / "manifests" / "python")!r})
             import eventgan_shards
-            eventgan_shards._OPEN_FILES = 2
-            samples = eventgan_shards.Shards(".", split="train")
-            print(len(samples._files))
-            print(sum(bool(sample["volume"].any()) for sample in samples), len(samples._files))
+            samples = eventgan_shards.Shards(".", split="train", open_files=2)
+            print(len(samples._files._open))
+            print(sum(bool(sample["volume"].any()) for sample in samples), len(samples._files._open))
         """, files=32)
         self.assertEqual(said.split(), ["0", "9", "2"])
 
@@ -258,6 +257,9 @@ class Reading(unittest.TestCase):
         (self.out / "dataset.json").unlink()
         self.assertEqual(len(eventgan_shards.Shards(self.out, split="val")), 5)
         self.assertEqual(len(eventgan_shards.Shards(self.out)), 14)
+
+    def test_the_view_stands_for_its_folder(self):
+        self.assertEqual(len(eventgan_shards.Shards(self.out / "dataset.h5")), 14)
 
     def test_the_reader_refuses_shards_that_were_not_described(self):
         name = shards_in(self.out)[0]

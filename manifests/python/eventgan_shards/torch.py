@@ -1,0 +1,450 @@
+"""PyTorch datasets of event volumes: boxes to detect, persons to find joints of.
+
+    from torch.utils.data import DataLoader
+    from eventgan_shards import Shards
+    from eventgan_shards.torch import DetectionDataset, collate_yolo
+
+    cars = DetectionDataset(Shards("out", split="train"), classes=["Car", "Pedestrian"])
+    for imgs, targets, ids in DataLoader(cars, batch_size=8, shuffle=True, num_workers=4, collate_fn=collate_yolo):
+        ...
+
+A volume is a tensor [2B, H, W], float32: channels 0..B-1 are the positive polarity in time order, B..2B-1 the negative. Points are
+x, y in pixels whose centres are whole numbers; boxes are left, top, right, bottom with edges at half pixels, so that a whole picture is
+0, 0, W, H in box coordinates: an edge at e lies half a pixel left of the centre e (shard_format.md, Geometry).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+import torch.nn.functional
+from torch import nn
+from torch.utils.data import ConcatDataset, Dataset, WeightedRandomSampler
+
+from .shards import Shards
+
+Item = dict[str, Any]
+
+
+@dataclasses.dataclass(frozen=True)
+class EventAugmentation:
+    """What may happen to events without making them unlike a camera's. Drawn by torch's random numbers.
+
+    flip: probability of left and right exchanged.
+    reverse: probability of time running backwards, which exchanges polarities and turns the bins round.
+    drop: probability of one polarity (either) being lost, as in a sensor with one threshold set high.
+    scale: factors between which the picture is enlarged, uniformly in its logarithm; what lies outside is cut, what is
+        missing is filled with 0, no events.
+    shift: by at most this share of width and height the scaled picture is moved.
+    There is no change of values: a volume has no brightness or hue.
+    """
+
+    flip: float = 0.5
+    reverse: float = 0.0
+    drop: float = 0.0
+    scale: tuple[float, float] = (1.0, 1.0)
+    shift: float = 0.0
+
+    def affine(self, height: int, width: int) -> np.ndarray:
+        """[2, 3]: where a point of the volume goes, drawn anew."""
+        flip, size, dx, dy = (float(each) for each in torch.rand(4))
+        s = math.exp(math.log(self.scale[0]) + size * math.log(self.scale[1] / self.scale[0]))
+        middle = np.array([(width - 1) / 2, (height - 1) / 2])
+        moved = middle + (2 * np.array([dx, dy]) - 1) * self.shift * np.array([width, height])
+        linear = np.diag([-s if flip < self.flip else s, s])
+        return np.column_stack([linear, moved - linear @ middle])
+
+    def events(self, volume: torch.Tensor) -> torch.Tensor:
+        """[2B, H, W]: the volume, perhaps backwards in time, perhaps without one polarity."""
+        reverse, drop, which = (float(each) for each in torch.rand(3))
+        if reverse < self.reverse:
+            volume = volume.flip(0)
+        if drop < self.drop:
+            bins = volume.shape[0] // 2
+            volume = volume.clone()
+            volume[:bins] = 0 if which < 0.5 else volume[:bins]
+            volume[bins:] = 0 if which >= 0.5 else volume[bins:]
+        return volume
+
+
+def warp(volume: torch.Tensor, affine: np.ndarray, height: int, width: int) -> torch.Tensor:
+    """[C, height, width]: `volume` [C, H, W] moved by `affine` [2, 3], the map of its points to those of the result;
+    bilinear, 0 where there is nothing. A shift by whole pixels, flipped or not, is exact."""
+    linear = np.linalg.inv(affine[:, :2])
+    back = np.column_stack([linear, -linear @ affine[:, 2]])
+    if np.allclose(np.abs(linear), np.eye(2), rtol=0, atol=1e-9) and np.allclose(back, back.round(), rtol=0, atol=1e-9):
+        return _shifted(volume, back.round().astype(int), height, width)
+    xs = torch.arange(width, dtype=torch.float64)
+    ys = torch.arange(height, dtype=torch.float64)[:, None]
+    x, y = (row[0] * xs + row[1] * ys + row[2] for row in back)
+    grid = torch.stack([(2 * x + 1) / volume.shape[2] - 1, (2 * y + 1) / volume.shape[1] - 1], -1).to(volume.dtype)
+    return nn.functional.grid_sample(volume[None], grid[None], mode="bilinear", padding_mode="zeros", align_corners=False)[0]
+
+
+def _shifted(volume: torch.Tensor, back: np.ndarray, height: int, width: int) -> torch.Tensor:
+    result = volume.new_zeros(volume.shape[0], height, width)
+    sources = []
+    for axis, (row, size, limit) in enumerate(((back[0], width, volume.shape[2]), (back[1], height, volume.shape[1]))):
+        at = row[axis] * np.arange(size) + row[2]
+        inside = np.flatnonzero((at >= 0) & (at < limit))
+        sources.append((torch.from_numpy(inside), torch.from_numpy(at[inside])))
+    (to_x, from_x), (to_y, from_y) = sources
+    result[:, to_y[:, None], to_x] = volume[:, from_y[:, None], from_x]
+    return result
+
+
+def move_points(points: np.ndarray, affine: np.ndarray) -> np.ndarray:
+    """[..., 2]: points [..., 2] moved by `affine` [2, 3]."""
+    return points @ affine[:, :2].T + affine[:, 2]
+
+
+def move_boxes(boxes: np.ndarray, affine: np.ndarray) -> np.ndarray:
+    """[n, 4]: left, top, right, bottom moved by `affine` [2, 3], the map of points, which flips or scales but does not
+    rotate."""
+    corners = move_points(np.asarray(boxes, float).reshape(-1, 2, 2) - 0.5, affine) + 0.5
+    return np.concatenate([corners.min(1), corners.max(1)], 1)
+
+
+def inverse(affine: np.ndarray) -> np.ndarray:
+    """[2, 3]: the map back."""
+    linear = np.linalg.inv(affine[:, :2])
+    return np.column_stack([linear, -linear @ affine[:, 2]])
+
+
+class DetectionDataset(Dataset):
+    """Volumes with boxes. An item:
+
+    volume   [2B, H, W] float32
+    boxes    [n, 4] float32, left, top, right, bottom in its pixels, cut to it
+    labels   [n] int64, position in `classes`; -1 for a box to be ignored whose class is not among them
+    ignore   [n] bool: neither to be learnt nor to be scored (annotated so, or less than `visible` of it is left)
+    id       str, sample_id
+    index    int, of the sample in `shards`
+
+    classes: names in the order of their numbers, or name → number, which may join classes: {"Car": 0, "Van": 0}. Boxes of
+        other classes are left out, unless to be ignored. A name that no shard knows is a ValueError. None: all names,
+        without those that are only ever ignored.
+    size: (H, W) that volumes are filled up to with zeros, or cut to, at the right and at the bottom; None: as they are.
+    augmentation: changes volume and boxes alike; None: nothing.
+    visible: share of a box's area that must be left for it not to be ignored.
+    """
+
+    def __init__(self, shards: Shards, classes: Sequence[str] | Mapping[str, int] | None = None,
+                 size: tuple[int, int] | None = None, augmentation: EventAugmentation | None = None, visible: float = 0.25):
+        self._shards = shards
+        known = shards.class_counts()
+        if classes is None:
+            classes = [name for name, count in known.items() if count]
+        self.classes = dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
+        unknown = [name for name in self.classes if name not in known]
+        if unknown:
+            raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}")
+        self._size, self._augmentation, self._visible = size, augmentation, visible
+
+    def __len__(self) -> int:
+        return len(self._shards)
+
+    def __getitem__(self, index: int) -> Item:
+        sample = self._shards.sample(index, {"volume", "pair", "boxes"})
+        volume = torch.from_numpy(sample["volume"])
+        rows = sample["boxes"]
+        names = self._shards.class_names(index)
+        labels = np.array([self.classes.get(names[each], -1) for each in rows["class_id"]], np.int64)
+        ignore = rows["ignore"] != 0
+        boxes = rows["xyxy"]
+        height, width = self._size or volume.shape[1:]
+        if self._augmentation:
+            affine = self._augmentation.affine(height, width)
+            volume = warp(self._augmentation.events(volume), affine, height, width)
+            boxes = move_boxes(boxes, affine)
+        elif self._size:
+            volume = warp(volume, np.eye(2, 3), height, width)
+        cut = np.clip(boxes, 0, [width, height, width, height])
+        ignore = ignore | (_areas(cut) < self._visible * np.maximum(_areas(boxes), 1e-9))
+        kept = (_areas(cut) > 0) & (ignore | (labels >= 0))
+        return {"volume": volume, "boxes": torch.from_numpy(cut[kept]).float(), "labels": torch.from_numpy(labels[kept]),
+                "ignore": torch.from_numpy(ignore[kept]), "id": sample["pair"]["sample_id"], "index": int(index)}
+
+
+def _areas(boxes: np.ndarray) -> np.ndarray:
+    return np.prod(np.maximum(boxes[:, 2:] - boxes[:, :2], 0), 1)
+
+
+def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, list[str]]:
+    """imgs [N, 2B, H, W] float32; targets [n, 6] float32: number of the picture in the batch, class, and centre x, centre y,
+    width, height as shares of W and H, 0..1; ids. Boxes to be ignored are left out. Volumes must be of one size
+    (DetectionDataset's `size`)."""
+    imgs = torch.stack([item["volume"] for item in items])
+    height, width = imgs.shape[2:]
+    targets = []
+    for number, item in enumerate(items):
+        kept = ~item["ignore"]
+        boxes = item["boxes"][kept] / torch.tensor([width, height, width, height])
+        target = torch.empty(len(boxes), 6)
+        target[:, 0] = number
+        target[:, 1] = item["labels"][kept]
+        target[:, 2:4] = (boxes[:, :2] + boxes[:, 2:]) / 2
+        target[:, 4:] = boxes[:, 2:] - boxes[:, :2]
+        targets.append(target)
+    return imgs, torch.cat(targets), [item["id"] for item in items]
+
+
+def collate_torchvision(items: Sequence[Item]) -> tuple[list[torch.Tensor], list[Item]]:
+    """Volumes and targets as torchvision's detectors take them, of any sizes: a list of [2B, H, W] and a list of
+    dictionaries with boxes [n, 4], labels [n] from 1 (0 is their background), `keypoints` [n, J, 3] if the items have
+    them, and `id`. Boxes to be ignored are left out."""
+    targets = []
+    for item in items:
+        kept = ~item["ignore"]
+        target = {"boxes": item["boxes"][kept], "labels": item["labels"][kept] + 1, "id": item["id"]}
+        if "keypoints" in item:
+            target["keypoints"] = item["keypoints"][kept]
+        targets.append(target)
+    return [item["volume"] for item in items], targets
+
+
+def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
+    """Joints that a mirror exchanges, as pairs of positions: those whose names differ by left and right."""
+    numbers = {name: i for i, name in enumerate(names)}
+    partners = ((i, numbers.get(name.replace("left", "right"))) for name, i in numbers.items() if "left" in name)
+    return [(i, partner) for i, partner in partners if partner is not None]
+
+
+class _Joints:
+    """Which columns of /labels/poses the wanted joints are, whatever order a source has them in."""
+
+    def __init__(self, shards: Shards, names: Sequence[str] | None):
+        of_sources = shards.joint_sets()
+        self.names = list(names if names is not None else of_sources[0] if of_sources else [])
+        for known in of_sources:
+            unknown = [name for name in self.names if name not in known]
+            if unknown:
+                raise ValueError(f"expected joints of {', '.join(known)}, got {', '.join(unknown)}")
+        self.pairs = flip_pairs(self.names)
+        self._columns: dict[tuple[str, ...], list[int]] = {}
+
+    def of(self, persons: Mapping[str, np.ndarray], known: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+        """[P, J, 2] in volume pixels and [P, J] bool, annotated."""
+        key = tuple(known)
+        if key not in self._columns:
+            self._columns[key] = [known.index(name) for name in self.names]
+        joints = persons["joints"][:, self._columns[key]]
+        source = persons["joints_source"][:, self._columns[key]]
+        return joints, ~np.all(source == -1, axis=-1)
+
+    def mirrored(self, rows: np.ndarray) -> np.ndarray:
+        """`rows` [..., J, k] with left and right exchanged."""
+        order = np.arange(len(self.names))
+        for left, right in self.pairs:
+            order[[left, right]] = right, left
+        return rows[..., order, :]
+
+
+class KeypointDataset(Dataset):
+    """Volumes with persons as boxes and keypoints, as Keypoint R-CNN learns them. Items are DetectionDataset's, all labels 0
+    ("person"), and
+
+    keypoints   [n, J, 3] float32: x, y, and 0 not annotated or outside, 1 hidden, 2 visible or annotated without a word on that
+
+    A person's box holds its annotated joints and a margin of `margin` of its longer side around them; one without any
+    annotated joint inside is to be ignored. joints: names to take, in that order; None: all of the first source.
+    """
+
+    def __init__(self, shards: Shards, joints: Sequence[str] | None = None, size: tuple[int, int] | None = None,
+                 augmentation: EventAugmentation | None = None, margin: float = 0.15):
+        self._shards, self._joints = shards, _Joints(shards, joints)
+        self._size, self._augmentation, self._margin = size, augmentation, margin
+        self.classes, self.joint_names = {"person": 0}, self._joints.names
+
+    def __len__(self) -> int:
+        return len(self._shards)
+
+    def __getitem__(self, index: int) -> Item:
+        sample = self._shards.sample(index, {"volume", "pair", "persons"})
+        joints, annotated = self._joints.of(sample["persons"], self._shards.joint_names(index))
+        hidden = annotated & (self._visible(sample, index) == 0)
+        volume = torch.from_numpy(sample["volume"])
+        height, width = self._size or volume.shape[1:]
+        if self._augmentation or self._size:
+            affine = self._augmentation.affine(height, width) if self._augmentation else np.eye(2, 3)
+            if self._augmentation:
+                volume = self._augmentation.events(volume)
+            volume = warp(volume, affine, height, width)
+            joints = move_points(joints, affine)
+            if affine[0, 0] < 0:
+                joints = self._joints.mirrored(joints)
+                annotated, hidden = (self._joints.mirrored(each[..., None])[..., 0] for each in (annotated, hidden))
+        annotated = annotated & np.all((joints > -0.5) & (joints < [width - 0.5, height - 0.5]), axis=-1)
+        boxes, found = _around(joints, annotated, self._margin)
+        boxes = np.clip(boxes, 0, [width, height, width, height])
+        keypoints = np.concatenate([joints, np.where(annotated, np.where(hidden, 1, 2), 0)[..., None]], -1)
+        keypoints[~annotated] = 0
+        return {"volume": volume, "boxes": torch.from_numpy(boxes).float(), "labels": torch.zeros(len(boxes), dtype=torch.int64),
+                "ignore": torch.from_numpy(~found), "keypoints": torch.from_numpy(keypoints).float(),
+                "id": sample["pair"]["sample_id"], "index": int(index)}
+
+    def _visible(self, sample: Item, index: int) -> np.ndarray:
+        known = self._shards.joint_names(index)
+        return sample["persons"]["visible"][:, [known.index(name) for name in self._joints.names]]
+
+
+def _around(joints: np.ndarray, annotated: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
+    """[P, 4] boxes around annotated joints [P, J, 2], and [P] whether there are any."""
+    found = annotated.any(-1)
+    low = np.where(annotated[..., None], joints, np.inf).min(1, initial=np.inf)
+    high = np.where(annotated[..., None], joints, -np.inf).max(1, initial=-np.inf) + 1
+    low[~found] = high[~found] = 0
+    wide = margin * (high - low).max(-1, initial=0, keepdims=True)
+    return np.concatenate([low - wide, high + wide], -1), found
+
+
+@dataclasses.dataclass(frozen=True)
+class PoseAugmentation:
+    """How a person's crop may vary, as Simple Baselines (Xiao et al. 2018) have it: its scale by normal factors of deviation
+    `scale` around 1, cut off at 1 ± scale; in a share `rotated` of the crops turned by normal angles of deviation `rotation` in degrees,
+    cut off at twice that; left and right exchanged with probability `flip`; and what may happen to its events."""
+
+    scale: float = 0.25
+    rotation: float = 30.0
+    rotated: float = 0.6
+    flip: float = 0.5
+    events: EventAugmentation = EventAugmentation(flip=0)
+
+
+class PoseDataset(Dataset):
+    """Persons, one an item, cut out as Microsoft's Simple Baselines do (lib/dataset/JointsDataset.py), which its trainer and
+    those that follow it take as they are: (input, target, target_weight, meta).
+
+    input          [2B, H, W] float32
+    target         [J, H/4, W/4] float32: a Gaussian of `sigma` pixels and height 1 around each joint
+    target_weight  [J, 1] float32: 1 where the joint is annotated and some of its Gaussian inside
+    meta           joints [J, 3] and joints_vis [J, 3] in input pixels (z 0; visible = annotated), center [2] and scale [2] of
+                   the crop in volume pixels, rotation (degrees), score 1, flipped, image (sample_id), index, person;
+                   to_volume and to_source [2, 3] float64: maps of input points to those of the volume and of the source
+
+    The crop is a square of 200 x scale pixels around the person's centre, turned by `rotation`, which fills the input's shorter
+    side; an input that is not square shows more at its longer ends. MPII's centres are moved down by 15 x scale and its scales enlarged by 1.25 first, as there. A person without annotated
+    centre and scale has those of its annotated joints' bounding box, enlarged by 1.25; one without annotated joints is left out.
+
+    size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: all of the first source.
+    """
+
+    def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
+                 sigma: float = 2.0, augmentation: PoseAugmentation | None = None):
+        if size[0] % 4 or size[1] % 4:
+            raise ValueError(f"expected sides that are multiples of 4, got {size}")
+        self._shards, self._joints = shards, _Joints(shards, joints)
+        self.joint_names, self.flip_pairs = self._joints.names, self._joints.pairs
+        self._size, self._sigma, self._augmentation = size, sigma, augmentation
+        self.persons = shards.persons
+        annotated = [self._person(index, row)[1].any() for index, row in self.persons]
+        self.persons = self.persons[np.array(annotated, bool)]
+
+    def __len__(self) -> int:
+        return len(self.persons)
+
+    def __getitem__(self, number: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor, Item]:
+        index, row = self.persons[number]
+        joints, annotated, center, scale, sample = self._person(index, row)
+        height, width = self._size
+        volume = torch.from_numpy(self._shards.sample(index, {"volume"})["volume"])
+        rotation, flipped = 0.0, False
+        if self._augmentation:
+            volume = self._augmentation.events.events(volume)
+            scale, rotation, flipped = self._varied(scale)
+        to_input = _crop(center, scale, rotation, height, width)
+        if flipped:
+            to_input = np.array([[-1, 0, width - 1], [0, 1, 0]]) @ np.vstack([to_input, [0, 0, 1]])
+        joints = move_points(joints, to_input)
+        if flipped:
+            joints, annotated = self._joints.mirrored(joints), self._joints.mirrored(annotated[:, None])[:, 0]
+        target, weight = heatmaps(joints / 4, annotated, height // 4, width // 4, self._sigma)
+        to_volume = inverse(to_input)
+        to_source = inverse(sample["pair"]["source_to_volume"]) @ np.vstack([to_volume, [0, 0, 1]])
+        meta = {"joints": np.column_stack([np.where(annotated[:, None], joints, 0), np.zeros(len(joints))]),
+                "joints_vis": np.repeat(annotated[:, None], 3, 1).astype(float) * [1, 1, 0], "center": center,
+                "scale": np.array([scale, scale]), "rotation": rotation, "score": 1.0, "flipped": flipped,
+                "image": sample["pair"]["sample_id"], "index": int(index), "person": int(row),
+                "to_volume": to_volume, "to_source": to_source}
+        return warp(volume, to_input, height, width), torch.from_numpy(target), torch.from_numpy(weight), meta
+
+    def _person(self, index: int, row: int):
+        sample = self._shards.sample(index, {"pair", "persons"})
+        joints, annotated = self._joints.of(sample["persons"], self._shards.joint_names(index))
+        joints, annotated = joints[row], annotated[row]
+        center, scale = sample["persons"]["center"][row].copy(), float(sample["persons"]["scale_volume"][row])
+        if scale > 0:
+            if sample["pair"]["dataset"].startswith("mpii"):
+                center[1] += 15 * scale
+                scale *= 1.25
+        elif annotated.any():
+            low, high = joints[annotated].min(0), joints[annotated].max(0)
+            center, scale = (low + high) / 2, 1.25 * max(*(high - low), 1.0) / 200
+        return joints, annotated, center, scale, sample
+
+    def _varied(self, scale: float) -> tuple[float, float, bool]:
+        spread = self._augmentation
+        factor, angle = torch.randn(2).tolist()
+        rotated, flip = torch.rand(2).tolist()
+        return (scale * (1 + spread.scale * min(max(factor, -1), 1)),
+                spread.rotation * min(max(angle, -2), 2) if rotated < spread.rotated else 0.0, flip < spread.flip)
+
+
+def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width: int) -> np.ndarray:
+    """[2, 3], volume → input: the square of 200 x scale px around `center` fills the shorter side; the centre comes to
+    (W / 2, H / 2), as in Simple Baselines' get_affine_transform."""
+    turn = math.radians(rotation)
+    zoom = min(height, width) / (200 * scale)
+    linear = zoom * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    return np.column_stack([linear, np.array([width / 2, height / 2]) - linear @ center])
+
+
+def heatmaps(joints: np.ndarray, annotated: np.ndarray, height: int, width: int, sigma: float) -> tuple[np.ndarray, np.ndarray]:
+    """[J, height, width] and [J, 1] float32: for each joint [J, 2], rounded to a pixel, exp(-d² / 2σ²) within 3 σ, and 1 if it is
+    annotated and any of that inside (else its map is 0), as Simple Baselines' generate_target."""
+    at, reach = np.floor(joints + 0.5), math.floor(3 * sigma)
+    weight = annotated & np.all((at + reach >= 0) & (at - reach < [width, height]), axis=-1)
+    x = np.arange(width) - np.where(weight, at[:, 0], 0)[:, None]
+    y = np.arange(height) - np.where(weight, at[:, 1], 0)[:, None]
+    along_x = np.exp(-(x**2) / (2 * sigma**2)) * (np.abs(x) <= reach)
+    along_y = np.exp(-(y**2) / (2 * sigma**2)) * (np.abs(y) <= reach)
+    maps = along_y[:, :, None] * along_x[:, None, :] * weight[:, None, None]
+    return maps.astype(np.float32), weight[:, None].astype(np.float32)
+
+
+def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | None = None,
+            generator: torch.Generator | None = None) -> tuple[ConcatDataset, WeightedRandomSampler]:
+    """Several datasets as one, and a sampler that draws from each its share, whatever their sizes: 0.8 and 0.2 for MPII and
+    Human3.6M as in the EventGAN paper. For DataLoader(dataset, sampler=sampler). length: draws an epoch (default: as
+    many as there are items)."""
+    joined = ConcatDataset(datasets)
+    sizes = np.diff([0, *joined.cumulative_sizes])
+    if len(shares) != len(sizes) or min(shares) < 0 or min(sizes) < 1:
+        raise ValueError(f"expected a share ≥ 0 for each of {len(sizes)} datasets that hold items, got {list(shares)} for {list(sizes)}")
+    weights = np.repeat(np.asarray(shares, float) / sizes, sizes)
+    return joined, WeightedRandomSampler(torch.from_numpy(weights), length or len(joined), generator=generator)
+
+
+def exchange_first_convolution(model: nn.Module, channels: int) -> nn.Module:
+    """Gives the model's first Conv2d (in the order of modules()) `channels` inputs, in place: the layer is initialised anew,
+    all other weights stay, as the EventGAN paper does with networks pretrained on pictures. Returns the model (a model that is that
+    layer alone: the new one)."""
+    for name, layer in model.named_modules():
+        if not isinstance(layer, nn.Conv2d):
+            continue
+        if layer.groups != 1:
+            raise ValueError(f"expected a first convolution of one group, got {layer.groups}, in {name}")
+        new = nn.Conv2d(channels, layer.out_channels, layer.kernel_size, layer.stride, layer.padding, layer.dilation,
+                        bias=layer.bias is not None, padding_mode=layer.padding_mode)
+        new = new.to(layer.weight.device, layer.weight.dtype)
+        if not name:
+            return new
+        parent, _, last = name.rpartition(".")
+        setattr(model.get_submodule(parent), last, new)
+        return model
+    raise ValueError("expected a model with a Conv2d, got none")

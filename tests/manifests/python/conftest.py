@@ -1,0 +1,36 @@
+"""The example shards of tests/stages/shards, for the tests of this folder."""
+
+import pathlib
+import shutil
+import sys
+
+import pytest
+
+SOURCE = pathlib.Path(__file__).resolve().parents[3]
+sys.path[:0] = [str(SOURCE / "manifests" / "python"), str(SOURCE / "tests" / "stages" / "shards")]
+
+from example_shards import NAME, ExampleShards  # noqa: E402
+
+SECOND = "demo-train-00001-of-00002.h5"
+
+
+@pytest.fixture(scope="session")
+def example():
+    shards = ExampleShards()
+    yield shards
+    shards.close()
+
+
+@pytest.fixture
+def folder(example, tmp_path):
+    """A folder with one shard of five samples, the third in quarantine, to be changed at will."""
+    return pathlib.Path(shutil.copytree(example.path("uint8-1").parent, tmp_path / "out"))
+
+
+@pytest.fixture
+def two_shards(folder):
+    """The same with a second shard of the same samples."""
+    shutil.copy(folder / NAME, folder / SECOND)
+    marker = (folder / NAME).with_suffix(".json").read_text()
+    (folder / SECOND).with_suffix(".json").write_text(marker.replace(NAME, SECOND))
+    return folder

@@ -1,0 +1,245 @@
+"""eventgan_shards.torch: volumes, boxes and joints that stay together whatever is done to them."""
+
+import os
+import pathlib
+
+import numpy as np
+import pytest
+from conftest import SOURCE
+
+torch = pytest.importorskip("torch")
+from torch.utils.data import DataLoader  # noqa: E402
+
+from eventgan_shards import Shards  # noqa: E402
+from eventgan_shards.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,  # noqa: E402
+                                   PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, flip_pairs,
+                                   heatmaps, inverse, mixture, move_boxes, move_points, warp)
+
+TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
+
+
+@pytest.fixture
+def shards(folder):
+    return Shards(folder)
+
+
+def dot(x, y, height=24, width=32):
+    """[2, height, width] with an event at (x, y), spread over four pixels."""
+    volume = torch.zeros(2, height, width)
+    left, top = int(x), int(y)
+    for column, row in ((0, 0), (0, 1), (1, 0), (1, 1)):
+        volume[:, top + row, left + column] = (1 - abs(x - left - column)) * (1 - abs(y - top - row))
+    return volume
+
+
+def middle_of(volume):
+    """x, y of the mean of its values."""
+    weights = volume[0] / volume[0].sum()
+    return np.array([float((weights.sum(0) * torch.arange(weights.shape[1])).sum()),
+                     float((weights.sum(1) * torch.arange(weights.shape[0])).sum())])
+
+
+@pytest.mark.parametrize("affine", [
+    [[1, 0, 0], [0, 1, 0]], [[1, 0, 3.25], [0, 1, -2.5]], [[-1, 0, 31], [0, 1, 0]], [[2, 0, -9.5], [0, 2, -7]],
+    [[0.8, 0.6, -2], [-0.6, 0.8, 9]]])
+def test_events_move_as_points_do(affine):
+    affine, point = np.array(affine, float), np.array([12.5, 10.25])
+    np.testing.assert_allclose(middle_of(warp(dot(*point), affine, 30, 40)), move_points(point, affine), atol=0.05)
+    np.testing.assert_allclose(move_points(move_points(point, affine), inverse(affine)), point, atol=1e-12)
+
+
+def test_whole_pixels_move_exactly_and_nothing_comes_from_outside():
+    volume = torch.rand(2, 5, 7)
+    moved = warp(volume, np.array([[1, 0, 2], [0, 1, -1.0]]), 6, 8)
+    assert torch.equal(moved[:, 0:4, 2:8], volume[:, 1:5, 0:6])
+    assert moved[:, 4:].sum() == moved[:, :, :2].sum() == 0
+    assert torch.equal(warp(volume, np.array([[-1, 0, 6], [0, 1, 0.0]]), 5, 7), volume.flip(2))
+
+
+def test_boxes_are_of_edges_points_of_centres():
+    mirror = np.array([[-1, 0, 31], [0, 1, 0.0]])  # of 32 columns
+    assert move_boxes([[0, 0, 32, 24], [1, 2, 4, 6]], mirror).tolist() == [[0, 0, 32, 24], [28, 2, 31, 6]]
+    double = np.array([[2, 0, 0.5], [0, 2, 0.5]])  # (x + 1/2) 2 - 1/2
+    assert move_boxes([[1, 2, 4, 6]], double).tolist() == [[2, 4, 8, 12]]
+
+
+def test_an_augmentation_s_events():
+    volume = torch.arange(1.0, 7).reshape(6, 1, 1)
+    assert EventAugmentation(reverse=1).events(volume).flatten().tolist() == [6, 5, 4, 3, 2, 1]
+    torch.manual_seed(1)
+    seen = {tuple(EventAugmentation(drop=1).events(volume).flatten().tolist()) for _ in range(20)}
+    assert seen == {(1, 2, 3, 0, 0, 0), (0, 0, 0, 4, 5, 6)}
+    assert volume.flatten().tolist() == [1, 2, 3, 4, 5, 6]
+
+
+def test_an_augmentation_s_map():
+    torch.manual_seed(1)
+    only_flip = EventAugmentation(flip=1).affine(24, 32)
+    np.testing.assert_allclose(only_flip, [[-1, 0, 31], [0, 1, 0]], atol=1e-12)
+    maps = np.stack([EventAugmentation(flip=0.5, scale=(0.5, 2), shift=0.1).affine(24, 32) for _ in range(200)])
+    assert 0.35 < np.mean(maps[:, 0, 0] < 0) < 0.65
+    assert np.all((0.5 <= maps[:, 1, 1]) & (maps[:, 1, 1] <= 2)) and 0.9 < np.median(maps[:, 1, 1]) < 1.1
+    middles = np.stack([move_points(np.array([15.5, 11.5]), each) for each in maps])
+    assert np.all(np.abs(middles - [15.5, 11.5]) <= [3.2 + 1e-9, 2.4 + 1e-9])
+
+
+def test_detection_items(shards):
+    items = DetectionDataset(shards)
+    assert items.classes == {"Car": 0}
+    first = items[0]
+    assert first["volume"].shape == (4, 6, 8) and first["volume"].dtype == torch.float32
+    assert first["boxes"].tolist() == [[1, 1, 4.25, 4.5], [0, 0, 0.5, 0.5]]
+    assert first["labels"].tolist() == [0, -1] and first["ignore"].tolist() == [False, True]
+    assert (first["id"], first["index"]) == ("000000", 0)
+    assert items[1]["boxes"].shape == (0, 4)
+    assert len(items) == 4
+
+
+def test_classes_may_be_joined_chosen_or_unknown(shards):
+    assert DetectionDataset(shards, {"Car": 3, "DontCare": 1})[0]["labels"].tolist() == [3, 1]
+    assert DetectionDataset(shards, ["DontCare"])[0]["boxes"].shape == (1, 4)
+    with pytest.raises(ValueError, match="expected classes of Car, DontCare, got Bus"):
+        DetectionDataset(shards, ["Car", "Bus"])
+
+
+def test_detection_items_of_another_size(shards):
+    item = DetectionDataset(shards, size=(8, 4))[0]
+    assert item["volume"].shape == (4, 8, 4)
+    assert torch.equal(item["volume"][:, :6], DetectionDataset(shards)[0]["volume"][:, :, :4])
+    assert item["volume"][:, 6:].sum() == 0
+    assert item["boxes"].tolist() == [[1, 1, 4, 4.5], [0, 0, 0.5, 0.5]]
+    narrow = DetectionDataset(shards, size=(6, 1))[0]  # a box that is cut off whole is gone
+    assert narrow["labels"].tolist() == [-1]
+    assert DetectionDataset(shards, size=(6, 5))[2]["boxes"].shape == (0, 4)  # it began at 5
+    assert DetectionDataset(shards, size=(2, 8), visible=0.5)[0]["ignore"].tolist() == [True, True]  # 1/3.5 is left
+
+
+def test_boxes_are_mirrored_with_their_events(shards):
+    plain, mirrored = DetectionDataset(shards)[0], DetectionDataset(shards, augmentation=EventAugmentation(flip=1))[0]
+    assert torch.equal(mirrored["volume"], plain["volume"].flip(2))
+    assert mirrored["boxes"].tolist() == [[3.75, 1, 7, 4.5], [7.5, 0, 8, 0.5]]
+
+
+def test_what_a_yolo_trainer_takes(shards):
+    imgs, targets, ids = next(iter(DataLoader(DetectionDataset(shards), batch_size=4, collate_fn=collate_yolo)))
+    assert imgs.shape == (4, 4, 6, 8) and imgs.dtype == torch.float32
+    np.testing.assert_allclose(targets, [[0, 0, 2.625 / 8, 2.75 / 6, 3.25 / 8, 3.5 / 6], [2, 0, 6.5 / 8, 1.5 / 6, 3 / 8, 3 / 6]], rtol=1e-6)
+    assert ids == ["000000", "000001", "000003", "000004"]
+    assert collate_yolo([DetectionDataset(shards)[1]])[1].shape == (0, 6)
+
+
+def test_what_torchvision_takes(shards):
+    images, targets = collate_torchvision([DetectionDataset(shards)[i] for i in (0, 1)])
+    assert [image.shape for image in images] == [(4, 6, 8)] * 2
+    assert targets[0]["boxes"].tolist() == [[1, 1, 4.25, 4.5]] and targets[0]["labels"].tolist() == [1]
+    assert targets[1]["boxes"].shape == (0, 4) and targets[1]["labels"].dtype == torch.int64
+
+
+def test_keypoint_items(shards):
+    item = KeypointDataset(shards, margin=0)[0]
+    # 1.5, 1.75 and 2.25, 2.875; the second person also has 3.25, 3.25. The centre of a pixel is 0.5 right of its left edge.
+    np.testing.assert_allclose(item["boxes"], [[1.5, 1.75, 3.25, 3.875], [1.5, 1.75, 4.25, 4.25]])
+    assert item["keypoints"][0].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [0, 0, 0]]
+    assert item["keypoints"][1].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [3.25, 3.25, 2]]
+    mirrored = KeypointDataset(shards, augmentation=EventAugmentation(flip=1))[0]["keypoints"][1]
+    assert mirrored.tolist() == [[5.5, 1.75, 2], [3.75, 3.25, 2], [4.75, 2.875, 1]]
+    assert KeypointDataset(shards)[1]["keypoints"].shape == (0, 3, 3)
+    images, targets = collate_torchvision([item])
+    assert targets[0]["keypoints"].shape == (2, 3, 3)
+
+
+def test_mirrored_joints():
+    names = ["left hand", "nose", "right hand", "left ear"]
+    assert flip_pairs(names) == [(0, 2)]
+
+
+def test_pose_items(shards):
+    persons = PoseDataset(shards, size=(64, 64))
+    assert len(persons) == 3 and persons.joint_names == ["nose", "left hand", "right hand"]
+    input, target, weight, meta = persons[1]  # centre 2.75, 2.25 and scale 0.875 as annotated: not MPII's
+    assert input.shape == (4, 64, 64) and target.shape == (3, 16, 16) and weight.tolist() == [[1], [1], [1]]
+    zoom = 64 / 175
+    np.testing.assert_allclose(meta["joints"][0], [32 + (1.5 - 2.75) * zoom, 32 + (1.75 - 2.25) * zoom, 0])
+    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_volume"]), [[1.5, 1.75], [2.25, 2.875], [3.25, 3.25]], atol=1e-9)
+    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"]), [[3.5, 4], [5, 6.25], [7, 7]], atol=1e-9)
+    assert (meta["image"], meta["index"], meta["person"]) == ("000000", 0, 1)
+
+
+def test_a_person_without_a_scale_has_that_of_its_joints(shards):
+    meta = PoseDataset(shards, size=(64, 64))[0][3]  # joints 1.5, 1.75 and 2.25, 2.875
+    np.testing.assert_allclose(meta["center"], [1.875, 2.3125])
+    np.testing.assert_allclose(meta["scale"], 1.25 * 1.125 / 200)
+    assert meta["joints_vis"].tolist() == [[1, 1, 0], [1, 1, 0], [0, 0, 0]]
+
+
+def test_varied_poses_still_lead_back(shards):
+    torch.manual_seed(3)
+    persons = PoseDataset(shards, size=(64, 48), augmentation=PoseAugmentation(rotated=1))
+    flips = set()
+    for _ in range(12):
+        meta = persons[1][3]
+        flips.add(meta["flipped"])
+        order = [0, 2, 1] if meta["flipped"] else [0, 1, 2]
+        np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"])[order], [[3.5, 4], [5, 6.25], [7, 7]], atol=1e-6)
+    assert flips == {False, True}
+
+
+def test_heatmaps():
+    maps, weight = heatmaps(np.array([[5.4, 3.6], [-1, 2], [4, 4], [-9, 2]]), np.array([True, True, False, True]), 12, 10, 1.0)
+    assert weight.tolist() == [[1], [1], [0], [0]]
+    assert np.unravel_index(maps[0].argmax(), (12, 10)) == (4, 5) and maps[0].max() == 1
+    np.testing.assert_allclose(maps[0, 4, 3:9], np.exp(-np.array([4, 1, 0, 1, 4, 9]) / 2), rtol=1e-6)
+    assert maps[0, 4, 9] == 0 and maps[1, 2, 0] == np.float32(np.exp(-0.5)) and not maps[2:].any()
+
+
+@pytest.mark.skipif(not TRAINERS.is_dir(), reason="no ../shared/trainers")
+def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
+    monkeypatch.syspath_prepend(str(TRAINERS / "stubs"))
+    monkeypatch.syspath_prepend(str(TRAINERS / "pose_resnet" / "lib"))
+    transforms = pytest.importorskip("utils.transforms")
+    from eventgan_shards.torch import _crop
+    joints_dataset = pytest.importorskip("dataset.JointsDataset")
+    for center, scale, rotation in (((100, 80), 0.7, 0), ((31.5, 47.25), 1.3, -40), ((0, 0), 2.0, 75)):
+        np.testing.assert_allclose(_crop(np.array(center, float), scale, rotation, 256, 256),
+                                   transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation, [256, 256]), atol=1e-3)
+    theirs = joints_dataset.JointsDataset.__new__(joints_dataset.JointsDataset)
+    theirs.num_joints, theirs.target_type, theirs.sigma = 4, "gaussian", 2
+    theirs.image_size, theirs.heatmap_size = np.array([256, 256]), np.array([64, 64])
+    joints = np.array([[100.3, 7, 0], [255, 255, 0], [2, 130, 0], [300, 20, 0]])
+    visible = np.array([[1, 1, 0], [1, 1, 0], [0, 0, 0], [1, 1, 0]], float)
+    expected, expected_weight = theirs.generate_target(joints, visible)
+    maps, weight = heatmaps(joints[:, :2] / 4, visible[:, 0] > 0, 64, 64, 2)
+    assert weight.tolist() == expected_weight.tolist()
+    np.testing.assert_allclose(maps[visible[:, 0] > 0], expected[visible[:, 0] > 0], rtol=1e-6)
+
+
+def test_datasets_are_mixed_by_share():
+    few, many = torch.utils.data.TensorDataset(torch.zeros(5)), torch.utils.data.TensorDataset(torch.ones(500))
+    joined, sampler = mixture([few, many], [0.8, 0.2], length=2000, generator=torch.Generator().manual_seed(1))
+    drawn = np.array([float(joined[i][0]) for i in sampler])
+    assert len(drawn) == 2000 and 0.16 < drawn.mean() < 0.24
+    with pytest.raises(ValueError, match="expected a share"):
+        mixture([few, many], [1])
+
+
+def test_the_first_convolution_is_exchanged():
+    model = torch.nn.Sequential(torch.nn.Sequential(torch.nn.Conv2d(3, 8, 7, 2, 3, bias=False), torch.nn.ReLU()), torch.nn.Conv2d(8, 4, 1))
+    kept = model[1].weight.clone()
+    assert exchange_first_convolution(model, 18) is model
+    assert model(torch.zeros(1, 18, 16, 16)).shape == (1, 4, 8, 8)
+    assert model[0][0].bias is None and torch.equal(model[1].weight, kept)
+    assert exchange_first_convolution(torch.nn.Conv2d(3, 4, 3), 18).weight.shape == (4, 18, 3, 3)
+    with pytest.raises(ValueError, match="expected a model with a Conv2d"):
+        exchange_first_convolution(torch.nn.ReLU(), 18)
+    with pytest.raises(ValueError, match="one group"):
+        exchange_first_convolution(torch.nn.Conv2d(4, 4, 3, groups=4), 18)
+
+
+@pytest.mark.parametrize("start", ["fork", "spawn"])
+def test_loaders_with_workers(shards, start):
+    loader = DataLoader(DetectionDataset(shards), batch_size=2, num_workers=2, multiprocessing_context=start, collate_fn=collate_yolo)
+    assert [ids for _, _, ids in loader] == [["000000", "000001"], ["000003", "000004"]]
+    poses = DataLoader(PoseDataset(shards, size=(32, 32)), batch_size=3, num_workers=1, multiprocessing_context=start)
+    input, target, weight, meta = next(iter(poses))
+    assert input.shape == (3, 4, 32, 32) and target.shape == (3, 3, 8, 8) and meta["image"] == ["000000", "000000", "000004"]
+    assert meta["to_source"].shape == (3, 2, 3)
