@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <iostream>
@@ -91,6 +92,14 @@ std::vector<RecordingSpec> wanted_parts(const RealismArguments& arguments) {
   return parts;
 }
 
+/// Whether a part is too short for any of the gaps: among several recordings that is no error.
+bool is_too_short(const RecordingSpec& part, const Recording& recording,
+                  const std::vector<int>& gaps) {
+  const std::int64_t last = part.last_frame.value_or(recording.frame_count() - 1);
+  return last >= part.first_frame &&
+         std::ranges::all_of(gaps, [&](int gap) { return last - part.first_frame < gap; });
+}
+
 int run_realism(const RealismArguments& arguments) {
   RealismOptions options = arguments.options;
   if (arguments.threshold != "fit") {
@@ -107,10 +116,17 @@ int run_realism(const RealismArguments& arguments) {
       options.pictures /= std::filesystem::path(part.path).stem();
     }
     const auto recording = open_recording(part.path, part.format, part.camera);
+    if (parts.size() > 1 && is_too_short(part, *recording, options.gaps)) {
+      tell_note("left out, since it has no frames that far apart: " + recording->name());
+      continue;
+    }
     reports.push_back(measure_realism(*recording, options, [&](std::int64_t total) {
       return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
     }));
     for (const std::string& note : recording->notes()) tell_note(note);
+  }
+  if (reports.empty()) {
+    throw UsageError("--gaps: expected a recording with frames that far apart, got none");
   }
   std::cout << (arguments.json ? to_json(reports) : to_text(reports)) << std::flush;
   return kComplete;

@@ -314,6 +314,17 @@ class TrainedWeights(program.InFolder):
         self.assertRegex(text, r"(?m)^  mean +↑ ")
         self.assertEqual({path.parent.name for path in self.folder.glob("*/*.png")}, {"clip", "still-001"})
 
+    def test_a_recording_that_is_too_short_for_the_gap_is_left_out_of_several(self):
+        clip, gap = work / "recordings" / "clip.hdf5", ["--with", "difference", "--progress", "none", "--json", "--gaps", FRAMES - 1]
+        short = work / "recordings" / "still-001.hdf5"
+        with h5py.File(short) as file:
+            self.assertLess(len(file["davis/left/image_raw"]), FRAMES)
+        out, err = run("realism", short, clip, *gap)
+        self.assertEqual([pathlib.Path(one["recording"]).name for one in json.loads(out)["recordings"]], ["clip.hdf5"])
+        self.assertIn("still-001.hdf5", err)
+        run("realism", short, *gap, expect=64)
+        run("realism", short, short, *gap, expect=64)
+
 
 if __name__ == "__main__":
     program.main()
