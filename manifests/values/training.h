@@ -54,7 +54,7 @@ struct NetworkSpec {
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
 /// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
 /// voxel
-/// (`volume`), summed over time (`count`), and in which pixels have events (`overlap`), for short
+/// (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
 /// trainings.
 struct LossWeights {
   double adversarial = 1;

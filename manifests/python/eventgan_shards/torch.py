@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -65,19 +66,16 @@ class EventAugmentation:
         if reverse < self.reverse:
             volume = volume.flip(0)
         if drop < self.drop:
-            bins = volume.shape[0] // 2
             volume = volume.clone()
-            volume[:bins] = 0 if which < 0.5 else volume[:bins]
-            volume[bins:] = 0 if which >= 0.5 else volume[bins:]
+            volume.chunk(2)[which < 0.5].zero_()
         return volume
 
 
 def warp(volume: torch.Tensor, affine: np.ndarray, height: int, width: int) -> torch.Tensor:
     """[C, height, width]: `volume` [C, H, W] moved by `affine` [2, 3], the map of its points to those of the result;
     bilinear, 0 where there is nothing. A shift by whole pixels, flipped or not, is exact."""
-    linear = np.linalg.inv(affine[:, :2])
-    back = np.column_stack([linear, -linear @ affine[:, 2]])
-    if np.allclose(np.abs(linear), np.eye(2), rtol=0, atol=1e-9) and np.allclose(back, back.round(), rtol=0, atol=1e-9):
+    back = inverse(affine)
+    if np.allclose(np.abs(back[:, :2]), np.eye(2), rtol=0, atol=1e-9) and np.allclose(back, back.round(), rtol=0, atol=1e-9):
         return _shifted(volume, back.round().astype(int), height, width)
     xs = torch.arange(width, dtype=torch.float64)
     ys = torch.arange(height, dtype=torch.float64)[:, None]
@@ -209,10 +207,12 @@ def collate_torchvision(items: Sequence[Item]) -> tuple[list[torch.Tensor], list
 
 
 def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
-    """Joints that a mirror exchanges, as pairs of positions: those whose names differ by left and right."""
+    """Joints that a mirror exchanges, as pairs of positions: those whose names differ by left and right, Left and Right (Human3.6M's), or
+    by l_ and r_ or L_ and R_ at their beginning (MPII's)."""
     numbers = {name: i for i, name in enumerate(names)}
-    partners = ((i, numbers.get(name.replace("left", "right"))) for name, i in numbers.items() if "left" in name)
-    return [(i, partner) for i, partner in partners if partner is not None]
+    sides = {"left": "right", "Left": "Right", "l_": "r_", "L_": "R_"}
+    mirrored = {name: re.sub("left|Left|^l_|^L_", lambda side: sides[side[0]], name) for name in names}
+    return [(i, numbers[mirrored[name]]) for name, i in numbers.items() if mirrored[name] != name and mirrored[name] in numbers]
 
 
 class _Joints:
@@ -330,17 +330,18 @@ class PoseDataset(Dataset):
     The crop is a square of 200 x scale pixels around the person's centre, turned by `rotation`, which fills the input's shorter
     side; an input that is not square shows more at its longer ends. MPII's centres are moved down by 15 x scale and its scales enlarged by 1.25 first, as there. A person without annotated
     centre and scale has those of its annotated joints' bounding box, enlarged by 1.25; one without annotated joints is left out.
+    moved: True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
 
     size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: all of the first source.
     """
 
     def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
-                 sigma: float = 2.0, augmentation: PoseAugmentation | None = None):
+                 sigma: float = 2.0, augmentation: PoseAugmentation | None = None, moved: bool = False):
         if size[0] % 4 or size[1] % 4:
             raise ValueError(f"expected sides that are multiples of 4, got {size}")
         self._shards, self._joints = shards, _Joints(shards, joints)
         self.joint_names, self.flip_pairs = self._joints.names, self._joints.pairs
-        self._size, self._sigma, self._augmentation = size, sigma, augmentation
+        self._size, self._sigma, self._augmentation, self._moved = size, sigma, augmentation, moved
         self.persons = shards.persons
         annotated = [self._person(index, row)[1].any() for index, row in self.persons]
         self.persons = self.persons[np.array(annotated, bool)]
@@ -379,7 +380,7 @@ class PoseDataset(Dataset):
         joints, annotated = joints[row], annotated[row]
         center, scale = sample["persons"]["center"][row].copy(), float(sample["persons"]["scale_volume"][row])
         if scale > 0:
-            if sample["pair"]["dataset"].startswith("mpii"):
+            if sample["pair"]["dataset"].startswith("mpii") and not self._moved:
                 center[1] += 15 * scale
                 scale *= 1.25
         elif annotated.any():

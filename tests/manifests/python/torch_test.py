@@ -3,9 +3,10 @@
 import os
 import pathlib
 
+import h5py
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import NAME, SOURCE
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader  # noqa: E402
@@ -151,6 +152,20 @@ def test_keypoint_items(shards):
 def test_mirrored_joints():
     names = ["left hand", "nose", "right hand", "left ear"]
     assert flip_pairs(names) == [(0, 2)]
+    # As MPII and Human3.6M have them; the pairs of MPII are those of Simple Baselines' lib/dataset/mpii.py.
+    mpii = ["r_ankle", "r_knee", "r_hip", "l_hip", "l_knee", "l_ankle", "pelvis", "thorax", "upper_neck", "head_top", "r_wrist", "r_elbow",
+            "r_shoulder", "l_shoulder", "l_elbow", "l_wrist"]
+    assert {frozenset(pair) for pair in flip_pairs(mpii)} == {frozenset(pair) for pair in ((0, 5), (1, 4), (2, 3), (10, 15), (11, 14), (12, 13))}
+    assert flip_pairs(["RightFoot", "Hips", "LeftFoot", "R_Wrist_End", "L_Wrist_End"]) == [(2, 0), (4, 3)]
+
+
+@pytest.mark.parametrize(("moved", "center", "scale"), [(False, [2.75, 2.25 + 15 * 0.875], 1.25 * 0.875), (True, [2.75, 2.25], 0.875)])
+def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
+    with h5py.File(folder / NAME, "r+") as file:
+        file["pairs/dataset"][...] = "mpii_list"
+    meta = PoseDataset(Shards(folder / NAME), size=(64, 64), moved=moved)[1][3]
+    np.testing.assert_allclose(meta["center"], center)
+    np.testing.assert_allclose(meta["scale"], scale)
 
 
 def test_pose_items(shards):
