@@ -79,6 +79,31 @@ class SpecialKeys {
   std::optional<DatasetKind> dataset_;
 };
 
+std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
+  std::vector<std::string> words;
+  if (!value) return words;
+  for (const StrictValue& element : value->elements(1)) words.push_back(element.text());
+  return words;
+}
+
+SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
+  SelectionSpec spec;
+  if (const auto ids = object.find("ids")) spec.ids = read_path(*ids);
+  spec.subjects = read_words(keys.find("subjects", {DatasetKind::kHuman36m}));
+  spec.cameras = read_words(keys.find("cameras", {DatasetKind::kHuman36m}));
+  spec.actions = read_words(keys.find("actions", {DatasetKind::kHuman36m}));
+  if (const auto fraction = object.find("fraction")) {
+    const auto ends = fraction->elements(2);
+    if (ends.size() == 2) {
+      spec.fraction = {ends[0].number(0, 1), ends[1].number(0, 1)};
+      if (spec.fraction[1] <= spec.fraction[0]) ends[1].fault("a number above the one before it");
+    } else if (!ends.empty()) {
+      fraction->fault("an array of 2");
+    }
+  }
+  return spec;
+}
+
 }  // namespace
 
 SourceSpec read_source(const StrictValue& value) {
@@ -95,7 +120,6 @@ SourceSpec read_source(const StrictValue& value) {
   spec.devkit = keys.find_path("devkit", {kKittiObject});
   // Neither is of use without the other: the devkit's mapping says which raw frame a picture is.
   if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
-  if (spec.devkit && !spec.raw_root) object.at("raw_root").fault("a path, since devkit is given");
   spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m});
   if (dataset == kMpiiList && !spec.annotations)
     spec.annotations = read_path(object.at("annotations"));
@@ -106,6 +130,7 @@ SourceSpec read_source(const StrictValue& value) {
     spec.frames_per_second = rate->number(1e-6, 1e6);
   }
 
+  spec.selection = read_selection(object, keys);
   spec.pairs = read_pairs(object.at("pairs"));
   object.finish();
   return spec;

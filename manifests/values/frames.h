@@ -42,6 +42,15 @@ struct FrameRef {
   }
 };
 
+/// What a dataset says of where a frame was taken; empty where it does not.
+struct FrameOrigin {
+  std::string subject = {};  ///< the person's (Human3.6M: "S1")
+  std::string action = {};   ///< what is done (Human3.6M: "Directions-1")
+  std::string camera = {};   ///< which of several (Human3.6M: "54138969")
+  std::string drive = {};    ///< the recording by a car ("2011_09_26_drive_0052_sync")
+  bool operator==(const FrameOrigin&) const = default;
+};
+
 /// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to.
 struct FramePair {
   FrameRef previous;

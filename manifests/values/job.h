@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -67,6 +68,15 @@ struct PairSpec {
   std::optional<double> max_gap_s = std::nullopt;
 };
 
+/// Which labelled frames of a dataset are taken: those for which all of it holds.
+struct SelectionSpec {
+  std::optional<std::string> ids;  ///< a text file, as written in the manifest: a sample_id a line
+  std::vector<std::string> subjects, cameras, actions;  ///< human36m: one of these; empty: any
+  /// Sequences (frames without one: each by its sample_id) whose number in [0, 1), which the seed
+  /// gives them, lies in [first, last): [0, 0.8] and [0.8, 1] share no sequence.
+  std::array<double, 2> fraction{0, 1};
+};
+
 /// One dataset on disk. Paths are as written in the manifest.
 struct SourceSpec {
   DatasetKind dataset = DatasetKind::kFrames;
@@ -79,6 +89,7 @@ struct SourceSpec {
   std::optional<std::string> sequences;     ///< mpii, mpii_list: the folder of video frames
   std::optional<Human36mLayout> layout;     ///< human36m only, and required there
   std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
+  SelectionSpec selection;
   PairSpec pairs;
 };
 

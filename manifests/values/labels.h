@@ -40,6 +40,8 @@ struct Box {
   float alpha = -10;      ///< observation angle, rad in [-pi, pi]; -10 unknown
   /// height, width, length (m), x, y, z (m, camera frame), rotation_y (rad).
   std::array<float, 7> box3d{-1, -1, -1, -1000, -1000, -1000, -10};
+  /// KITTI's: 0 easy, 1 moderate, 2 hard; -1 none of them, not known, or another dataset's.
+  int difficulty = -1;
   std::int64_t track_id = -1;  ///< object's number within its sequence; -1 none
   bool ignore = false;         ///< a region to leave out of training and scoring (DontCare)
   bool operator==(const Box&) const = default;
@@ -74,12 +76,14 @@ struct LensDistortion {
   bool operator==(const LensDistortion&) const = default;
 };
 
-/// One person as annotated, in pixels of the source picture, 0-based.
+/// One person as annotated, in pixels of the source picture, 0-based. Human3.6M has no centres,
+/// scales and boxes of its own: h36m-fetch's persons have those of their joints (derive_frame).
 struct Person {
   std::vector<Joint> joints;     ///< one for each of LabelSchema::joint_names, in that order
   Point center = kMissingPoint;  ///< kMissingPoint if not annotated
   double scale = -1;             ///< as annotated (MPII: height / 200 px); -1 if not annotated
   std::optional<Rectangle> head_box;
+  std::optional<Rectangle> box;  ///< Human3.6M: around the joints
   /// [J][x, y, z] in mm in the camera frame, none for a joint that is not known; empty if no joint
   /// is.
   std::vector<std::optional<std::array<double, 3>>> joints3d_mm;
@@ -95,6 +99,9 @@ struct Annotation {
   std::string original;
   std::vector<Box> boxes;
   std::vector<Person> persons;
+  /// P, row-major [3][4], of the picture's camera (KITTI's P2): w [u, v, 1] = P [X, Y, Z, 1], in
+  /// pixels of the source picture and m in the rectified frame of camera 0.
+  std::optional<std::array<double, 12>> projection = {};
   bool operator==(const Annotation&) const = default;
 };
 
@@ -102,6 +109,9 @@ struct Annotation {
 struct LabelSchema {
   std::vector<std::string> class_names;
   std::vector<std::string> joint_names;
+  /// Of joints that a subset in common use names otherwise, that name (Human3.6M: the 17 joints),
+  /// "" of the others; empty, or one for each of joint_names.
+  std::vector<std::string> joint_aliases = {};
   bool operator==(const LabelSchema&) const = default;
 };
 
@@ -118,6 +128,7 @@ struct VolumePerson {
   Point center = kMissingPoint;
   double scale = -1;  ///< the annotated scale times sqrt(scale_x scale_y); -1 if not annotated
   std::optional<Rectangle> head_box;
+  std::optional<Rectangle> box;
   std::optional<Intrinsics> camera;
 };
 
@@ -125,6 +136,7 @@ struct VolumePerson {
 struct VolumeLabels {
   std::vector<VolumeBox> boxes;
   std::vector<VolumePerson> persons;
+  std::optional<std::array<double, 12>> projection = {};
 };
 
 }  // namespace eventgan

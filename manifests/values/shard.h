@@ -37,6 +37,9 @@ struct ShardHeader {
   std::string preprocessing;  ///< JSON: fit, grey, blur, preset
   std::string plan_hash;      ///< SHA-256 of the frozen plan, hex
   std::string manifest_text;
+  /// The weights' name: "shipped:8", "untrained:8", or the file as the manifest has it; empty for a
+  /// simulator, and of shards from before it was kept.
+  std::string weights;
   std::string weights_hash;  ///< SHA-256 of the weights (simulators: of `generator`), hex
   std::string generator;     ///< Generator::description()
   std::string program_version;
@@ -48,6 +51,7 @@ struct ShardSample {
   std::string fault;  ///< why not, if not valid; kept in the marker, not in the shard
   std::string sample_id;
   std::string sequence;
+  FrameOrigin origin;
   FramePair pair;
   ImageSize source_size;                     ///< {0, 0} if unknown (quarantined)
   std::array<double, 6> source_to_volume{};  ///< NaN if unknown (quarantined)

@@ -70,6 +70,8 @@ void SampleStages::read(SampleMessage& message) const try {
   const PlannedSample& planned = message.planned();
   message.sample.sample_id = planned.sample_id;
   message.sample.sequence = planned.sequence;
+  message.sample.origin = frame_origin(
+      manifest_.sources[static_cast<std::size_t>(message.shard->source)].dataset, planned.sequence);
   message.sample.pair = planned.pair;
   message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
   if (!planned.fault.empty()) {

@@ -11,6 +11,7 @@
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/base/files/atomic_file.h"
+#include "stages/generator/shipped_weights.h"
 
 namespace eventgan {
 namespace {
@@ -33,6 +34,9 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   header.preprocessing = preprocessing_json(manifest.image);
   header.plan_hash = job.frozen.hash;
   header.manifest_text = job.frozen.plan.manifest_text;
+  if (manifest.generator.kind == GeneratorKind::kNetwork) {
+    header.weights = shipped_weights_name(manifest.generator.weights);
+  }
   header.weights_hash = job.weights_hash;
   header.generator = job.generator.description();
   header.program_version = program_version();

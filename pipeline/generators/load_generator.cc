@@ -28,6 +28,16 @@ std::string untrained_warning(const Weights& weights, const std::string& name) {
          "else.";
 }
 
+/// The weights that come with the program say what they are for.
+std::string shipped_warning(const JobManifest& manifest) {
+  const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
+  if (!name || name->origin != WeightsOrigin::kShipped) return "";
+  return "the weights are those that come with the program (" +
+         shipped_weights_name(manifest.generator.weights) +
+         "), trained on some minutes of recordings: fit to try things with. For results import or "
+         "train weights (README, \"The generator's weights\").";
+}
+
 LoadedWeights named_weights(const JobManifest& manifest) {
   const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
   if (!name) {
@@ -57,7 +67,8 @@ LoadedWeights load_weights(const JobManifest& manifest) {
     throw UsageError("$.volume.bins: expected " + std::to_string(loaded.weights.bins) +
                      " as the weights have, got " + std::to_string(manifest.volume.bins));
   }
-  loaded.warning = untrained_warning(loaded.weights, manifest.generator.weights);
+  loaded.warning =
+      untrained_warning(loaded.weights, manifest.generator.weights) + shipped_warning(manifest);
   return loaded;
 }
 

@@ -17,6 +17,7 @@
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/frame_selection.h"
 
 namespace eventgan {
 namespace {
@@ -235,7 +236,9 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
   SourceSummary summary;
   std::int64_t pairs = 0;
   layout.begin_source(index, spec.split);
-  for (const LabelledFrame& frame : dataset.labelled_frames()) {
+  const std::vector<LabelledFrame> frames =
+      select_frames(dataset.labelled_frames(), spec, manifest.directory, manifest.seed);
+  for (const LabelledFrame& frame : frames) {
     before_frame();
     PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
     summary.without_partner += chosen.samples.empty() && spec.pairs.choose == PairChoice::kOne
@@ -250,8 +253,13 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
       layout.add(std::move(sample), size);
     }
   }
-  summary.labelled_frames = static_cast<std::int64_t>(dataset.labelled_frames().size());
+  summary.labelled_frames = static_cast<std::int64_t>(frames.size());
   summary.notes = dataset.notes();
+  if (const auto left_out = dataset.labelled_frames().size() - frames.size(); left_out > 0) {
+    summary.notes.push_back(std::to_string(left_out) + " of " +
+                            std::to_string(dataset.labelled_frames().size()) +
+                            " labelled frames left out, as the manifest selects");
+  }
   if (pairs < spec.pairs.min_pairs) {
     throw InputError("expected at least " + std::to_string(spec.pairs.min_pairs) +
                      " pairs (pairs.min_pairs), got " + std::to_string(pairs) + " of " +
@@ -352,6 +360,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
         plan_source(manifest, static_cast<int>(i), *dataset, probe, layout, stop_if_asked));
     const auto files = dataset->annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
+    if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);
   }
   job.plan.shards = layout.finish();
   note_unknown_sizes(job.plan);

@@ -32,4 +32,35 @@ std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesys
   throw std::logic_error("open_dataset: not a kind of dataset");
 }
 
+namespace {
+
+/// SUBJECT, separator, ACTION, last separator, CAMERA.
+FrameOrigin human36m_origin(const std::string& sequence) {
+  const bool fetched = sequence.find('/') != std::string::npos;
+  const std::size_t first = sequence.find(fetched ? '/' : '_');
+  const std::size_t last = sequence.rfind(fetched ? '/' : '.');
+  if (first == std::string::npos || last == std::string::npos || first >= last) return {};
+  return {.subject = sequence.substr(0, first),
+          .action = sequence.substr(first + 1, last - first - 1),
+          .camera = sequence.substr(last + 1)};
+}
+
+}  // namespace
+
+FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence) {
+  switch (dataset) {
+    case DatasetKind::kHuman36m:
+      return human36m_origin(sequence);
+    case DatasetKind::kKittiRaw:
+    case DatasetKind::kKittiObject:
+    case DatasetKind::kKittiTracking:
+      return {.drive = sequence};
+    case DatasetKind::kMpii:
+    case DatasetKind::kMpiiList:
+    case DatasetKind::kFrames:
+      break;
+  }
+  return {};
+}
+
 }  // namespace eventgan

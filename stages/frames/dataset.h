@@ -74,6 +74,10 @@ class Dataset {
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
+/// What the name of a sequence of such a dataset tells: Human3.6M's "S1/Directions-1/54138969" or
+/// "S1_Directions_1.54138969", KITTI's drive. A function of its arguments alone.
+FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence);
+
 /// Opens the source described by `spec`; relative paths start at `base`, the manifest's folder.
 /// Throws InputError if the source's root or an annotation file is missing or unreadable,
 /// UsageError if the manifest's keys do not fit what is there.

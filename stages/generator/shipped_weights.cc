@@ -56,6 +56,10 @@ int default_shipped_width() {
   return *(beyond - 1);
 }
 
+std::string shipped_weights_name(const std::string& name) {
+  return name == "shipped" ? name + ":" + std::to_string(default_shipped_width()) : name;
+}
+
 std::span<const std::byte> shipped_weights_bytes(int width) {
   for (const ShippedFile& file : shipped_files()) {
     if (file.width == width) return {file.begin, file.end};

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "stages/generator/weights.h"
@@ -18,6 +19,9 @@ std::vector<int> shipped_widths();
 /// The width that the name "shipped" stands for: the largest one that is at most 16 (beyond it a
 /// processor takes seconds for a pair). Throws InputError if there is none.
 int default_shipped_width();
+
+/// "shipped" with its width, "shipped:8"; any other name as it is.
+std::string shipped_weights_name(const std::string& name);
 
 /// The file's bytes as they stand in the repository; they live as long as the program. Throws
 /// InputError, listing the widths there are, if that width is not shipped.

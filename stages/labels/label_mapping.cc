@@ -63,6 +63,17 @@ Intrinsics to_volume(const Placement& placement, const Intrinsics& camera) {
           y.point_to_volume(camera.centre_y)};
 }
 
+std::array<double, 12> to_volume(const Placement& placement,
+                                 const std::array<double, 12>& projection) {
+  const std::array<double, 6> map = placement.source_to_volume();  // [2][3]
+  std::array<double, 12> mapped = projection;
+  for (std::size_t i = 0; i < 4; ++i) {
+    mapped[i] = map[0] * projection[i] + map[2] * projection[8 + i];
+    mapped[4 + i] = map[4] * projection[4 + i] + map[5] * projection[8 + i];
+  }
+  return mapped;
+}
+
 Rectangle clip(const Rectangle& box, ImageSize size) {
   const auto into = [](double x, int extent) {
     return std::clamp(x, 0.0, static_cast<double>(extent));
@@ -216,6 +227,7 @@ VolumePerson map(const Person& person, const Placement& placement) {
                      ? person.scale
                      : person.scale * std::sqrt(placement.scale_x() * placement.scale_y());
   if (person.head_box) mapped.head_box = to_volume(placement, *person.head_box);
+  if (person.box) mapped.box = to_volume(placement, *person.box);
   if (person.camera) mapped.camera = to_volume(placement, *person.camera);
   return mapped;
 }
@@ -239,6 +251,9 @@ Complaint check(const VolumePerson& mapped, const Person& person) {
   }
   if (mapped.head_box && !complaint) {
     complaint = check_mapped("a finite head box", *mapped.head_box, *person.head_box);
+  }
+  if (mapped.box && !complaint) {
+    complaint = check_mapped("a finite box", *mapped.box, *person.box);
   }
   if (mapped.camera && !complaint) {
     complaint = check_mapped("a finite camera", *mapped.camera, *person.camera);
@@ -275,6 +290,7 @@ Outcome<VolumeLabels> map_labels(const Annotation& annotation, const Placement& 
   if (auto fault = map_all(annotation.persons, "person", placement, where, labels.persons)) {
     return *fault;
   }
+  if (annotation.projection) labels.projection = to_volume(placement, *annotation.projection);
   return labels;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 
 #include "manifests/values/faults.h"
@@ -17,6 +18,11 @@ Rectangle to_source(const Placement& placement, const Rectangle& box);
 
 /// Focal lengths scale, the principal point maps as a point.
 Intrinsics to_volume(const Placement& placement, const Intrinsics& camera);
+
+/// A camera's P [3][4], so that w [x', y', 1] = P' [X, Y, Z, 1]: its rows are combined as the map
+/// of points combines x, y and 1.
+std::array<double, 12> to_volume(const Placement& placement,
+                                 const std::array<double, 12>& projection);
 
 /// `box` cut to [0, width] x [0, height]; a box wholly outside becomes empty (zero width or height)
 /// at the border nearest to it, never inside out.

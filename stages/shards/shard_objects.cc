@@ -87,6 +87,7 @@ void describe_origin(hid_t object, const ShardHeader& header) {
   write_attribute(object, "plan_hash", header.plan_hash);
   write_attribute(object, "manifest", header.manifest_text);
   write_attribute(object, "weights_hash", header.weights_hash);
+  write_attribute(object, "weights", header.weights);
   write_attribute(object, "generator", header.generator);
   write_attribute(object, "program_version", header.program_version);
   write_attribute(object, "preprocessing", header.preprocessing);
@@ -130,6 +131,9 @@ void describe_columns(hid_t location, const ShardHeader& header) {
                   schema.class_names);
   write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
   write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
+  if (!schema.joint_aliases.empty()) {
+    write_attribute(open_object(location, "labels/poses"), "joint_aliases", schema.joint_aliases);
+  }
   write_attribute(open_object(location, "events/statistics/flags"), "bits",
                   std::vector<std::string>{"empty", "extrapolated", "saturated", "vanished"});
   write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
@@ -138,6 +142,11 @@ void describe_columns(hid_t location, const ShardHeader& header) {
 }
 
 namespace {
+
+/// Some came after the first shards were written.
+bool has_attribute(hid_t object, const char* name) {
+  return checked(H5Aexists(object, name), "look for", name) > 0;
+}
 
 void check_format(hid_t file) {
   const std::string format = read_text_attribute(file, "format");
@@ -214,6 +223,7 @@ ShardHeader read_header(hid_t file) {
   header.plan_hash = read_text_attribute(file, "plan_hash");
   header.manifest_text = read_text_attribute(file, "manifest");
   header.weights_hash = read_text_attribute(file, "weights_hash");
+  if (has_attribute(file, "weights")) header.weights = read_text_attribute(file, "weights");
   header.generator = read_text_attribute(file, "generator");
   header.program_version = read_text_attribute(file, "program_version");
   header.preprocessing = read_text_attribute(file, "preprocessing");
@@ -222,6 +232,10 @@ ShardHeader read_header(hid_t file) {
       read_texts_attribute(open_object(file, "/labels/boxes/class_id"), "class_names");
   header.label_schema.joint_names =
       read_texts_attribute(open_object(file, "/labels/poses"), "joint_names");
+  if (const Hdf5Handle poses = open_object(file, "/labels/poses");
+      has_attribute(poses, "joint_aliases")) {
+    header.label_schema.joint_aliases = read_texts_attribute(poses, "joint_aliases");
+  }
   return header;
 }
 

@@ -7,8 +7,10 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace eventgan {
 namespace {
@@ -28,19 +30,55 @@ void push(std::vector<double>& column, const std::optional<Rectangle>& box) {
   push(column, box.value_or(Rectangle{-1, -1, -1, -1}));
 }
 
-/// Makes an optional column as long as if every row before `size` had NaN for "none".
-void pad(std::vector<double>& column, std::size_t size) { column.resize(size, kNan); }
+/// Row `row` of an optional column of `width` elements a row: nothing until the first row that has
+/// `values`, from then on `none` where a row has not.
+template <class Element>
+void put(std::vector<Element>& column, std::span<const Element> values, std::size_t width,
+         std::size_t row, const Element& none) {
+  if (values.empty() && column.empty()) return;
+  column.resize(width * row, none);
+  column.insert(column.end(), values.begin(), values.end());
+  column.resize(width * (row + 1), none);
+}
 
-void push_camera(std::vector<double>& column, const std::optional<Intrinsics>& camera,
-                 std::size_t persons_before) {
-  if (!camera) return;
-  pad(column, 4 * persons_before);
-  column.insert(column.end(),
-                {camera->focal_x, camera->focal_y, camera->centre_x, camera->centre_y});
+void put(std::vector<double>& column, std::span<const double> values, std::size_t width,
+         std::size_t row) {
+  put(column, values, width, row, kNan);
+}
+
+void put(std::vector<double>& column, double value, std::size_t row) {
+  put(column, std::isnan(value) ? std::span<const double>() : std::span(&value, 1), 1, row);
+}
+
+void put(std::vector<std::string>& column, const std::string& value, std::size_t row) {
+  put<std::string>(column, {&value, value.empty() ? 0u : 1u}, 1, row, "");
+}
+
+template <std::size_t count>
+void put(std::vector<double>& column, const std::optional<std::array<double, count>>& values,
+         std::size_t row) {
+  put(column, values ? std::span<const double>(*values) : std::span<const double>(), count, row);
+}
+
+void put(std::vector<double>& column, const std::optional<Rectangle>& box, std::size_t row) {
+  using Edges = std::array<double, 4>;
+  put(column,
+      box ? std::optional(Edges{box->left, box->top, box->right, box->bottom}) : std::nullopt, row);
+}
+
+void put(std::vector<double>& column, const std::optional<Intrinsics>& camera, std::size_t row) {
+  using Numbers = std::array<double, 4>;
+  put(column,
+      camera ? std::optional(
+                   Numbers{camera->focal_x, camera->focal_y, camera->centre_x, camera->centre_y})
+             : std::nullopt,
+      row);
 }
 
 void append_pair(const ShardHeader& header, const ShardSample& sample, PairColumns& to) {
   const FramePair& pair = sample.pair;
+  const FrameOrigin& origin = sample.origin;
+  const std::size_t row = to.sample_id.size();
   to.sample_id.push_back(sample.sample_id);
   to.dataset.push_back(header.dataset);
   to.sequence.push_back(sample.sequence);
@@ -58,6 +96,12 @@ void append_pair(const ShardHeader& header, const ShardSample& sample, PairColum
                         {sample.source_size.height, sample.source_size.width});
   to.source_to_volume.insert(to.source_to_volume.end(), sample.source_to_volume.begin(),
                              sample.source_to_volume.end());
+  put(to.prev_time_s, pair.previous.time_s, row);
+  put(to.next_time_s, pair.next.time_s, row);
+  put(to.subject, origin.subject, row);
+  put(to.action, origin.action, row);
+  put(to.camera, origin.camera, row);
+  put(to.drive, origin.drive, row);
 }
 
 void append_events(const ShardSample& sample, EventColumns& to) {
@@ -72,6 +116,7 @@ void append_events(const ShardSample& sample, EventColumns& to) {
 }
 
 void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
+  const std::size_t row = to.class_id.size();
   push(to.xyxy, mapped.clipped);
   push(to.xyxy_unclipped, mapped.unclipped);
   push(to.xyxy_source, box.xyxy);
@@ -83,10 +128,12 @@ void append_box(const Box& box, const VolumeBox& mapped, BoxColumns& to) {
   to.ignore.push_back(mapped.ignore);
   to.ignore_source.push_back(box.ignore);
   to.track_id.push_back(box.track_id);
+  const auto difficulty = static_cast<std::int8_t>(box.difficulty);
+  put<std::int8_t>(to.difficulty, {&difficulty, difficulty < 0 ? 0u : 1u}, 1, row, -1);
 }
 
 void append_person(const Person& person, const VolumePerson& mapped, PoseColumns& to) {
-  const std::size_t persons_before = to.scale.size();
+  const std::size_t row = to.scale.size();
   for (const Joint& joint : person.joints) {
     push(to.joints_source, joint.at);
     to.visible.push_back(static_cast<std::int8_t>(joint.visible));
@@ -98,29 +145,19 @@ void append_person(const Person& person, const VolumePerson& mapped, PoseColumns
   to.scale_volume.push_back(mapped.scale);
   push(to.head_box, mapped.head_box);
   push(to.head_box_source, person.head_box);
-  if (!person.joints3d_mm.empty()) {
-    pad(to.joints3d_mm, 3 * person.joints3d_mm.size() * persons_before);
-    for (const auto& joint : person.joints3d_mm) {
-      const auto place = joint.value_or(std::array{kNan, kNan, kNan});
-      to.joints3d_mm.insert(to.joints3d_mm.end(), place.begin(), place.end());
-    }
+  put(to.box, mapped.box, row);
+  put(to.box_source, person.box, row);
+  std::vector<double> joints3d;
+  for (const auto& joint : person.joints3d_mm) {
+    const auto place = joint.value_or(std::array{kNan, kNan, kNan});
+    joints3d.insert(joints3d.end(), place.begin(), place.end());
   }
-  push_camera(to.camera, mapped.camera, persons_before);
-  push_camera(to.camera_source, person.camera, persons_before);
-  if (const auto& lens = person.distortion) {
-    pad(to.camera_distortion, 5 * persons_before);
-    to.camera_distortion.insert(to.camera_distortion.end(),
-                                {lens->k1, lens->k2, lens->k3, lens->p1, lens->p2});
-  }
-}
-
-/// Persons after the last with a 3-D pose or a camera.
-void pad_optional(std::size_t joints, PoseColumns& poses) {
-  const std::size_t persons = poses.scale.size();
-  if (!poses.joints3d_mm.empty()) pad(poses.joints3d_mm, 3 * joints * persons);
-  if (!poses.camera.empty()) pad(poses.camera, 4 * persons);
-  if (!poses.camera_source.empty()) pad(poses.camera_source, 4 * persons);
-  if (!poses.camera_distortion.empty()) pad(poses.camera_distortion, 5 * persons);
+  put(to.joints3d_mm, joints3d, 3 * person.joints.size(), row);
+  put(to.camera, mapped.camera, row);
+  put(to.camera_source, person.camera, row);
+  std::optional<std::array<double, 5>> lens;
+  if (const auto& d = person.distortion) lens = {d->k1, d->k2, d->k3, d->p1, d->p2};
+  put(to.camera_distortion, lens, row);
 }
 
 void check_labels(const LabelSchema& schema, const ShardSample& sample) {
@@ -154,10 +191,13 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
       sample.valid || !sample.labels.boxes.empty() || !sample.labels.persons.empty();
   if (labelled) check_labels(header.label_schema, sample);
 
+  const std::size_t row = tables.valid.size();
   append_events(sample, tables.events);
   append_pair(header, sample, tables.pairs);
   tables.original.emplace_back(sample.annotation.original.begin(),
                                sample.annotation.original.end());
+  put(tables.projection, sample.labels.projection, row);
+  put(tables.projection_source, sample.annotation.projection, row);
   tables.valid.push_back(sample.valid);
   if (labelled) {
     for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
@@ -166,7 +206,6 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
     for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
       append_person(sample.annotation.persons[i], sample.labels.persons[i], tables.poses);
     }
-    pad_optional(header.label_schema.joint_names.size(), tables.poses);
   }
   tables.boxes.offsets.push_back(static_cast<std::int64_t>(tables.boxes.class_id.size()));
   tables.poses.offsets.push_back(static_cast<std::int64_t>(tables.poses.scale.size()));
@@ -197,6 +236,19 @@ const double* row_if_any(const std::vector<double>& column, std::size_t width, s
   return any ? first : nullptr;
 }
 
+std::optional<Rectangle> optional_box(const std::vector<double>& column, std::size_t row) {
+  return row_if_any(column, 4, row) == nullptr ? std::nullopt : std::optional(box_at(column, row));
+}
+
+std::optional<std::array<double, 12>> projection_if_any(const std::vector<double>& column,
+                                                        std::size_t row) {
+  const double* number = row_if_any(column, 12, row);
+  if (number == nullptr) return std::nullopt;
+  std::array<double, 12> projection;
+  std::copy_n(number, projection.size(), projection.begin());
+  return projection;
+}
+
 std::optional<Intrinsics> camera_if_any(const std::vector<double>& column, std::size_t row) {
   const double* number = row_if_any(column, 4, row);
   if (number == nullptr) return std::nullopt;
@@ -210,15 +262,28 @@ std::optional<LensDistortion> distortion_if_any(const std::vector<double>& colum
   return LensDistortion{number[0], number[1], number[2], number[3], number[4]};
 }
 
+/// A shard from before times were kept tells the gap: then the previous frame's is 0.
 FramePair pair_at(const PairColumns& from, std::size_t row) {
+  const auto time_s = [row](const std::vector<double>& column, double otherwise) {
+    return column.empty() ? otherwise : column[row];
+  };
+  const double gap_s = from.gap_s[row];
   FramePair pair;
-  pair.previous = {from.prev_path[row], from.prev_index[row], from.prev_video_frame[row], 0};
+  pair.previous = {from.prev_path[row], from.prev_index[row], from.prev_video_frame[row],
+                   time_s(from.prev_time_s, std::isnan(gap_s) ? kNan : 0)};
   pair.next = {from.next_path[row], from.next_index[row], from.next_video_frame[row],
-               from.gap_s[row]};
+               time_s(from.next_time_s, gap_s)};
   pair.gap_frames = from.gap_frames[row];
   pair.label_index = from.label_index[row];
   pair.label_position = from.label_position[row];
   return pair;
+}
+
+FrameOrigin origin_at(const PairColumns& from, std::size_t row) {
+  const auto text = [&](const std::vector<std::string>& column) {
+    return column.empty() ? std::string() : column[row];
+  };
+  return {text(from.subject), text(from.action), text(from.camera), text(from.drive)};
 }
 
 VolumeStatistics statistics_at(const EventColumns& from, std::size_t row) {
@@ -241,6 +306,7 @@ Box annotated_box(const BoxColumns& from, std::size_t row) {
   box.alpha = from.alpha[row];
   for (std::size_t i = 0; i < box.box3d.size(); ++i) box.box3d[i] = from.box3d[7 * row + i];
   box.track_id = from.track_id[row];
+  if (!from.difficulty.empty()) box.difficulty = from.difficulty[row];
   box.ignore = from.ignore_source[row] != 0;
   return box;
 }
@@ -253,6 +319,7 @@ Person annotated_person(const PoseColumns& from, std::size_t joints, std::size_t
   person.center = point_at(from.center_source, row);
   person.scale = from.scale[row];
   person.head_box = box_if_any(from.head_box_source, row);
+  person.box = optional_box(from.box_source, row);
   if (row_if_any(from.joints3d_mm, 3 * joints, row) != nullptr) {
     for (std::size_t j = row * joints; j < (row + 1) * joints; ++j) {
       const double* mm = row_if_any(from.joints3d_mm, 3, j);
@@ -273,6 +340,7 @@ VolumePerson mapped_person(const PoseColumns& from, std::size_t joints, std::siz
   person.center = point_at(from.center, row);
   person.scale = from.scale_volume[row];
   person.head_box = box_if_any(from.head_box, row);
+  person.box = optional_box(from.box, row);
   person.camera = camera_if_any(from.camera, row);
   return person;
 }
@@ -285,6 +353,7 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   sample.valid = tables.valid[row] != 0;
   sample.sample_id = tables.pairs.sample_id[row];
   sample.sequence = tables.pairs.sequence[row];
+  sample.origin = origin_at(tables.pairs, row);
   sample.pair = pair_at(tables.pairs, row);
   sample.source_size = {tables.pairs.source_size[2 * row], tables.pairs.source_size[2 * row + 1]};
   for (std::size_t i = 0; i < sample.source_to_volume.size(); ++i) {
@@ -293,6 +362,9 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   sample.statistics = statistics_at(tables.events, row);
   sample.scale = tables.events.scale[row];
   sample.annotation.original.assign(tables.original[row].begin(), tables.original[row].end());
+
+  sample.annotation.projection = projection_if_any(tables.projection_source, row);
+  sample.labels.projection = projection_if_any(tables.projection, row);
 
   const auto rows_of = [row](const std::vector<std::int64_t>& offsets, auto&& each) {
     for (std::int64_t k = offsets[row]; k < offsets[row + 1]; ++k)

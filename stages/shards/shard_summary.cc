@@ -152,7 +152,8 @@ std::string describe_shard(const ShardReader& reader) {
   }
   line.add("preprocessing", header.preprocessing);
   line.add("generator", header.generator);
-  line.add("weights", header.weights_hash);
+  line.add("weights", header.weights.empty() ? header.weights_hash
+                                             : header.weights + ", " + header.weights_hash);
   line.add("plan", header.plan_hash);
   return line.text();
 }
@@ -293,6 +294,7 @@ std::string shard_json(const ShardReader& reader) {
                {"joint_names", header.label_schema.joint_names},
                {"preprocessing", header.preprocessing},
                {"generator", header.generator},
+               {"weights", header.weights},
                {"weights_hash", header.weights_hash},
                {"plan_hash", header.plan_hash},
                {"program_version", header.program_version},

@@ -22,7 +22,8 @@ struct EventColumns {
   std::vector<std::uint32_t> flags;
 };
 
-/// `/pairs/*`, one row a sample.
+/// `/pairs/*`, one row a sample. The last two lines are empty as long as no sample has such a
+/// thing.
 struct PairColumns {
   std::vector<std::string> sample_id, dataset, sequence;
   std::vector<std::string> prev_path, next_path;
@@ -34,6 +35,8 @@ struct PairColumns {
   std::vector<double> label_position;
   std::vector<std::int32_t> source_size;
   std::vector<double> source_to_volume;
+  std::vector<double> prev_time_s, next_time_s;
+  std::vector<std::string> subject, action, camera, drive;
 };
 
 /// `/labels/boxes/*`, rows offsets[i] to offsets[i + 1] for sample i.
@@ -46,10 +49,11 @@ struct BoxColumns {
   std::vector<float> alpha, box3d;
   std::vector<std::uint8_t> ignore, ignore_source;
   std::vector<std::int64_t> track_id;
+  std::vector<std::int8_t> difficulty;  ///< empty as long as no box has one
 };
 
-/// `/labels/poses/*`, rows offsets[i] to offsets[i + 1] for sample i. The last four are empty as
-/// long as no person has such a thing.
+/// `/labels/poses/*`, rows offsets[i] to offsets[i + 1] for sample i. The last two lines are empty
+/// as long as no person has such a thing.
 struct PoseColumns {
   std::vector<std::int64_t> offsets{0};
   std::vector<double> joints, joints_source;
@@ -57,13 +61,15 @@ struct PoseColumns {
   std::vector<double> center, center_source;
   std::vector<double> scale, scale_volume;
   std::vector<double> head_box, head_box_source;
+  std::vector<double> box, box_source;
   std::vector<double> joints3d_mm, camera, camera_source, camera_distortion;
 };
 
 struct ShardTables {
   EventColumns events;
   PairColumns pairs;
-  std::vector<std::vector<char>> original;  ///< bytes
+  std::vector<std::vector<char>> original;            ///< bytes
+  std::vector<double> projection, projection_source;  ///< empty as long as no sample has one
   BoxColumns boxes;
   PoseColumns poses;
   std::vector<std::uint8_t> valid;
@@ -110,8 +116,17 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
   visit(ColumnSpec{"/pairs/label_position", Rows::kSamples, {}}, p.label_position);
   visit(ColumnSpec{"/pairs/source_size", Rows::kSamples, {2}}, p.source_size);
   visit(ColumnSpec{"/pairs/source_to_volume", Rows::kSamples, {2, 3}}, p.source_to_volume);
+  visit(ColumnSpec{"/pairs/prev_time_s", Rows::kSamples, {}, true}, p.prev_time_s);
+  visit(ColumnSpec{"/pairs/next_time_s", Rows::kSamples, {}, true}, p.next_time_s);
+  visit(ColumnSpec{"/pairs/subject", Rows::kSamples, {}, true}, p.subject);
+  visit(ColumnSpec{"/pairs/action", Rows::kSamples, {}, true}, p.action);
+  visit(ColumnSpec{"/pairs/camera", Rows::kSamples, {}, true}, p.camera);
+  visit(ColumnSpec{"/pairs/drive", Rows::kSamples, {}, true}, p.drive);
 
   visit(ColumnSpec{"/labels/original", Rows::kSamples, {}}, tables.original);
+  visit(ColumnSpec{"/labels/projection", Rows::kSamples, {3, 4}, true}, tables.projection);
+  visit(ColumnSpec{"/labels/projection_source", Rows::kSamples, {3, 4}, true},
+        tables.projection_source);
 
   auto& b = tables.boxes;
   visit(ColumnSpec{"/labels/boxes/offsets", Rows::kOffsets, {}}, b.offsets);
@@ -126,6 +141,7 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
   visit(ColumnSpec{"/labels/boxes/ignore", Rows::kBoxes, {}}, b.ignore);
   visit(ColumnSpec{"/labels/boxes/ignore_source", Rows::kBoxes, {}}, b.ignore_source);
   visit(ColumnSpec{"/labels/boxes/track_id", Rows::kBoxes, {}}, b.track_id);
+  visit(ColumnSpec{"/labels/boxes/difficulty", Rows::kBoxes, {}, true}, b.difficulty);
 
   auto& h = tables.poses;
   visit(ColumnSpec{"/labels/poses/offsets", Rows::kOffsets, {}}, h.offsets);
@@ -138,6 +154,8 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
   visit(ColumnSpec{"/labels/poses/scale_volume", Rows::kPersons, {}}, h.scale_volume);
   visit(ColumnSpec{"/labels/poses/head_box", Rows::kPersons, {4}}, h.head_box);
   visit(ColumnSpec{"/labels/poses/head_box_source", Rows::kPersons, {4}}, h.head_box_source);
+  visit(ColumnSpec{"/labels/poses/box", Rows::kPersons, {4}, true}, h.box);
+  visit(ColumnSpec{"/labels/poses/box_source", Rows::kPersons, {4}, true}, h.box_source);
   visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, true}, h.joints3d_mm);
   visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, true}, h.camera);
   visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, true}, h.camera_source);

@@ -103,7 +103,7 @@ class Shards(Sequence):
         """One sample, a dictionary of the fields asked for; keys are shard_format.md's names:
 
         volume        float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
-        pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]
+        pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if it is there
         statistics    everything of /events/statistics, and eta98; flags as int64, since PyTorch has no uint32
         boxes         arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
         persons       arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
@@ -120,6 +120,8 @@ class Shards(Sequence):
             sample.update(file.volume(slot, self._decode))
         if "pair" in fields:
             sample["pair"] = file.row("pairs", slot)
+            for name in file.optional("labels/projection", "labels/projection_source"):
+                sample["pair"][name.removeprefix("labels/")] = file.column(name)[slot]
         if "statistics" in fields:
             sample["statistics"] = {**file.row("events/statistics", slot), "eta98": file.column("events/eta98")[slot]}
         if "boxes" in fields:
@@ -170,10 +172,10 @@ class Shards(Sequence):
                 counts[name] = counts.get(name, 0) + count
         return counts
 
-    def joint_sets(self) -> list[list[str]]:
-        """The lists of joint names that occur, in the order the shards have them."""
+    def joint_sets(self) -> list[tuple[str, ...]]:
+        """The different lists of joint names that occur, in the order the shards have them."""
         files = (self._files[self.paths[number]] for number in np.unique(self._shard))
-        return [list(names) for names in dict.fromkeys(tuple(file.names("labels/poses", "joint_names")) for file in files) if names]
+        return [names for names in dict.fromkeys(tuple(file.names("labels/poses", "joint_names")) for file in files) if names]
 
     def class_names(self, index: int) -> list[str]:
         """What the class ids of sample `index` mean, the same for a whole source."""
@@ -182,6 +184,18 @@ class Shards(Sequence):
     def joint_names(self, index: int) -> list[str]:
         """What the joints of sample `index` are, the same for a whole source."""
         return self._files[self._place(index)[0]].names("labels/poses", "joint_names")
+
+    def joint_places(self, index: int, names: Iterable[str]) -> list[int]:
+        """Where these joints stand among those of sample `index`, found by their names or by those of the 17 joints in common
+        use (`joint_aliases`); a name that is neither is a ValueError."""
+        file = self._files[self._place(index)[0]]
+        known = file.names("labels/poses", "joint_names")
+        places = {alias: i for i, alias in enumerate(file.names("labels/poses", "joint_aliases")) if alias}
+        places.update({name: i for i, name in enumerate(known)})
+        unknown = [name for name in names if name not in places]
+        if unknown:
+            raise ValueError(f"expected joints of {', '.join(known)}, got {', '.join(unknown)}, in {file.file.filename}")
+        return [places[name] for name in names]
 
     def _place(self, index: int) -> tuple[pathlib.Path, int]:
         if not -len(self) <= index < len(self):
@@ -275,6 +289,12 @@ class _OpenShard:
             self._columns[name] = column.astype(np.int64) if column.dtype == np.uint32 else column
         return self._columns[name]
 
+    def optional(self, *names: str) -> list[str]:
+        if "" not in self._columns:  # every name, asked for once
+            self._columns[""] = set()
+            self.file.visit(self._columns[""].add)
+        return [name for name in names if name in self._columns[""]]
+
     def row(self, group: str, slot: int) -> Sample:
         return {name: column[slot] for name, column in self._group(group)}
 
@@ -283,7 +303,7 @@ class _OpenShard:
         return {name: column[first:last] for name, column in self._group(group) if name != "offsets"}
 
     def names(self, item: str, attribute: str) -> list[str]:
-        return list(self.file[item].attrs[attribute])
+        return list(self.file[item].attrs.get(attribute, ()))
 
     def _group(self, group: str) -> list[tuple[str, np.ndarray]]:
         if group not in self._columns:

@@ -216,26 +216,23 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
 
 
 class _Joints:
-    """Which columns of /labels/poses the wanted joints are, whatever order a source has them in."""
+    """The wanted joints, whatever order a source has them in."""
 
     def __init__(self, shards: Shards, names: Sequence[str] | None):
         of_sources = shards.joint_sets()
+        self._shards = shards
         self.names = list(names if names is not None else of_sources[0] if of_sources else [])
-        for known in of_sources:
-            unknown = [name for name in self.names if name not in known]
-            if unknown:
-                raise ValueError(f"expected joints of {', '.join(known)}, got {', '.join(unknown)}")
         self.pairs = flip_pairs(self.names)
-        self._columns: dict[tuple[str, ...], list[int]] = {}
+        self._places: dict[tuple[str, ...], list[int]] = {}
 
-    def of(self, persons: Mapping[str, np.ndarray], known: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
-        """[P, J, 2] in volume pixels and [P, J] bool, annotated."""
-        key = tuple(known)
-        if key not in self._columns:
-            self._columns[key] = [known.index(name) for name in self.names]
-        joints = persons["joints"][:, self._columns[key]]
-        source = persons["joints_source"][:, self._columns[key]]
-        return joints, ~np.all(source == -1, axis=-1)
+    def of(self, persons: Mapping[str, np.ndarray], index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """[P, J, 2] in volume pixels; [P, J] bool, annotated; [P, J] bool, annotated and hidden."""
+        known = tuple(self._shards.joint_names(index))
+        if known not in self._places:
+            self._places[known] = self._shards.joint_places(index, self.names)
+        places = self._places[known]
+        annotated = ~np.all(persons["joints_source"][:, places] == -1, axis=-1)
+        return persons["joints"][:, places], annotated, annotated & (persons["visible"][:, places] == 0)
 
     def mirrored(self, rows: np.ndarray) -> np.ndarray:
         """`rows` [..., J, k] with left and right exchanged."""
@@ -266,8 +263,7 @@ class KeypointDataset(Dataset):
 
     def __getitem__(self, index: int) -> Item:
         sample = self._shards.sample(index, {"volume", "pair", "persons"})
-        joints, annotated = self._joints.of(sample["persons"], self._shards.joint_names(index))
-        hidden = annotated & (self._visible(sample, index) == 0)
+        joints, annotated, hidden = self._joints.of(sample["persons"], index)
         volume = torch.from_numpy(sample["volume"])
         height, width = self._size or volume.shape[1:]
         if self._augmentation or self._size:
@@ -287,10 +283,6 @@ class KeypointDataset(Dataset):
         return {"volume": volume, "boxes": torch.from_numpy(boxes).float(), "labels": torch.zeros(len(boxes), dtype=torch.int64),
                 "ignore": torch.from_numpy(~found), "keypoints": torch.from_numpy(keypoints).float(),
                 "id": sample["pair"]["sample_id"], "index": int(index)}
-
-    def _visible(self, sample: Item, index: int) -> np.ndarray:
-        known = self._shards.joint_names(index)
-        return sample["persons"]["visible"][:, [known.index(name) for name in self._joints.names]]
 
 
 def _around(joints: np.ndarray, annotated: np.ndarray, margin: float) -> tuple[np.ndarray, np.ndarray]:
@@ -376,8 +368,7 @@ class PoseDataset(Dataset):
 
     def _person(self, index: int, row: int):
         sample = self._shards.sample(index, {"pair", "persons"})
-        joints, annotated = self._joints.of(sample["persons"], self._shards.joint_names(index))
-        joints, annotated = joints[row], annotated[row]
+        joints, annotated, _ = (each[row] for each in self._joints.of(sample["persons"], index))
         center, scale = sample["persons"]["center"][row].copy(), float(sample["persons"]["scale_volume"][row])
         if scale > 0:
             if sample["pair"]["dataset"].startswith("mpii") and not self._moved:

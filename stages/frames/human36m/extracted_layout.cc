@@ -149,6 +149,7 @@ Person NpzTable::person(std::size_t row) const {
   if (!any_in_3d) person.joints3d_mm.clear();
   person.center = {center[0], center[1]};
   person.scale = columns_.row_of("scale", row)[0];
+  derive_box(person);
   if (const Human36mCamera* one = camera(row)) {
     person.camera = one->intrinsics;
     person.distortion = one->distortion;

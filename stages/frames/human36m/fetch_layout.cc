@@ -128,6 +128,7 @@ Person FetchTable::person(std::size_t row) const {
         std::array{joints3d[3 * j], joints3d[3 * j + 1], joints3d[3 * j + 2]});
   }
   person.camera = intrinsics(row);
+  derive_frame(person);
   return person;
 }
 

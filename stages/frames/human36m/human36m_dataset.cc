@@ -58,6 +58,15 @@ std::vector<std::string> human36m_joint_names(std::size_t count) {
   return names;
 }
 
+std::vector<std::string> human36m_joint_aliases(std::size_t count) {
+  if (count != 32) return {};
+  constexpr std::size_t kPlaces[] = {0, 1, 2, 3, 6, 7, 8, 12, 13, 14, 15, 17, 18, 19, 25, 26, 27};
+  std::vector<std::string> aliases(count);
+  const std::vector<std::string> names = human36m_joint_names(std::size(kPlaces));
+  for (std::size_t i = 0; i < names.size(); ++i) aliases[kPlaces[i]] = names[i];
+  return aliases;
+}
+
 FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequence stored,
                          const std::vector<std::int64_t>& labelled)
     : folder_(std::move(folder)),
@@ -93,7 +102,10 @@ Neighbour FrameFolder::neighbour(std::int64_t number, int steps) const {
 
 void IndexedDataset::add_table(const std::string& key, const std::string& written,
                                std::unique_ptr<PoseTable> table) {
-  if (tables_.empty()) schema_.joint_names = human36m_joint_names(table->joint_count());
+  if (tables_.empty()) {
+    schema_.joint_names = human36m_joint_names(table->joint_count());
+    schema_.joint_aliases = human36m_joint_aliases(table->joint_count());
+  }
   if (table->joint_count() != schema_.joint_names.size()) {
     throw InputError("expected " + std::to_string(schema_.joint_names.size()) +
                      " joints as in the files before, got " + std::to_string(table->joint_count()) +

@@ -22,6 +22,10 @@ namespace eventgan {
 /// trainers do, else "joint_0", "joint_1", ...
 std::vector<std::string> human36m_joint_names(std::size_t count);
 
+/// The names that the 17 joints in common use have, for those of the 32 that are among them; "" for
+/// the others. Empty for any other count.
+std::vector<std::string> human36m_joint_aliases(std::size_t count);
+
 /// Human3.6M's videos run at this rate, and its frame numbers count all of their frames from 1.
 inline constexpr double kHuman36mFramesPerSecond = 50;
 

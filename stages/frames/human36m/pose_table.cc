@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -81,6 +82,29 @@ Json TableColumns::fields(std::size_t row, std::size_t row_count,
     object[name] = to_json(array, row);
   }
   return object;
+}
+
+void derive_box(Person& person) {
+  person.box.reset();
+  for (const Joint& joint : person.joints) {
+    const Point at = joint.at;
+    if (at == kMissingPoint) continue;
+    Rectangle& box =
+        person.box ? *person.box : person.box.emplace(Rectangle{at.x, at.y, at.x, at.y});
+    box = {std::min(box.left, at.x), std::min(box.top, at.y), std::max(box.right, at.x),
+           std::max(box.bottom, at.y)};
+  }
+  // Of centres of pixels so far; of edges from here on.
+  if (person.box) person.box->right += 1, person.box->bottom += 1;
+}
+
+void derive_frame(Person& person) {
+  derive_box(person);
+  if (!person.box) return;
+  const double width = person.box->right - person.box->left - 1;
+  const double height = person.box->bottom - person.box->top - 1;
+  person.center = {person.box->left + width / 2, person.box->top + height / 2};
+  person.scale = 1.2 * std::max(width, height) / 200;
 }
 
 }  // namespace eventgan

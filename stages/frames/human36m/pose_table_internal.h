@@ -66,4 +66,13 @@ class TableColumns {
   std::string file_;
 };
 
+/// Centre, scale and box of a person that is annotated by joints alone, by the rule that pose
+/// trainers use on Human3.6M (Kolotouros et al. 2019, SPIN): the box holds all annotated joints,
+/// the centre is its middle, the scale 1.2 times its longer side over 200 px. Nothing without
+/// annotated joints.
+void derive_frame(Person& person);
+
+/// The same, but only the box: for persons that have a centre and a scale.
+void derive_box(Person& person);
+
 }  // namespace eventgan

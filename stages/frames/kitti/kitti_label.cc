@@ -107,6 +107,32 @@ int kitti_class_id(std::string_view name) {
   return found == names.end() ? -1 : static_cast<int>(found - names.begin());
 }
 
+namespace {
+
+struct DifficultyLimits {
+  double height;
+  int occlusion;
+  float truncation;
+};
+
+/// Easy, moderate, hard: cpp/evaluate_object.cpp of the development kit.
+constexpr DifficultyLimits kDifficulties[] = {{40, 0, 0.15f}, {25, 1, 0.3f}, {25, 2, 0.5f}};
+
+int kitti_difficulty(const Box& box) {
+  if (box.occlusion < 0 || box.truncation < 0) return -1;
+  const double height = box.xyxy.bottom - box.xyxy.top;
+  for (int i = 0; i < std::ssize(kDifficulties); ++i) {
+    const DifficultyLimits& limits = kDifficulties[i];
+    if (height >= limits.height && box.occlusion <= limits.occlusion &&
+        box.truncation <= limits.truncation) {
+      return i;
+    }
+  }
+  return -1;
+}
+
+}  // namespace
+
 Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, KittiColumns kind,
                                 const std::string& where) {
   const bool tracking = kind == KittiColumns::kTracking;
@@ -149,6 +175,7 @@ Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, Kitti
   constexpr decltype(box.box3d) kTrackingUnknown{-1000, -1000, -1000, -10, -1, -1, -1};
   if (box.box3d == kTrackingUnknown) box.box3d = Box().box3d;
   box.ignore = box.class_id == kKittiDontCare || (tracking && box.truncation == kIgnoredLevel);
+  if (!tracking && !box.ignore) box.difficulty = kitti_difficulty(box);
   return box;
 }
 

@@ -80,6 +80,11 @@ enum class KittiColumns {
 /// -1 where they are unknown. Numbers are taken as they are, except that the unknown 3-D box of
 /// tracking's DontCare (location, rotation_y and size, in this order) becomes Box's own.
 ///
+/// The difficulty is that of the object development kit: with h = bottom - top, easy: h ≥ 40 px,
+/// fully visible, truncated ≤ 0.15; moderate: h ≥ 25, at most partly occluded, ≤ 0.30; hard: h ≥
+/// 25, at most largely occluded, ≤ 0.50. None for DontCare and where either is unknown; none in
+/// tracking.
+///
 /// DontCare becomes `ignore`, and so does tracking's level 2, an object to be ignored. A fault
 /// reads "expected 15 columns, got 7, in WHERE".
 Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, KittiColumns kind,

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "stages/base/pictures/picture_file.h"
+#include "stages/frames/kitti/calibration_file_internal.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/source_folders.h"
@@ -98,10 +99,12 @@ class KittiObjectDataset : public Dataset {
     note_left_out(labels.left_out(), "label_2");
     note_left_out(pictures_.labelled().left_out(), "image_2");
     note_left_out(pictures_.previous_left_out(), "prev_2");
-    if (spec.raw_root) {
+    if (spec.devkit) {
       const SourceRoot devkit(*spec.devkit, base);
-      follow_to_raw(SourceRoot(*spec.raw_root, base), devkit);
-      check_mapping(SourceRoot("", base), devkit.written(kMappingFile));
+      std::optional<SourceRoot> raw;
+      if (spec.raw_root) raw.emplace(*spec.raw_root, base);
+      follow_mapping(devkit, raw);
+      if (raw) check_mapping(SourceRoot("", base), devkit.written(kMappingFile));
     }
     std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
@@ -138,7 +141,17 @@ class KittiObjectDataset : public Dataset {
   Outcome<Annotation> annotation(const std::string& label_key) const override {
     auto text = root_.read(label_key);
     if (auto* fault = std::get_if<SampleFault>(&text)) return *fault;
-    return parse_kitti_label(std::get<std::string>(std::move(text)), label_place(label_key));
+    auto annotation =
+        parse_kitti_label(std::get<std::string>(std::move(text)), label_place(label_key));
+    const std::string calibration = calibration_of(label_key);
+    if (is_fault(annotation) || !root_.has_file(calibration)) return annotation;
+    try {
+      std::get<Annotation>(annotation).projection =
+          CalibrationFile(root_, calibration).read<12>("P2");
+    } catch (const InputError& error) {
+      return SampleFault{error.what()};
+    }
+    return annotation;
   }
 
   std::string label_place(const std::string& label_key) const override {
@@ -151,13 +164,23 @@ class KittiObjectDataset : public Dataset {
     frame.sample_id = label_name.substr(0, label_name.rfind('.'));
     frame.label_key = "label_2/" + label_name;
     annotation_files_.push_back(root_.written(frame.label_key));
+    if (const std::string calibration = calibration_of(frame.label_key);
+        root_.has_file(calibration)) {
+      annotation_files_.push_back(root_.written(calibration));
+    }
     const auto place = pictures_.at(number, frame.sample_id, 0);
     frame.frame = {root_.written(place.path), 0, -1, 0};
     frames_.push_back(std::move(frame));
   }
 
-  void follow_to_raw(const SourceRoot& raw, const SourceRoot& devkit) {
-    raw.require_folder("");
+  /// "label_2/001497.txt" → "calib/001497.txt"
+  static std::string calibration_of(const std::string& label_key) {
+    return "calib" + label_key.substr(label_key.find('/'));
+  }
+
+  /// Without `raw` the drives' names and the frames' numbers alone.
+  void follow_mapping(const SourceRoot& devkit, const std::optional<SourceRoot>& raw) {
+    if (raw) raw->require_folder("");
     const RawMapping mapping = read_mapping(devkit);
     annotation_files_.push_back(devkit.written(kMappingFile));
     annotation_files_.push_back(devkit.written(kRandFile));
@@ -172,14 +195,18 @@ class KittiObjectDataset : public Dataset {
       frame.sequence = raw_frame->drive;
       frame.frame.index = raw_frame->number;
       auto [place, is_new] = drives_.try_emplace(raw_frame->drive, std::nullopt);
-      if (is_new) open_drive(raw, raw_frame->date + "/" + raw_frame->drive, place->second);
+      if (is_new && raw) {
+        open_drive(*raw, raw_frame->date + "/" + raw_frame->drive, place->second);
+      }
       if (!place->second) ++without_drive;
       frame.frame.time_s = place->second
                                ? place->second->time_s(raw_frame->number)
                                : static_cast<double>(raw_frame->number) * kKittiFrameSeconds;
     }
     note(unmapped, "labelled frames that " + devkit.written(kMappingFile) + " does not know");
-    note(without_drive, "labelled frames whose raw drive is missing in " + raw.written(""));
+    if (raw) {
+      note(without_drive, "labelled frames whose raw drive is missing in " + raw->written(""));
+    }
   }
 
   /// Tells the frames of drives that are at fault so. Another list than the devkit's leads
@@ -280,9 +307,8 @@ class KittiObjectDataset : public Dataset {
 
 std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
                                                    const std::filesystem::path& base) {
-  if (spec.raw_root.has_value() != spec.devkit.has_value()) {
-    throw UsageError(std::string("kitti_object: expected raw_root and devkit together, got only ") +
-                     (spec.raw_root ? "raw_root" : "devkit"));
+  if (spec.raw_root && !spec.devkit) {
+    throw UsageError("kitti_object: expected devkit with raw_root, got raw_root alone");
   }
   return std::make_unique<KittiObjectDataset>(spec, base);
 }

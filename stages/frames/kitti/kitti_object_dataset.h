@@ -50,15 +50,17 @@ class ObjectPictures {
 /// With `raw_root` and `devkit`, devkit/mapping leads to the raw drive: FrameRef::index is then the
 /// raw frame's number and `sequence` the drive, and neighbours come from prev_2 where it has them
 /// (its pictures are those of the raw drive, pixel for pixel), else from the drive. Without, index
-/// is 0 for the labelled frame and -K for the frame K before. Times are the drive's timestamps, or
-/// 0.1 s a frame.
+/// is 0 for the labelled frame and -K for the frame K before. With `devkit` alone drive and number
+/// are known, no frames beyond prev_2. Times are the drive's timestamps, or 0.1 s a frame.
+///
+/// calib/NNNNNN.txt, where it is there, gives Annotation::projection (P2).
 ///
 /// What the mapping says is compared with what is stored: of each drive one picture, labelled or
 /// previous, with the raw frame it should be, and the pixels must be equal. Where they are not,
 /// where a previous picture would come before the drive's first frame, and where the drive's
 /// timestamps are damaged, the frames are at fault (LabelledFrame::fault).
 ///
-/// Throws UsageError if only one of `raw_root` and `devkit` is given.
+/// Throws UsageError if `raw_root` is given without `devkit`.
 std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
                                                    const std::filesystem::path& base);
 

@@ -87,6 +87,7 @@ class KittiRawDataset : public Dataset {
   static Outcome<Annotation> annotate(const Drive& drive, std::int64_t number) {
     if (drive.unreadable) return *drive.unreadable;
     Annotation annotation;
+    if (drive.calibration != nullptr) annotation.projection = drive.calibration->projection;
     if (!drive.tracklets) return annotation;
     auto outcome = drive.tracklets->frame(number);
     if (auto* fault = std::get_if<SampleFault>(&outcome)) return std::move(*fault);

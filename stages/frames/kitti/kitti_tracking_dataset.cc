@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "stages/frames/kitti/calibration_file_internal.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/numbered_sequence.h"
@@ -68,6 +69,7 @@ namespace {
 struct Sequence {
   NumberedSequence pictures;
   TrackingLabels labels;
+  std::optional<std::array<double, 12>> projection;  ///< P2 of calib/SEQ.txt, if it is there
 };
 
 class KittiTrackingDataset : public Dataset {
@@ -120,7 +122,11 @@ class KittiTrackingDataset : public Dataset {
       return SampleFault{"expected label_02/SEQUENCE.txt#FRAME, got " + in_quotes(label_key) +
                          ", in " + root_.written("")};
     }
-    return sequence->second.labels.annotation(*frame);
+    auto annotation = sequence->second.labels.annotation(*frame);
+    if (auto* found = std::get_if<Annotation>(&annotation)) {
+      found->projection = sequence->second.projection;
+    }
+    return annotation;
   }
 
   std::string label_place(const std::string& label_key) const override {
@@ -134,12 +140,18 @@ class KittiTrackingDataset : public Dataset {
     return {std::get<std::string>(std::move(text)), root_.written(label)};
   }
 
+  std::optional<std::array<double, 12>> read_projection(const std::string& file) {
+    if (!root_.has_file(file)) return std::nullopt;
+    annotation_files_.push_back(root_.written(file));
+    return CalibrationFile(root_, file).read<12>("P2");
+  }
+
   void add_sequence(const std::string& name) {
     const std::string label = "label_02/" + name + ".txt";
     annotation_files_.push_back(root_.written(label));
     const auto [place, is_new] = sequences_.emplace(
-        name,
-        Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)), read_labels(label)});
+        name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
+                       read_labels(label), read_projection("calib/" + name + ".txt")});
     const Sequence& sequence = place->second;
     note_left_out(sequence.pictures.left_out(), "image_02/" + name);
 

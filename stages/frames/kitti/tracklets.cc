@@ -15,6 +15,7 @@
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
+#include "stages/frames/kitti/calibration_file_internal.h"
 #include "stages/frames/kitti/kitti_label.h"
 
 namespace eventgan {
@@ -188,40 +189,6 @@ Point3 rotate(const std::array<double, 9>& m, const Point3& x) {
           m[6] * x[0] + m[7] * x[1] + m[8] * x[2]};
 }
 
-/// A calibration file: lines "KEY: number number ...".
-class CalibrationFile {
- public:
-  CalibrationFile(std::string text, std::string path)
-      : text_(std::move(text)), path_(std::move(path)) {}
-
-  template <std::size_t N>
-  void read(std::string_view key, std::array<double, N>& values) const {
-    for (const TextLine& line : split_lines(text_)) {
-      const auto columns = split_columns(line.bytes);
-      if (columns.empty() || columns[0] != std::string(key) + ":") continue;
-      const std::string where = "in " + place_in_file(path_, line.number);
-      if (columns.size() != N + 1) {
-        throw InputError("expected " + std::to_string(N) + " numbers for " + std::string(key) +
-                         ", got " + std::to_string(columns.size() - 1) + ", " + where);
-      }
-      for (std::size_t i = 0; i < N; ++i) {
-        const auto number = parse_number<double>(columns[i + 1]);
-        if (!number) {
-          throw InputError("expected finite numbers for " + std::string(key) + ", got " +
-                           in_quotes(columns[i + 1]) + ", " + where);
-        }
-        values[i] = *number;
-      }
-      return;
-    }
-    throw InputError("expected a line " + std::string(key) + ", got none, in " + path_);
-  }
-
- private:
-  std::string text_;
-  std::string path_;
-};
-
 ImageSize to_size(const std::array<double, 2>& width_height, const std::string& path) {
   for (const double side : width_height) {
     if (side < 1 || side > std::numeric_limits<int>::max()) {
@@ -256,15 +223,13 @@ std::optional<RawCalibration> read_raw_calibration(const SourceRoot& root,
   if (!root.has_file(velo_path) || !root.has_file(cam_path)) return std::nullopt;
 
   RawCalibration calibration;
-  const CalibrationFile velo(root.read_or_throw(velo_path), root.written(velo_path));
-  velo.read("R", calibration.rotation);
-  velo.read("T", calibration.translation);
-  const CalibrationFile cam(root.read_or_throw(cam_path), root.written(cam_path));
-  cam.read("R_rect_00", calibration.rectification);
-  cam.read("P_rect_02", calibration.projection);
-  std::array<double, 2> width_height{};
-  cam.read("S_rect_02", width_height);
-  calibration.picture = to_size(width_height, root.written(cam_path));
+  const CalibrationFile velo(root, velo_path);
+  calibration.rotation = velo.read<9>("R");
+  calibration.translation = velo.read<3>("T");
+  const CalibrationFile cam(root, cam_path);
+  calibration.rectification = cam.read<9>("R_rect_00");
+  calibration.projection = cam.read<12>("P_rect_02");
+  calibration.picture = to_size(cam.read<2>("S_rect_02"), root.written(cam_path));
   return calibration;
 }
 

@@ -52,6 +52,7 @@ namespace {
 constexpr int kLabelledFrames = 12;
 constexpr int kPreviousFrames = 3;
 constexpr int kFramesBetween = 2;  // from one labelled frame to the next
+constexpr int kFramesOfADrive = 40;
 
 /// Writes pictures of a scene, each drawn once although it stands beside several labelled frames.
 class FrameFiles {
@@ -72,21 +73,34 @@ class FrameFiles {
   std::map<int, std::filesystem::path> written_;
 };
 
+/// A labelled frame with those before it.
+void write_frame(const std::filesystem::path& root, int number, const RoadScene& scene, int frame,
+                 FrameFiles& files) {
+  const std::string name = numbered(number, 6);
+  for (int back = kPreviousFrames; back > 0; --back) {
+    files.write(frame - back, root / "prev_2" / (name + "_" + numbered(back, 2) + ".png"));
+  }
+  files.write(frame, root / "image_2" / (name + ".png"));
+  write_text(root / "label_2" / (name + ".txt"), kitti_labels(scene.labels(frame)));
+  write_text(root / "calib" / (name + ".txt"), kitti_calibration(scene.camera()));
+}
+
 }  // namespace
 
-void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed) {
+void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes) {
   for (const char* folder : {"image_2", "prev_2", "label_2", "calib"}) make_folder(root / folder);
+  if (scenes > 0) {
+    for (int i = 0; i < scenes; ++i) {
+      const RoadScene scene(seed + static_cast<std::uint64_t>(i));
+      FrameFiles files(scene);
+      write_frame(root, i, scene, kPreviousFrames + i % kFramesOfADrive, files);
+    }
+    return;
+  }
   const RoadScene scene(seed);
   FrameFiles files(scene);
   for (int i = 0; i < kLabelledFrames; ++i) {
-    const std::string name = numbered(i, 6);
-    const int frame = kPreviousFrames + kFramesBetween * i;
-    for (int back = kPreviousFrames; back > 0; --back) {
-      files.write(frame - back, root / "prev_2" / (name + "_" + numbered(back, 2) + ".png"));
-    }
-    files.write(frame, root / "image_2" / (name + ".png"));
-    write_text(root / "label_2" / (name + ".txt"), kitti_labels(scene.labels(frame)));
-    write_text(root / "calib" / (name + ".txt"), kitti_calibration(scene.camera()));
+    write_frame(root, i, scene, kPreviousFrames + kFramesBetween * i, files);
   }
 }
 

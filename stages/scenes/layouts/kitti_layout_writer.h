@@ -17,8 +17,8 @@ std::string kitti_labels(const std::vector<RoadLabel>& labels);
 std::string kitti_calibration(const Intrinsics& camera);
 
 /// Writes a drive (RoadScene) as KITTI's object set lays it out, 12 labelled frames with three
-/// previous frames each: `root`/{image_2, prev_2, label_2, calib}. Throws std::runtime_error naming
-/// the path.
-void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed);
+/// previous frames each: `root`/{image_2, prev_2, label_2, calib}; or, of `scenes` > 0, so many
+/// drives with a labelled frame each. Throws std::runtime_error naming the path.
+void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes = 0);
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include <algorithm>
 #include <array>
 #include <new>
 #include <stdexcept>
@@ -222,10 +223,10 @@ FigureScene scene_of(std::uint64_t seed, int image) {
 
 }  // namespace
 
-void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed) {
+void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes) {
   make_folder(root / "images");
   std::vector<DemoMpiiEntry> entries;
-  for (int image = 0; image < kImages; ++image) {
+  for (int image = 0; image < std::max(kImages, scenes); ++image) {
     const FigureScene scene = scene_of(seed, image);
     const std::string name = numbered(image + 1, 9);
     const std::filesystem::path sequence = root / "sequences" / name;

@@ -168,6 +168,12 @@ def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
     np.testing.assert_allclose(meta["scale"], scale)
 
 
+def test_joints_by_the_names_in_common_use(shards):
+    assert PoseDataset(shards, joints=["right_wrist", "nose"], size=(64, 64))[1][3]["joints_vis"].tolist() == [[1, 1, 0]] * 2
+    with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand, got tail"):
+        PoseDataset(shards, joints=["tail"])
+
+
 def test_pose_items(shards):
     persons = PoseDataset(shards, size=(64, 64))
     assert len(persons) == 3 and persons.joint_names == ["nose", "left hand", "right hand"]

@@ -30,6 +30,7 @@ class SampleStagesTest : public ::testing::Test {
     dataset_ = dataset.get();
     datasets_.push_back(std::move(dataset));
     manifest_.directory = folder_.path();
+    manifest_.sources.resize(1);
     manifest_.output.dtype = StoredType::kFloat32;
     shard_ = {"s.h5", 0, {4, 6}, {}};
     shard_.samples = {

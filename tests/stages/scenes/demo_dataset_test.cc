@@ -83,6 +83,16 @@ TEST(DemoDataset, IsCompleteSmallAndTheSameForTheSameSeed) {
   EXPECT_TRUE(content_of(folder / "empty") == files);
 }
 
+TEST(DemoDataset, ScenesAreStreetsOfTheirOwn) {
+  const TemporaryFolder folder;
+  write_demo_dataset(folder / "two", 7, 2);
+  const Files files = content_of(folder / "two");
+  EXPECT_EQ(files.at("kitti/training/label_2/000001.txt"), kitti_labels(RoadScene(8).labels(4)));
+  EXPECT_EQ(files.count("kitti/training/image_2/000002.png"), 0u);
+  EXPECT_EQ(files.count("kitti/training/prev_2/000001_03.png"), 1u);
+  EXPECT_EQ(files.count("mpii/images/000000007.jpg"), 1u);
+}
+
 TEST(DemoDataset, RefusesAFolderWithContentAndAFile) {
   const TemporaryFolder folder;
   write_file(folder / "full/notes.txt", "mine");
@@ -101,6 +111,11 @@ TEST(DemoManifest, IsAManifestOfTheThreeLayouts) {
   EXPECT_EQ(manifest.sources[1].root, "mpii");
   EXPECT_EQ(manifest.sources[2].dataset, DatasetKind::kHuman36m);
   EXPECT_EQ(manifest.sources[2].root, "h36m");
+
+  const JobManifest split = parse_job_manifest(demo_manifest(7, 400), "/demo", "manifest.json");
+  ASSERT_EQ(split.sources.size(), 5u);
+  EXPECT_EQ(split.sources[1].split, "val");
+  EXPECT_EQ(split.sources[0].selection.fraction[1], split.sources[1].selection.fraction[0]);
 }
 
 }  // namespace

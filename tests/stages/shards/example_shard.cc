@@ -40,6 +40,7 @@ ShardSample sample(int number) {
   ShardSample sample;
   sample.sample_id = "00000" + std::to_string(number);
   sample.sequence = "drive_" + std::to_string(number / 2);
+  sample.origin = {"S1", number == 0 ? "" : "Walking-1", "54138969", sample.sequence};
   sample.pair.previous = {"kitti/prev_2/00000" + std::to_string(number) + "_02.png", 10 + number,
                           -1, 1.0};
   sample.pair.next = {"kitti/image_2/00000" + std::to_string(number) + ".png", 12 + number, -1,
@@ -67,6 +68,7 @@ void add_person(ShardSample& to, const Person& person) {
   mapped.center = half(person.center);
   mapped.scale = person.scale < 0 ? -1 : person.scale / 2;
   if (person.head_box) mapped.head_box = half(*person.head_box);
+  if (person.box) mapped.box = half(*person.box);
   if (person.camera) {
     mapped.camera = {person.camera->focal_x / 2, person.camera->focal_y / 2,
                      half(Point{person.camera->centre_x, 0}).x,
@@ -88,6 +90,7 @@ Person full_person() {
   person.center = {6, 5};
   person.scale = 1.75;
   person.head_box = Rectangle{1, 2, 5, 6.5};
+  person.box = Rectangle{3.5, 4, 8, 8};
   person.joints3d_mm = {std::nullopt, std::array{4.0, 5.0, 3001.0}, std::array{7.0, 8.0, 3002.0}};
   person.camera = Intrinsics{1145.0494, 1143.7811, 7.5, 5.5};
   person.distortion = {.k1 = -0.2071, .k2 = 0.2478, .k3 = -0.0031, .p1 = -0.0014, .p2 = -0.001};
@@ -114,6 +117,7 @@ ShardHeader header(StoredType type, int deflate_level) {
   header.preprocessing = R"({"fit":"stretch","grey":"before_resize","blur":3,"preset":"kitti"})";
   header.plan_hash = std::string(64, 'a');
   header.manifest_text = "{ \"name\": \"d\xc3\xa9mo\" }\n";
+  header.weights = "shipped:8";
   header.weights_hash = std::string(64, 'b');
   header.generator = "a fake generator";
   header.program_version = "0.1.0";
@@ -131,7 +135,8 @@ void add(ExampleShard& shard, ShardSample sample, std::vector<float> values) {
 
 ExampleShard example_shard(StoredType type, int deflate_level) {
   ExampleShard shard{header(type, deflate_level), {}, {}};
-  shard.header.label_schema = {{"Car", "DontCare"}, {"nose", "left hand", "right hand"}};
+  shard.header.label_schema = {
+      {"Car", "DontCare"}, {"nose", "left hand", "right hand"}, {"", "left_wrist", "right_wrist"}};
   const std::size_t size = shard.header.volume.value_count();
 
   ShardSample first = sample(0);
@@ -143,6 +148,10 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   first.annotation.boxes[0].alpha = 1.57f;
   first.annotation.boxes[0].box3d = {1.5f, 1.6f, 3.9f, -2, 1.7f, 20, 0.1f};
   first.annotation.boxes[0].track_id = 7;
+  first.annotation.boxes[0].difficulty = 1;
+  // P' of M = [1/2 0 -1/4; 0 1/2 -1/4]: rows 1/2 r1 - 1/4 r3, 1/2 r2 - 1/4 r3, r3.
+  first.annotation.projection = {700, 0, 8, 40, 0, 700, 6, 2, 0, 0, 1, 4};
+  first.labels.projection = {350, 0, 3.75, 19, 0, 350, 2.75, 0, 0, 0, 1, 4};
   add_person(first, plain_person());
   add_person(first, full_person());
   add(shard, first, volume(0, size));

@@ -81,6 +81,13 @@ class ShardInH5py(unittest.TestCase):
         lens = [-0.2071, 0.2478, -0.0031, -0.0014, -0.001]
         np.testing.assert_array_equal(poses["camera_distortion"], [[np.nan] * 5, lens, [np.nan] * 5])
 
+    def test_optional_texts_and_levels(self):
+        file = self.open("float16-1")
+        self.assertEqual(file["pairs/action"].asstr()[:].tolist(), ["", "Walking-1", "Walking-1", "Walking-1", "Walking-1"])
+        self.assertEqual(file["labels/boxes/difficulty"][:].tolist(), [1, -1, -1])
+        np.testing.assert_array_equal(file["pairs/next_time_s"][:], [1.2, np.nan, 1.2, 1.2, 1.2])
+        self.assertTrue(np.isnan(file["labels/projection"][1:]).all())
+
     def test_a_source_without_labels_has_empty_datasets(self):
         labels = self.open("unlabelled")["labels"]
         self.assertEqual(labels["boxes/xyxy"].shape, (0, 4))

@@ -37,6 +37,7 @@ void expect_same(const ShardHeader& got, const ShardHeader& expected) {
   EXPECT_EQ(got.preprocessing, expected.preprocessing);
   EXPECT_EQ(got.plan_hash, expected.plan_hash);
   EXPECT_EQ(got.manifest_text, expected.manifest_text);
+  EXPECT_EQ(got.weights, expected.weights);
   EXPECT_EQ(got.weights_hash, expected.weights_hash);
   EXPECT_EQ(got.generator, expected.generator);
   EXPECT_EQ(got.program_version, expected.program_version);
@@ -55,15 +56,20 @@ void expect_same(const VolumeLabels& got, const VolumeLabels& expected) {
     EXPECT_EQ(got.persons[i].center, expected.persons[i].center);
     EXPECT_EQ(got.persons[i].scale, expected.persons[i].scale);
     EXPECT_EQ(got.persons[i].head_box, expected.persons[i].head_box);
+    EXPECT_EQ(got.persons[i].box, expected.persons[i].box);
     EXPECT_EQ(got.persons[i].camera, expected.persons[i].camera);
   }
+  EXPECT_EQ(got.projection, expected.projection);
 }
 
-/// All fields; `fault` is in the marker, and times are relative.
+/// All fields; `fault` is in the marker.
 void expect_same(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.valid, expected.valid);
   EXPECT_EQ(got.sample_id, expected.sample_id);
   EXPECT_EQ(got.sequence, expected.sequence);
+  EXPECT_EQ(got.origin, expected.origin);
+  EXPECT_THAT(got.pair.previous.time_s,
+              ::testing::NanSensitiveDoubleEq(expected.pair.previous.time_s));
   EXPECT_EQ(got.pair.previous, expected.pair.previous);
   EXPECT_EQ(got.pair.next, expected.pair.next);
   EXPECT_EQ(got.pair.gap_frames, expected.pair.gap_frames);

@@ -38,10 +38,13 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
   EXPECT_EQ(marker.contents.persons, persons);
   EXPECT_EQ(marker.contents.classes, classes);
   EXPECT_EQ(marker.contents.gaps, gaps);
-  EXPECT_EQ(
+  EXPECT_THAT(
       marker.contents.optional_columns,
-      (std::vector<std::string>{"/labels/poses/joints3d_mm", "/labels/poses/camera",
-                                "/labels/poses/camera_source", "/labels/poses/camera_distortion"}));
+      ElementsAre("/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject", "/pairs/action",
+                  "/pairs/camera", "/pairs/drive", "/labels/projection",
+                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
+                  "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
+                  "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
 TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
@@ -51,7 +54,9 @@ TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
   EXPECT_EQ(marker.contents.persons, std::vector<std::int32_t>{0});
   EXPECT_TRUE(marker.contents.classes.empty());
   EXPECT_EQ(marker.contents.gaps.size(), 1u);
-  EXPECT_TRUE(marker.contents.optional_columns.empty());
+  EXPECT_THAT(marker.contents.optional_columns,
+              ElementsAre("/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject",
+                          "/pairs/camera", "/pairs/drive"));
 }
 
 TEST(ShardContents, OfNoRowsAreEmpty) {

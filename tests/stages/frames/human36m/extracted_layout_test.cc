@@ -143,6 +143,7 @@ TEST_F(ExtractedLayoutTest, ReadsThePersonOfARow) {
   EXPECT_EQ(person.joints[1], (Joint{{11, 11.5}, 0})) << "a place without confidence";
   EXPECT_EQ(person.center, (Point{501, 400}));
   EXPECT_EQ(person.scale, 3);
+  EXPECT_TRUE(person.box);
   EXPECT_FALSE(person.camera);
   ASSERT_TRUE(person.joints3d_mm.at(3));
   EXPECT_EQ(person.joints3d_mm.at(3)->at(1), 2);

@@ -87,8 +87,10 @@ TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
   EXPECT_THAT(person.joints, ElementsAre(Joint{{100.25, 101.25}, -1}, Joint{{110.25, 111.25}, -1}));
   ASSERT_EQ(person.joints3d_mm.size(), 2u);
   EXPECT_EQ(person.joints3d_mm[1], (std::array{-1609.0, -2021.25, 5000.0}));
-  EXPECT_EQ(person.center, kMissingPoint);
-  EXPECT_EQ(person.scale, -1);
+  // Of the joints: pixels 100.25 to 110.25 and 101.25 to 111.25.
+  EXPECT_EQ(person.box, (Rectangle{100.25, 101.25, 111.25, 112.25}));
+  EXPECT_EQ(person.center, (Point{105.25, 106.25}));
+  EXPECT_DOUBLE_EQ(person.scale, 1.2 * 10 / 200);
   EXPECT_FALSE(person.head_box);
   // The file holds [fx, cx, fy, cy].
   EXPECT_EQ(person.camera, (Intrinsics{1250, 1000, 512.5, 515.5}));

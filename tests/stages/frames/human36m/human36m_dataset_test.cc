@@ -55,6 +55,28 @@ TEST(Human36mJointsTest, SeventeenJointsHaveTheSidesOfThoseAmongTheThirtyTwo) {
   EXPECT_EQ(chosen[6], "left_foot");
 }
 
+TEST(Human36mJointsTest, AliasesOfThirtyTwoAreTheNamesOfSeventeenInTheirOrder) {
+  auto aliases = human36m_joint_aliases(32);
+  ASSERT_EQ(aliases.size(), 32u);
+  EXPECT_EQ(aliases[27], "right_wrist");
+  EXPECT_EQ(aliases[4], "");
+  std::erase(aliases, "");
+  EXPECT_EQ(aliases, human36m_joint_names(17));
+  EXPECT_TRUE(human36m_joint_aliases(17).empty());
+}
+
+TEST(DeriveFrame, TakesAnnotatedJointsAlone) {
+  Person person;
+  derive_frame(person);
+  EXPECT_FALSE(person.box);
+  EXPECT_EQ(person.scale, -1);
+  person.joints = {{{10, 40}, -1}, {kMissingPoint, 0}, {{30, 20}, 0}};
+  derive_frame(person);
+  EXPECT_EQ(person.box, (Rectangle{10, 20, 31, 41}));
+  EXPECT_EQ(person.center, (Point{20, 30}));
+  EXPECT_DOUBLE_EQ(person.scale, 0.12);
+}
+
 using State = Neighbour::State;
 
 NumberedSequence stored(const std::vector<std::int64_t>& numbers) {

@@ -127,6 +127,28 @@ TEST(KittiLabel, ADontCareLineHoldsTheValuesForUnknown) {
   EXPECT_THAT(parsed(kDontCare).boxes, ElementsAre(unknown));
 }
 
+/// A car of 100 x height pixels.
+int difficulty(const std::string& truncation, const std::string& occlusion, int height) {
+  return parsed("Car " + truncation + " " + occlusion + " 0 10 20 110 " +
+                std::to_string(20 + height) + " 1 1 1 1 1 1 1\n")
+      .boxes.at(0)
+      .difficulty;
+}
+
+TEST(KittiLabel, TheDifficultyIsTheDevelopmentKits) {
+  EXPECT_EQ(difficulty("0.15", "0", 40), 0);
+  EXPECT_EQ(difficulty("0.15", "0", 39), 1);
+  EXPECT_EQ(difficulty("0.16", "0", 40), 1);
+  EXPECT_EQ(difficulty("0.30", "1", 25), 1);
+  EXPECT_EQ(difficulty("0.31", "1", 25), 2);
+  EXPECT_EQ(difficulty("0.50", "2", 25), 2);
+  EXPECT_EQ(difficulty("0.51", "2", 25), -1);
+  EXPECT_EQ(difficulty("0.00", "3", 90), -1);
+  EXPECT_EQ(difficulty("0.00", "0", 24), -1);
+  EXPECT_EQ(difficulty("-1", "0", 90), -1);  // not known
+  EXPECT_EQ(difficulty("0.00", "-1", 90), -1);
+}
+
 TEST(KittiLabel, KnowsEveryClass) {
   const auto& names = kitti_label_schema().class_names;
   EXPECT_THAT(names, ElementsAre("Car", "Van", "Truck", "Pedestrian", "Person_sitting", "Cyclist",

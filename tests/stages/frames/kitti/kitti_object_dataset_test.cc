@@ -345,9 +345,35 @@ TEST_F(KittiObjectDatasetTest, RawRootAndDevkitGoTogether) {
   EXPECT_THROW(open(), UsageError);
   spec_ = spec();
   spec_.devkit = "devkit";
-  EXPECT_THROW(open(), UsageError);
   spec_.raw_root = "absent";
   EXPECT_THROW(open(), InputError);
+}
+
+TEST_F(KittiObjectDatasetTest, TheDevkitAloneNamesTheDrives) {
+  add_raw();
+  spec_.raw_root.reset();
+  const auto dataset = open();
+  const LabelledFrame& frame = dataset->labelled_frames()[0];
+  EXPECT_EQ(frame.sequence, "2011_09_26_drive_0052_sync");
+  EXPECT_EQ(frame.frame.index, 4);
+  EXPECT_EQ(dataset->neighbour(frame, -2).state, State::kPresent);
+  EXPECT_EQ(dataset->neighbour(frame, -2).frame.index, 2);
+  EXPECT_EQ(dataset->neighbour(frame, -3).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+}
+
+TEST_F(KittiObjectDatasetTest, TheCalibrationGivesTheProjection) {
+  write("training/calib/000000.txt", "P1: 1 2\nP2: 700 0 8 40 0 700 6 2 0 0 1 4\n\n");
+  write("training/calib/000001.txt", "P2: 700 0 8\n");
+  const auto dataset = open();
+  const auto annotation = [&](const char* key) { return dataset->annotation(key); };
+  EXPECT_EQ(std::get<Annotation>(annotation("label_2/000000.txt")).projection,
+            (std::array<double, 12>{700, 0, 8, 40, 0, 700, 6, 2, 0, 0, 1, 4}));
+  EXPECT_EQ(std::get<SampleFault>(annotation("label_2/000001.txt")).reason,
+            "expected 12 numbers for P2, got 3, in training/calib/000001.txt:1");
+  EXPECT_FALSE(std::get<Annotation>(annotation("label_2/000002.txt")).projection);
+  EXPECT_THAT(dataset->annotation_files(), Contains("training/calib/000000.txt"));
 }
 
 TEST(KittiObjectData, RealFramesReachSixStepsThroughTheMapping) {

@@ -1,0 +1,101 @@
+#include "stages/frames/frame_selection.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "stages/frames/source_folders.h"
+
+namespace eventgan {
+namespace {
+
+/// Up to five of some names, and how many more there are.
+std::string some_of(const std::set<std::string>& names) {
+  constexpr std::size_t kNamed = 5;
+  std::string text;
+  std::size_t count = 0;
+  for (const std::string& name : names) {
+    if (++count > kNamed) return text + ", ...";
+    text += (text.empty() ? "" : ", ") + name;
+  }
+  return text;
+}
+
+/// A line each; blank ones, and white space around, are passed over.
+std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) {
+  constexpr std::string_view kBlank = " \t\r";
+  const std::string text = base.read_or_throw(path);
+  std::set<std::string> ids;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string line = text.substr(begin, end - begin);
+    begin = end + 1;
+    const std::size_t first = line.find_first_not_of(kBlank);
+    if (first != std::string::npos) {
+      ids.insert(line.substr(first, line.find_last_not_of(kBlank) - first + 1));
+    }
+  }
+  return ids;
+}
+
+/// Keeps the frames whose word is among `wanted`, which must all occur.
+template <class WordOf>
+void keep(std::vector<LabelledFrame>& frames, const std::set<std::string>& wanted, WordOf word_of,
+          const std::string& what, const std::string& where) {
+  std::set<std::string> missing = wanted;
+  std::erase_if(frames, [&](const LabelledFrame& frame) {
+    const std::string word = word_of(frame);
+    missing.erase(word);
+    return !wanted.contains(word);
+  });
+  if (missing.empty()) return;
+  throw InputError("expected " + what + " of the source, got " + std::to_string(missing.size()) +
+                   " that it does not have (" + some_of(missing) + "), in " + where);
+}
+
+}  // namespace
+
+std::vector<LabelledFrame> select_frames(const std::vector<LabelledFrame>& frames,
+                                         const SourceSpec& spec, const std::filesystem::path& base,
+                                         std::uint64_t seed) {
+  const SelectionSpec& selection = spec.selection;
+  std::vector<LabelledFrame> selected = frames;
+  if (selection.ids) {
+    keep(
+        selected, read_ids(SourceRoot("", base), *selection.ids),
+        [](const LabelledFrame& frame) { return frame.sample_id; }, "sample ids", *selection.ids);
+  }
+  const auto keep_origin = [&](const std::vector<std::string>& words,
+                               std::string FrameOrigin::*part, const char* what) {
+    if (words.empty()) return;
+    keep(
+        selected, {words.begin(), words.end()},
+        [&](const LabelledFrame& frame) {
+          return frame_origin(spec.dataset, frame.sequence).*part;
+        },
+        what, spec.root);
+  };
+  keep_origin(selection.subjects, &FrameOrigin::subject, "subjects");
+  keep_origin(selection.cameras, &FrameOrigin::camera, "cameras");
+  keep_origin(selection.actions, &FrameOrigin::action, "actions");
+
+  const CounterRandom random = CounterRandom(seed).keyed("fraction");
+  const auto [first, last] = selection.fraction;
+  std::erase_if(selected, [&, first = first, last = last](const LabelledFrame& frame) {
+    const double place =
+        random.keyed(frame.sequence.empty() ? frame.sample_id : frame.sequence).uniform(0);
+    return place < first || place >= last;
+  });
+  if (selected.empty() && !frames.empty()) {
+    throw InputError(
+        "expected labelled frames that ids, subjects, cameras, actions and fraction "
+        "leave, got none of " +
+        std::to_string(frames.size()) + ", in " + spec.root);
+  }
+  return selected;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// The labelled frames of a source that its selection takes, in the dataset's order; relative paths
+/// start at `base`. Throws InputError if the list of ids cannot be read, or holds one that the
+/// source does not have; if no frame has a subject, camera or action that is asked for; or if
+/// nothing is left.
+std::vector<LabelledFrame> select_frames(const std::vector<LabelledFrame>& frames,
+                                         const SourceSpec& spec, const std::filesystem::path& base,
+                                         std::uint64_t seed);
+
+}  // namespace eventgan
