@@ -23,15 +23,6 @@ std::string time_axis_text(VolumeUnit unit) {
 
 namespace {
 
-/// IEEE 754 binary16, which HDF5 1.10 has no name for.
-Hdf5Handle half_type() {
-  Hdf5Handle type = number_type(4, true, true);
-  checked(H5Tset_fields(type, 15, 10, 5, 0, 10), "make", "float16");
-  checked(H5Tset_size(type, 2), "make", "float16");
-  checked(H5Tset_ebias(type, 15), "make", "float16");
-  return type;
-}
-
 void write_root_attributes(hid_t file, const ShardHeader& header) {
   write_attribute(file, "format", std::string(kShardFormat));
   write_attribute(file, "format_version", std::int32_t{kShardFormatVersion});
@@ -76,7 +67,7 @@ Hdf5Handle volume_type(StoredType type) {
     case StoredType::kFloat32:
       return number_type(4, true, true);
     case StoredType::kFloat16:
-      return half_type();
+      return number_type(2, true, true);
     case StoredType::kUint8:
       return number_type(1, false, false);
   }

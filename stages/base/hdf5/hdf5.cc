@@ -171,7 +171,21 @@ Hdf5Handle text_type() {
 
 Hdf5Handle bytes_type() { return {H5Tvlen_create(H5T_STD_U8LE), H5Tclose, "make", "a bytes type"}; }
 
+namespace {
+
+/// IEEE 754 binary16, which HDF5 1.10 has no name for.
+Hdf5Handle half_type() {
+  Hdf5Handle type = copy_of(H5T_IEEE_F32LE);
+  checked(H5Tset_fields(type, 15, 10, 5, 0, 10), "make", "float16");
+  checked(H5Tset_size(type, 2), "make", "float16");
+  checked(H5Tset_ebias(type, 15), "make", "float16");
+  return type;
+}
+
+}  // namespace
+
 Hdf5Handle number_type(std::size_t size, bool is_float, bool is_signed) {
+  if (is_float && size == 2) return half_type();
   if (is_float) return copy_of(size == 4 ? H5T_IEEE_F32LE : H5T_IEEE_F64LE);
   switch (size) {
     case 1:

@@ -269,17 +269,29 @@ cv::Mat compose(const PreviewContent& content) {
   return canvas;
 }
 
+std::string png_of(const cv::Mat& picture) {
+  std::vector<unsigned char> png;
+  cv::imencode(".png", picture, png);
+  return {png.begin(), png.end()};
+}
+
 }  // namespace
 
 void write_preview_png(const PreviewContent& content, const std::filesystem::path& path) {
   check(content);
-  std::vector<unsigned char> png;
   try {
-    cv::imencode(".png", compose(content), png);
+    write_file_atomically(path, png_of(compose(content)));
   } catch (const cv::Exception& exception) {
     throw std::runtime_error("cannot draw " + path.string() + ": " + exception.err);
   }
-  write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
+}
+
+std::string time_picture_png(std::span<const float> volume, const VolumeShape& shape) {
+  try {
+    return png_of(time_panel(volume, shape));
+  } catch (const cv::Exception& exception) {
+    throw std::runtime_error("cannot draw a picture of times: " + exception.err);
+  }
 }
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -53,5 +54,10 @@ struct PreviewContent {
 /// Throws std::runtime_error naming the path if it cannot be written; std::invalid_argument if the
 /// sizes do not fit each other. Thread safe.
 void write_preview_png(const PreviewContent& content, const std::filesystem::path& path);
+
+/// The average-timestamp picture of a volume [2 bins, y, x] alone, coloured as above and of the
+/// volume's size, as the bytes of a PNG. Throws std::runtime_error if it cannot be encoded. Thread
+/// safe.
+std::string time_picture_png(std::span<const float> volume, const VolumeShape& shape);
 
 }  // namespace eventgan
