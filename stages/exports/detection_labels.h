@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+
+namespace eventgan {
+
+// Labels as YOLO's and COCO's trainers read them. Rectangles are in volume pixels by their edges (a
+// whole volume is 0, 0, width, height), points by pixel centres, as shards have them. Lines are
+// without line ends. All thread safe.
+
+/// "class xc yc w h": centre and size as shares of the volume's width and height, 9 decimals, each
+/// within 0..1. `box` lies within the volume.
+std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume);
+
+/// data.yaml of `names` (number i is names[i]) and of the splits' lists, SPLIT.txt each.
+std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
+                           const std::vector<std::string>& splits);
+
+/// An entry of COCO's `images`.
+std::string coco_image(std::int64_t id, const std::string& file_name, ImageSize volume,
+                       const std::string& sample_id);
+
+/// What a box and a person have in common in COCO's `annotations`.
+struct CocoPlace {
+  std::int64_t id = 0;
+  std::int64_t image_id = 0;
+  int category_id = 0;
+};
+
+/// An entry for a box: `bbox` is left, top, width, height; `area` that of the box.
+std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd);
+
+/// A joint of an exported person.
+struct ExportedJoint {
+  Point at = kMissingPoint;  ///< volume pixels; kMissingPoint if not annotated
+  int visible = -1;          ///< as Joint::visible
+};
+
+/// An entry for a person: COCO counts a picture from its left edge, so each joint is moved by half
+/// a pixel; visibility 0 not annotated (then x = y = 0), 1 hidden, 2 visible or not known.
+std::string coco_person(const CocoPlace& place, const Rectangle& box,
+                        const std::vector<ExportedJoint>& joints);
+
+/// An entry of `categories`.
+std::string coco_category(int id, const std::string& name);
+
+/// The same of persons; `limbs`: pairs of joints counted from 0, which COCO counts from 1.
+std::string coco_person_category(int id, const std::string& name,
+                                 const std::vector<std::string>& joint_names,
+                                 const std::vector<std::pair<int, int>>& limbs);
+
+}  // namespace eventgan

@@ -1,0 +1,127 @@
+#include "stages/exports/sampled_events.h"
+
+#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+
+namespace eventgan {
+namespace {
+
+/// By inversion; a large mean is the sum of several small ones, since exp(-mean) must not vanish.
+/// Draws counters `place`, `place + stride`, ...
+int draw_poisson(double mean, const CounterRandom& random, std::uint64_t place,
+                 std::uint64_t stride) {
+  constexpr double kLargestStep = 16;
+  int count = 0;
+  for (; mean > 0; mean -= kLargestStep, place += stride) {
+    const double step = std::min(mean, kLargestStep);
+    const double uniform = random.uniform(place);
+    double probability = std::exp(-step);
+    double sum = probability;
+    int drawn = 0;
+    while (uniform >= sum && probability > 0) {
+      probability *= step / ++drawn;
+      sum += probability;
+    }
+    count += drawn;
+  }
+  return count;
+}
+
+/// The events of one volume on their way.
+class Sampling {
+ public:
+  Sampling(const VolumeShape& shape, double duration_s, const CounterRandom& random)
+      : shape_(shape), duration_s_(duration_s), offsets_(random.keyed("offsets")) {}
+
+  /// `counts`: of each value of the volume.
+  std::vector<Event> run(const std::vector<int>& counts) {
+    const std::size_t plane = shape_.size.pixel_count();
+    std::vector<int> bins(static_cast<std::size_t>(shape_.bins));
+    for (std::size_t polarity = 0; polarity < 2; ++polarity) {
+      for (std::size_t pixel = 0; pixel < plane; ++pixel) {
+        for (std::size_t bin = 0; bin < bins.size(); ++bin) {
+          bins[bin] = counts[(polarity * bins.size() + bin) * plane + pixel];
+        }
+        take_pixel(pixel, polarity == 0, bins);
+      }
+    }
+    std::ranges::stable_sort(events_, {}, &Event::t_s);
+    return std::move(events_);
+  }
+
+ private:
+  void add(std::size_t pixel, bool positive, double bin) {
+    const auto width = static_cast<std::size_t>(shape_.size.width);
+    const double share = shape_.bins > 1 ? bin / (shape_.bins - 1) : 0;
+    events_.push_back({static_cast<int>(pixel % width), static_cast<int>(pixel / width),
+                       share * duration_s_, positive});
+  }
+
+  /// `bins` are counts, and are used up.
+  void take_pixel(std::size_t pixel, bool positive, std::vector<int>& bins) {
+    if (std::ranges::all_of(bins, [](int count) { return count == 0; })) return;
+    const std::size_t last = bins.size() - 1;
+    // The first pixel with events in an outermost bin leaves them there.
+    const bool anchors_first = !has_first_ && bins.front() > 0;
+    const bool anchors_last = !has_last_ && bins.back() > 0;
+    has_first_ |= anchors_first;
+    has_last_ |= anchors_last;
+    // Every second pair of neighbours, then the others with what is left.
+    const std::size_t begin = offsets_.bits(draws_++) & 1;
+    for (const std::size_t parity : {begin, 1 - begin}) {
+      for (std::size_t bin = parity; bin < last; bin += 2) {
+        if ((bin == 0 && anchors_first) || (bin + 1 == last && anchors_last)) continue;
+        const int pairs = std::min(bins[bin], bins[bin + 1]);
+        for (int i = 0; i < pairs; ++i) {
+          const double u = 1 - std::sqrt(1 - offsets_.uniform(draws_++));
+          add(pixel, positive, static_cast<double>(bin) + u);
+          add(pixel, positive, static_cast<double>(bin + 1) - u);
+        }
+        bins[bin] -= pairs;
+        bins[bin + 1] -= pairs;
+      }
+    }
+    for (std::size_t bin = 0; bin <= last; ++bin) {
+      for (int i = 0; i < bins[bin]; ++i) add(pixel, positive, static_cast<double>(bin));
+    }
+  }
+
+  const VolumeShape& shape_;
+  double duration_s_;
+  CounterRandom offsets_;
+  std::uint64_t draws_ = 0;
+  bool has_first_ = false;
+  bool has_last_ = false;
+  std::vector<Event> events_;
+};
+
+}  // namespace
+
+std::vector<Event> sample_events(std::span<const float> volume, const VolumeShape& shape,
+                                 double duration_s, EventCounts counts,
+                                 const CounterRandom& random) {
+  const CounterRandom draws = random.keyed("counts");
+  std::vector<int> drawn(volume.size());
+  for (std::size_t i = 0; i < volume.size(); ++i) {
+    drawn[i] = counts == EventCounts::kRounded ? static_cast<int>(std::lround(volume[i]))
+                                               : draw_poisson(volume[i], draws, i, volume.size());
+  }
+  return Sampling(shape, duration_s, random).run(drawn);
+}
+
+std::string events_text(std::span<const Event> events) {
+  std::string text;
+  for (const Event& event : events) {
+    fmt::format_to(std::back_inserter(text), "{:.9f} {} {} {}\n", event.t_s, event.x, event.y,
+                   event.positive ? 1 : 0);
+  }
+  return text;
+}
+
+}  // namespace eventgan
