@@ -41,7 +41,7 @@ class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
         for command in ["convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
-                        "import-weights", "calibrate", "simulate", "train", "realism"]:
+                        "import-weights", "calibrate", "simulate", "train", "realism", "export"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -69,6 +69,7 @@ class CommandLine(program.InFolder):
         _, err = run("convert", path, expect=66)
         self.assertIn("nowhere", err)
         run("inspect", self.folder / "none.h5", expect=66)
+        run("export", self.folder, "--to", "yolo", "--out", self.folder / "export", expect=66)
         run("preview", self.folder / "none.h5", "--out", self.folder / "p", expect=66)
         run("import-weights", self.folder / "none.pt", self.folder / "w.safetensors", expect=66)
         run("simulate", self.folder / "none.json", expect=66)

@@ -1,0 +1,146 @@
+#include <fmt/core.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/options.h"
+#include "pipeline/exports/export_job.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
+
+namespace eventgan {
+namespace {
+
+const std::map<std::string, ExportFormat> kFormats = {
+    {"yolo", ExportFormat::kYolo},     {"coco", ExportFormat::kCoco},
+    {"mpii", ExportFormat::kMpii},     {"davis", ExportFormat::kDavis},
+    {"events", ExportFormat::kEvents}, {"webdataset", ExportFormat::kWebdataset}};
+const std::map<std::string, bool> kIgnored = {{"keep", true}, {"drop", false}};
+const std::map<std::string, bool> kIsFloat32 = {{"float16", false}, {"float32", true}};
+const std::map<std::string, EventCounts> kCounts = {{"poisson", EventCounts::kPoisson},
+                                                    {"rounded", EventCounts::kRounded}};
+const std::map<std::string, EventFile> kEventFiles = {{"text", EventFile::kText},
+                                                      {"mvsec", EventFile::kMvsec}};
+
+/// An option that only some formats have.
+struct OwnOption {
+  const char* name;
+  const char* formats;
+  std::vector<ExportFormat> of;
+};
+const std::vector<OwnOption> kOwnOptions = {
+    {"--classes", "yolo or coco", {ExportFormat::kYolo, ExportFormat::kCoco}},
+    {"--ignored", "yolo or coco", {ExportFormat::kYolo, ExportFormat::kCoco}},
+    {"--full-scale", "yolo or mpii", {ExportFormat::kYolo, ExportFormat::kMpii}},
+    {"--dtype", "davis", {ExportFormat::kDavis}},
+    {"--counts", "events", {ExportFormat::kEvents}},
+    {"--layout", "events", {ExportFormat::kEvents}},
+    {"--seed", "events", {ExportFormat::kEvents}}};
+
+struct ExportArguments {
+  std::string folder;
+  std::string out;
+  std::string classes;
+  bool keep_ignored = false;
+  bool is_float32 = false;
+  ExportOptions options;
+  ProgressStyle progress = ProgressStyle::kAuto;
+};
+
+int run(const CLI::App& command, const ExportArguments& arguments) {
+  ExportOptions options = arguments.options;
+  for (const OwnOption& option : kOwnOptions) {
+    const bool has_it = std::ranges::find(option.of, options.to) != option.of.end();
+    if (command.count(option.name) > 0 && !has_it) {
+      throw UsageError(fmt::format("{}: expected with --to {}, got another format", option.name,
+                                   option.formats));
+    }
+  }
+  if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
+  options.out = arguments.out;
+  if (command.count("--classes") > 0) options.classes = arguments.classes;
+  if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;
+  if (arguments.is_float32) options.dtype = StoredType::kFloat32;
+  const StopSignal signal;
+  options.stop = [&] { return signal.requested(); };
+  options.make_progress = [&](std::int64_t total) {
+    return show_progress(arguments.progress, total, {"samples", /*has_bytes=*/false});
+  };
+  const ExportReport report = run_export(arguments.folder, options);
+  std::cout << (arguments.progress == ProgressStyle::kJson ? to_json(report) : to_text(report))
+            << std::flush;
+  return kComplete;
+}
+
+template <class Value>
+CLI::CheckedTransformer one_of(const std::map<std::string, Value>& words) {
+  CLI::CheckedTransformer transformer(words);
+  transformer.description("");
+  return transformer;
+}
+
+}  // namespace
+
+void add_export_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "export",
+      "Writes what other trainers read, from a finalized folder; run again, it does what "
+      "is left");
+  const auto arguments = std::make_shared<ExportArguments>();
+  ExportOptions& options = arguments->options;
+  command->add_option("DIR", arguments->folder, "A folder that finalize has completed")->required();
+  command
+      ->add_option("--to", options.to,
+                   "yolo, coco, mpii, davis, webdataset or events (manifests/guides/exports.md)")
+      ->required()
+      ->transform(one_of(kFormats))
+      ->option_text("FORMAT");
+  command->add_option("--out", arguments->out, "Folder to write to")
+      ->required()
+      ->option_text("FOLDER");
+  command->add_option("--split", options.splits, "Only this split; may be given several times")
+      ->option_text("NAME")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--classes", arguments->classes,
+                   "yolo, coco: JSON of class names and their numbers, null to leave one out")
+      ->option_text("FILE");
+  command
+      ->add_option("--ignored", arguments->keep_ignored,
+                   "keep or drop boxes to ignore (DontCare), yolo: as a class of their own, "
+                   "default drop; coco: as crowds, default keep")
+      ->transform(one_of(kIgnored))
+      ->option_text("WHAT");
+  command
+      ->add_option("--full-scale", options.full_scale,
+                   "yolo, mpii: the value that becomes 255; default: 1")
+      ->check(CLI::Range(1e-6, 1e6))
+      ->option_text("VALUE");
+  command->add_option("--dtype", arguments->is_float32, "davis: float16 (default) or float32")
+      ->transform(one_of(kIsFloat32))
+      ->option_text("TYPE");
+  command->add_option("--counts", options.counts, "events: poisson (default) or rounded")
+      ->transform(one_of(kCounts))
+      ->option_text("RULE");
+  command
+      ->add_option("--layout", options.event_file,
+                   "events: text, lines t x y p (default), or mvsec, HDF5")
+      ->transform(one_of(kEventFiles))
+      ->option_text("LAYOUT");
+  command->add_option("--seed", options.seed, "events: of all draws; default: 0")
+      ->option_text("NUMBER");
+  command->add_option("--threads", options.threads, "Threads to use; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  command->add_flag("--overwrite", options.overwrite, "Replace another export in FOLDER");
+  add_progress_option(*command, arguments->progress);
+  command->callback([command, arguments, &exit_code] { exit_code = run(*command, *arguments); });
+}
+
+}  // namespace eventgan

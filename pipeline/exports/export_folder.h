@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <mutex>
+#include <set>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+namespace eventgan {
+
+/// What says that an export is complete.
+inline constexpr char kExportDescription[] = "export.json";
+
+/// The folder that an export is written to, and what of it is done: .export/export.txt says which
+/// export it is, .export/STEP.json is a receipt, written after all files of a step and listing them
+/// with their sizes. A step is done if its receipt is of the same input and each of its files has
+/// its size; else it is done again, and export.json, a step of its own, goes before anything else
+/// is written. Thread safe.
+class ExportFolder {
+ public:
+  /// Begins, or goes on with, the export that `identity` describes, a line for each of its
+  /// settings. Throws UsageError if the folder holds another one or other files; with `overwrite`
+  /// another export's files go first.
+  ExportFolder(std::filesystem::path folder, const std::string& identity, bool overwrite);
+
+  /// Files that are made together, and their receipt.
+  class Step {
+   public:
+    /// `input`: hash of everything the files are made from.
+    Step(ExportFolder& folder, std::string name, std::string input);
+
+    bool is_done() const;
+
+    /// Where to write the file `relative`, whose folder is there afterwards. The file counts as
+    /// this step's, and must be under its name at `finish`. Thread safe, as is `write`.
+    std::filesystem::path file(const std::string& relative);
+    void write(const std::string& relative, std::string_view bytes);
+
+    /// Writes the receipt; files of an earlier one that were not made again go.
+    void finish();
+
+   private:
+    ExportFolder& folder_;
+    std::string name_;
+    std::string input_;
+    std::mutex mutex_;
+    std::vector<std::string> files_;
+  };
+
+  const std::filesystem::path& path() const { return folder_; }
+
+ private:
+  std::filesystem::path receipt(const std::string& step) const;
+  void make_folder(const std::filesystem::path& folder);
+  void discard();
+  void begin(const std::string& step);
+
+  std::filesystem::path folder_;
+  std::mutex mutex_;
+  std::set<std::filesystem::path> made_;
+  bool has_begun_ = false;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,197 @@
+#include "pipeline/exports/export_input.h"
+
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_scan.h"
+#include "stages/base/files/input_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr char kWayOut[] = " (eventgan finalize writes it anew)";
+
+nlohmann::json read_dataset_json(const fs::path& folder) {
+  const fs::path file = folder / kDescriptionName;
+  std::string reason;
+  const auto text = try_read_file(file, reason);
+  if (!text) {
+    throw InputError("expected a folder that eventgan finalize has completed, got no " +
+                     file.string() + ": " + reason);
+  }
+  FaultList faults(file.string());
+  auto json = parse_json_text(*text, faults);
+  if (!faults.empty()) throw InputError(faults.text() + kWayOut);
+  return *std::move(json);
+}
+
+/// Throws InputError unless the shard stands, as far as `depth` goes, with the hash that
+/// dataset.json has.
+ShardState require_shard(const fs::path& folder, const ShardOutline& outline,
+                         const std::string& plan_hash, const std::string& sha256, ScanDepth depth) {
+  ShardState state = shard_state(folder, outline, plan_hash, depth);
+  if (!state.done()) {
+    throw InputError(state.faults.empty() ? fmt::format("expected a shard, got none, in {}",
+                                                        (folder / outline.name).string())
+                                          : state.faults.front());
+  }
+  if (state.marker->sha256 != sha256) {
+    throw InputError(
+        fmt::format("expected the shard that was finalized, SHA-256 {}, got {}, in "
+                    "{} (eventgan finalize takes it in)",
+                    sha256, state.marker->sha256, (folder / outline.name).string()));
+  }
+  return state;
+}
+
+}  // namespace
+
+ExportInput::ExportInput(const fs::path& folder, const std::vector<std::string>& splits)
+    : folder_(folder) {
+  try {
+    read_description(splits);
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(fmt::format("expected what eventgan finalize writes, got {}, in {}{}",
+                                 error.what(), (folder / kDescriptionName).string(), kWayOut));
+  }
+  name_sources();
+}
+
+void ExportInput::read_description(const std::vector<std::string>& splits) {
+  const nlohmann::json json = read_dataset_json(folder_);
+  const fs::path file = folder_ / kDescriptionName;
+  if (json.at("format") != "eventgan-dataset" || json.at("version") != 1) {
+    throw InputError("expected eventgan-dataset, version 1, got another document, in " +
+                     file.string());
+  }
+  const FrozenOutline frozen = read_frozen_outline(folder_);
+  name_ = json.at("name");
+  plan_hash_ = json.at("plan_hash");
+  if (plan_hash_ != frozen.hash) {
+    throw InputError("expected the plan of dataset.json, SHA-256 " + plan_hash_ + ", got " +
+                     frozen.hash + ", in " + (folder_ / "plan.json").string() + kWayOut);
+  }
+  missing_ = json.at("missing");
+  for (const auto& source : json.at("sources")) {
+    ExportSource& known = sources_.emplace_back();
+    known.dataset = source.at("dataset");
+    known.split = source.at("split");
+    if (source.at("class_names").is_array()) known.class_names = source.at("class_names");
+    if (source.at("joint_names").is_array()) known.joint_names = source.at("joint_names");
+  }
+  std::vector<std::string> there;
+  for (const ExportSource& source : sources_) {
+    if (std::ranges::find(there, source.split) == there.end()) there.push_back(source.split);
+  }
+  for (const std::string& split : splits) {
+    if (std::ranges::find(there, split) != there.end()) continue;
+    throw UsageError(
+        fmt::format("--split: expected one of {}, got {}", fmt::join(there, ", "), split));
+  }
+  for (const std::string& split : there) {
+    if (splits.empty() || std::ranges::find(splits, split) != splits.end()) {
+      splits_.push_back(split);
+    }
+  }
+  std::map<std::string, std::string> hashes;
+  for (const auto& shard : json.at("shards")) hashes[shard.at("name")] = shard.at("sha256");
+  for (const ShardOutline& outline : frozen.plan.shards) {
+    const auto hash = hashes.find(outline.name);
+    const std::string& split = sources_.at(static_cast<std::size_t>(outline.source)).split;
+    if (hash == hashes.end() || std::ranges::find(splits_, split) == splits_.end()) continue;
+    ShardState state =
+        require_shard(folder_, outline, plan_hash_, hash->second, ScanDepth::kMarker);
+    shards_.push_back(
+        {outline, hash->second, state.marker->valid, std::move(state.marker->quarantined)});
+  }
+}
+
+void ExportInput::name_sources() {
+  std::map<std::string, int> in_split;
+  for (const ExportSource& source : sources_) ++in_split[source.split];
+  std::map<std::string, int> of_kind;
+  for (ExportSource& source : sources_) {
+    if (in_split[source.split] == 1) continue;
+    const int number = ++of_kind[source.split + " " + source.dataset];
+    source.name_prefix =
+        source.dataset + (number > 1 ? "-" + std::to_string(number) : std::string()) + "+";
+  }
+}
+
+ShardReader ExportInput::open(const ExportShard& shard) const {
+  const std::string& name = shard.outline.name;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!hashed_.contains(name)) {
+      require_shard(folder_, shard.outline, plan_hash_, shard.sha256, ScanDepth::kBytes);
+      hashed_.insert(name);
+    }
+  }
+  return ShardReader(folder_ / name);
+}
+
+std::vector<ExportSet> ExportInput::sets(bool joints_only, bool by_size) const {
+  struct Key {
+    std::string split, dataset;
+    std::vector<std::string> joints;
+    ImageSize size;
+    bool operator==(const Key&) const = default;
+  };
+  std::vector<Key> keys;
+  std::vector<ExportSet> sets;
+  for (const ExportShard& shard : shards_) {
+    const ExportSource& source = source_of(shard);
+    if (joints_only && !source.has_joints()) continue;
+    Key key{source.split, source.dataset, source.joint_names, {}};
+    if (by_size) {
+      key.size =
+          shard.outline.size_unknown ? open(shard).header().volume.size : shard.outline.volume_size;
+    }
+    const auto at = std::ranges::find(keys, key) - keys.begin();
+    if (static_cast<std::size_t>(at) == keys.size()) {
+      keys.push_back(key);
+      sets.push_back({"", source.split, {}});
+    }
+    sets[static_cast<std::size_t>(at)].shards.push_back(&shard);
+  }
+  // The shortest name that tells a set from the others of its split.
+  for (std::size_t i = 0; i < sets.size(); ++i) {
+    const auto others = [&](auto same) {
+      int count = -1;  // itself
+      for (const Key& key : keys) count += same(key, keys[i]) ? 1 : 0;
+      return count;
+    };
+    const auto same_split = [](const Key& a, const Key& b) { return a.split == b.split; };
+    const auto same_kind = [&](const Key& a, const Key& b) {
+      return same_split(a, b) && a.dataset == b.dataset;
+    };
+    const auto same_size = [&](const Key& a, const Key& b) {
+      return same_kind(a, b) && a.size == b.size;
+    };
+    std::string& name = sets[i].name;
+    name = keys[i].split;
+    if (others(same_split) > 0) name += "-" + keys[i].dataset;
+    if (by_size && others(same_kind) > 0) {
+      name += fmt::format("-{}x{}", keys[i].size.height, keys[i].size.width);
+    }
+    const auto earlier = std::count_if(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(i),
+                                       [&](const Key& key) { return same_size(key, keys[i]); });
+    if (earlier > 0) name += "-" + std::to_string(earlier + 1);
+  }
+  return sets;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,75 @@
+#include <fmt/core.h>
+
+#include "pipeline/exports/exporter_internal.h"
+#include "stages/exports/pose_list.h"
+
+namespace eventgan {
+namespace {
+
+/// annot/SET.json, annot/gt_SET.mat, images/SPLIT/NAME.{png,npy}.
+class MpiiExporter : public Exporter {
+ public:
+  explicit MpiiExporter(const ExportOptions& options) : full_scale_(options.full_scale) {}
+
+  std::string settings() const override { return fmt::format("full scale {}\n", full_scale_); }
+
+  bool takes(const ExportSource& source) const override { return source.has_joints(); }
+
+  void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
+                   ExportFolder::Step& step) const override {
+    work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
+      write_picture_pair(sample, "images/" + sample.source.split, full_scale_, step);
+    });
+  }
+
+  void finish(const ExportWork& work, const std::vector<const ExportShard*>&) const override {
+    for (const ExportSet& set : work.input.sets(/*joints_only=*/true, /*by_size=*/false)) {
+      write_list(work, set);
+    }
+  }
+
+  void account(const OutgoingSample& sample, LeftOut& left_out) const override {
+    account_full_scale(sample, full_scale_, left_out);
+    const JointChoice choice = choose_joints(sample.reader.header().label_schema);
+    PckhTruth truth(choice.names);
+    for (const VolumePerson& person : sample.labels.labels.persons) {
+      if (const std::string why = why_not_listed(person, choice); !why.empty()) {
+        ++left_out["persons: " + why];
+      } else if (!truth.add(listed_person(person, choice))) {
+        ++left_out["persons without a head's size, in gt_*.mat with all joints missing"];
+      }
+    }
+  }
+
+ private:
+  static void write_list(const ExportWork& work, const ExportSet& set) {
+    ExportFolder::Step step(work.folder, "annot-" + set.name, input_hash(set.shards));
+    if (step.is_done()) return;
+    const JointChoice choice = choose_joints(work.input.open(*set.shards[0]).header().label_schema);
+    PckhTruth truth(choice.names);
+    std::string list = "[";
+    const char* before = "\n";
+    work.walk(set.shards, [&](const OutgoingSample& sample) {
+      for (const VolumePerson& person : sample.labels.labels.persons) {
+        if (!why_not_listed(person, choice).empty()) continue;
+        const ListedPerson listed = listed_person(person, choice);
+        truth.add(listed);
+        list += before + mpii_entry(set.split + "/" + sample.name + ".png", listed);
+        before = ",\n";
+      }
+    });
+    step.write("annot/" + set.name + ".json", list + "\n]\n");
+    if (!truth.is_empty()) truth.write(step.file("annot/gt_" + set.name + ".mat"));
+    step.finish();
+  }
+
+  double full_scale_;
+};
+
+}  // namespace
+
+std::unique_ptr<Exporter> mpii_exporter(const ExportOptions& options) {
+  return std::make_unique<MpiiExporter>(options);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,163 @@
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "manifests/documents/json_text_internal.h"
+#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/exports/array_files.h"
+#include "stages/shards/codec/volume_codec.h"
+
+namespace eventgan {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json json_of(Point point) {
+  return point == kMissingPoint ? Json() : Json::array({point.x, point.y});
+}
+
+Json json_of(const Rectangle& box) { return {box.left, box.top, box.right, box.bottom}; }
+
+Json json_of(const std::optional<Rectangle>& box) { return box ? json_of(*box) : Json(); }
+
+Json box_json(const Box& box, const VolumeBox& in_volume, const std::vector<std::string>& names) {
+  return {{"class", names.at(static_cast<std::size_t>(box.class_id))},
+          {"xyxy", json_of(in_volume.clipped)},
+          {"xyxy_unclipped", json_of(in_volume.unclipped)},
+          {"xyxy_source", json_of(box.xyxy)},
+          {"ignore", in_volume.ignore},
+          {"truncation", box.truncation},
+          {"occlusion", box.occlusion},
+          {"difficulty", box.difficulty},
+          {"alpha", box.alpha},
+          {"box3d", box.box3d},
+          {"track_id", box.track_id}};
+}
+
+Json person_json(const Person& person, const VolumePerson& in_volume) {
+  Json joints = Json::array();
+  Json joints_source = Json::array();
+  Json visible = Json::array();
+  for (std::size_t j = 0; j < person.joints.size(); ++j) {
+    joints.push_back(json_of(in_volume.joints.at(j)));
+    joints_source.push_back(json_of(person.joints[j].at));
+    visible.push_back(person.joints[j].visible);
+  }
+  Json json = {{"joints", joints},
+               {"joints_source", joints_source},
+               {"visible", visible},
+               {"center", json_of(in_volume.center)},
+               {"scale", in_volume.scale > 0 ? Json(in_volume.scale) : Json()},
+               {"head_box", json_of(in_volume.head_box)},
+               {"box", json_of(in_volume.box)}};
+  if (!person.joints3d_mm.empty()) {
+    Json& joints3d = json["joints3d_mm"] = Json::array();
+    for (const auto& joint : person.joints3d_mm) joints3d.push_back(joint ? Json(*joint) : Json());
+  }
+  if (in_volume.camera) {
+    const Intrinsics& camera = *in_volume.camera;
+    json["camera"] = {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
+  }
+  return json;
+}
+
+std::string labels_json(const OutgoingSample& sample) {
+  const ShardSample& labels = sample.labels;
+  const LabelSchema& schema = sample.reader.header().label_schema;
+  Json json = {{"sample_id", labels.sample_id},
+               {"dataset", sample.source.dataset},
+               {"split", sample.source.split},
+               {"sequence", labels.sequence},
+               {"previous", labels.pair.previous.path},
+               {"next", labels.pair.next.path},
+               {"gap_frames", labels.pair.gap_frames},
+               {"gap_s", labels.pair.gap_s()},
+               {"label_position", labels.pair.label_position},
+               {"source_size", {labels.source_size.height, labels.source_size.width}},
+               {"source_to_volume", labels.source_to_volume}};
+  if (sample.source.has_boxes()) {
+    Json& boxes = json["boxes"] = Json::array();
+    for (std::size_t i = 0; i < labels.annotation.boxes.size(); ++i) {
+      boxes.push_back(
+          box_json(labels.annotation.boxes[i], labels.labels.boxes[i], schema.class_names));
+    }
+  }
+  if (sample.source.has_joints()) {
+    json["joint_names"] = schema.joint_names;
+    Json& persons = json["persons"] = Json::array();
+    for (std::size_t i = 0; i < labels.annotation.persons.size(); ++i) {
+      persons.push_back(person_json(labels.annotation.persons[i], labels.labels.persons[i]));
+    }
+  }
+  return dump_json(json) + "\n";
+}
+
+const char* dtype_of(StoredType type) {
+  switch (type) {
+    case StoredType::kFloat32:
+      return "<f4";
+    case StoredType::kFloat16:
+      return "<f2";
+    case StoredType::kUint8:
+      break;
+  }
+  return "|u1";
+}
+
+/// `volume` as the shard stores it, and its `scale`.
+std::string volume_npz(const OutgoingSample& sample) {
+  const ShardHeader& header = sample.reader.header();
+  const VolumeShape& shape = header.volume;
+  const std::size_t size_bytes = shape.value_count() * stored_size(header.dtype);
+  const auto stored = decode_chunk(sample.reader.stored_chunk(sample.slot), header.dtype,
+                                   header.deflate_level, size_bytes);
+  if (!stored) {
+    throw std::runtime_error("expected a sound volume, got a damaged one, in " + header.name +
+                             " (" + sample.labels.sample_id + ")");
+  }
+  const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),
+                                       static_cast<std::size_t>(shape.size.height),
+                                       static_cast<std::size_t>(shape.size.width)};
+  return npz_file({{"volume", npy_file(dtype_of(header.dtype), sides, *stored)},
+                   {"scale", npy_file("<f4", {}, std::vector<float>{sample.labels.scale})}});
+}
+
+/// SHARD.tar with NAME.npz and NAME.json.
+class WebdatasetExporter : public Exporter {
+ public:
+  std::string settings() const override { return ""; }
+
+  void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
+                   ExportFolder::Step& step) const override {
+    AtomicFile file(
+        step.file(shard.outline.name.substr(0, shard.outline.name.rfind('.')) + ".tar"));
+    file.create();
+    // Some samples at a time: a shard may be large.
+    constexpr std::size_t kAtOnce = 16;
+    const auto count = static_cast<std::size_t>(reader.header().sample_count);
+    for (std::size_t first = 0; first < count; first += kAtOnce) {
+      work.check_stop();
+      std::array<std::string, kAtOnce> members;
+      for_each_index(std::min(kAtOnce, count - first), work.threads, [&](std::size_t i) {
+        work.with_sample(shard, reader, static_cast<int>(first + i),
+                         [&](const OutgoingSample& sample) {
+                           members[i] = tar_member(sample.name + ".npz", volume_npz(sample)) +
+                                        tar_member(sample.name + ".json", labels_json(sample));
+                         });
+      });
+      for (const std::string& member : members) file.write(member);
+    }
+    file.write(tar_end());
+    file.publish();
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Exporter> webdataset_exporter() { return std::make_unique<WebdatasetExporter>(); }
+
+}  // namespace eventgan

@@ -1,0 +1,650 @@
+"""Exports of a finalized folder, each read from outside: with numpy, h5py, scipy and tarfile, and by the trainers that it is for."""
+
+import collections
+import io
+import json
+import pathlib
+import shutil
+import signal
+import subprocess
+import sys
+import tarfile
+import tempfile
+import textwrap
+import time
+import unittest
+
+import h5py
+import numpy as np
+import PIL.Image
+import scipy.io
+import yaml
+
+import failing_files
+import program
+import small_job
+from folders import content, same_folder
+from program import run, text
+
+TRAINERS = program.SHARED.parent / "trainers"
+PIXELS = 0.01  # the largest error of a label that is mapped back
+FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events"]
+BROKEN = "000003"  # of KITTI: quarantined
+
+
+def setUpModule():
+    global folder, finalized, samples
+    folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-export-"))
+    demo = folder / "demo"
+    run("make-demo", demo)
+    picture = demo / "kitti" / "training" / "image_2" / f"{BROKEN}.png"
+    picture.write_bytes(picture.read_bytes()[:-50])
+    kitti = {"dataset": "kitti_object", "root": "kitti/training", "pairs": program.pairs([1, 2, 3])}
+    sources = [kitti, {**kitti, "split": "val"},
+               {"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2, 4], side="around")},
+               {"dataset": "human36m", "root": "h36m", "layout": "fetch", "pairs": program.pairs([1, 2], side="after")}]
+    manifest = program.manifest(
+        sources, image={"width": 173, "height": 130, "fit": "letterbox", "preset": "mpii"},
+        generator={"kind": "difference"}, volume={"bins": 9, "normalize": "none"},
+        errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})
+    (demo / "manifest.json").write_text(json.dumps(manifest))
+    finalized = demo / "out"
+    run("convert", demo / "manifest.json", "--progress", "none")
+    run("finalize", finalized)
+    samples = read_samples(finalized)
+
+
+def tearDownModule():
+    shutil.rmtree(folder)
+
+
+def read_samples(out):
+    """Each sample of the shards that is not quarantined: its columns, by (split, dataset, sample id)."""
+    found = {}
+    for name in [shard["name"] for shard in json.loads((out / "dataset.json").read_text())["shards"]]:
+        with h5py.File(out / name) as shard:
+            classes = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
+            joints = [text(name) for name in shard["labels/poses"].attrs["joint_names"]]
+            aliases = [text(name) for name in shard["labels/poses"].attrs.get("joint_aliases", joints)]
+            for i in np.flatnonzero(shard["valid"][:]):
+                sample = {"shard": name, "slot": i, "volume": shard["events/volume"][i], "classes": classes,
+                          "joints": [j for j, alias in enumerate(aliases) if alias], "joint_names": [a for a in aliases if a]}
+                for kind in ("boxes", "poses"):
+                    group = shard["labels"][kind]
+                    rows = slice(*group["offsets"][i:i + 2])
+                    sample[kind] = {key: group[key][rows] for key in group if key != "offsets"}
+                for column in ("source_to_volume", "gap_s", "label_index"):
+                    sample[column] = shard["pairs"][column][i]
+                key = (text(shard.attrs["split"]), text(shard.attrs["dataset"]), text(shard["pairs/sample_id"][i]))
+                found[key] = sample
+    return found
+
+
+def of(split=None, dataset=None):
+    return {key: sample for key, sample in samples.items()
+            if split in (None, key[0]) and dataset in (None, key[1])}
+
+
+def name_of(key):
+    """What a sample's files are called; train has several sources."""
+    split, dataset, sample_id = key
+    return (f"{dataset}+" if split == "train" else "") + sample_id.replace("/", "+")
+
+
+def edges_to_source(sample, boxes):
+    """Left, top, right, bottom in volume pixels as source pixels: edges lie between pixels."""
+    matrix = sample["source_to_volume"]
+    scale = np.array([matrix[0, 0], matrix[1, 1]] * 2)
+    shift = np.array([matrix[0, 2], matrix[1, 2]] * 2) + 0.5 - 0.5 * scale
+    return (np.asarray(boxes) - shift) / scale
+
+
+def points_to_source(sample, points):
+    matrix = sample["source_to_volume"]
+    return (np.asarray(points) - matrix[:, 2]) / np.array([matrix[0, 0], matrix[1, 1]])
+
+
+def events_volume(rows, shape, gap):
+    """The volume [18, H, W] of events t, x, y, p, with times from 0 to `gap`."""
+    volume = np.zeros(shape)
+    bins = shape[0] // 2
+    for t, x, y, p in rows:
+        star = (bins - 1) * t / gap
+        low = min(int(star), bins - 2)
+        channel = (0 if p > 0 else bins) + low
+        volume[channel, int(y), int(x)] += 1 - (star - low)
+        volume[channel + 1, int(y), int(x)] += star - low
+    return volume
+
+
+def split_for(to):
+    """A small one: of persons there is but train."""
+    return "train" if to == "mpii" else "val"
+
+
+class Export(unittest.TestCase):
+    def setUp(self):
+        self.out = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "export"
+
+    def export(self, to, *arguments, out=None, source=None, expect=0):
+        return run("export", source or finalized, "--to", to, "--out", out or self.out, "--progress", "none", *arguments,
+                   expect=expect)
+
+    def described(self, out=None):
+        return json.loads(((out or self.out) / "export.json").read_text())
+
+
+class Formats(Export):
+    def test_export_json_names_every_sample(self):
+        out, _ = self.export("webdataset")
+        described = self.described()
+        self.assertEqual({(entry["split"], entry["sample_id"], entry["name"]) for entry in described["samples"]},
+                         {(key[0], key[2], name_of(key)) for key in samples})
+        self.assertEqual([entry["sample_id"] for entry in described["quarantined"]], [BROKEN, BROKEN])
+        self.assertIn(f"{BROKEN}.png", described["quarantined"][0]["reason"])
+        self.assertIn("2 quarantined", out)
+
+    def test_yolo(self):
+        self.export("yolo")
+        data = yaml.safe_load((self.out / "data.yaml").read_text())
+        self.assertEqual(data["nc"], 8)
+        self.assertEqual(data["channels"], 18)
+        self.assertNotIn("DontCare", data["names"])
+        for split in ("train", "val"):
+            lines = (self.out / data[split]).read_text().split()
+            self.assertEqual(lines, [f"./images/{split}/{name_of(key)}.png" for key in of(split, "kitti_object")])
+        boxes = 0
+        for key, sample in of(dataset="kitti_object").items():
+            stem = f"{key[0]}/{name_of(key)}"
+            codes = np.load(self.out / "images" / f"{stem}.npy")
+            self.assertEqual(codes.dtype, np.uint8)
+            expected = np.round(np.minimum(sample["volume"].astype(float), 1) * 255)
+            np.testing.assert_array_equal(codes, expected.transpose(1, 2, 0))
+            with PIL.Image.open(self.out / "images" / f"{stem}.png") as picture:
+                self.assertEqual((picture.height, picture.width), codes.shape[:2])
+            found = np.loadtxt(self.out / "labels" / f"{stem}.txt", ndmin=2).reshape(-1, 5)
+            kept = np.flatnonzero(sample["boxes"]["ignore"] == 0)
+            self.assertEqual([data["names"][int(row[0])] for row in found],
+                             [sample["classes"][sample["boxes"]["class_id"][i]] for i in kept])
+            size = np.array([codes.shape[1], codes.shape[0]])
+            centre, extent = found[:, 1:3] * size, found[:, 3:5] * size
+            in_volume = np.hstack([centre - extent / 2, centre + extent / 2])
+            np.testing.assert_allclose(in_volume, sample["boxes"]["xyxy"][kept], atol=1e-4)
+            whole = (sample["boxes"]["xyxy"] == sample["boxes"]["xyxy_unclipped"]).all(axis=1)[kept]
+            np.testing.assert_allclose(edges_to_source(sample, in_volume)[whole],
+                                       sample["boxes"]["xyxy_source"][kept][whole], atol=PIXELS)
+            boxes += whole.sum()
+        self.assertGreater(boxes, 20)
+        left_out = self.described()["left_out"]
+        self.assertEqual(sum(count for what, count in left_out.items() if what.startswith("samples of ")),
+                         len(of(dataset="mpii")) + len(of(dataset="human36m")))
+
+    def test_yolo_classes_and_ignored(self):
+        classes = folder / "classes.json"
+        classes.write_text(json.dumps({"Car": 0, "Van": 0, "Pedestrian": 1, "Truck": None}))
+        out, _ = self.export("yolo", "--classes", classes, "--ignored", "keep", "--split", "val")
+        data = yaml.safe_load((self.out / "data.yaml").read_text())
+        self.assertEqual(data["names"], ["Car/Van", "Pedestrian", "ignored"])
+        self.assertNotIn("train", data)
+        expected, found = collections.Counter(), collections.Counter()
+        for key, sample in of("val").items():
+            for class_id, ignore in zip(sample["boxes"]["class_id"], sample["boxes"]["ignore"]):
+                name = sample["classes"][class_id]
+                expected["ignored" if ignore else "Car/Van" if name in ("Car", "Van") else name] += 1
+            for line in (self.out / "labels" / "val" / f"{name_of(key)}.txt").read_text().splitlines():
+                found[data["names"][int(line.split()[0])]] += 1
+        left_out = {name: count for name, count in expected.items() if name not in data["names"]}
+        self.assertEqual(found, {name: expected[name] for name in data["names"] if expected[name]})
+        described = self.described()["left_out"]
+        for name, count in left_out.items():
+            self.assertEqual(described[f"boxes of class {name}"], count)
+            self.assertIn(f"left out: {count} boxes of class {name}", out)
+
+    def test_yolo_full_scale(self):
+        self.export("yolo", "--split", "val", "--full-scale", "4")
+        beyond = sum(sample["volume"].max() > 4 for sample in of("val").values())
+        counted = self.described()["left_out"].get("samples' values above the full scale (cut to it)", 0)
+        self.assertEqual(counted, beyond)
+        for key, sample in of("val").items():
+            codes = np.load(self.out / "images" / "val" / f"{name_of(key)}.npy")
+            values = np.minimum(sample["volume"].astype(float), 4)
+            np.testing.assert_allclose(codes.transpose(2, 0, 1) / 255 * 4, values, atol=4 / 510 + 1e-6)
+
+    def test_coco(self):
+        self.export("coco")
+        for split in ("train", "val"):
+            coco = json.loads((self.out / f"instances_{split}.json").read_text())
+            names = {category["id"]: category["name"] for category in coco["categories"]}
+            self.assertEqual(sorted(names), list(range(1, 9)))
+            self.assertEqual([image["sample_id"] for image in coco["images"]], [key[2] for key in of(split, "kitti_object")])
+            self.assertEqual([one["id"] for one in coco["annotations"]], list(range(1, len(coco["annotations"]) + 1)))
+            of_image = collections.defaultdict(list)
+            for one in coco["annotations"]:
+                of_image[one["image_id"]].append(one)
+            for image, sample in zip(coco["images"], of(split, "kitti_object").values()):
+                volume = np.load(self.out / image["file_name"])
+                np.testing.assert_array_equal(volume, sample["volume"])  # shards have float16 too
+                self.assertEqual((18, image["height"], image["width"]), volume.shape)
+                boxes = sample["boxes"]
+                found = [one for one in of_image[image["id"]] if not one["iscrowd"]]
+                kept = np.flatnonzero(boxes["ignore"] == 0)
+                self.assertEqual([names[one["category_id"]] for one in found],
+                                 [sample["classes"][i] for i in boxes["class_id"][kept]])
+                xywh = np.array([one["bbox"] for one in found]).reshape(-1, 4)
+                np.testing.assert_allclose(np.hstack([xywh[:, :2], xywh[:, :2] + xywh[:, 2:]]), boxes["xyxy"][kept], atol=1e-9)
+                np.testing.assert_allclose([one["area"] for one in found], xywh[:, 2] * xywh[:, 3])
+                # A region to ignore is a crowd of each class.
+                self.assertEqual(len(of_image[image["id"]]) - len(found), 8 * (boxes["ignore"] == 1).sum())
+        self.assertFalse((self.out / "person_keypoints_val.json").exists())
+        self.check_keypoints(json.loads((self.out / "person_keypoints_train.json").read_text()))
+
+    def check_keypoints(self, coco):
+        persons = {key: sample for key, sample in of("train").items() if key[1] != "kitti_object"}
+        self.assertEqual([image["sample_id"] for image in coco["images"]], [key[2] for key in persons])
+        self.assertEqual([category["name"] for category in coco["categories"]], ["person", "person-2"])
+        self.assertEqual([len(category["keypoints"]) for category in coco["categories"]], [16, 17])
+        for category in coco["categories"]:
+            ends = np.array(category["skeleton"])
+            self.assertGreater(len(ends), 9)
+            self.assertTrue(1 <= ends.min() and ends.max() <= len(category["keypoints"]))
+        images = {image["id"]: sample for image, sample in zip(coco["images"], persons.values())}
+        for image_id, sample in images.items():
+            found = [one for one in coco["annotations"] if one["image_id"] == image_id]
+            poses = sample["poses"]
+            self.assertEqual(len(found), len(poses["joints"]))
+            for one, joints, source, visible in zip(found, poses["joints"], poses["joints_source"], poses["visible"]):
+                keypoints = np.array(one["keypoints"]).reshape(-1, 3)
+                chosen = sample["joints"]
+                there = (joints[chosen] != -1).any(axis=1)
+                np.testing.assert_array_equal(keypoints[:, 2] > 0, there)
+                np.testing.assert_array_equal(keypoints[there, 2] == 1, visible[chosen][there] == 0)
+                np.testing.assert_allclose(points_to_source(sample, keypoints[there, :2] - 0.5), source[chosen][there], atol=PIXELS)
+                self.assertEqual(one["num_keypoints"], there.sum())
+
+    def test_mpii(self):
+        self.export("mpii")
+        self.assertEqual(sorted(path.name for path in (self.out / "annot").iterdir()),
+                         ["gt_train-human36m.mat", "gt_train-mpii.mat", "train-human36m.json", "train-mpii.json"])
+        for dataset, joints in (("mpii", 16), ("human36m", 17)):
+            entries = json.loads((self.out / "annot" / f"train-{dataset}.json").read_text())
+            truth = scipy.io.loadmat(self.out / "annot" / f"gt_train-{dataset}.mat")
+            persons = [(key, sample, row) for key, sample in of("train", dataset).items()
+                       for row in range(len(sample["poses"]["scale"])) if sample["poses"]["scale"][row] > 0]
+            self.assertEqual(len(entries), len(persons))
+            self.assertEqual(truth["pos_gt_src"].shape, (joints, 2, len(entries)))
+            self.assertEqual(truth["headboxes_src"].shape, (2, 2, len(entries)))
+            for n, (entry, (key, sample, row)) in enumerate(zip(entries, persons)):
+                poses, chosen = sample["poses"], sample["joints"]
+                self.assertEqual(entry["image"], f"train/{name_of(key)}.png")
+                self.assertTrue((self.out / "images" / entry["image"]).exists())
+                there = np.array(entry["joints_vis"]) == 1
+                np.testing.assert_array_equal(there, (poses["joints"][row][chosen] != -1).any(axis=1))
+                in_volume = np.array(entry["joints"]) - 1
+                np.testing.assert_allclose(points_to_source(sample, in_volume[there]), poses["joints_source"][row][chosen][there],
+                                           atol=PIXELS)
+                np.testing.assert_allclose(np.array(entry["center"]) - 1, poses["center"][row])
+                self.assertAlmostEqual(entry["scale"], poses["scale_volume"][row])
+                np.testing.assert_array_equal(truth["jnt_missing"][:, n], ~there)
+                np.testing.assert_allclose(truth["pos_gt_src"][there, :, n] - 1, in_volume[there])
+                if dataset == "mpii":
+                    np.testing.assert_allclose(truth["headboxes_src"][:, :, n].ravel() - 1, poses["head_box"][row])
+            names = [text(cell[0]) for cell in truth["dataset_joints"][0]]
+            self.assertLess({"head", "neck", "lsho", "rank", "pelv"}, set(names))
+
+    def test_davis(self):
+        self.export("davis")
+        kitti = of("train", "kitti_object")
+        with h5py.File(self.out / "train-kitti_object.hdf5") as file:
+            events, valid = file["davis/events"], file["davis/valid"][:]
+            self.assertEqual(events.dtype, np.float16)
+            self.assertEqual(events.chunks, (1, *events.shape[1:]))
+            ids = {int(key[2]): sample for key, sample in kitti.items()}
+            self.assertEqual(len(events), max(ids) + 1)
+            np.testing.assert_array_equal(np.flatnonzero(valid), sorted(ids))
+            for row in range(len(events)):
+                expected = ids[row]["volume"].transpose(1, 2, 0) if row in ids else 0 * events[row]
+                np.testing.assert_array_equal(events[row], expected)
+        self.assertEqual((self.out / "val.txt").read_text().split(), [key[2] for key in of("val")])
+        for dataset in ("mpii", "human36m"):
+            persons = [(key[2], sample, row) for key, sample in of("train", dataset).items()
+                       for row in range(len(sample["poses"]["scale"])) if sample["poses"]["scale"][row] > 0]
+            with np.load(self.out / f"train-{dataset}.npz") as entries, \
+                    h5py.File(self.out / f"train-{dataset}.hdf5") as file:
+                self.assertEqual(list(entries["imgname"]), [key for key, _, _ in persons])
+                self.assertEqual(entries["views"].shape, (len(persons), 5))
+                self.assertTrue((file["davis/valid"][:] == 1).all())
+                for n, (_, sample, row) in enumerate(persons):
+                    np.testing.assert_array_equal(file["davis/events"][n], sample["volume"].transpose(1, 2, 0))
+                    self.assertEqual(entries["views"][n, 2], sample["label_index"])
+                    np.testing.assert_allclose(entries["center"][n], sample["poses"]["center"][row])
+                    self.assertAlmostEqual(entries["scale"][n], sample["poses"]["scale_volume"][row])
+                    part = entries["part"][n]
+                    there = part[:, 2] == 1
+                    source = sample["poses"]["joints_source"][row][sample["joints"]]
+                    np.testing.assert_allclose(points_to_source(sample, part[there, :2]), source[there], atol=PIXELS)
+
+    def test_davis_in_float32(self):
+        self.export("davis", "--dtype", "float32", "--split", "val")
+        with h5py.File(self.out / "val.hdf5") as file:
+            self.assertEqual(file["davis/events"].dtype, np.float32)
+            for key, sample in of("val").items():
+                np.testing.assert_array_equal(file["davis/events"][int(key[2])], sample["volume"].transpose(1, 2, 0))
+
+    def test_davis_has_a_file_for_each_size_and_a_row_for_each_image(self):
+        cars = self.out.parent / "cars"
+        small_job.write_cars(cars, 4, np.random.default_rng(7))
+        for path in [cars / "image_2" / "000002.png", *(cars / "prev_2").glob("000002_*.png")]:
+            with PIL.Image.open(path) as picture:
+                picture.resize((40, 30)).save(path)
+        sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs([1, 2], choose=choose), "split": choose}
+                   for choose in ("one", "all")]
+        manifest = self.out.parent / "manifest.json"
+        manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", self.out.parent / "out")
+        self.export("davis", "--split", "one", source=self.out.parent / "out")
+        valid = {}
+        for path in self.out.glob("*.hdf5"):
+            with h5py.File(path) as file:
+                valid[path.name] = (file["davis/events"].shape, list(file["davis/valid"][:]))
+        self.assertEqual(valid, {"one-kitti_object-24x32.hdf5": ((4, 24, 32, 18), [1, 1, 0, 1]),
+                                 "one-kitti_object-30x40.hdf5": ((3, 30, 40, 18), [0, 0, 1])})
+        _, err = self.export("davis", "--split", "all", source=self.out.parent / "out", out=self.out / "all", expect=64)
+        self.assertIn("000000@before1 and 000000@before2", err)
+        self.export("yolo", "--split", "all", source=self.out.parent / "out", out=self.out.parent / "yolo")
+        self.assertTrue((self.out.parent / "yolo" / "images" / "all" / "000002@before2.npy").exists())
+
+    def test_webdataset(self):
+        self.export("webdataset")
+        seen = 0
+        for path in sorted(self.out.glob("*.tar")):
+            shard = (finalized / path.name).with_suffix(".h5")
+            # Deflate without HDF5's shuffling is a little worse.
+            self.assertLess(path.stat().st_size, 1.6 * shard.stat().st_size + 20000)
+            with tarfile.open(path) as tar:
+                members = tar.getmembers()
+                self.assertTrue(all(member.mtime == 0 and member.uid == 0 for member in members))
+                files = {member.name: tar.extractfile(member).read() for member in members}
+            self.assertEqual(len({name.split(".")[0] for name in files}) * 2, len(files))  # webdataset's keys
+            for name in [name for name in files if name.endswith(".json")]:
+                labels = json.loads(files[name])
+                sample = samples[labels["split"], labels["dataset"], labels["sample_id"]]
+                self.assertEqual(name, name_of((labels["split"], labels["dataset"], labels["sample_id"])) + ".json")
+                with np.load(io.BytesIO(files[name.replace(".json", ".npz")])) as arrays:
+                    np.testing.assert_array_equal(arrays["volume"], sample["volume"])
+                    self.assertEqual(arrays["volume"].dtype, np.float16)
+                    self.assertEqual(arrays["scale"], 1)
+                np.testing.assert_allclose(labels["source_to_volume"], sample["source_to_volume"].ravel())
+                np.testing.assert_allclose(np.array([box["xyxy"] for box in labels.get("boxes", [])]).reshape(-1, 4),
+                                           sample["boxes"]["xyxy"])
+                for person, joints in zip(labels.get("persons", []), sample["poses"]["joints"]):
+                    found = np.array([joint or [-1, -1] for joint in person["joints"]])
+                    np.testing.assert_allclose(found, joints)
+                seen += 1
+        self.assertEqual(seen, len(samples))
+
+    def test_events_as_text(self):
+        self.export("events", "--counts", "rounded", "--split", "val")
+        for key, sample in of("val").items():
+            rows = np.loadtxt(self.out / "events" / "val" / f"{name_of(key)}.txt", ndmin=2)
+            self.assertTrue((np.diff(rows[:, 0]) >= 0).all())
+            again = events_volume(rows, sample["volume"].shape, sample["gap_s"])
+            np.testing.assert_allclose(again, np.floor(sample["volume"].astype(float) + 0.5), atol=1e-4)
+            self.assertLessEqual(np.abs(again - sample["volume"]).max(), 0.5 + 1e-4)
+
+    def test_events_in_mvsecs_layout_follow_the_seed(self):
+        self.export("events", "--layout", "mvsec", "--split", "val")
+        seeded = self.out.parent / "seeded"
+        self.export("events", "--layout", "mvsec", "--split", "val", "--seed", "5", out=seeded)
+        expected = got = 0
+        for key, sample in of("val").items():
+            name = pathlib.Path("events") / "val" / f"{name_of(key)}.hdf5"
+            with h5py.File(self.out / name) as file, h5py.File(seeded / name) as other:
+                left = file["davis/left"]
+                self.assertEqual(left["image_raw"].shape, (2, *sample["volume"].shape[1:]))
+                np.testing.assert_allclose(left["image_raw_ts"][:], [0, sample["gap_s"]])
+                self.assertEqual(left["image_raw_event_inds"][1], len(left["events"]) - 1)
+                rows = left["events"][:][:, [2, 0, 1, 3]]
+                self.assertFalse(len(rows) == len(other["davis/left/events"]) and
+                                 (left["events"][:] == other["davis/left/events"][:]).all())
+            expected += sample["volume"].sum(dtype=float)
+            got += events_volume(rows, sample["volume"].shape, sample["gap_s"]).sum()
+        self.assertLess(abs(got - expected), 5 * np.sqrt(expected))
+
+
+class Trainers(Export):
+    """The trainers' own readers."""
+
+    def setUp(self):
+        if not TRAINERS.is_dir():
+            self.skipTest("no ../shared/trainers")
+        super().setUp()
+
+    def python(self, paths, code):
+        environment = {"PYTHONPATH": ":".join(map(str, paths)), "PYTHONDONTWRITEBYTECODE": "1", "PATH": "/usr/bin:/bin",
+                       "OMP_NUM_THREADS": "1"}
+        done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True,
+                              cwd=self.out, env=environment)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return done.stdout
+
+    def test_yolov3_reads_lists_and_labels(self):
+        self.export("yolo")
+        counted = self.python([TRAINERS / "yolov3", TRAINERS / "stubs"], """
+            from utils.datasets import LoadImagesAndLabels
+            data = LoadImagesAndLabels("train.txt", img_size=160, batch_size=2, augment=False)
+            picture, labels, path, _ = data[0]
+            print(len(data), sum(len(one) for one in data.labels), len(labels))
+            """).split()[-3:]
+        kitti = of("train", "kitti_object")
+        boxes = [int((sample["boxes"]["ignore"] == 0).sum()) for sample in kitti.values()]
+        self.assertEqual(counted, [str(len(kitti)), str(sum(boxes)), str(boxes[0])])
+
+    def test_pose_resnet_reads_the_list_and_scores_the_truth(self):
+        self.export("mpii")
+        score = self.python([TRAINERS / "pose_resnet" / "lib", TRAINERS / "stubs"], """
+            import numpy as np
+            from easydict import EasyDict
+            from dataset.mpii import MPIIDataset
+            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-mpii", DATA_FORMAT="png", SCALE_FACTOR=0.25,
+                           ROT_FACTOR=30, FLIP=False, SELECT_DATA=False),
+                           MODEL=dict(IMAGE_SIZE=np.array([256, 256]),
+                                      EXTRA=dict(TARGET_TYPE="gaussian", HEATMAP_SIZE=np.array([64, 64]), SIGMA=2)))
+            data = MPIIDataset(cfg, ".", "train-mpii", False)
+            picture, target, weight, meta = data[0]
+            assert target.shape == (16, 64, 64) and weight.sum() > 8, target.shape
+            truth = np.array([entry["joints_3d"] for entry in data.db])
+            _, mean = data.evaluate(cfg, truth, "")
+            _, off = data.evaluate(cfg, truth + [500, 0, 0], "")
+            print(len(data), mean, off)
+            """).split()[-3:]
+        persons = sum(int((sample["poses"]["scale"] > 0).sum()) for sample in of("train", "mpii").values())
+        self.assertEqual(int(score[0]), persons)
+        self.assertAlmostEqual(float(score[1]), 100)
+        self.assertAlmostEqual(float(score[2]), 0)
+
+
+class AgainAndAgain(Export):
+    def stamps(self):
+        return {path: path.stat().st_mtime_ns for path in self.out.rglob("*")}
+
+    def test_a_second_run_writes_nothing_and_threads_change_nothing(self):
+        for to in FORMATS:
+            with self.subTest(to=to):
+                out = self.out / to
+                self.export(to, "--threads", "2", out=out)
+                before = self.stamps()
+                first, _ = self.export(to, out=out)
+                self.assertEqual(self.stamps(), before)
+                other = self.out.parent / f"{to}-again"
+                second, _ = self.export(to, "--threads", "1", out=other)
+                self.assertEqual(second, first.replace(str(out), str(other)))
+                same_folder(other, out)
+
+    def test_what_was_removed_or_cut_is_made_again(self):
+        for to in FORMATS:
+            with self.subTest(to=to):
+                out = self.out / to
+                self.export(to, "--split", "train", out=out)
+                before = content(out)
+                files = sorted(path for path in out.rglob("*") if path.is_file() and ".export" not in path.parts)
+                for n, path in enumerate(files[::3]):
+                    if n % 2:
+                        path.unlink()
+                    else:
+                        path.write_bytes(path.read_bytes()[:-1])
+                self.export(to, "--split", "train", out=out)
+                self.assertEqual(content(out), before)
+
+    def test_a_killed_run_is_completed(self):
+        for to in FORMATS:
+            expected = self.out / to
+            self.export(to, "--split", split_for(to), out=expected)
+            arguments = ["export", finalized, "--to", to, "--split", split_for(to), "--progress", "none"]
+            for number in (1, 3, 5):  # davis has six, the last one the receipt of export.json
+                with self.subTest(to=to, number=number):
+                    out = self.out.parent / f"{to}-{number}"
+                    out.mkdir()
+                    done = failing_files.run(out, f"kill-before rename {number}", *arguments, "--out", out)
+                    if done.struck:
+                        self.assertEqual(done.code, -9)
+                        self.assertFalse((out / "export.json").exists())
+                    run(*arguments, "--out", out)
+                    same_folder(out, expected)
+
+    def test_a_signal_stops_it_and_the_same_command_goes_on(self):
+        expected = self.out / "expected"
+        self.export("coco", out=expected)
+        out = self.out / "stopped"
+        running = subprocess.Popen([program.PROGRAM, "export", finalized, "--to", "coco", "--out", out, "--threads", "1",
+                                    "--progress", "none"], stderr=subprocess.PIPE, text=True)
+        while running.poll() is None and not list(out.glob("volumes/*/*.npy")):
+            time.sleep(0.001)
+        running.send_signal(signal.SIGTERM)
+        _, err = running.communicate()
+        if running.returncode != 0:  # it may have been quicker than the signal
+            self.assertEqual(running.returncode, 75, err)
+            self.assertIn("goes on", err)
+            self.assertFalse((out / "export.json").exists())
+        self.export("coco", out=out)
+        same_folder(out, expected)
+
+    def test_a_full_disk_is_an_error_and_leaves_no_part_of_a_file(self):
+        for to in FORMATS:
+            with self.subTest(to=to):
+                expected = self.out / to
+                self.export(to, "--split", split_for(to), out=expected)
+                out = self.out.parent / f"{to}-full"
+                out.mkdir()
+                arguments = ["export", finalized, "--to", to, "--split", split_for(to), "--progress", "none", "--out", out]
+                done = failing_files.run(out, "ENOSPC write 5+", *arguments)
+                self.assertEqual(done.code, 1)
+                self.assertIn("No space left on device", done.err)
+                whole = content(expected)
+                self.assertEqual({name: whole.get(name) for name in content(out)}, content(out))
+                run(*arguments)
+                same_folder(out, expected)
+
+    def test_a_shard_that_changed_is_exported_again(self):
+        source = self.out.parent / "source"
+        shutil.copytree(finalized, source)
+        self.export("yolo", "--split", "val", source=source)
+        receipts = sorted((self.out / ".export").glob("*-of-*.json"))
+        receipts[0].write_text(receipts[0].read_text().replace('"input":"', '"input":"0'))
+        stamps = self.stamps()
+        self.export("yolo", "--split", "val", source=source)
+        changed = {path.name for path, stamp in self.stamps().items() if path.is_file() and stamps.get(path) != stamp}
+        self.assertIn("000000.npy", changed)
+        self.assertNotIn("000011.npy", changed)
+
+
+class BadInput(Export):
+    def test_a_folder_that_is_not_finalized(self):
+        source = self.out.parent / "source"
+        shutil.copytree(finalized, source)
+        (source / "dataset.json").unlink()
+        _, err = self.export("yolo", source=source, expect=66)
+        self.assertIn("dataset.json", err)
+        self.export("yolo", source=folder / "none", expect=66)
+        self.assertFalse(self.out.exists())
+
+    def test_a_shard_that_is_missing_or_another_one(self):
+        for change in ("remove", "bytes", "marker", "plan"):
+            with self.subTest(change=change):
+                source = self.out.parent / change
+                shutil.copytree(finalized, source)
+                shard = sorted(source.glob("*-val-*.h5"))[0]
+                marker = shard.with_suffix(".json")
+                if change == "remove":
+                    shard.unlink()
+                elif change == "bytes":
+                    data = bytearray(shard.read_bytes())
+                    data[len(data) // 2] ^= 1
+                    shard.write_bytes(data)
+                elif change == "marker":
+                    edited = json.loads(marker.read_text())
+                    edited["sha256"] = edited["sha256"][::-1]
+                    marker.write_text(json.dumps(edited))
+                else:
+                    description = json.loads((source / "dataset.json").read_text())
+                    description["plan_hash"] = description["plan_hash"][::-1]
+                    (source / "dataset.json").write_text(json.dumps(description))
+                _, err = self.export("coco", source=source, out=self.out / change, expect=66)
+                self.assertIn("plan.json" if change == "plan" else shard.name, err)
+                self.assertFalse((self.out / change / "export.json").exists())
+
+    def test_a_partial_folder_says_so(self):
+        source = self.out.parent / "source"
+        shutil.copytree(finalized, source)
+        gone = sorted(source.glob("*-val-*.h5"))[0]
+        gone.unlink()
+        run("finalize", source, "--partial")
+        out, _ = self.export("webdataset", source=source)
+        self.assertIn("PARTIAL", out)
+        self.assertEqual(self.described()["missing_shards"], [gone.name])
+        shutil.copy(finalized / gone.name, gone)
+        run("finalize", source)
+        self.export("webdataset", source=source)
+        self.assertEqual(len(self.described()["samples"]), len(samples))
+
+    def test_wrong_usage(self):
+        _, err = self.export("yolo", "--split", "test", expect=64)
+        self.assertIn("train, val", err)
+        self.export("voc", expect=64)
+        for to, option, value in [("coco", "--dtype", "float32"), ("yolo", "--counts", "rounded"), ("davis", "--seed", "1"),
+                                  ("mpii", "--classes", "x"), ("webdataset", "--full-scale", "2")]:
+            _, err = self.export(to, option, value, expect=64)
+            self.assertIn(option, err)
+        _, err = self.export("mpii", "--split", "val", expect=64)
+        self.assertIn("has a use for", err)
+        self.assertFalse(self.out.exists())
+
+    def test_a_wrong_class_map(self):
+        classes = folder / "wrong.json"
+        for content_, what in [('{"Car": 0, "Cat": 1}', "DontCare"), ('{"Car": 1}', "no 0"), ('{"Car": "a"}', "whole number"),
+                               ('[1]', "class names"), ('{"Car": 0', "JSON"), ('{"Car": null}', "one class")]:
+            with self.subTest(classes=content_):
+                classes.write_text(content_)
+                _, err = self.export("yolo", "--classes", classes, expect=64)
+                self.assertIn(what, err)
+        self.export("yolo", "--classes", folder / "none.json", expect=66)
+
+    def test_a_folder_with_something_else(self):
+        self.export("yolo", "--split", "val")
+        _, err = self.export("yolo", "--split", "val", "--full-scale", "2", expect=64)
+        self.assertIn("--overwrite", err)
+        self.export("coco", "--split", "val", "--overwrite")
+        self.assertFalse((self.out / "data.yaml").exists())
+        self.assertFalse((self.out / "images").exists())
+        same = self.out.parent / "same"
+        self.export("coco", "--split", "val", out=same)
+        same_folder(self.out, same)
+        other = self.out.parent / "other"
+        other.mkdir()
+        (other / "a.txt").write_text("mine")
+        _, err = self.export("coco", "--overwrite", out=other, expect=64)
+        self.assertEqual([path.name for path in other.iterdir()], ["a.txt"])
+
+
+if __name__ == "__main__":
+    program.main()
