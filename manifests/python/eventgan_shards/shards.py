@@ -145,6 +145,18 @@ class Shards(Sequence):
         samples = np.repeat(np.arange(len(self)), counts)
         return np.stack([samples, np.arange(len(samples)) - first[samples]], axis=1) if len(samples) else np.empty((0, 2), int)
 
+    def picture_area(self) -> np.ndarray:
+        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' pictures cover, all together. What
+        is outside is the border that a letterbox adds and never holds events."""
+        maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
+        if np.isnan(maps).all():
+            raise ValueError(f"expected samples with pictures, got none, in {self._where_from}")
+        scale = maps[:, [0, 1], [0, 1]]
+        low = maps[:, :, 2] - scale / 2 + 0.5
+        volumes = self._gathered(lambda file: np.tile(file.size[::-1], (len(file.column("valid")), 1)))
+        high = np.minimum(low + scale * sizes[:, ::-1], volumes)
+        return np.concatenate([np.nanmin(np.maximum(low, 0), axis=0), np.nanmax(high, axis=0)])
+
     def divide(self, fraction: float, by: str = "sequence", seed: int = 0) -> tuple[Shards, Shards]:
         """Two parts, the first of about `fraction` of the samples, that share no value of column `by`: no drive, no
         subject is in both. Which groups are in the first is a function of seed and their names."""
@@ -271,6 +283,7 @@ class _OpenShard:
         self.file = open_shard(path)
         self._columns = columns
         self._volume = self.file["events/volume"]
+        self.size = self._volume.shape[2:]  # H, W
 
     def volume(self, slot: int, decode: bool) -> Sample:
         stored, scale = self._volume[slot], self.column("events/scale")[slot]

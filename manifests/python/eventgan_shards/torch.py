@@ -114,6 +114,22 @@ def inverse(affine: np.ndarray) -> np.ndarray:
     return np.column_stack([linear, -linear @ affine[:, 2]])
 
 
+def fitted(area: Sequence[float], size: tuple[int, int]) -> np.ndarray:
+    """[2, 3]: the map of points that scales `area` (left, top, right, bottom in volume pixels, edges) to fit into (H, W) and lays it
+    into the middle, both sides by the same factor. Of Shards.picture_area(): what a letterbox has added is left out."""
+    left, top, right, bottom = area
+    height, width = size
+    s = min(width / (right - left), height / (bottom - top))
+    to_middle = np.array([width - s * (left + right), height - s * (top + bottom)]) / 2
+    return np.column_stack([s * np.eye(2), to_middle + (s - 1) / 2])
+
+
+def _move(view: np.ndarray | None, augmentation: EventAugmentation | None, height: int, width: int) -> np.ndarray:
+    """[2, 3]: where a point of the volume goes: by `view`, then by the augmentation."""
+    view = np.eye(2, 3) if view is None else view
+    return augmentation.affine(height, width) @ np.vstack([view, [0, 0, 1]]) if augmentation else view
+
+
 class DetectionDataset(Dataset):
     """Volumes with boxes. An item:
 
@@ -130,10 +146,12 @@ class DetectionDataset(Dataset):
     size: (H, W) that volumes are filled up to with zeros, or cut to, at the right and at the bottom; None: as they are.
     augmentation: changes volume and boxes alike; None: nothing.
     visible: share of a box's area that must be left for it not to be ignored.
+    view: [2, 3], where points of a volume go before that, such as `fitted(area, size)`; None: they stay.
     """
 
     def __init__(self, shards: Shards, classes: Sequence[str] | Mapping[str, int] | None = None,
-                 size: tuple[int, int] | None = None, augmentation: EventAugmentation | None = None, visible: float = 0.25):
+                 size: tuple[int, int] | None = None, augmentation: EventAugmentation | None = None, visible: float = 0.25,
+                 view: np.ndarray | None = None):
         self._shards = shards
         known = shards.class_counts()
         if classes is None:
@@ -142,7 +160,7 @@ class DetectionDataset(Dataset):
         unknown = [name for name in self.classes if name not in known]
         if unknown:
             raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}")
-        self._size, self._augmentation, self._visible = size, augmentation, visible
+        self._size, self._augmentation, self._visible, self._view = size, augmentation, visible, view
 
     def __len__(self) -> int:
         return len(self._shards)
@@ -157,11 +175,10 @@ class DetectionDataset(Dataset):
         boxes = rows["xyxy"]
         height, width = self._size or volume.shape[1:]
         if self._augmentation:
-            affine = self._augmentation.affine(height, width)
-            volume = warp(self._augmentation.events(volume), affine, height, width)
-            boxes = move_boxes(boxes, affine)
-        elif self._size:
-            volume = warp(volume, np.eye(2, 3), height, width)
+            volume = self._augmentation.events(volume)
+        if self._augmentation or self._size or self._view is not None:
+            affine = _move(self._view, self._augmentation, height, width)
+            volume, boxes = warp(volume, affine, height, width), move_boxes(boxes, affine)
         cut = np.clip(boxes, 0, [width, height, width, height])
         ignore = ignore | (_areas(cut) < self._visible * np.maximum(_areas(boxes), 1e-9))
         kept = (_areas(cut) > 0) & (ignore | (labels >= 0))
@@ -253,9 +270,9 @@ class KeypointDataset(Dataset):
     """
 
     def __init__(self, shards: Shards, joints: Sequence[str] | None = None, size: tuple[int, int] | None = None,
-                 augmentation: EventAugmentation | None = None, margin: float = 0.15):
+                 augmentation: EventAugmentation | None = None, margin: float = 0.15, view: np.ndarray | None = None):
         self._shards, self._joints = shards, _Joints(shards, joints)
-        self._size, self._augmentation, self._margin = size, augmentation, margin
+        self._size, self._augmentation, self._margin, self._view = size, augmentation, margin, view
         self.classes, self.joint_names = {"person": 0}, self._joints.names
 
     def __len__(self) -> int:
@@ -266,12 +283,11 @@ class KeypointDataset(Dataset):
         joints, annotated, hidden = self._joints.of(sample["persons"], index)
         volume = torch.from_numpy(sample["volume"])
         height, width = self._size or volume.shape[1:]
-        if self._augmentation or self._size:
-            affine = self._augmentation.affine(height, width) if self._augmentation else np.eye(2, 3)
-            if self._augmentation:
-                volume = self._augmentation.events(volume)
-            volume = warp(volume, affine, height, width)
-            joints = move_points(joints, affine)
+        if self._augmentation:
+            volume = self._augmentation.events(volume)
+        if self._augmentation or self._size or self._view is not None:
+            affine = _move(self._view, self._augmentation, height, width)
+            volume, joints = warp(volume, affine, height, width), move_points(joints, affine)
             if affine[0, 0] < 0:
                 joints = self._joints.mirrored(joints)
                 annotated, hidden = (self._joints.mirrored(each[..., None])[..., 0] for each in (annotated, hidden))

@@ -169,6 +169,16 @@ def test_columns(two_shards):
     assert shards.column("source_to_volume").shape == (8, 2, 3)
 
 
+def test_what_pictures_cover(folder):
+    shards = Shards(folder)
+    assert shards.picture_area().tolist() == [0, 0, 8, 6]
+    with h5py.File(folder / NAME, "r+") as file:  # 16 x 12 pixels at a quarter, with borders of 2, 1 and 2, 2
+        file["pairs/source_to_volume"][:] = [[0.25, 0, 1.625], [0, 0.25, 0.625]]
+    assert Shards(folder).picture_area().tolist() == [2, 1, 6, 4]
+    with pytest.raises(ValueError, match="expected samples with pictures, got none"):
+        shards[:0].picture_area()
+
+
 def test_shards_that_are_not_done_are_left_out(two_shards):
     (two_shards / SECOND).with_suffix(".json").unlink()
     assert len(Shards(two_shards)) == 4

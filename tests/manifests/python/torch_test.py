@@ -13,8 +13,8 @@ from torch.utils.data import DataLoader  # noqa: E402
 
 from eventgan_shards import Shards  # noqa: E402
 from eventgan_shards.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,  # noqa: E402
-                                   PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, flip_pairs,
-                                   heatmaps, inverse, mixture, move_boxes, move_points, warp)
+                                   PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
+                                   flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 
@@ -121,6 +121,18 @@ def test_boxes_are_mirrored_with_their_events(shards):
     assert mirrored["boxes"].tolist() == [[3.75, 1, 7, 4.5], [7.5, 0, 8, 0.5]]
 
 
+def test_an_area_of_the_volume_fills_the_item(shards):
+    affine = fitted([2, 1, 6, 3], (24, 32))  # 4 x 2 pixels, 8 times as large, 4 rows free above and below
+    assert move_boxes([[2, 1, 6, 3]], affine).tolist() == [[0, 4, 32, 20]]
+    item = DetectionDataset(shards, size=(24, 32), view=affine)[0]
+    assert item["volume"].shape == (4, 24, 32) and item["boxes"][0].tolist() == [0, 4, 18, 24]
+    mirrored = DetectionDataset(shards, size=(24, 32), view=affine, augmentation=EventAugmentation(flip=1))[0]
+    assert mirrored["boxes"][0].tolist() == [14, 4, 32, 24]
+    np.testing.assert_allclose(mirrored["volume"], item["volume"].flip(2), atol=1e-5)
+    keypoints = KeypointDataset(shards, size=(24, 32), view=affine)[0]["keypoints"][0]
+    np.testing.assert_allclose(keypoints[1, :2], [(2.25 + 0.5 - 2) * 8 - 0.5, (2.875 + 0.5 - 1) * 8 + 4 - 0.5])
+
+
 def test_what_a_yolo_trainer_takes(shards):
     imgs, targets, ids = next(iter(DataLoader(DetectionDataset(shards), batch_size=4, collate_fn=collate_yolo)))
     assert imgs.shape == (4, 4, 6, 8) and imgs.dtype == torch.float32
@@ -157,6 +169,7 @@ def test_mirrored_joints():
             "r_shoulder", "l_shoulder", "l_elbow", "l_wrist"]
     assert {frozenset(pair) for pair in flip_pairs(mpii)} == {frozenset(pair) for pair in ((0, 5), (1, 4), (2, 3), (10, 15), (11, 14), (12, 13))}
     assert flip_pairs(["RightFoot", "Hips", "LeftFoot", "R_Wrist_End", "L_Wrist_End"]) == [(2, 0), (4, 3)]
+    assert flip_pairs(["r_hip", "l_hip", "pelvis", "l_wrist", "r_wrist"]) == [(1, 0), (3, 4)]
 
 
 @pytest.mark.parametrize(("moved", "center", "scale"), [(False, [2.75, 2.25 + 15 * 0.875], 1.25 * 0.875), (True, [2.75, 2.25], 0.875)])
