@@ -170,11 +170,12 @@ def test_columns(two_shards):
 
 
 def test_what_pictures_cover(folder):
-    shards = Shards(folder)
-    assert shards.picture_area().tolist() == [0, 0, 8, 6]
+    with Shards(folder) as shards:
+        assert shards.picture_area().tolist() == [0, 0, 8, 6]
     with h5py.File(folder / NAME, "r+") as file:  # 16 x 12 pixels at a quarter, with borders of 2, 1 and 2, 2
-        file["pairs/source_to_volume"][:] = [[0.25, 0, 1.625], [0, 0.25, 0.625]]
-    assert Shards(folder).picture_area().tolist() == [2, 1, 6, 4]
+        del file["pairs/source_to_volume"]
+        file["pairs/source_to_volume"] = [[[0.25, 0, 1.625], [0, 0.25, 0.625]]] * 5
+    assert Shards(folder / NAME).picture_area().tolist() == [2, 1, 6, 4]
     with pytest.raises(ValueError, match="expected samples with pictures, got none"):
         shards[:0].picture_area()
 
