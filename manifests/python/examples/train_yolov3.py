@@ -1,0 +1,141 @@
+#!/usr/bin/python3
+"""Trains ultralytics' YOLOv3 (the archive branch) on the boxes of event-volume shards: its Darknet, its loss, its AP.
+
+    train_yolov3.py --trainer ../shared/trainers/yolov3 --data out --out cars --minutes 30
+"""
+
+from __future__ import annotations
+
+import argparse
+import pathlib
+import re
+
+import cv2
+import numpy as np
+import torch
+import training
+from eventgan_shards import Shards
+from eventgan_shards.torch import DetectionDataset, EventAugmentation, collate_yolo, exchange_first_convolution, fitted, move_boxes
+
+
+def read_args() -> argparse.Namespace:
+    parser = training.options(__doc__.splitlines()[0], batch=8, lr=1e-3)
+    parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3")
+    parser.add_argument("--cfg", default="yolov3-tiny.cfg", help="of the trainer's cfg/, or a path")
+    parser.add_argument("--classes", default="Car", help="names with commas between them; the first one's AP is the result")
+    parser.add_argument("--scale", type=float, default=2.0, help="input pixels for a pixel of the volume: small objects need more than the stride")
+    return training.begin(parser)
+
+
+def with_boxes(shards: Shards) -> list[int]:
+    return [i for i in range(len(shards)) if shards.class_names(i)]
+
+
+def collate(items: list) -> tuple:
+    return (*collate_yolo(items)[:2], items)
+
+
+def anchors_of(shards: Shards, classes: list[str], view: np.ndarray, count: int) -> np.ndarray:
+    """[count, 2] widths and heights in input pixels: means of the boxes to learn, by k-means of their logarithms, smallest first."""
+    boxes = [np.empty((0, 4))]
+    for i in range(len(shards)):
+        rows, names = shards.labels(i)["boxes"], np.array(shards.class_names(i))
+        boxes.append(move_boxes(rows["xyxy"][(rows["ignore"] == 0) & np.isin(names[rows["class_id"]], classes)], view))
+    sides = np.log(np.maximum(np.concatenate(boxes)[:, 2:] - np.concatenate(boxes)[:, :2], 1)).astype(np.float32)
+    if len(sides) < count:
+        raise SystemExit(f"expected {count} boxes or more of {', '.join(classes)} to learn, got {len(sides)}")
+    cv2.setRNGSeed(1)
+    _, _, means = cv2.kmeans(sides, count, None, (cv2.TERM_CRITERIA_MAX_ITER, 50, 0), 5, cv2.KMEANS_PP_CENTERS)
+    return np.exp(means[np.argsort(means.sum(1))])
+
+
+def adapted(cfg: str, classes: int, anchors: np.ndarray) -> str:
+    """The cfg's text with the numbers that go with a dataset: classes, filters of the layers before [yolo], anchors."""
+    pairs = ",  ".join(f"{width:.1f},{height:.1f}" for width, height in anchors)
+    for pattern, text in ((r"(?m)^channels *=.*", "channels=18"), (r"(?m)^classes *=.*", f"classes={classes}"), (r"(?m)^anchors *=.*", f"anchors = {pairs}"),
+                          (r"filters *= *\d+(\s+activation *= *linear\s+\[yolo\])", rf"filters={3 * (classes + 5)}\1"),
+                          (r"(?m)^mask *= *1,2,3$", "mask = 0,1,2")):  # yolov3-tiny's own leaves its smallest anchor out
+        cfg = re.sub(pattern, text, cfg)
+    return cfg
+
+
+def main() -> None:
+    args = read_args()
+    folder = training.use_trainer(args.trainer, "models.py", "train.py", "cfg")
+    import tensorboard_stub  # noqa: F401  (train.py asks for tensorboard)
+    from models import Darknet
+    from train import hyp
+    from utils.utils import ap_per_class, clip_coords, compute_loss, non_max_suppression
+
+    learnt, checked = training.divided(args, with_boxes)
+    classes = args.classes.split(",")
+    area = learnt.picture_area()  # what a letterbox has added costs time and shows nothing
+    width, height = (32 * int(np.ceil(side * args.scale / 32)) for side in (area[2:] - area[:2]))
+    view = fitted(area, (height, width))
+    augmentation = EventAugmentation(scale=(0.8, 1.25), shift=0.1)
+    try:
+        learn = DetectionDataset(learnt, classes, (height, width), augmentation, view=view)
+        check = DetectionDataset(checked, classes, (height, width), view=view)
+    except ValueError as error:
+        raise SystemExit(f"{error}, in {args.data}")
+
+    path = pathlib.Path(args.cfg) if pathlib.Path(args.cfg).exists() else folder / "cfg" / args.cfg
+    if not path.exists():
+        raise SystemExit(f"expected a cfg, got none, in {path}")
+    cfg = path.read_text()
+    anchors = anchors_of(learnt, classes, view, int(re.search(r"(?m)^num *= *(\d+)", cfg)[1]))
+    own = pathlib.Path(args.out, "model.cfg")
+    own.write_text(adapted(cfg, len(classes), anchors))
+    with torch.no_grad():  # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
+        model = Darknet(str(own), (height, width))
+    training.load_fitting(model, args.pretrained)
+    model = exchange_first_convolution(model, 18).to(args.device).to(memory_format=torch.channels_last)
+    model.eval()(torch.zeros(1, 18, height, width, device=args.device))  # it makes its grids only if it does not begin with training
+    model.nc, model.hyp = len(classes), {**hyp, "cls": hyp["cls"] * len(classes) / 80, "obj": hyp["obj"] * max(height, width) / 320}
+
+    def loss_of(batch: tuple, progress: float) -> torch.Tensor:
+        model.gr = min(progress / 0.05, 1.0)  # at first every true box counts as an object, then as far as it is found
+        imgs, targets, _ = batch
+        return compute_loss(model(imgs.to(args.device)), targets.to(args.device), model)[0]
+
+    def detect(imgs: torch.Tensor, threshold: float) -> list[torch.Tensor]:
+        """[n, 6] for each: left, top, right, bottom in input pixels, score, class."""
+        found = non_max_suppression(model(imgs.to(args.device))[0], threshold, 0.6, multi_label=len(classes) > 1)
+        found = [torch.zeros(0, 6) if each is None else each.cpu() for each in found]
+        for each in found:
+            clip_coords(each, (height, width))
+        return found
+
+    def measure() -> dict[str, float]:
+        rows, truth = [], []
+        for imgs, _, items in training.batches(args, check, collate):
+            for each, item in zip(detect(imgs, 0.001), items):
+                true = ~item["ignore"]
+                correct, counts = training.matched(each[:, :4], each[:, 5], item["boxes"][true], item["labels"][true], item["boxes"][~true])
+                rows.append(torch.column_stack([correct, each[:, 4:]])[counts].numpy())
+                truth.append(item["labels"][true].numpy())
+        rows, truth = np.concatenate(rows), np.concatenate(truth)
+        _, _, precision, _, of_classes = ap_per_class(rows[:, :1], rows[:, 1], rows[:, 2], truth)
+        return {f"AP50 {name}": float(precision[of_classes == c].sum()) for c, name in enumerate(classes)}
+
+    groups = {True: [], False: []}
+    for name, weight in model.named_parameters():
+        groups["Conv2d.weight" in name].append(weight)
+    optimizer = torch.optim.AdamW([{"params": groups[True], "weight_decay": 0.01}, {"params": groups[False], "weight_decay": 0}], lr=args.lr)
+    print(f"input {height} x {width}, anchors " + ", ".join(f"{w:.0f}x{h:.0f}" for w, h in anchors))
+    training.fit(args, model, optimizer, training.batches(args, learn, collate, learn=True), loss_of, measure, f"AP50 {classes[0]}")
+
+    def picture_of(i: int) -> tuple[str, np.ndarray]:
+        item = check[i]
+        found = detect(item["volume"][None], 0.3)[0]
+        picture = training.events_picture(item["volume"])
+        training.draw_boxes(picture, item["boxes"][item["ignore"]], training.GREY)
+        training.draw_boxes(picture, item["boxes"][~item["ignore"]], training.GREEN)
+        training.draw_boxes(picture, found[:, :4], training.YELLOW, [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
+        return item["id"], picture
+
+    training.write_pictures(args, len(check), picture_of)
+
+
+if __name__ == "__main__":
+    main()

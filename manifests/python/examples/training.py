@@ -1,0 +1,258 @@
+"""What the examples share: options, which samples are learnt and which are checked, the loop with its checkpoint, pictures."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import sys
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import cv2
+import numpy as np
+import torch
+from torch import nn
+from torch.utils.data import DataLoader, Dataset
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
+
+from eventgan_shards import Shards, read_description  # noqa: E402
+
+CHECKED_SPLITS = ("validation", "valid", "val", "test")
+# From the column that keeps the most together; sample_id is always there.
+GROUPS = ("subject", "drive", "sequence", "sample_id")
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures"}  # when a run goes on
+GREEN, YELLOW, GREY = (80, 220, 80), (60, 230, 255), (150, 150, 150)
+
+
+def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
+    """The options that all examples have. The first limit that is reached ends the training."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--data", required=True, help="folder that eventgan finalize has completed")
+    parser.add_argument("--out", required=True, help="folder for checkpoint.pt, weights.pt, metrics.json and pictures/; the same line again goes on")
+    parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
+    parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
+    parser.add_argument("--epochs", type=int, help="limit")
+    parser.add_argument("--steps", type=int, help="limit, in batches")
+    parser.add_argument("--minutes", type=float, help="limit, with all checking (default: 30 if there is no other limit)")
+    parser.add_argument("--batch", type=int)
+    parser.add_argument("--lr", type=float, help="highest learning rate: it rises for 5 %% of the way and falls to 1 %% as a cosine")
+    parser.add_argument("--pretrained", help=".pt file of weights to begin with; those that do not fit, and the first layer, begin anew")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--device", default="cpu", help="cpu or cuda")
+    parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--workers", type=int, default=0, help="processes that read samples")
+    parser.add_argument("--pictures", type=int, default=6)
+    parser.set_defaults(**defaults)
+    return parser
+
+
+def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
+    args = parser.parse_args()
+    if args.epochs is None and args.steps is None and args.minutes is None:
+        args.minutes = 30.0
+    if args.device == "cuda" and not torch.cuda.is_available():
+        sys.exit("expected a CUDA device, got none, in --device cuda")
+    if args.threads:
+        torch.set_num_threads(args.threads)
+    torch.manual_seed(args.seed)
+    pathlib.Path(args.out).mkdir(parents=True, exist_ok=True)
+    return args
+
+
+def use_trainer(folder: str, *modules: str) -> pathlib.Path:
+    """Puts the trainer's folder of modules first on the path, and `stubs` beside it, if there."""
+    path = pathlib.Path(folder).resolve()
+    for module in modules:
+        if not (path / module).exists():
+            sys.exit(f"expected the trainer's {module}, got none, in {path}")
+    first = path / modules[0]
+    sys.path[:0] = [str(first.parent), str(path.parent / "stubs")]
+    return path
+
+
+def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
+    """The samples to learn and those to check, of which `usable` gives the positions of those with labels: by the folder's
+    splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no sample."""
+    where = {"dataset": args.dataset} if args.dataset else None
+    try:
+        description = read_description(args.data)
+        splits = description["counts"]["by_split"]
+        checked = next((name for name in CHECKED_SPLITS if name in splits), None)
+        if checked and "train" in splits and not args.overfit:
+            parts, how = [Shards(args.data, split=split, where=where) for split in ("train", checked)], f"of split {checked}"
+            parts = [part[list(usable(part))] for part in parts]
+        else:
+            shards = Shards(args.data, where=where)
+            shards = shards[list(usable(shards))]
+            by = next((column for column in GROUPS if _divides(shards, column)), "sample_id")
+            parts, how = ([shards, shards], "the same") if args.overfit else (shards.divide(0.8, by, args.seed), f"of another {by}")
+    except FileNotFoundError as error:
+        sys.exit(f"expected a folder that eventgan finalize has completed, got no {error.filename}")
+    except ValueError as error:
+        sys.exit(str(error))
+    if not len(parts[0]) or not len(parts[1]):
+        sys.exit(f"expected labelled samples to learn and to check, got {len(parts[0])} and {len(parts[1])}, in {args.data}")
+    if description["quarantined"]:
+        print(f"{len(description['quarantined'])} samples are in quarantine and left out")
+    print(f"{len(parts[0])} samples to learn, {len(parts[1])} to check, {how}")
+    return parts[0], parts[1]
+
+
+def _divides(shards: Shards, column: str) -> bool:
+    try:
+        values = set(shards.column(column).tolist())
+    except ValueError:  # not all shards have it
+        return False
+    return len(values) > 1 and "" not in values
+
+
+def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None, learn: bool = False) -> DataLoader:
+    return DataLoader(dataset, args.batch, shuffle=learn, num_workers=args.workers, collate_fn=collate, persistent_workers=args.workers > 0)
+
+
+def load_fitting(model: nn.Module, path: str | None) -> None:
+    """Takes over those weights of the file that have the name and shape of one of the model's."""
+    if not path:
+        return
+    weights = torch.load(path, map_location="cpu", weights_only=True)  # runs nothing that the file holds
+    weights = next((weights[key] for key in ("model", "state_dict") if key in weights), weights)
+    own = model.state_dict()
+    fitting = {name: value for name, value in weights.items() if name in own and own[name].shape == value.shape}
+    if not fitting:
+        sys.exit(f"expected weights that fit the model, such as {next(iter(own))}, got none, in {path}")
+    model.load_state_dict(fitting, strict=False)
+    print(f"{len(fitting)} of the model's {len(own)} tensors are those of {path}")
+
+
+def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,
+        loss_of: Callable[[Any, float], torch.Tensor], check: Callable[[], dict[str, float]], metric: str) -> None:
+    """Trains up to the limits, from the checkpoint if there is one. loss_of(batch, progress): the loss, progress 0..1 of the way to
+    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch."""
+    out = pathlib.Path(args.out)
+    settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
+    state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
+    if (out / "checkpoint.pt").exists():
+        state = torch.load(out / "checkpoint.pt", map_location=args.device, weights_only=True)
+        for name, value in settings.items():
+            if state["settings"].get(name) != value:
+                sys.exit(f"expected --{name} {state['settings'].get(name)}, with which this run began, got {value}, in {out / 'checkpoint.pt'}")
+        model.load_state_dict(state["model"])
+        optimizer.load_state_dict(state["optimizer"])
+        print(f"goes on after epoch {state['epoch']}")
+    for group in optimizer.param_groups:
+        group.setdefault("initial_lr", group["lr"])
+    began = time.monotonic() - state["seconds"]
+    steps = min(args.steps or math.inf, (args.epochs or math.inf) * len(loader))
+    checking = 0.0
+
+    def progress() -> float:
+        minutes = (time.monotonic() - began + checking) / 60
+        return max(state["step"] / steps, minutes / args.minutes if args.minutes else 0)
+
+    def report(loss: float | None) -> None:
+        nonlocal checking
+        start = time.monotonic()
+        model.eval()
+        with torch.no_grad():
+            found = check()
+        checking = time.monotonic() - start
+        state["seconds"] = time.monotonic() - began
+        row = {"epoch": state["epoch"], "step": state["step"], "minutes": round(state["seconds"] / 60, 2), "loss": loss, **found}
+        state["history"].append({name: None if value is None or math.isnan(value) else value for name, value in row.items()})
+        numbers = " ".join(f"{name} {value:.4g}" for name, value in row.items() if value is not None and name not in ("epoch", "step"))
+        print(f"epoch {row['epoch']:3} step {row['step']:5} {numbers}" + ("" if row["step"] else "  (untrained)"), flush=True)
+
+    if not state["history"]:
+        report(None)
+    while progress() < 1:
+        state["epoch"] += 1
+        torch.manual_seed(args.seed * 1_000_003 + state["epoch"])  # what an epoch draws does not depend on where a run went on
+        model.train()
+        losses = []
+        for batch in loader:
+            at = progress()
+            for group in optimizer.param_groups:
+                group["lr"] = group["initial_lr"] * min(at / 0.05 + 0.01, 1) * (0.505 + 0.495 * math.cos(math.pi * min(at, 1)))
+            loss = loss_of(batch, at)
+            if not torch.isfinite(loss):
+                sys.exit(f"expected a finite loss, got {loss.item()}, at step {state['step']} (a smaller --lr?)")
+            optimizer.zero_grad()
+            loss.backward()
+            nn.utils.clip_grad_norm_(model.parameters(), 10)
+            optimizer.step()
+            losses.append(loss.item())
+            state["step"] += 1
+            if progress() >= 1:
+                break
+        report(float(np.mean(losses)))
+        _replace(out / "checkpoint.pt", lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()}, path))
+    model.eval()
+    untrained, last = state["history"][0][metric], state["history"][-1][metric]
+    summary = {"metric": metric, "untrained": untrained, metric: last, "minutes": round(state["seconds"] / 60, 2), **state["settings"],
+               "history": state["history"]}
+    _replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
+    _replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
+    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, pictures/")
+
+
+def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
+    new = path.with_name(path.name + ".new")
+    write(new)
+    os.replace(new, path)
+
+
+def matched(found: torch.Tensor, labels: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor,
+            ignored: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+    """For boxes found, [n, 4] in the order of their scores, with `labels` [n]: [n] bool, whether it is the first on a true box [m, 4] of
+    its class with an IoU above 0.5; and [n] bool, whether it counts: wrong ones that lie by more than half in an ignored box do not."""
+    correct, counts = torch.zeros(len(found), dtype=torch.bool), torch.ones(len(found), dtype=torch.bool)
+    if len(boxes) and len(found):
+        iou = _shares(found, boxes, union=True) * (labels[:, None] == classes)
+        best, which = iou.max(1)
+        taken = set()
+        for i in torch.nonzero(best > 0.5).flatten().tolist():
+            correct[i] = which[i].item() not in taken
+            taken.add(which[i].item())
+    if len(ignored) and len(found):
+        counts = correct | (_shares(found, ignored, union=False).max(1)[0] <= 0.5)
+    return correct, counts
+
+
+def _shares(first: torch.Tensor, second: torch.Tensor, union: bool) -> torch.Tensor:
+    """[n, m]: the intersection of boxes [n, 4] with boxes [m, 4], as a share of the union, or of the first one's area."""
+    overlap = (torch.min(first[:, None, 2:], second[:, 2:]) - torch.max(first[:, None, :2], second[:, :2])).clamp(min=0).prod(2)
+    areas = [(boxes[:, 2:] - boxes[:, :2]).prod(1) for boxes in (first, second)]
+    return overlap / ((areas[0][:, None] + areas[1] - overlap if union else areas[0][:, None]) + 1e-9)
+
+
+def events_picture(volume: torch.Tensor, zoom: int = 2) -> np.ndarray:
+    """BGR [H zoom, W zoom, 3] uint8 of a volume [2B, H, W]: positive events red, negative blue."""
+    positive, negative = volume.cpu().unflatten(0, (2, -1)).sum(1).numpy()
+    both = positive + negative
+    top = np.percentile(both[both > 0], 98) if (both > 0).any() else 1
+    picture = np.clip(np.stack([negative, np.zeros_like(both), positive], -1) / top, 0, 1)
+    return cv2.resize((255 * picture).astype(np.uint8), None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
+
+
+def draw_boxes(picture: np.ndarray, boxes: Iterable[Iterable[float]], colour: tuple[int, int, int], texts: Iterable[str] = (), zoom: int = 2) -> None:
+    """Boxes in volume pixels, whose edges lie half a pixel left of the points of their number, onto events_picture."""
+    texts = iter(texts)
+    for box in boxes:
+        left, top, right, bottom = (round(zoom * float(edge)) for edge in box)
+        cv2.rectangle(picture, (left, top), (right - 1, bottom - 1), colour, 1)
+        cv2.putText(picture, next(texts, ""), (left, top - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+
+
+def write_pictures(args: argparse.Namespace, count: int, picture_of: Callable[[int], tuple[str, np.ndarray]]) -> None:
+    """picture_of(i) for some of `count` items, evenly spread: a name, and what to write under it."""
+    folder = pathlib.Path(args.out, "pictures")
+    folder.mkdir(exist_ok=True)
+    with torch.no_grad():
+        for i in np.unique(np.linspace(0, count - 1, args.pictures).round().astype(int)).tolist() if args.pictures else ():
+            name, picture = picture_of(i)
+            cv2.imwrite(str(folder / (name.replace("/", "_") + ".png")), picture)
