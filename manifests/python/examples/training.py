@@ -25,7 +25,7 @@ from eventgan_shards import Shards, read_description  # noqa: E402
 CHECKED_SPLITS = ("validation", "valid", "val", "test")
 # From the column that keeps the most together; sample_id is always there.
 GROUPS = ("subject", "drive", "sequence", "sample_id")
-MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures"}  # when a run goes on
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every"}  # when a run goes on
 GREEN, YELLOW, GREY = (80, 220, 80), (60, 230, 255), (150, 150, 150)
 
 
@@ -39,6 +39,7 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--epochs", type=int, help="limit")
     parser.add_argument("--steps", type=int, help="limit, in batches")
     parser.add_argument("--minutes", type=float, help="limit, with all checking (default: 30 if there is no other limit)")
+    parser.add_argument("--every", type=int, default=1, help="check after each such number of epochs, and at the end")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--lr", type=float, help="highest learning rate: it rises for 5 %% of the way and falls to 1 %% as a cosine")
     parser.add_argument("--pretrained", help=".pt file of weights to begin with; those that do not fit, and the first layer, begin anew")
@@ -132,7 +133,7 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
 def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,
         loss_of: Callable[[Any, float], torch.Tensor], check: Callable[[], dict[str, float]], metric: str) -> None:
     """Trains up to the limits, from the checkpoint if there is one. loss_of(batch, progress): the loss, progress 0..1 of the way to
-    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch."""
+    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch (each --every)."""
     out = pathlib.Path(args.out)
     settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
@@ -189,6 +190,8 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             state["step"] += 1
             if progress() >= 1:
                 break
+        if state["epoch"] % args.every and progress() < 1:
+            continue
         report(float(np.mean(losses)))
         _replace(out / "checkpoint.pt", lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()}, path))
     model.eval()
