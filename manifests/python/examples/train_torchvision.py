@@ -1,0 +1,132 @@
+#!/usr/bin/python3
+"""Trains torchvision's Faster R-CNN on the boxes of event-volume shards, or its Keypoint R-CNN on the persons.
+
+    train_torchvision.py --data out --dataset kitti_object --out cars
+    train_torchvision.py --task keypoints --data out --dataset mpii --out persons
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import cv2
+import numpy as np
+import torch
+import torchvision
+import training
+from eventgan_shards import Shards
+from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
+
+
+def read_args() -> argparse.Namespace:
+    parser = training.options(__doc__.splitlines()[0], batch=4, lr=2e-4)
+    parser.add_argument("--task", choices=["detection", "keypoints"], default="detection")
+    parser.add_argument("--classes", help="detection: names with commas between them (default: all that occur); the first one's AP is the result")
+    parser.add_argument("--scale", type=float, default=1.5, help="input pixels for a pixel of the volume")
+    return training.begin(parser)
+
+
+def usable(task: str):
+    """What gives the samples with labels for the task."""
+    if task == "keypoints":
+        return lambda shards: np.unique(shards.persons[:, 0])
+    return lambda shards: [i for i in range(len(shards)) if shards.class_names(i)]
+
+
+def average_precision(correct: np.ndarray, scores: np.ndarray, truths: int) -> float:
+    """Area under the highest precision at each recall and above, of detections [n]; 0 if there is nothing to find."""
+    hits = np.cumsum(correct[np.argsort(-scores, kind="stable")])
+    precision = np.maximum.accumulate((hits / np.arange(1, len(hits) + 1))[::-1])[::-1]
+    return float(np.sum(np.diff(hits, prepend=0) * precision) / max(truths, 1))
+
+
+def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
+    """[k] bool, of each annotated joint of an item's persons, whether the best person found on it, [n, 4 + 2J] with boxes, has it within a
+    fifth of the longer side of the person's box."""
+    near = []
+    for box, joints in zip(item["boxes"][~item["ignore"]], item["keypoints"][~item["ignore"]]):
+        known = joints[:, 2] > 0
+        distance = torch.full((int(known.sum()),), torch.inf)
+        if len(found):
+            best = torchvision.ops.box_iou(found[:, :4], box[None]).argmax()
+            distance = (found[best, 4:].reshape(-1, 2) - joints[:, :2])[known].norm(dim=1)
+        near.append((distance < 0.2 * (box[2:] - box[:2]).max()).numpy())
+    return np.concatenate([*near, np.empty(0, bool)])
+
+
+def network(task: str, classes: int, joints: int, height: int, width: int) -> torch.nn.Module:
+    """The detector for inputs of 18 channels that are of this size already and are not normalised."""
+    settings = {"weights": None, "weights_backbone": None, "min_size": height, "max_size": width, "image_mean": [0.0] * 18, "image_std": [1.0] * 18}
+    if task == "keypoints":
+        return torchvision.models.detection.keypointrcnn_resnet50_fpn(num_classes=2, num_keypoints=joints, **settings)
+    return torchvision.models.detection.fasterrcnn_mobilenet_v3_large_fpn(num_classes=classes + 1, **settings)
+
+
+def main() -> None:
+    args = read_args()
+    learnt, checked = training.divided(args, usable(args.task))
+    area = learnt.picture_area()
+    width, height = (32 * int(np.ceil(side * args.scale / 32)) for side in (area[2:] - area[:2]))
+    place = {"size": (height, width), "view": fitted(area, (height, width))}
+    augmentation = EventAugmentation(scale=(0.8, 1.25), shift=0.1)
+    try:
+        if args.task == "keypoints":
+            learn = KeypointDataset(learnt, augmentation=augmentation, **place)
+            check = KeypointDataset(checked, learn.joint_names, **place)
+        else:
+            learn = DetectionDataset(learnt, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
+            check = DetectionDataset(checked, learn.classes, **place)
+    except ValueError as error:
+        raise SystemExit(f"{error}, in {args.data}")
+    classes = list(learn.classes)
+    print(f"input {height} x {width}, classes " + ", ".join(classes))
+    model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), height, width)
+    training.load_fitting(model, args.pretrained)
+    model = exchange_first_convolution(model, 18).to(args.device)
+
+    def loss_of(batch: tuple, _: float) -> torch.Tensor:
+        images, targets = batch
+        targets = [{name: value.to(args.device) for name, value in target.items() if name != "id"} for target in targets]
+        return sum(model([image.to(args.device) for image in images], targets).values())
+
+    def detect(volumes: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
+        return [{name: value.cpu() for name, value in found.items()} for found in model([volume.to(args.device) for volume in volumes])]
+
+    def measure() -> dict[str, float]:
+        rows, truths, near = [np.empty((0, 3))], np.zeros(len(classes), int), [np.empty(0, bool)]
+        for items in training.batches(args, check, list):
+            for found, item in zip(detect([item["volume"] for item in items]), items):
+                true, labels = ~item["ignore"], found["labels"] - 1
+                correct, counts = training.matched(found["boxes"], labels, item["boxes"][true], item["labels"][true], item["boxes"][~true])
+                rows.append(torch.column_stack([correct, found["scores"], labels])[counts].numpy())
+                truths += np.bincount(item["labels"][true], minlength=len(classes))
+                if "keypoints" in found:
+                    near.append(near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item))
+        correct, scores, labels = np.concatenate(rows).T
+        values = {f"AP50 {name}": average_precision(correct[labels == c], scores[labels == c], truths[c]) for c, name in enumerate(classes)}
+        return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))} if args.task == "keypoints" else values
+
+    optimizer = torch.optim.AdamW(model.parameters(), lr=args.lr, weight_decay=1e-4)
+    loader = training.batches(args, learn, collate_torchvision, learn=True)
+    training.fit(args, model, optimizer, loader, loss_of, measure, f"AP50 {classes[0]}")
+
+    def picture_of(i: int) -> tuple[str, np.ndarray]:
+        item = check[i]
+        found = detect([item["volume"]])[0]
+        sure = found["scores"] > 0.5
+        picture = training.events_picture(item["volume"])
+        training.draw_boxes(picture, item["boxes"][item["ignore"]], training.GREY)
+        training.draw_boxes(picture, item["boxes"][~item["ignore"]], training.GREEN)
+        texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
+        training.draw_boxes(picture, found["boxes"][sure], training.YELLOW, texts)
+        for joints, colour in ((item.get("keypoints"), training.GREEN), (found["keypoints"][sure] if "keypoints" in found else None, training.YELLOW)):
+            for x, y, known in joints.reshape(-1, 3).tolist() if joints is not None else ():
+                if known:
+                    cv2.circle(picture, (round(2 * x + 0.5), round(2 * y + 0.5)), 2, colour, -1, cv2.LINE_AA)
+        return item["id"], picture
+
+    training.write_pictures(args, len(check), picture_of)
+
+
+if __name__ == "__main__":
+    main()
