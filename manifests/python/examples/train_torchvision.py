@@ -23,6 +23,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--task", choices=["detection", "keypoints"], default="detection")
     parser.add_argument("--classes", help="detection: names with commas between them (default: all that occur); the first one's AP is the result")
     parser.add_argument("--scale", type=float, default=1.5, help="input pixels for a pixel of the volume")
+    parser.add_argument("--regions", type=int, default=64, help="proposals of a volume that the heads learn from: their cost")
     return training.begin(parser)
 
 
@@ -54,9 +55,12 @@ def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
     return np.concatenate([*near, np.empty(0, bool)])
 
 
-def network(task: str, classes: int, joints: int, height: int, width: int) -> torch.nn.Module:
-    """The detector for inputs of 18 channels that are of this size already and are not normalised."""
-    settings = {"weights": None, "weights_backbone": None, "min_size": height, "max_size": width, "image_mean": [0.0] * 18, "image_std": [1.0] * 18}
+def network(task: str, classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
+    """The detector for inputs of 18 channels that are of this size already and are not normalised. A volume holds tens of objects, not hundreds
+    as a picture of COCO: fewer regions are looked at."""
+    settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size), "image_mean": [0.0] * 18,
+                "image_std": [1.0] * 18, "box_batch_size_per_image": regions, "rpn_post_nms_top_n_train": 4 * regions,
+                "rpn_post_nms_top_n_test": 2 * regions, "box_detections_per_img": regions // 2}
     if task == "keypoints":
         return torchvision.models.detection.keypointrcnn_resnet50_fpn(num_classes=2, num_keypoints=joints, **settings)
     return torchvision.models.detection.fasterrcnn_mobilenet_v3_large_fpn(num_classes=classes + 1, **settings)
@@ -80,7 +84,7 @@ def main() -> None:
         raise SystemExit(f"{error}, in {args.data}")
     classes = list(learn.classes)
     print(f"input {height} x {width}, classes " + ", ".join(classes))
-    model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), height, width)
+    model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), (height, width), args.regions)
     training.load_fitting(model, args.pretrained)
     model = exchange_first_convolution(model, 18).to(args.device)
 

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import pathlib
+import pickle
 import sys
 import time
 from collections.abc import Callable, Iterable
@@ -120,7 +121,10 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
     """Takes over those weights of the file that have the name and shape of one of the model's."""
     if not path:
         return
-    weights = torch.load(path, map_location="cpu", weights_only=True)  # runs nothing that the file holds
+    try:
+        weights = torch.load(path, map_location="cpu", weights_only=True)  # runs nothing that the file holds
+    except (OSError, pickle.UnpicklingError) as error:
+        sys.exit(f"expected a .pt file of tensors and nothing else, got {str(error).splitlines()[0]}, in {path}")
     weights = next((weights[key] for key in ("model", "state_dict") if key in weights), weights)
     own = model.state_dict()
     fitting = {name: value for name, value in weights.items() if name in own and own[name].shape == value.shape}
@@ -138,7 +142,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
     if (out / "checkpoint.pt").exists():
-        state = torch.load(out / "checkpoint.pt", map_location=args.device, weights_only=True)
+        state = torch.load(out / "checkpoint.pt", map_location=args.device)  # its own: a pickle, not to be had from others
         for name, value in settings.items():
             if state["settings"].get(name) != value:
                 sys.exit(f"expected --{name} {state['settings'].get(name)}, with which this run began, got {value}, in {out / 'checkpoint.pt'}")

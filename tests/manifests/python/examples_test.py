@@ -1,0 +1,116 @@
+"""manifests/python/examples: a few steps of each on the demo dataset, and going on where they ended."""
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from conftest import SOURCE
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("torchvision")
+pytest.importorskip("cv2")
+
+PROGRAM = os.environ["EVENTGAN_PROGRAM"]
+EXAMPLES = SOURCE / "manifests" / "python" / "examples"
+ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
+TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory):
+    """The demo, converted at half its size and finalized."""
+    demo = tmp_path_factory.mktemp("data") / "demo"
+    subprocess.run([PROGRAM, "make-demo", demo], check=True, capture_output=True)
+    manifest = (demo / "manifest.json").read_text()
+    assert '"width": 346, "height": 260' in manifest
+    (demo / "manifest.json").write_text(manifest.replace('"width": 346, "height": 260', '"width": 176, "height": 132'))
+    subprocess.run([PROGRAM, "convert", demo / "manifest.json", "--output", demo / "out", "--progress", "none"], check=True, capture_output=True)
+    subprocess.run([PROGRAM, "finalize", demo / "out"], check=True, capture_output=True)
+    return demo / "out"
+
+
+def line(example, data, out, *more):
+    return [sys.executable, EXAMPLES / f"{example}.py", "--data", data, "--out", out, "--threads", "1", *more]
+
+
+def train(example, data, out, *more, expect=0):
+    """What the example says, on one thread of the processor."""
+    done = subprocess.run(line(example, data, out, *more), capture_output=True, text=True, env=ONE_THREAD)
+    assert done.returncode == expect, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def history(out):
+    return json.loads((out / "metrics.json").read_text())["history"]
+
+
+def need_trainer(name, *modules):
+    if not (TRAINERS / name).is_dir():
+        pytest.skip(f"no ../shared/trainers/{name}")
+    for module in modules:
+        pytest.importorskip(module)
+    return TRAINERS / name
+
+
+def assert_trained(out, steps, pictures):
+    assert [row["step"] for row in history(out)] == steps
+    assert all(np.isfinite(row["loss"]) for row in history(out)[1:])
+    assert len(list((out / "pictures").glob("*.png"))) == pictures
+    assert torch.load(out / "weights.pt", weights_only=True)
+    assert not list(out.glob("*.new"))
+
+
+def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
+    options = ["--dataset", "kitti_object", "--batch", "2", "--scale", "0.5", "--regions", "16", "--every", "9"]
+    said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
+    assert "10 samples to learn, 2 to check, of another sample_id" in said and "(untrained)" in said
+    assert "goes on after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
+    assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
+    assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
+    said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
+    assert "expected --lr 0.0002, with which this run began, got 0.5, in" in said
+
+
+def test_keypoint_rcnn_learns(data, tmp_path):
+    train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "2", "--batch", "1", "--scale", "0.5",
+          "--regions", "8", "--every", "9")
+    assert_trained(tmp_path / "out", [0, 2], pictures=1)
+    assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
+
+
+def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
+    trainer = need_trainer("pose_resnet", "easydict", "json_tricks", "scipy", "yaml")
+    options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
+    train("train_pose", data, tmp_path / "whole", *options)
+    assert_trained(tmp_path / "whole", [0, 2, 4, 6], pictures=1)
+    with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options), stdout=subprocess.DEVNULL, env=ONE_THREAD) as process:
+        while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
+            time.sleep(0.01)
+        process.kill()
+    assert "goes on after epoch" in train("train_pose", data, tmp_path / "killed", *options)
+    whole, killed = ([{**row, "minutes": 0} for row in history(tmp_path / out)] for out in ("whole", "killed"))
+    assert whole == killed
+
+
+def test_yolov3_learns(data, tmp_path):
+    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
+    train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2", "--batch", "2", "--scale", "1",
+          "--every", "9", "--classes", "Car,Van")
+    assert_trained(tmp_path / "out", [0, 2], pictures=2)
+    assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
+    said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes", "Bus", expect=1)
+    assert "got Bus" in said and str(data) in said
+
+
+def test_what_cannot_be_trained_with_is_named(data, tmp_path):
+    said = train("train_torchvision", tmp_path, tmp_path / "out", expect=1)
+    assert f"got no {tmp_path / 'dataset.json'}" in said and "Traceback" not in said
+    said = train("train_torchvision", data, tmp_path / "out", "--dataset", "kitti_raw", expect=1)
+    assert "kitti_raw" in said and "Traceback" not in said
+    said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, expect=1)
+    assert f"expected the trainer's lib/models, got none, in {tmp_path}" in said
