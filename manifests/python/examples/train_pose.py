@@ -24,6 +24,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--size", type=int, default=128, help="height and width of the input, a multiple of 32")
     parser.add_argument("--layers", type=int, default=18, help="of the ResNet: 18, 34, 50, 101, 152")
     parser.add_argument("--filters", type=int, default=128, help="of each of the three deconvolutions")
+    parser.add_argument("--rotation", type=float, default=15.0, help="deviation of the crops' angles in degrees; Simple Baselines': 30")
     parser.add_argument("--sigma", type=float, default=1.5, help="of the heatmaps, in their pixels")
     return training.begin(parser)
 
@@ -75,14 +76,14 @@ def main() -> None:
 
     learnt, checked = training.divided(args, with_persons)
     size = (args.size, args.size)
-    learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation())
+    learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
     check = PoseDataset(checked, size, learn.joint_names, sigma=args.sigma)
     heads = head_sizes(checked, check.persons)  # PCKh is measured by them
     known = np.isfinite(heads).all((1, 2))
     check.persons, heads = check.persons[known], heads[known]
     if len(learn.joint_names) != 16 or not len(check):
-        raise SystemExit(f"expected persons with MPII's 16 joints and head boxes to check, got {len(check)} with {len(learn.joint_names)} joints, "
-                         f"in {args.data} (--dataset {args.dataset})")
+        raise SystemExit(f"expected persons with MPII's 16 joints and head boxes to check, got {len(check)} with {len(learn.joint_names)} joints, in "
+                         f"{args.data} (--dataset {args.dataset})")
     print(f"{len(learn)} persons to learn, {len(check)} to check")
     metas = [check[i][3] for i in range(len(check))]
     write_truth(pathlib.Path(args.out, "annot"), check, metas, heads)
@@ -104,7 +105,8 @@ def main() -> None:
 
     def find(events: torch.Tensor, meta: dict) -> np.ndarray:
         """[n, J, 2]: joints in volume pixels."""
-        return get_final_preds(config, model(events.to(args.device)).cpu().numpy(), np.asarray(meta["center"]), np.asarray(meta["scale"]))[0]
+        maps = model(events.to(args.device)).cpu().numpy()
+        return get_final_preds(config, maps, np.asarray(meta["center"]), np.asarray(meta["scale"]))[0]
 
     def measure() -> dict[str, float]:
         found = np.concatenate([find(events, meta) for events, _, _, meta in training.batches(args, check)])

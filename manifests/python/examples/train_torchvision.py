@@ -21,7 +21,7 @@ from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointD
 def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=4, lr=2e-4)
     parser.add_argument("--task", choices=["detection", "keypoints"], default="detection")
-    parser.add_argument("--classes", help="detection: names with commas between them (default: all that occur); the first one's AP is the result")
+    parser.add_argument("--classes", help="detection: names with commas between them (default: all); the first one's AP is the result")
     parser.add_argument("--scale", type=float, default=1.5, help="input pixels for a pixel of the volume")
     parser.add_argument("--regions", type=int, default=64, help="proposals of a volume that the heads learn from: their cost")
     return training.begin(parser)
@@ -123,8 +123,8 @@ def main() -> None:
         training.draw_boxes(picture, item["boxes"][~item["ignore"]], training.GREEN)
         texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
         training.draw_boxes(picture, found["boxes"][sure], training.YELLOW, texts)
-        for joints, colour in ((item.get("keypoints"), training.GREEN), (found["keypoints"][sure] if "keypoints" in found else None, training.YELLOW)):
-            for x, y, known in joints.reshape(-1, 3).tolist() if joints is not None else ():
+        for source, kept, colour in ((item, ~item["ignore"], training.GREEN), (found, sure, training.YELLOW)):
+            for x, y, known in source["keypoints"][kept].reshape(-1, 3).tolist() if "keypoints" in source else ():
                 if known:
                     cv2.circle(picture, (round(2 * x + 0.5), round(2 * y + 0.5)), 2, colour, -1, cv2.LINE_AA)
         return item["id"], picture

@@ -23,7 +23,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3")
     parser.add_argument("--cfg", default="yolov3-tiny.cfg", help="of the trainer's cfg/, or a path")
     parser.add_argument("--classes", default="Car", help="names with commas between them; the first one's AP is the result")
-    parser.add_argument("--scale", type=float, default=2.0, help="input pixels for a pixel of the volume: small objects need more than the stride")
+    parser.add_argument("--scale", type=float, default=2.0, help="input pixels for a pixel of the volume: small objects need it")
     return training.begin(parser)
 
 
@@ -52,7 +52,8 @@ def anchors_of(shards: Shards, classes: list[str], view: np.ndarray, count: int)
 def adapted(cfg: str, classes: int, anchors: np.ndarray) -> str:
     """The cfg's text with the numbers that go with a dataset: classes, filters of the layers before [yolo], anchors."""
     pairs = ",  ".join(f"{width:.1f},{height:.1f}" for width, height in anchors)
-    for pattern, text in ((r"(?m)^channels *=.*", "channels=18"), (r"(?m)^classes *=.*", f"classes={classes}"), (r"(?m)^anchors *=.*", f"anchors = {pairs}"),
+    for pattern, text in ((r"(?m)^channels *=.*", "channels=18"), (r"(?m)^classes *=.*", f"classes={classes}"),
+                          (r"(?m)^anchors *=.*", f"anchors = {pairs}"),
                           (r"filters *= *\d+(\s+activation *= *linear\s+\[yolo\])", rf"filters={3 * (classes + 5)}\1"),
                           (r"(?m)^mask *= *1,2,3$", "mask = 0,1,2")):  # yolov3-tiny's own leaves its smallest anchor out
         cfg = re.sub(pattern, text, cfg)

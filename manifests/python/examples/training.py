@@ -34,7 +34,7 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     """The options that all examples have. The first limit that is reached ends the training."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", required=True, help="folder that eventgan finalize has completed")
-    parser.add_argument("--out", required=True, help="folder for checkpoint.pt, weights.pt, metrics.json and pictures/; the same line again goes on")
+    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and pictures; the same line again goes on")
     parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
     parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
     parser.add_argument("--epochs", type=int, help="limit")
