@@ -266,6 +266,20 @@ GeneratorSpec read_generator(const StrictValue& value) {
   if (const auto precision = keys.find("precision", {kNetwork})) {
     spec.precision = precision->choice(kPrecisionWords);
   }
+  if (const auto scope = keys.find("scope", {kNetwork})) {
+    spec.scope.scope = scope->choice(kScopeWords);
+  }
+  if (const auto threshold = keys.find("motion_threshold", {kNetwork})) {
+    spec.scope.motion_threshold = threshold->number(0, 255);
+  }
+  if (const auto margin = keys.find("motion_margin_px", {kNetwork})) {
+    spec.scope.motion_margin_px = margin->integer(0, 64);
+  }
+  if (const auto margin = keys.find("label_margin_px", {kNetwork})) {
+    spec.scope.label_margin_px = margin->integer(0, 1024);
+  }
+  if (const auto tile = keys.find("tile_px", {kNetwork}))
+    spec.scope.tile_px = tile->integer(8, 128);
   if (const auto sensor = keys.find("sensor", {kEsim, kDifference})) {
     spec.sensor = read_sensor(*sensor);
   }

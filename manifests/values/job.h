@@ -116,6 +116,23 @@ enum class GeneratorKind {
   kDifference  ///< log intensity on a line from the previous frame to the next
 };
 
+/// Which part of a volume is generated; the rest is zeros.
+enum class Scope {
+  kWhole,
+  kMotion,     ///< where the two frames differ
+  kLabels,     ///< there, and around labelled boxes and persons
+  kLabelsOnly  ///< around these alone
+};
+
+/// A tile is generated if one of its pixels is wanted.
+struct ScopeSpec {
+  Scope scope = Scope::kWhole;
+  double motion_threshold = 8;  ///< of the difference of a pixel's two values, grey levels, 0..255
+  int motion_margin_px = 4;     ///< wanted around a pixel that differs by more, 0..64
+  int label_margin_px = 16;     ///< wanted around a box or a person's crop, 0..1024
+  int tile_px = 16;             ///< side of a tile, 8..128
+};
+
 struct GeneratorSpec {
   GeneratorKind kind = GeneratorKind::kNetwork;
   /// kNetwork: path of a .safetensors file, "shipped" or "shipped:WIDTH" (manifests/weights), or
@@ -124,6 +141,7 @@ struct GeneratorSpec {
   /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
   std::optional<Engine> engine;
   Precision precision = Precision::kFloat32;  ///< kNetwork
+  ScopeSpec scope;                            ///< kNetwork
   SensorSpec sensor;                          ///< kEsim, kDifference
   double duration_s = 0.1;          ///< kEsim, kDifference: time between the two frames, for the
                                     ///< noise and the refractory time; 1e-4..10
@@ -178,6 +196,7 @@ std::string_view to_string(PairChoice choice);
 std::string_view to_string(ImageFit fit);
 std::string_view to_string(GreyOrder order);
 std::string_view to_string(GeneratorKind kind);
+std::string_view to_string(Scope scope);
 std::string_view to_string(Normalization normalization);
 std::string_view to_string(StoredType type);
 std::string_view to_string(ErrorPolicy policy);

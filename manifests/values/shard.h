@@ -33,6 +33,8 @@ struct ShardHeader {
   int deflate_level = 1;
   Normalization normalization = Normalization::kNone;
   VolumeUnit unit = VolumeUnit::kLearned;
+  std::string scope;  ///< "motion"; empty if whole volumes are generated
+  int tile_px = 0;    ///< side of the tiles of ShardSample::tiles; 0 if whole ones are
   LabelSchema label_schema;
   std::string preprocessing;  ///< JSON: fit, grey, blur, preset
   std::string plan_hash;      ///< SHA-256 of the frozen plan, hex
@@ -56,6 +58,8 @@ struct ShardSample {
   ImageSize source_size;                     ///< {0, 0} if unknown (quarantined)
   std::array<double, 6> source_to_volume{};  ///< NaN if unknown (quarantined)
   VolumeStatistics statistics;
+  /// [row, column] of the volume's tiles: 1 generated, 0 left at zero. Empty: all is generated.
+  std::vector<std::uint8_t> tiles;
   float scale = 1;        ///< value = stored code x scale for uint8; 1 for floats
   Annotation annotation;  ///< empty boxes and persons if the annotation could not be read
   VolumeLabels labels;    ///< as many entries as `annotation`

@@ -15,6 +15,7 @@ std::string_view to_string(PairChoice choice) { return word_of(kChoiceWords, cho
 std::string_view to_string(ImageFit fit) { return word_of(kFitWords, fit); }
 std::string_view to_string(GreyOrder order) { return word_of(kGreyWords, order); }
 std::string_view to_string(GeneratorKind kind) { return word_of(kGeneratorWords, kind); }
+std::string_view to_string(Scope scope) { return word_of(kScopeWords, scope); }
 std::string_view to_string(Normalization normalization) {
   return word_of(kNormalizationWords, normalization);
 }

@@ -67,6 +67,9 @@ inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std
                                          Word<std::optional<Engine>>{"torch", Engine::kTorch},
                                          Word<std::optional<Engine>>{"onednn", Engine::kOnednn}};
 
+inline constexpr std::array kScopeWords{
+    Word<Scope>{"whole", Scope::kWhole}, Word<Scope>{"motion", Scope::kMotion},
+    Word<Scope>{"labels", Scope::kLabels}, Word<Scope>{"labels_only", Scope::kLabelsOnly}};
 inline constexpr std::array kPrecisionWords{Word<Precision>{"float32", Precision::kFloat32},
                                             Word<Precision>{"bfloat16", Precision::kBfloat16},
                                             Word<Precision>{"int8", Precision::kInt8}};

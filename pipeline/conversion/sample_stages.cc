@@ -9,6 +9,7 @@
 
 #include "pipeline/runtime/threads.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/generator/wanted_tiles.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {
@@ -125,7 +126,17 @@ void SampleStages::generate(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
   message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
-  generator_.generate(prepared.input, prepared.content, message.volume);
+  const ScopeSpec& scope = manifest_.generator.scope;
+  if (scope.scope == Scope::kWhole) {
+    generator_.generate(prepared.input, prepared.content, message.volume);
+  } else {
+    const TileMask wanted =
+        wanted_tiles(scope, prepared.input, prepared.content, prepared.content_y,
+                     prepared.content_x, message.sample.labels);
+    message.sample.tiles =
+        tiles_of_volume(wanted, prepared.content_y, prepared.content_x, prepared.placement.volume);
+    generator_.generate_tiles(prepared.input, wanted, message.volume);
+  }
   message.prepared.input = {};
 } catch (const std::exception&) {
   name_sample(message, "generate the volume of");

@@ -36,6 +36,10 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   header.manifest_text = job.frozen.plan.manifest_text;
   if (manifest.generator.kind == GeneratorKind::kNetwork) {
     header.weights = shipped_weights_name(manifest.generator.weights);
+    if (const ScopeSpec& scope = manifest.generator.scope; scope.scope != Scope::kWhole) {
+      header.scope = to_string(scope.scope);
+      header.tile_px = scope.tile_px;
+    }
   }
   header.weights_hash = job.weights_hash;
   header.generator = job.generator.description();

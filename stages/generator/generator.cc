@@ -1,9 +1,33 @@
 #include "stages/generator/generator.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <string>
 
 namespace eventgan {
+
+void Generator::generate_tiles(std::span<const float> frames, const TileMask& wanted,
+                               std::span<float> volume) const {
+  if (std::ranges::find(wanted.wanted, 1) == wanted.wanted.end()) {
+    check_generator_spans(frames, wanted.size, volume, bins());
+    std::ranges::fill(volume, 0.0f);
+    return;
+  }
+  generate(frames, wanted.size, volume);
+  clear_unwanted(wanted, volume);
+}
+
+void clear_unwanted(const TileMask& wanted, std::span<float> volume) {
+  const std::size_t plane = wanted.size.pixel_count();
+  for (std::size_t first = 0; first < volume.size(); first += plane) {
+    wanted.visit_tiles(false, [&](const TileMask::Pixels& tile) {
+      for (int y = tile.top; y < tile.bottom; ++y) {
+        float* row = volume.data() + first + static_cast<std::size_t>(y) * wanted.size.width;
+        std::fill(row + tile.left, row + tile.right, 0.0f);
+      }
+    });
+  }
+}
 
 void check_generator_spans(std::span<const float> frames, ImageSize size,
                            std::span<const float> volume, int bins) {

@@ -158,7 +158,7 @@ class ViewColumns {
     known.boxes.offsets = view_.layout.box_offsets;
     known.poses.offsets = view_.layout.person_offsets;
     known.valid = view_.layout.valid;
-    visit_columns(std::as_const(known), view_.header.label_schema.joint_names.size(),
+    visit_columns(std::as_const(known), view_.header,
                   [&](const ColumnSpec& spec, const auto& column) { add(spec, column); });
   }
 

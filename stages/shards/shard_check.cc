@@ -192,12 +192,12 @@ std::vector<std::string> count_faults(const std::filesystem::path& shard,
                                       const ShardMarker& marker) {
   std::vector<std::string> faults;
   ShardTables tables;
-  LabelSchema schema;
+  ShardHeader header;
   {
     const Hdf5Lock lock;
     ShardFile file = open_shard(shard, faults, Columns::kCounted);
     tables = std::move(file.tables);
-    schema = std::move(file.header.label_schema);
+    header = std::move(file.header);
   }
   if (!faults.empty()) throw std::runtime_error(faults.front());
   std::vector<QuarantinedSample> invalid;
@@ -209,7 +209,7 @@ std::vector<std::string> count_faults(const std::filesystem::path& shard,
     faults.push_back("expected the " + std::to_string(invalid.size()) +
                      " samples with valid = 0 as quarantined, got others");
   }
-  for (std::string& fault : contents_faults(contents_of(tables, schema), marker.contents)) {
+  for (std::string& fault : contents_faults(contents_of(tables, header), marker.contents)) {
     faults.push_back(std::move(fault));
   }
   return faults;

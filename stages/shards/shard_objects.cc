@@ -122,6 +122,11 @@ void describe_columns(hid_t location, const ShardHeader& header) {
                   schema.class_names);
   write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
   write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
+  if (header.tile_px > 0) {
+    const Hdf5Handle tiles = open_object(location, "events/tiles");
+    write_attribute(tiles, "tile_px", std::int32_t{header.tile_px});
+    write_attribute(tiles, "scope", header.scope);
+  }
   if (!schema.joint_aliases.empty()) {
     write_attribute(open_object(location, "labels/poses"), "joint_aliases", schema.joint_aliases);
   }
@@ -203,11 +208,25 @@ void read_volume(hid_t file, ShardHeader& header) {
   header.volume.size = {static_cast<int>(dims[2]), static_cast<int>(dims[3])};
 }
 
+void read_tiles(hid_t file, ShardHeader& header) {
+  if (checked(H5Lexists(file, "/events/tiles", H5P_DEFAULT), "look for", "/events/tiles") == 0) {
+    return;
+  }
+  const Hdf5Handle tiles = open_object(file, "/events/tiles");
+  header.scope = read_text_attribute(tiles, "scope");
+  header.tile_px = read_number_attribute(tiles, "tile_px");
+  if (header.tile_px < 1) {
+    throw Hdf5Error("expected tile_px of /events/tiles above 0, got " +
+                    std::to_string(header.tile_px));
+  }
+}
+
 }  // namespace
 
 ShardHeader read_header(hid_t file) {
   check_format(file);
   ShardHeader header;
+  read_tiles(file, header);
   header.name = read_text_attribute(file, "name");
   header.dataset = read_text_attribute(file, "dataset");
   header.split = read_text_attribute(file, "split");

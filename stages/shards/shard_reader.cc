@@ -132,8 +132,7 @@ ShardFile open_shard(const std::filesystem::path& path, std::vector<std::string>
   } catch (const std::exception& error) {
     throw std::runtime_error(path.string() + ": " + error.what());
   }
-  visit_columns(shard.tables, shard.header.label_schema.joint_names.size(),
-                ColumnReader(shard, path.string(), faults, columns));
+  visit_columns(shard.tables, shard.header, ColumnReader(shard, path.string(), faults, columns));
   return shard;
 }
 
@@ -207,9 +206,7 @@ ShardReader::ShardReader(ShardReader&&) noexcept = default;
 
 const ShardHeader& ShardReader::header() const { return state_->shard.header; }
 
-ShardContents ShardReader::contents() const {
-  return contents_of(state_->shard.tables, header().label_schema);
-}
+ShardContents ShardReader::contents() const { return contents_of(state_->shard.tables, header()); }
 
 ShardSample ShardReader::sample(int slot) const {
   state_->check_slot(slot);

@@ -187,12 +187,18 @@ void check_labels(const LabelSchema& schema, const ShardSample& sample) {
 }  // namespace
 
 void append_row(const ShardHeader& header, const ShardSample& sample, ShardTables& tables) {
+  const std::size_t tiles = tile_grid(header).pixel_count();
+  if (sample.valid && sample.tiles.size() != tiles) {
+    throw std::logic_error("expected the tiles of the header's grid (" + sample.sample_id + ")");
+  }
   const bool labelled =
       sample.valid || !sample.labels.boxes.empty() || !sample.labels.persons.empty();
   if (labelled) check_labels(header.label_schema, sample);
 
   const std::size_t row = tables.valid.size();
   append_events(sample, tables.events);
+  tables.events.tiles.insert(tables.events.tiles.end(), sample.tiles.begin(), sample.tiles.end());
+  tables.events.tiles.resize(tiles * (row + 1));  // a quarantined sample has none
   append_pair(header, sample, tables.pairs);
   tables.original.emplace_back(sample.annotation.original.begin(),
                                sample.annotation.original.end());
@@ -361,6 +367,9 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   }
   sample.statistics = statistics_at(tables.events, row);
   sample.scale = tables.events.scale[row];
+  const auto tiles = static_cast<std::ptrdiff_t>(tile_grid(header).pixel_count());
+  const auto first_tile = tables.events.tiles.begin() + static_cast<std::ptrdiff_t>(row) * tiles;
+  sample.tiles.assign(first_tile, first_tile + tiles);
   sample.annotation.original.assign(tables.original[row].begin(), tables.original[row].end());
 
   sample.annotation.projection = projection_if_any(tables.projection_source, row);

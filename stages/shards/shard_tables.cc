@@ -16,15 +16,22 @@ std::vector<std::int32_t> rows_by_slot(const std::vector<std::int64_t>& offsets)
 
 }  // namespace
 
-ShardContents contents_of(const ShardTables& tables, const LabelSchema& schema) {
+ImageSize tile_grid(const ShardHeader& header) {
+  const int side = header.tile_px;
+  if (side == 0) return {};
+  const ImageSize size = header.volume.size;
+  return {(size.height + side - 1) / side, (size.width + side - 1) / side};
+}
+
+ShardContents contents_of(const ShardTables& tables, const ShardHeader& header) {
   ShardContents contents;
   contents.boxes = rows_by_slot(tables.boxes.offsets);
   contents.persons = rows_by_slot(tables.poses.offsets);
   for (const std::int32_t id : tables.boxes.class_id) {
-    ++contents.classes[schema.class_names.at(static_cast<std::size_t>(id))];
+    ++contents.classes[header.label_schema.class_names.at(static_cast<std::size_t>(id))];
   }
   for (const std::int32_t gap : tables.pairs.gap_frames) ++contents.gaps[gap];
-  visit_columns(tables, schema.joint_names.size(), [&](const ColumnSpec& spec, const auto& column) {
+  visit_columns(tables, header, [&](const ColumnSpec& spec, const auto& column) {
     if (spec.optional && !column.empty()) contents.optional_columns.push_back(spec.path);
   });
   return contents;

@@ -20,6 +20,7 @@ struct EventColumns {
   std::vector<float> nonzero_fraction, max;
   std::vector<double> sum_positive, sum_negative;
   std::vector<std::uint32_t> flags;
+  std::vector<std::uint8_t> tiles;  ///< empty if whole volumes are generated
 };
 
 /// `/pairs/*`, one row a sample. The last two lines are empty as long as no sample has such a
@@ -75,6 +76,9 @@ struct ShardTables {
   std::vector<std::uint8_t> valid;
 };
 
+/// Rows and columns of ShardSample::tiles; {0, 0} if there are none.
+ImageSize tile_grid(const ShardHeader& header);
+
 /// What a column has one row for. kOffsets: one more row than samples.
 enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
 
@@ -88,9 +92,11 @@ struct ColumnSpec {
 
 /// Calls visit(ColumnSpec, column) for every column, offsets before the rows they lead to. Writer,
 /// reader and check all go through this list, so it is the one place where the layout of a shard
-/// stands in the code. Tables: ShardTables or const ShardTables. `joints` = number of joint names.
+/// stands in the code. Tables: ShardTables or const ShardTables.
 template <class Tables, class Visit>
-void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
+void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
+  const std::size_t joints = header.label_schema.joint_names.size();
+  const ImageSize grid = tile_grid(header);
   auto& e = tables.events;
   visit(ColumnSpec{"/events/eta98", Rows::kSamples, {}}, e.eta98);
   visit(ColumnSpec{"/events/scale", Rows::kSamples, {}}, e.scale);
@@ -99,6 +105,11 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
   visit(ColumnSpec{"/events/statistics/sum_negative", Rows::kSamples, {}}, e.sum_negative);
   visit(ColumnSpec{"/events/statistics/max", Rows::kSamples, {}}, e.max);
   visit(ColumnSpec{"/events/statistics/flags", Rows::kSamples, {}}, e.flags);
+  visit(ColumnSpec{"/events/tiles",
+                   Rows::kSamples,
+                   {static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)},
+                   true},
+        e.tiles);
 
   auto& p = tables.pairs;
   visit(ColumnSpec{"/pairs/sample_id", Rows::kSamples, {}}, p.sample_id);
@@ -166,6 +177,6 @@ void visit_columns(Tables& tables, std::size_t joints, Visit&& visit) {
 }
 
 /// Counts the rows of consistent tables.
-ShardContents contents_of(const ShardTables& tables, const LabelSchema& schema);
+ShardContents contents_of(const ShardTables& tables, const ShardHeader& header);
 
 }  // namespace eventgan

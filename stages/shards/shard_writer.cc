@@ -50,7 +50,6 @@ void ShardWriter::State::write_chunk(std::span<const std::byte> chunk) {
 }
 
 void ShardWriter::State::write_columns() {
-  const std::size_t joints = header.label_schema.joint_names.size();
   const ShardTables& columns = tables;
   const auto rows = [&](Rows kind) {
     switch (kind) {
@@ -65,7 +64,7 @@ void ShardWriter::State::write_columns() {
     }
     throw std::logic_error("unknown kind of rows");
   };
-  visit_columns(columns, joints, [&](const ColumnSpec& spec, const auto& column) {
+  visit_columns(columns, header, [&](const ColumnSpec& spec, const auto& column) {
     if (spec.optional && column.empty()) return;
     Dims dims{rows(spec.rows)};
     dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
@@ -80,7 +79,7 @@ ShardReceipt ShardWriter::State::flush() {
     file.output().sync();
     return {sha256_of_file(temporary),
             static_cast<std::int64_t>(std::filesystem::file_size(temporary)),
-            contents_of(tables, header.label_schema)};
+            contents_of(tables, header)};
   } catch (const std::runtime_error&) {
     std::error_code unknown;
     if (std::filesystem::exists(temporary, unknown) || unknown) throw;

@@ -52,6 +52,23 @@ class Engines(program.InFolder):
             self.assertTrue(shard["valid"][:].all())
             return shard["events/volume"][:], err
 
+    def test_scope_generates_the_tiles_that_it_says(self):
+        for engine in ("onednn", "torch"):
+            if not self.is_offered(self.manifest("offered.json", engine=engine)):
+                continue
+            whole, _ = self.convert("whole", engine=engine)
+            for scope, is_any in (("motion", False), ("labels", True), ("labels_only", True)):
+                # Nothing differs by more than 255 grey levels.
+                volumes, _ = self.convert(scope, engine=engine, scope=scope, motion_threshold=255, label_margin_px=0, tile_px=8)
+                with h5py.File(next((self.job / scope).glob("*.h5"))) as shard:
+                    tiles = shard["events/tiles"]
+                    self.assertEqual((tiles.attrs["scope"], tiles.attrs["tile_px"]), (scope, 8))
+                    kept = np.repeat(np.repeat(tiles[:], 8, 1), 8, 2)[:, None, :whole.shape[2], :whole.shape[3]]
+                self.assertEqual((kept.mean() > 0, kept.mean() < 1), (is_any, True))
+                np.testing.assert_allclose(volumes, whole * kept, atol=1e-5 * whole.max())
+                run("finalize", self.job / scope)
+                run("verify", self.job / scope, "--deep")
+
     def is_offered(self, path):
         """Whether this program on this processor takes a manifest's engine and precision."""
         code = subprocess.run([program.PROGRAM, "plan", path], capture_output=True).returncode

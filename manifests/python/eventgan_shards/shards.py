@@ -104,7 +104,8 @@ class Shards(Sequence):
 
         volume        float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
         pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if it is there
-        statistics    everything of /events/statistics, and eta98; flags as int64, since PyTorch has no uint32
+        statistics    everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as int64,
+                      since PyTorch has no uint32
         boxes         arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
         persons       arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
         original      bytes, the annotation as the dataset holds it
@@ -124,6 +125,8 @@ class Shards(Sequence):
                 sample["pair"][name.removeprefix("labels/")] = file.column(name)[slot]
         if "statistics" in fields:
             sample["statistics"] = {**file.row("events/statistics", slot), "eta98": file.column("events/eta98")[slot]}
+            for name in file.optional("events/tiles"):
+                sample["statistics"]["tiles"] = file.column(name)[slot]
         if "boxes" in fields:
             sample["boxes"] = file.rows("labels/boxes", slot)
         if "persons" in fields:

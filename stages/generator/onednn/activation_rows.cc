@@ -44,10 +44,12 @@ template <class T>
   }
 }
 
-/// The values of a row's pixel behind the phases' kernel.
-[[gnu::always_inline]] inline const float* phase_of(const DecoderRow& row, std::ptrdiff_t x) {
+/// The values of a row's pixel behind the phases' kernel: pixel x of the picture stands at
+/// (x + 1) / 2.
+[[gnu::always_inline]] inline const float* phase_of(const DecoderRow& row, std::ptrdiff_t i) {
+  const std::ptrdiff_t x = i + row.column_phase;
   const std::ptrdiff_t phase = 2 * row.row_phase + x % 2;
-  return row.phases + ((x + 1) / 2 * 4 + phase) * row.channels;
+  return row.phases + (((x + 1) / 2 - row.column_phase) * 4 + phase) * row.channels;
 }
 
 [[gnu::always_inline]] inline void combine_row(const DecoderRow& row, float* combined) {

@@ -23,12 +23,14 @@ void store_activations(const float* values, std::size_t count, std::uint8_t* sto
 
 /// Where one row of a decoder's output comes from.
 struct DecoderRow {
-  int width = 0;      ///< of the output row, pixels
-  int channels = 0;   ///< of the output
-  int row_phase = 0;  ///< 0: even row, 1: odd row
+  int width = 0;         ///< of this part of the output row, pixels
+  int channels = 0;      ///< of the output
+  int row_phase = 0;     ///< 0: even row, 1: odd row
+  int column_phase = 0;  ///< the same of the first pixel
   /// [x, channel]: what the skip connection adds, bias included; may be overwritten.
   float* skip = nullptr;
-  /// [(x + 1) / 2, phase, channel]: the row of phase_kernel's output that holds this one.
+  /// [pixel, phase, channel]: the row of phase_kernel's output that holds this one, from the
+  /// pixel that holds the first one on.
   const float* phases = nullptr;
   /// Not null: [x, channel], in place of `phases`.
   const float* whole_row = nullptr;

@@ -13,10 +13,15 @@ class BufferLayout {
  public:
   /// Offset of a new buffer, on a cache line of its own.
   std::size_t add(std::size_t size_bytes) {
-    constexpr std::size_t kLine = 64;
-    const std::size_t offset = (total_bytes_ + kLine - 1) / kLine * kLine;
+    const std::size_t offset = aligned(total_bytes_);
     total_bytes_ = offset + size_bytes;
     return offset;
+  }
+
+  /// Where a cache line begins, `bytes` or next behind.
+  static constexpr std::size_t aligned(std::size_t bytes) {
+    constexpr std::size_t kLine = 64;
+    return (bytes + kLine - 1) / kLine * kLine;
   }
 
   std::size_t total_bytes() const { return std::max<std::size_t>(total_bytes_, 1); }

@@ -39,6 +39,7 @@ DecoderLevel::DecoderLevel(NetworkLayers& layers, int level, ImageSize large, Bu
       channels_(layers.at(layer_name(level, "skip")).numbers().out_channels),
       small_pixel_bytes_(dnnl::memory::data_type_size(layers.stored_type()) *
                          layers.at(layer_name(level, "phases")).numbers().in_channels),
+      skip_pixel_bytes_(dnnl::memory::data_type_size(layers.stored_type()) * channels_),
       phases_(setup_of(small_, phase_size(large), layers.stored_type()),
               layers.at(layer_name(level, "phases")), layers.engine()),
       skip_(setup_of(large, large, layers.stored_type()), layers.at(layer_name(level, "skip")),
@@ -126,14 +127,19 @@ DecoderRow DecoderLevel::row(const EngineRun& run, const DecoderStrip& strip, in
   row.phases = reinterpret_cast<const float*>(run.block + phase_buffer_ +
                                               ((y + 1) / 2 - strip.first_phase_row) *
                                                   phases_.output_row_bytes());
+  add_edges(run, y, 0, row);
+  return row;
+}
+
+void DecoderLevel::add_edges(const EngineRun& run, int y, int first_x, DecoderRow& row) const {
   if (last_row_ && y == large_.height - 1) {
-    row.whole_row = reinterpret_cast<const float*>(run.block + last_row_->output);
+    row.whole_row = reinterpret_cast<const float*>(run.block + last_row_->output) +
+                    static_cast<std::ptrdiff_t>(first_x) * channels_;
   }
-  if (last_column_) {
+  if (last_column_ && first_x + row.width == large_.width) {
     row.last_pixel = reinterpret_cast<const float*>(run.block + last_column_->output) +
                      static_cast<std::ptrdiff_t>(y) * channels_;
   }
-  return row;
 }
 
 std::size_t DecoderLevel::scratch_bytes() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <dnnl.hpp>
 #include <optional>
@@ -11,6 +12,7 @@
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/fused_convolution_internal.h"
 #include "stages/generator/onednn/network_layers_internal.h"
+#include "stages/generator/onednn/tiled_layers_internal.h"
 
 namespace eventgan {
 
@@ -19,6 +21,7 @@ struct EngineRun {
   dnnl::stream& stream;
   std::byte* block = nullptr;  ///< what BufferLayout's offsets count from
   std::byte* scratch = nullptr;
+  std::byte* tiles = nullptr;  ///< TiledLayers' buffers, where it is used
 };
 
 /// One decoder for one picture size: the sums of its convolutions over the doubled picture and over
@@ -42,6 +45,35 @@ class DecoderLevel {
 
   DecoderRow row(const EngineRun& run, const DecoderStrip& strip, int y) const;
 
+  /// In place of strips: computes a piece, and calls visit(y, first_x, DecoderRow) for each of its
+  /// rows in the picture.
+  template <class Visit>
+  void compute_tile(const EngineRun& run, const DecoderTile& tile, TilePlace place,
+                    std::byte* small, std::byte* skip, Visit&& visit) const {
+    tile.compute(run.stream, run.tiles, place, {small, small_, small_pixel_bytes_},
+                 {skip, large_, skip_pixel_bytes_});
+    const int first_x = std::max(2 * place.column - 1, 0);
+    const int end_x = std::min(2 * place.column - 1 + tile.size().width, large_.width);
+    const int end_y = std::min(2 * place.row - 1 + tile.size().height, large_.height);
+    for (int y = std::max(2 * place.row - 1, 0); y < end_y; ++y) {
+      DecoderRow row = tile.row(run.tiles, place, y, first_x, end_x);
+      add_edges(run, y, first_x, row);
+      visit(y, first_x, row);
+    }
+  }
+
+  /// The same by pixels of the phases: visit(y, x, DecoderRow) for each pixel of theirs.
+  template <class Visit>
+  void compute_pixels(const EngineRun& run, const DecoderPixels& pixels,
+                      const std::vector<int>& numbers, std::byte* small, std::byte* skip,
+                      Visit&& visit) const {
+    pixels.run(run.stream, run.tiles, numbers, {small, small_, small_pixel_bytes_},
+               {skip, large_, skip_pixel_bytes_}, [&](int y, int x, DecoderRow row) {
+                 add_edges(run, y, x, row);
+                 visit(y, x, row);
+               });
+  }
+
   std::size_t scratch_bytes() const;
   void list_implementations(std::vector<std::string>& names) const;
 
@@ -55,6 +87,7 @@ class DecoderLevel {
   };
   Edge make_edge(NetworkLayers& layers, const std::string& name, int across, int along,
                  BufferLayout& layout) const;
+  void add_edges(const EngineRun& run, int y, int first_x, DecoderRow& row) const;
   void gather(const std::byte* small, int row, int column, std::byte* pixel) const;
   void run_edge(const EngineRun& run, const Edge& edge) const;
 
@@ -62,6 +95,7 @@ class DecoderLevel {
   ImageSize large_;
   int channels_;
   std::size_t small_pixel_bytes_;
+  std::size_t skip_pixel_bytes_;
   RowConvolution phases_;
   RowConvolution skip_;
   std::optional<Edge> last_row_;

@@ -179,39 +179,134 @@ void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
   }
 }
 
-template <class Stored>
-void NetworkPlan::run_stored(const EngineRun& run, const float* frames, float* volume) const {
-  const auto at = [&](const Buffer& buffer) { return run.block + buffer.offset; };
-  run_head<Stored>(run, frames);
-  for (int level = 0; level < kNetworkLevels; ++level) {
-    const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottom_;
-    encoders_[level].run(run.stream, at(skips_[level]), at(target), run.scratch);
+template <class Compute>
+void NetworkPlan::with_stored_type(Compute&& compute) const {
+  switch (stored_type_) {
+    case Type::f32:
+      return compute(float());
+    case Type::bf16:
+      return compute(Bfloat16());
+    case Type::u8:
+      return compute(std::uint8_t());
+    default:
+      throw std::logic_error("unknown type of activations");
   }
-  for (int block = 0; block < kResidualBlocks; ++block) {
-    residuals_[2 * block].run(run.stream, at(bottom_), at(between_), run.scratch);
-    residuals_[2 * block + 1].run(run.stream, at(between_), at(bottom_), run.scratch);
-  }
-  const std::byte* small = at(bottom_);
-  for (int level = 0; level < kNetworkLevels - 1; ++level) {
-    run_decoder<Stored>(run, level, small);
-    small = at(decoded_[level]);
-  }
-  run_last_decoder(run, small, volume);
 }
 
 void NetworkPlan::run(const float* frames, float* volume, std::byte* block) const {
   dnnl::stream stream(engine_);
   const EngineRun run{stream, block, block + scratch_};
-  switch (stored_type_) {
-    case Type::f32:
-      return run_stored<float>(run, frames, volume);
-    case Type::bf16:
-      return run_stored<Bfloat16>(run, frames, volume);
-    case Type::u8:
-      return run_stored<std::uint8_t>(run, frames, volume);
-    default:
-      throw std::logic_error("unknown type of activations");
+  const auto at = [&](const Buffer& buffer) { return block + buffer.offset; };
+  with_stored_type([&]<class Stored>(Stored) {
+    run_head<Stored>(run, frames);
+    for (int level = 0; level < kNetworkLevels; ++level) {
+      const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottom_;
+      encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
+    }
+    for (std::size_t i = 0; i < residuals_.size(); i += 2) {
+      residuals_[i].run(stream, at(bottom_), at(between_), run.scratch);
+      residuals_[i + 1].run(stream, at(between_), at(bottom_), run.scratch);
+    }
+    const std::byte* small = at(bottom_);
+    for (int level = 0; level < kNetworkLevels - 1; ++level) {
+      run_decoder<Stored>(run, level, small);
+      small = at(decoded_[level]);
+    }
+    run_last_decoder(run, small, volume);
+  });
+}
+
+template <class Stored>
+void NetworkPlan::run_decoder_tiles(const EngineRun& run, const TiledLayers& layers,
+                                    const TiledWork& work, int level, std::byte* small) const {
+  const DecoderLevel& decoder = decoders_[level];
+  std::byte* skip = run.block + skips_[kNetworkLevels - 1 - level].offset;
+  auto* stored = reinterpret_cast<Stored*>(run.block + decoded_[level].offset);
+  const std::ptrdiff_t width = sizes_[kNetworkLevels - 1 - level].width;
+  const auto store = [&](int y, int first_x, const DecoderRow& row) {
+    combine_phases(row, stored + (y * width + first_x) * row.channels);
+  };
+  decoder.compute_edges(run, small);
+  if (level == 0) {
+    decoder.compute_pixels(run, layers.first_decoder.front(), work.first_decoder, small, skip,
+                           store);
+    return;
   }
+  for (const TilePlace place : work.decoders[level - 1]) {
+    decoder.compute_tile(run, layers.decoders[level - 1], place, small, skip, store);
+  }
+}
+
+void NetworkPlan::run_last_tiles(const EngineRun& run, const TiledLayers& layers,
+                                 const TiledWork& work, const TileMask& wanted, std::byte* small,
+                                 float* volume) const {
+  const DecoderLevel& decoder = decoders_.back();
+  const DecoderTile& tile = layers.decoders.back();
+  std::byte* skip = run.block + skips_[0].offset;
+  float* decoded = layers.decoded(run.tiles);
+  decoder.compute_edges(run, small);
+  for (const TilePlace place : work.decoders.back()) {
+    const int top = 2 * place.row - 1;
+    const int left = 2 * place.column - 1;
+    const auto pixel_at = [&](int y, int x) {
+      return static_cast<std::ptrdiff_t>(y - top) * tile.size().width + x - left;
+    };
+    decoder.compute_tile(run, tile, place, small, skip,
+                         [&](int y, int first_x, const DecoderRow& row) {
+                           combine_phases(row, decoded + pixel_at(y, first_x) * row.channels);
+                         });
+    const float* predicted = layers.predict(run.stream, run.tiles);
+    const TileMask::Pixels piece{std::max(top, 0), std::min(top + tile.size().height, size_.height),
+                                 std::max(left, 0),
+                                 std::min(left + tile.size().width, size_.width)};
+    wanted.visit_within(piece, [&](const TileMask::Pixels& pixels) {
+      for (int y = pixels.top; y < pixels.bottom; ++y) {
+        rectify_into_planes(predicted + pixel_at(y, pixels.left) * 2 * bins_,
+                            static_cast<std::size_t>(pixels.right - pixels.left), 2 * bins_,
+                            volume + static_cast<std::ptrdiff_t>(y) * size_.width + pixels.left,
+                            size_.pixel_count());
+      }
+    });
+  }
+}
+
+void NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
+                            const TileMask& wanted, const float* frames, float* volume,
+                            std::byte* block, std::byte* tiles) const {
+  dnnl::stream stream(engine_);
+  const EngineRun run{stream, block, block + scratch_, tiles};
+  const std::size_t value = dnnl::memory::data_type_size(stored_type_);
+  const auto skip = [&](int level) {
+    return Activations{block + skips_[level].offset, sizes_[level],
+                       value * (static_cast<std::size_t>(base_channels_) << level)};
+  };
+  const auto at_bottom = [&](const Buffer& buffer) {
+    return Activations{block + buffer.offset, half_size(sizes_.back()),
+                       value * (static_cast<std::size_t>(base_channels_) << kNetworkLevels)};
+  };
+  with_stored_type([&]<class Stored>(Stored) {
+    run_head<Stored>(run, frames);
+    for (int level = 0; level < kTiledEncoders; ++level) {
+      for (const TilePlace place : work.encoders[level]) {
+        layers.encoders[level].run(stream, tiles, place, skip(level), skip(level + 1));
+      }
+    }
+    // The last encoder, then the blocks' first and second convolutions in turns.
+    Activations source = skip(kTiledEncoders);
+    Activations target = at_bottom(bottom_);
+    auto pixels = work.bottom.begin();
+    for (const PixelConvolution& convolution : layers.bottom) {
+      convolution.run(stream, tiles, *pixels++, source, target);
+      source = target;
+      target = at_bottom(source.data == block + bottom_.offset ? between_ : bottom_);
+    }
+    std::byte* small = block + bottom_.offset;
+    for (int level = 0; level < kNetworkLevels - 1; ++level) {
+      run_decoder_tiles<Stored>(run, layers, work, level, small);
+      small = block + decoded_[level].offset;
+    }
+    run_last_tiles(run, layers, work, wanted, small, volume);
+  });
 }
 
 std::vector<std::string> NetworkPlan::implementations() const {

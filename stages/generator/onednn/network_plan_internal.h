@@ -33,6 +33,11 @@ class NetworkPlan {
   /// block_bytes(), whatever stands in it.
   void run(const float* frames, float* volume, std::byte* block) const;
 
+  /// The same for the tiles that are wanted, by what tiled_work says of them; nothing else of the
+  /// volume is written. `tiles`: a block for layers.layout.
+  void run_tiles(const TiledLayers& layers, const TiledWork& work, const TileMask& wanted,
+                 const float* frames, float* volume, std::byte* block, std::byte* tiles) const;
+
   /// oneDNN's names of all kernels.
   std::vector<std::string> implementations() const;
 
@@ -49,13 +54,19 @@ class NetworkPlan {
   void plan_decoders(NetworkLayers& layers);
   void plan_prediction(NetworkLayers& layers);
 
-  template <class Stored>
-  void run_stored(const EngineRun& run, const float* frames, float* volume) const;
+  /// Calls compute(Stored()) with the type of the stored activations.
+  template <class Compute>
+  void with_stored_type(Compute&& compute) const;
   template <class Stored>
   void run_head(const EngineRun& run, const float* frames) const;
   template <class Stored>
   void run_decoder(const EngineRun& run, int level, const std::byte* small) const;
   void run_last_decoder(const EngineRun& run, const std::byte* small, float* volume) const;
+  template <class Stored>
+  void run_decoder_tiles(const EngineRun& run, const TiledLayers& layers, const TiledWork& work,
+                         int level, std::byte* small) const;
+  void run_last_tiles(const EngineRun& run, const TiledLayers& layers, const TiledWork& work,
+                      const TileMask& wanted, std::byte* small, float* volume) const;
 
   dnnl::engine engine_;
   ImageSize size_;

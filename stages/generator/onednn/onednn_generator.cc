@@ -4,15 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <dnnl.hpp>
 #include <limits>
+#include <mutex>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string>
 
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/network_plan_internal.h"
+#include "stages/generator/onednn/tiled_layers_internal.h"
 
 namespace eventgan {
 namespace {
@@ -132,11 +136,46 @@ class OnednnGenerator final : public Generator {
       std::ranges::fill(volume, std::numeric_limits<float>::quiet_NaN());
       return;
     }
-    use_one_thread();
-    try {
+    compute(size, [&] {
       const auto plan = plans_.plan(size);
       const BlockPool::Lease block = blocks_.take(plan->block_bytes());
       plan->run(frames.data(), volume.data(), block.data());
+    });
+  }
+
+  void generate_tiles(std::span<const float> frames, const TileMask& wanted,
+                      std::span<float> volume) const override {
+    check_generator_spans(frames, wanted.size, volume, bins_);
+    // Above it, computing all is not slower; what tiles depend on is more than they are.
+    constexpr double kLargestShare = 0.9;
+    constexpr double kManyTiles = 0.6;
+    const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
+    TiledWork work;
+    if (tiles > 0 && tiles < kManyTiles * static_cast<double>(wanted.wanted.size()) &&
+        (precision_ != Precision::kInt8 || all_finite(frames))) {
+      work = tiled_work(wanted);
+    }
+    if (work.share == 0 || work.share > kLargestShare) {
+      Generator::generate_tiles(frames, wanted, volume);
+      return;
+    }
+    std::memset(volume.data(), 0, volume.size_bytes());
+    compute(wanted.size, [&] {
+      const TiledLayers& layers = tiled_layers();
+      const auto plan = plans_.plan(wanted.size);
+      const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
+      const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
+      plan->run_tiles(layers, work, wanted, frames.data(), volume.data(), block.data(),
+                      block.data() + plan_bytes);
+    });
+  }
+
+ private:
+  template <class Work>
+  void compute(ImageSize size, Work&& work) const {
+    use_one_thread();
+    try {
+      work();
     } catch (const dnnl::error&) {
       std::throw_with_nested(std::runtime_error("the generator failed in oneDNN"));
     } catch (const std::bad_alloc&) {
@@ -147,12 +186,20 @@ class OnednnGenerator final : public Generator {
     }
   }
 
- private:
+  /// Built when they are first needed.
+  const TiledLayers& tiled_layers() const {
+    const std::lock_guard lock(tiled_layers_mutex_);
+    if (!tiled_layers_) tiled_layers_.emplace(layers_);
+    return *tiled_layers_;
+  }
+
   int bins_;
   std::optional<GapRange> training_gaps_;
   Precision precision_;
   std::string description_;
   mutable NetworkLayers layers_;
+  mutable std::mutex tiled_layers_mutex_;
+  mutable std::optional<TiledLayers> tiled_layers_;
   mutable PlanCache plans_;
   mutable BlockPool blocks_;
 };

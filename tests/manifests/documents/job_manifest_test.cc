@@ -85,7 +85,9 @@ TEST(JobManifest, HoldsEveryValueGiven) {
       {"dataset": "human36m", "root": "g", "layout": "extracted", "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97, "pairs": {"gaps": [2]}}],
     "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
-    "generator": {"weights": "untrained:8", "engine": "onednn", "precision": "int8"},
+    "generator": {"weights": "untrained:8", "engine": "onednn", "precision": "int8",
+                  "scope": "labels", "motion_threshold": 2.5, "motion_margin_px": 0,
+                  "label_margin_px": 100, "tile_px": 32},
     "volume": {"bins": 3, "normalize": "eta98"},
     "output": {"directory": "o", "samples_per_shard": 7, "dtype": "uint8", "deflate_level": 9},
     "errors": {"policy": "fail", "max_count": 3, "max_fraction": 0.5}})");
@@ -116,6 +118,11 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.generator.weights, "untrained:8");
   EXPECT_EQ(manifest.generator.engine, Engine::kOnednn);
   EXPECT_EQ(manifest.generator.precision, Precision::kInt8);
+  EXPECT_EQ(manifest.generator.scope.scope, Scope::kLabels);
+  EXPECT_EQ(manifest.generator.scope.motion_threshold, 2.5);
+  EXPECT_EQ(manifest.generator.scope.motion_margin_px, 0);
+  EXPECT_EQ(manifest.generator.scope.label_margin_px, 100);
+  EXPECT_EQ(manifest.generator.scope.tile_px, 32);
   EXPECT_EQ(manifest.volume.bins, 3);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kEta98);
   EXPECT_EQ(manifest.output.directory, "o");

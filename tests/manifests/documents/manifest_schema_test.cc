@@ -58,6 +58,7 @@ TEST(ManifestSchema, ListsTheSameWords) {
   EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
   EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
   EXPECT_EQ(listed("/properties/generator/properties/precision"), words(kPrecisionWords));
+  EXPECT_EQ(listed("/properties/generator/properties/scope"), words(kScopeWords));
   EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
   EXPECT_EQ(listed("/properties/output/properties/dtype"), words(kStoredTypeWords));
   EXPECT_EQ(listed("/properties/errors/properties/policy"), words(kPolicyWords));
@@ -79,6 +80,14 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/generator/properties/precision"), to_string(generator.precision));
   EXPECT_EQ(stated("/properties/generator/properties/engine"),
             word_of(kEngineWords, generator.engine));
+  EXPECT_EQ(stated("/properties/generator/properties/scope"), to_string(generator.scope.scope));
+  EXPECT_EQ(stated("/properties/generator/properties/motion_threshold"),
+            generator.scope.motion_threshold);
+  EXPECT_EQ(stated("/properties/generator/properties/motion_margin_px"),
+            generator.scope.motion_margin_px);
+  EXPECT_EQ(stated("/properties/generator/properties/label_margin_px"),
+            generator.scope.label_margin_px);
+  EXPECT_EQ(stated("/properties/generator/properties/tile_px"), generator.scope.tile_px);
   EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
   EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
             generator.max_displacement_px);

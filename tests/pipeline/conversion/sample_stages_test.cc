@@ -142,6 +142,24 @@ TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
   EXPECT_EQ(message.sample.statistics.eta98, 0.0f);
 }
 
+TEST_F(SampleStagesTest, GeneratesWhatTheScopeWants) {
+  // 24 x 40: 2 x 3 tiles.
+  manifest_.generator.scope.scope = Scope::kMotion;
+  manifest_.image.size = shard_.volume_size = {24, 40};
+  testing::write_flat_picture(folder_ / "clip" / "0000.png", {24, 40}, 51);
+  testing::write_flat_picture(folder_ / "clip" / "0001.png", {24, 40}, 51);
+  const SampleMessage still = run();
+  ASSERT_FALSE(still.failed()) << still.sample.fault;
+  EXPECT_THAT(still.sample.tiles, ::testing::ElementsAre(0, 0, 0, 0, 0, 0));
+  EXPECT_EQ(still.sample.statistics.flags, kFlagEmpty);
+  EXPECT_EQ(generator_.calls(), 0);
+
+  testing::write_flat_picture(folder_ / "clip" / "0001.png", {24, 40}, 102);
+  const SampleMessage moving = run();
+  EXPECT_THAT(moving.sample.tiles, ::testing::ElementsAre(1, 1, 1, 1, 1, 1));
+  EXPECT_EQ(generator_.calls(), 1);
+}
+
 /// Gives the same value everywhere, or no memory.
 class FlatGenerator final : public Generator {
  public:

@@ -9,6 +9,7 @@
 #include <thread>
 #include <vector>
 
+#include "manifests/values/counter_random.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/onednn/onednn_generator.h"
@@ -131,6 +132,56 @@ TEST_P(Engines, EqualsThePublishedNetworkWhateverRanBefore) {
     }
   }
   EXPECT_EQ(cases, 6);
+}
+
+/// A sixth of a picture's rows and columns of tiles at a place drawn by the seed; for even seeds
+/// its last tile too.
+TileMask some_tiles(ImageSize size, int origin_y, int origin_x, std::uint64_t seed) {
+  TileMask mask{size, 16, origin_y, origin_x, {}};
+  mask.wanted.assign(static_cast<std::size_t>(mask.rows()) * mask.columns(), 0);
+  const CounterRandom random(seed);
+  const int rows = (mask.rows() + 5) / 6, columns = (mask.columns() + 5) / 6;
+  const int top = int(random.uniform(0) * (mask.rows() - rows + 1));
+  const int left = int(random.uniform(1) * (mask.columns() - columns + 1));
+  for (int row = top; row < top + rows; ++row) {
+    std::fill_n(mask.wanted.begin() + row * mask.columns() + left, columns, std::uint8_t{1});
+  }
+  if (seed % 2 == 0) mask.wanted.back() = 1;
+  return mask;
+}
+
+TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
+  const Weights weights = untrained_weights(4, 3, 5);
+  const auto generator = engine(weights);
+  const std::map<Precision, float> largest = {
+      {Precision::kFloat32, 1e-5f}, {Precision::kBfloat16, 0.02f}, {Precision::kInt8, 1e-5f}};
+  std::uint64_t seed = 0;
+  for (const ImageSize size : {ImageSize{320, 480}, ImageSize{255, 401}, ImageSize{64, 700},
+                               ImageSize{49, 33}, ImageSize{1, 37}, ImageSize{5, 1}}) {
+    for (const int origin : {0, 5}) {
+      const TileMask wanted = some_tiles(size, origin, 15 - origin, seed++);
+      const auto frames = natural_frames(size, 11);
+      std::vector<float> expected = generated(*generator, frames, size);
+      clear_unwanted(wanted, expected);
+      std::vector<float> volume(expected.size(), -1.0f);
+      generator->generate_tiles(frames, wanted, volume);
+      EXPECT_LE(largest_difference(volume, expected),
+                largest.at(GetParam().precision) * std::ranges::max(expected))
+          << testing::size_text(size) << " " << origin;
+      for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_GE(volume[i], 0.0f) << i;
+    }
+  }
+}
+
+TEST_P(Engines, GivesZerosIfNothingIsWanted) {
+  const auto generator = engine(untrained_weights(2, 3, 5));
+  const TileMask nothing{{17, 40}, 16, 0, 0, std::vector<std::uint8_t>(2 * 3)};
+  std::vector<float> volume(2 * 3 * nothing.size.pixel_count(), -1.0f);
+  generator->generate_tiles(natural_frames(nothing.size, 1), nothing, volume);
+  EXPECT_EQ(volume, std::vector<float>(volume.size(), 0.0f));
+  volume.pop_back();
+  EXPECT_THROW(generator->generate_tiles(natural_frames(nothing.size, 1), nothing, volume),
+               std::invalid_argument);
 }
 
 TEST_P(Engines, EqualsTheReferenceWithShippedWeightsAtTheUsualSize) {

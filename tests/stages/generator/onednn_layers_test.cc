@@ -163,7 +163,7 @@ TEST(CombinePhases, TakesEachPixelFromItsPhase) {
   for (std::size_t i = 0; i < phases.size(); ++i) phases[i] = float(i);
   const std::vector<float> sums = {100, 200, 300, 400, -500, 600};
   std::vector<float> skip = sums;
-  DecoderRow row{3, channels, 1, skip.data(), phases.data(), nullptr, nullptr};
+  DecoderRow row{3, channels, 1, 0, skip.data(), phases.data(), nullptr, nullptr};
   std::vector<float> stored(6);
   combine_phases(row, stored.data());
   // Phase pixel 0, phase 2: 4, 5; pixel 1, phase 3: 14, 15; pixel 1, phase 2: 12, 13.
@@ -182,6 +182,16 @@ TEST(CombinePhases, TakesEachPixelFromItsPhase) {
   EXPECT_TRUE(std::isnan(stored.back()));
 }
 
+TEST(CombinePhases, BeginsAtAnOddColumn) {
+  // Pixel 1 reads phase pixel 1, phase 1, and pixel 2 the same one's phase 0.
+  const std::vector<float> phases = {10, 20, 30, 40};
+  std::vector<float> skip = {1, 2};
+  const DecoderRow row{2, 1, 0, 1, skip.data(), phases.data(), nullptr, nullptr};
+  std::vector<float> stored(2);
+  combine_phases(row, stored.data());
+  EXPECT_THAT(stored, ElementsAre(21, 12));
+}
+
 TEST(CombinePhases, StoresEveryTypeAlike) {
   const int width = 37, channels = 19;
   const CounterRandom random(5);
@@ -189,7 +199,7 @@ TEST(CombinePhases, StoresEveryTypeAlike) {
   for (std::size_t i = 0; i < phases.size(); ++i) phases[i] = float(random.uniform(i) * 200 - 50);
   for (std::size_t i = 0; i < skip.size(); ++i)
     skip[i] = float(random.uniform(i + 99999) * 200 - 50);
-  const DecoderRow row{width, channels, 0, skip.data(), phases.data(), nullptr, nullptr};
+  const DecoderRow row{width, channels, 0, 0, skip.data(), phases.data(), nullptr, nullptr};
   std::vector<float> floats(skip.size());
   std::vector<Bfloat16> halves(skip.size()), expected_halves(skip.size());
   std::vector<std::uint8_t> bytes(skip.size()), expected_bytes(skip.size());

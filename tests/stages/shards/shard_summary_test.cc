@@ -60,7 +60,7 @@ TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
 }
 
 TEST(ShardContents, OfNoRowsAreEmpty) {
-  EXPECT_EQ(contents_of(ShardTables{}, LabelSchema{}), ShardContents{});
+  EXPECT_EQ(contents_of(ShardTables{}, ShardHeader{}), ShardContents{});
 }
 
 class ShardSummary : public ::testing::Test {

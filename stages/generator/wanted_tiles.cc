@@ -1,0 +1,115 @@
+#include "stages/generator/wanted_tiles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+namespace eventgan {
+namespace {
+
+/// Marks the tiles that hold pixels top..bottom - 1, left..right - 1 of the picture.
+void want(TileMask& mask, TileMask::Pixels part) {
+  part = {std::max(part.top, 0), std::min(part.bottom, mask.size.height), std::max(part.left, 0),
+          std::min(part.right, mask.size.width)};
+  if (part.top >= part.bottom || part.left >= part.right) return;
+  const int last_row = (part.bottom - 1 + mask.origin_y) / mask.side;
+  const int first_column = (part.left + mask.origin_x) / mask.side;
+  const int last_column = (part.right - 1 + mask.origin_x) / mask.side;
+  for (int row = (part.top + mask.origin_y) / mask.side; row <= last_row; ++row) {
+    std::fill_n(mask.wanted.begin() + row * mask.columns() + first_column,
+                last_column - first_column + 1, std::uint8_t{1});
+  }
+}
+
+/// A tile is wanted if a pixel that moves lies in it or near it: so each is asked for itself, until
+/// one is found, which in a scene that moves is soon.
+void want_motion(TileMask& mask, std::span<const float> frames, double threshold, int margin) {
+  const std::size_t pixels = mask.size.pixel_count();
+  const auto least = static_cast<float>(threshold / 127.5);
+  for (int row = 0; row < mask.rows(); ++row) {
+    for (int column = 0; column < mask.columns(); ++column) {
+      const TileMask::Pixels tile = mask.pixels(row, column);
+      const int left = std::max(tile.left - margin, 0);
+      const int width = std::min(tile.right + margin, mask.size.width) - left;
+      const int bottom = std::min(tile.bottom + margin, mask.size.height);
+      bool moves = false;
+      for (int y = std::max(tile.top - margin, 0); y < bottom && !moves; ++y) {
+        const float* previous =
+            frames.data() + static_cast<std::size_t>(y) * mask.size.width + left;
+        const float* next = previous + pixels;
+        int still = 0;
+        for (int x = 0; x < width; ++x) still += std::abs(next[x] - previous[x]) <= least ? 1 : 0;
+        moves = still < width;
+      }
+      if (moves) mask.wanted[static_cast<std::size_t>(row) * mask.columns() + column] = 1;
+    }
+  }
+}
+
+Rectangle crop_of(const VolumePerson& person) {
+  if (person.center != kMissingPoint && person.scale > 0) {
+    constexpr double kHalfSide = 1.25 * 200 / 2;
+    const double half = kHalfSide * person.scale;
+    return {person.center.x - half, person.center.y - half, person.center.x + half,
+            person.center.y + half};
+  }
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Rectangle box{kFar, kFar, -kFar, -kFar};
+  for (const Point joint : person.joints) {
+    if (joint == kMissingPoint) continue;
+    box = {std::min(box.left, joint.x), std::min(box.top, joint.y), std::max(box.right, joint.x),
+           std::max(box.bottom, joint.y)};
+  }
+  return box;
+}
+
+/// The pixels of a rectangle, which may lie anywhere, and of its surroundings.
+TileMask::Pixels around(const Rectangle& box, int margin, ImageSize volume_up_to) {
+  const auto pixel = [](double edge, int most) {
+    return static_cast<int>(std::clamp(edge, -1.0, static_cast<double>(most)));
+  };
+  return {pixel(std::floor(box.top) - margin, volume_up_to.height),
+          pixel(std::ceil(box.bottom) + margin + 1, volume_up_to.height),
+          pixel(std::floor(box.left) - margin, volume_up_to.width),
+          pixel(std::ceil(box.right) + margin + 1, volume_up_to.width)};
+}
+
+}  // namespace
+
+TileMask wanted_tiles(const ScopeSpec& scope, std::span<const float> frames, ImageSize content,
+                      int content_y, int content_x, const VolumeLabels& labels) {
+  TileMask mask{content, scope.tile_px, content_y % scope.tile_px, content_x % scope.tile_px, {}};
+  mask.wanted.resize(static_cast<std::size_t>(mask.rows()) * mask.columns());
+  if (scope.scope != Scope::kLabelsOnly) {
+    want_motion(mask, frames, scope.motion_threshold, scope.motion_margin_px);
+  }
+  if (scope.scope == Scope::kMotion) return mask;
+  const auto want_around = [&](const Rectangle& box) {
+    if (box.left > box.right) return;
+    const ImageSize end{content_y + content.height, content_x + content.width};
+    const TileMask::Pixels part = around(box, scope.label_margin_px, end);
+    want(mask, {part.top - content_y, part.bottom - content_y, part.left - content_x,
+                part.right - content_x});
+  };
+  for (const VolumeBox& box : labels.boxes) {
+    if (!box.ignore) want_around(box.clipped);
+  }
+  for (const VolumePerson& person : labels.persons) want_around(crop_of(person));
+  return mask;
+}
+
+std::vector<std::uint8_t> tiles_of_volume(const TileMask& wanted, int content_y, int content_x,
+                                          ImageSize volume) {
+  const int side = wanted.side;
+  const int columns = (volume.width + side - 1) / side;
+  std::vector<std::uint8_t> tiles(static_cast<std::size_t>((volume.height + side - 1) / side) *
+                                  columns);
+  for (int row = 0; row < wanted.rows(); ++row) {
+    std::copy_n(wanted.wanted.begin() + row * wanted.columns(), wanted.columns(),
+                tiles.begin() + (content_y / side + row) * columns + content_x / side);
+  }
+  return tiles;
+}
+
+}  // namespace eventgan
