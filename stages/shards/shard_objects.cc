@@ -122,7 +122,7 @@ void describe_columns(hid_t location, const ShardHeader& header) {
                   schema.class_names);
   write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
   write_attribute(open_object(location, "labels/poses/joints"), "joint_names", schema.joint_names);
-  if (header.tile_px > 0) {
+  if (checked(H5Lexists(location, "events/tiles", H5P_DEFAULT), "look for", "tiles") > 0) {
     const Hdf5Handle tiles = open_object(location, "events/tiles");
     write_attribute(tiles, "tile_px", std::int32_t{header.tile_px});
     write_attribute(tiles, "scope", header.scope);

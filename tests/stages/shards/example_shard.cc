@@ -126,6 +126,7 @@ ShardHeader header(StoredType type, int deflate_level) {
 
 void add(ExampleShard& shard, ShardSample sample, std::vector<float> values) {
   if (sample.valid) sample.statistics = statistics_of(values);
+  if (sample.valid && shard.header.tile_px > 0) sample.tiles = {1, 1, 0, 1};  // 2 x 2 of 4 px
   shard.samples.push_back(std::move(sample));
   shard.volumes.push_back(std::move(values));
   shard.header.sample_count = static_cast<int>(shard.samples.size());
@@ -135,6 +136,8 @@ void add(ExampleShard& shard, ShardSample sample, std::vector<float> values) {
 
 ExampleShard example_shard(StoredType type, int deflate_level) {
   ExampleShard shard{header(type, deflate_level), {}, {}};
+  shard.header.scope = "motion";
+  shard.header.tile_px = 4;
   shard.header.label_schema = {
       {"Car", "DontCare"}, {"nose", "left hand", "right hand"}, {"", "left_wrist", "right_wrist"}};
   const std::size_t size = shard.header.volume.value_count();

@@ -42,8 +42,8 @@ class ShardFormatPage(unittest.TestCase):
         self.assertGreater(len(self.attributes), 20)
 
     def test_every_dataset_of_the_page_is_in_the_shard_as_described(self):
-        # 5 samples, 2 bins, 6 x 8 pixels, 3 boxes, 3 persons, 3 joints.
-        sizes = {"N": 5, "N+1": 6, "2B": 4, "H": 6, "W": 8, "R": 3, "P": 3, "J": 3}
+        # 5 samples, 2 bins, 6 x 8 pixels, 3 boxes, 3 persons, 3 joints, 2 x 2 tiles.
+        sizes = {"N": 5, "N+1": 6, "2B": 4, "H": 6, "W": 8, "R": 3, "P": 3, "J": 3, "TR": 2, "TC": 2}
         for path, shape, dtype, _ in self.datasets:
             with self.subTest(path=path):
                 dataset = self.file[path]

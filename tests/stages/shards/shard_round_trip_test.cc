@@ -37,6 +37,8 @@ void expect_same(const ShardHeader& got, const ShardHeader& expected) {
   EXPECT_EQ(got.preprocessing, expected.preprocessing);
   EXPECT_EQ(got.plan_hash, expected.plan_hash);
   EXPECT_EQ(got.manifest_text, expected.manifest_text);
+  EXPECT_EQ(got.scope, expected.scope);
+  EXPECT_EQ(got.tile_px, expected.tile_px);
   EXPECT_EQ(got.weights, expected.weights);
   EXPECT_EQ(got.weights_hash, expected.weights_hash);
   EXPECT_EQ(got.generator, expected.generator);
@@ -87,6 +89,7 @@ void expect_same(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.statistics.sum_positive, expected.statistics.sum_positive);
   EXPECT_EQ(got.statistics.sum_negative, expected.statistics.sum_negative);
   EXPECT_EQ(got.statistics.flags, expected.statistics.flags);
+  EXPECT_EQ(got.tiles, expected.valid ? expected.tiles : std::vector<std::uint8_t>(4));
   EXPECT_EQ(got.annotation, expected.annotation);
   expect_same(got.labels, expected.labels);
 }

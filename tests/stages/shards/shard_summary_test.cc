@@ -40,8 +40,8 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
   EXPECT_EQ(marker.contents.gaps, gaps);
   EXPECT_THAT(
       marker.contents.optional_columns,
-      ElementsAre("/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject", "/pairs/action",
-                  "/pairs/camera", "/pairs/drive", "/labels/projection",
+      ElementsAre("/events/tiles", "/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject",
+                  "/pairs/action", "/pairs/camera", "/pairs/drive", "/labels/projection",
                   "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
                   "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
