@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -20,31 +21,48 @@ void check_event(const Event& event, std::size_t number, const VolumeShape& shap
   }
 }
 
+void check_times(std::span<const Event> events, int last_bin) {
+  const auto unsorted = std::ranges::is_sorted_until(events, {}, &Event::t_s);
+  if (unsorted != events.end()) {
+    throw std::invalid_argument(
+        "expected events in time order, got t=" + std::to_string(unsorted->t_s) +
+        " after t=" + std::to_string(std::prev(unsorted)->t_s) + " as event " +
+        std::to_string(unsorted - events.begin()));
+  }
+  // Beyond it the scaled times below are infinite.
+  if (!std::isfinite(last_bin * (events.back().t_s - events.front().t_s))) {
+    throw std::invalid_argument(
+        "expected times whose differences are finite, got t=" + std::to_string(events.front().t_s) +
+        " to " + std::to_string(events.back().t_s));
+  }
+}
+
 }  // namespace
 
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape) {
-  std::vector<float> volume(shape.value_count(), 0.0f);
-  if (events.empty()) return volume;
+  // In double: a sum of ones in float32 stays at 2^24.
+  std::vector<double> volume(shape.value_count(), 0.0);
+  if (events.empty()) return {volume.begin(), volume.end()};
 
   const std::size_t plane = shape.size.pixel_count();
   const double first = events.front().t_s;
   const double duration = events.back().t_s - first;
   const int last_bin = shape.bins - 1;
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    const Event& event = events[i];
-    check_event(event, i, shape);
+  for (std::size_t i = 0; i < events.size(); ++i) check_event(events[i], i, shape);
+  check_times(events, last_bin);
+  for (const Event& event : events) {
     const double star =
         duration > 0 ? std::clamp(last_bin * (event.t_s - first) / duration, 0.0, double(last_bin))
                      : 0.0;
     // Rounding may carry t* of the last event past the last bin, for which there is no plane.
     const int bin = std::min(static_cast<int>(star), last_bin);
-    const float above = static_cast<float>(star - bin);
-    float* pixel = volume.data() + (event.positive ? 0 : shape.bins * plane) + bin * plane +
-                   static_cast<std::size_t>(event.y) * shape.size.width + event.x;
-    pixel[0] += 1.0f - above;
+    const double above = star - bin;
+    double* pixel = volume.data() + (event.positive ? 0 : shape.bins * plane) + bin * plane +
+                    static_cast<std::size_t>(event.y) * shape.size.width + event.x;
+    pixel[0] += 1 - above;
     if (above > 0) pixel[plane] += above;
   }
-  return volume;
+  return {volume.begin(), volume.end()};
 }
 
 namespace {

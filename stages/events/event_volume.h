@@ -8,9 +8,10 @@
 namespace eventgan {
 
 /// V(x,y,b) = Σ_i max(0, 1 - |b - t*_i|), t*_i = (B-1)(t_i - t_1)/(t_N - t_1), per polarity (DESIGN
-/// section 5); [2 bins, H, W] float32, C order. Events in time order. No events → zeros; t_N = t_1
-/// → t* = 0. Throws std::invalid_argument for an event outside the picture or a time that is not
-/// finite. Thread safe.
+/// section 5); [2 bins, H, W] float32, C order; sums are formed in double. No events → zeros; t_N =
+/// t_1 → t* = 0. Throws std::invalid_argument for an event outside the picture, a time that is not
+/// finite, events that are not in time order, or a first and last one so far apart (1e307) that
+/// (B-1)(t_N - t_1) is not finite. Thread safe.
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape);
 
 /// The average-timestamp picture of the paper, per polarity: at each pixel the mean of the bins'

@@ -290,7 +290,14 @@ Outcome<VolumeLabels> map_labels(const Annotation& annotation, const Placement& 
   if (auto fault = map_all(annotation.persons, "person", placement, where, labels.persons)) {
     return *fault;
   }
-  if (annotation.projection) labels.projection = to_volume(placement, *annotation.projection);
+  if (annotation.projection) {
+    labels.projection = to_volume(placement, *annotation.projection);
+    for (const double number : *labels.projection) {
+      if (std::isfinite(number)) continue;
+      return SampleFault{
+          text("expected a finite projection in the volume, got ", number, ", in ", where)};
+    }
+  }
   return labels;
 }
 

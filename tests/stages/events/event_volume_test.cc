@@ -49,7 +49,7 @@ TEST(EventVolume, TimeIsSharedLinearlyBetweenTheTwoNearestBins) {
 
 TEST(EventVolume, NoBinCountIndexesBeyondTheLastBin) {
   // Times whose scaled value may round up past the last bin; the sum proves that no event is lost.
-  for (int bins = 1; bins <= 40; ++bins) {
+  for (int bins = 1; bins <= 64; ++bins) {
     const VolumeShape shape{bins, {1, 1}};
     std::vector<Event> events;
     for (int i = 0; i <= 30; ++i) events.push_back({0, 0, 1e9 + i * 0.1, i % 2 == 0});
@@ -63,6 +63,36 @@ TEST(EventVolume, RefusesEventsOutsideThePictureAndTimesThatAreNotFinite) {
                           Event{0, 0, std::numeric_limits<double>::quiet_NaN(), true}}) {
     EXPECT_THROW(event_volume({&bad, 1}, kShape), std::invalid_argument);
   }
+}
+
+TEST(EventVolume, RefusesEventsThatAreNotInTimeOrderOrTooFarApart) {
+  EXPECT_THROW(
+      event_volume(std::vector<Event>{{0, 0, 1, true}, {0, 0, 0.5, true}, {0, 0, 2, true}}, kShape),
+      std::invalid_argument);
+  // 8 (t_N - t_1) of more than 1.8e308 would make t* = infinity / infinity.
+  EXPECT_THROW(event_volume(std::vector<Event>{{0, 0, -1e308, true}, {0, 0, 1e308, true}}, kShape),
+               std::invalid_argument);
+  const auto volume =
+      event_volume(std::vector<Event>{{0, 0, 0, true}, {0, 0, 2e307, true}}, kShape);
+  EXPECT_EQ(volume[index(8, 0, 0)], 1.0f);
+}
+
+TEST(EventVolume, AShortRecordingLateOnAClockKeepsItsTimes) {
+  // At 1e9 s doubles are 2^-23 s = 0.12 us apart, so that steps of 1 us are off by 0.06 us at each
+  // end: of the 0.8 ms between first and last event 8 (0.06 + 0.06) / 800 = 0.0012 bins.
+  std::vector<Event> events;
+  for (int i = 0; i <= 800; ++i) events.push_back({i % 5, 0, 1e9 + i * 1e-6, true});
+  const auto late = event_volume(events, kShape);
+  for (int i = 0; i <= 800; ++i) events[i].t_s = i * 1e-6;
+  // 20 events of a pixel share a bin's triangle on either side.
+  EXPECT_THAT(
+      late, ::testing::Pointwise(::testing::FloatNear(40 * 0.0012f), event_volume(events, kShape)));
+}
+
+TEST(EventVolume, CountsBeyondWhatFloat32CanCountTo) {
+  // 1 added to 2^24 is 2^24 in float32; 2^24 + 8 is a float32 again.
+  const std::vector<Event> events((1 << 24) + 8, Event{0, 0, 0, true});
+  EXPECT_EQ(event_volume(events, {1, {1, 1}})[0], float((1 << 24) + 8));
 }
 
 TEST(EventVolume, EqualsThePublishedCode) {

@@ -245,5 +245,43 @@ TEST(MapLabels, ANumberThatIsNotFiniteInTheVolumeIsAFault) {
   EXPECT_THAT(reason({"", {}, {one}}), HasSubstr("camera in the volume, got f_x 4000, f_y inf"));
 }
 
+TEST(MapLabels, AProjectionThatIsNotFiniteIsAFault) {
+  Annotation annotation;
+  annotation.projection.emplace().fill(1);
+  EXPECT_EQ(fault(annotation), "");
+  (*annotation.projection)[3] = kNan;
+  EXPECT_EQ(fault(annotation),
+            "expected a finite projection in the volume, got nan, in label_2/001497.txt");
+  // x' = s_x X + (s_x / 2 - 1/2 + offset) Z leaves double where the volume is larger.
+  annotation.projection->fill(1e308);
+  const Placement fourfold{{100, 100}, {400, 400}, {400, 400}, 0, 0};
+  EXPECT_TRUE(is_fault(map_labels(annotation, fourfold, "a.txt")));
+}
+
+TEST(MapLabels, ScalesOfAThousandthAndAThousandAreExact) {
+  const Placement smaller{{4000, 4000}, {4, 4}, {4, 4}, 0, 0};
+  const Placement larger{{4, 4}, {4000, 4000}, {4000, 4000}, 0, 0};
+  const VolumeBox small = mapped({"", {box(1000, 500, 3000, 1500)}, {}}, smaller).boxes[0];
+  EXPECT_EQ(small.clipped, (Rectangle{1, 0.5, 3, 1.5}));
+  const VolumeLabels large = mapped({"", {box(1, 0.5, 3, 1.5)}, {person({{{1, 2}, 1}})}}, larger);
+  EXPECT_EQ(large.boxes[0].clipped, (Rectangle{1000, 500, 3000, 1500}));
+  EXPECT_EQ(large.persons[0].joints[0], (Point{1499.5, 2499.5}));  // (x + 1/2) 1000 - 1/2
+}
+
+TEST(MapLabels, ABoxWithoutAreaIsKeptAndIgnored) {
+  const VolumeLabels labels = mapped({"", {box(10, 20, 10, 40), box(10, 20, 30, 20)}, {}}, kHalf);
+  for (const VolumeBox& one : labels.boxes) EXPECT_TRUE(one.ignore);
+  EXPECT_DOUBLE_EQ(labels.boxes[0].unclipped.left, labels.boxes[0].unclipped.right);
+}
+
+TEST(MapLabels, ABoxFarBeyondThePictureIsCutAndKeptUncut) {
+  // kHalf: x / 2; 1e9 is exact in double.
+  const VolumeBox wide = mapped({"", {box(-1e9, 0, 1e9, 375)}, {}}, kHalf).boxes[0];
+  EXPECT_EQ(wide.clipped, (Rectangle{0, 0, 621, 188}));
+  EXPECT_EQ(wide.unclipped, (Rectangle{-5e8, 0, 5e8, 188}));
+  EXPECT_FALSE(wide.ignore);
+  EXPECT_THAT(fault(box(1e9, 0, 2e9, 375)), HasSubstr("expected an overlap with the picture"));
+}
+
 }  // namespace
 }  // namespace eventgan
