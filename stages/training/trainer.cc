@@ -99,13 +99,15 @@ void set_learning(torch::nn::Module& network, bool learning) {
   for (at::Tensor& parameter : network.parameters()) parameter.set_requires_grad(learning);
 }
 
-/// Of all parameters that have a gradient. A finite one whose sum is beyond float32 counts as not
-/// finite.
+/// Of all parameters that have a gradient. One beyond 1.8e19 counts as not finite: its square is
+/// not, and would stay in the optimiser's second moments for ever.
 bool gradients_are_finite(const torch::nn::Module& network) {
   // A sum is not finite if a term is not, and costs one pass.
   std::vector<at::Tensor> sums;
   for (const at::Tensor& parameter : network.parameters()) {
-    if (parameter.grad().defined()) sums.push_back(parameter.grad().sum());
+    if (!parameter.grad().defined()) continue;
+    const at::Tensor gradient = parameter.grad().flatten();
+    sums.push_back(at::dot(gradient, gradient));
   }
   return sums.empty() || at::isfinite(at::stack(sums)).all().item<bool>();
 }
@@ -198,7 +200,7 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   StepLosses result = values(update_loss, where);
   update_loss.total.backward();
   if (!gradients_are_finite(*learner.network)) {
-    throw UnsoundLoss("expected finite gradients, got others" + where);
+    throw UnsoundLoss("expected gradients with finite squares, got others" + where);
   }
   learner.optimizer.set_rate(rate(learner, phase, step));
   learner.optimizer.step();

@@ -87,6 +87,19 @@ TEST(Ssim, IsOneForEqualPictures) {
   }
 }
 
+TEST(Ssim, OfConstantPicturesIsWhatTheDefinitionSays) {
+  // Their variance is rounding alone, and may come out below zero.
+  for (const auto& [a, b] :
+       {std::pair{0.0, 0.0}, {1.0, 1.0}, {-1.0, 1.0}, {0.0, 1.0}, {0.3, 0.3}}) {
+    const at::Tensor first = at::full({1, 1, 13, 14}, a, at::kDouble).requires_grad_();
+    const at::Tensor second = at::full({1, 1, 13, 14}, b, at::kDouble);
+    const double expected = ssim_by_definition(first, second);
+    EXPECT_NEAR(ssim(first.to(at::kFloat), second.to(at::kFloat)).item<double>(), expected, 1e-5);
+    ssim(first.to(at::kFloat), second.to(at::kFloat)).backward();
+    EXPECT_TRUE(at::isfinite(first.grad()).all().item<bool>()) << a << " " << b;
+  }
+}
+
 TEST(ImageLoss, IsTheMeanDifferenceLessTheSimilarity) {
   const at::Tensor black = at::zeros({2, 1, 6, 6}, at::kDouble);
   EXPECT_NEAR(image_loss(black + 0.25, black).item<double>(),
@@ -348,6 +361,27 @@ TEST(VolumeLoss, HasTheGradientOfDifferences) {
   testing::expect_gradient_of_differences(
       [&](const at::Tensor& generated) { return volume_loss(generated, real, 0.7); },
       random_tensor({2, 4, 3, 2}, 2));
+}
+
+TEST(VolumeLosses, AreExactAndHaveFiniteGradientsForEmptyAndHugeVolumes) {
+  // Two voxels of each polarity; 1e37 and four times that are float32.
+  const at::Tensor empty = at::zeros({1, 4, 1, 1});
+  const at::Tensor huge = at::full({1, 4, 1, 1}, 1e37);
+  for (const at::Tensor& values : {empty, huge}) {
+    for (const at::Tensor& real : {empty, huge}) {
+      const at::Tensor generated = values.clone().requires_grad_();
+      const double apart = std::abs(values[0][0].item<double>() - real[0][0].item<double>());
+      const at::Tensor voxels = volume_loss(generated, real, 0.5);
+      const at::Tensor counts = count_loss(generated, real, 0.5);
+      const at::Tensor overlap = overlap_loss(generated, real);
+      EXPECT_FLOAT_EQ(voxels.item<float>(), float(apart));
+      EXPECT_FLOAT_EQ(counts.item<float>(), float(2 * apart));  // of two bins
+      // 1 - (2 · 0 + 1) / (4 + 1) of the voxels, 1 - 1 / (2 + 1) of the sums.
+      EXPECT_FLOAT_EQ(overlap.item<float>(), apart == 0 ? 0 : 4.0f / 5 + 2.0f / 3);
+      (voxels + counts + overlap).backward();
+      EXPECT_TRUE(at::isfinite(generated.grad()).all().item<bool>());
+    }
+  }
 }
 
 TEST(VolumeLoss, LetsNanThrough) {

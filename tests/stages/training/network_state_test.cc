@@ -51,6 +51,13 @@ TEST(SpectralNormConv, DividesByTheNormAfterOnePowerIteration) {
                                    {float(5.4 / std::sqrt(193)), float(12.8 / std::sqrt(193))}));
 }
 
+TEST(SpectralNormConv, AMatrixOfZerosHasNoNormAndGivesNan) {
+  // 0 / 0: the trainer refuses the loss that comes of it.
+  SpectralNormConv convolution = small_convolution({0, 0, 0, 0}, {0.6f, 0.8f});
+  const at::Tensor output = convolution->forward(at::ones({1, 2, 1, 1}));
+  for (const float value : numbers(output)) EXPECT_TRUE(std::isnan(value));
+}
+
 TEST(SpectralNormConv, ComesToTheLargestSingularValueAlsoInEvaluation) {
   SpectralNormConv convolution = small_convolution({3, 0, 0, 4}, {0.6f, 0.8f});
   convolution->eval();
