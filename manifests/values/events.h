@@ -54,6 +54,9 @@ enum VolumeFlag : std::uint32_t {
   kFlagExtrapolated = 1u << 1,  ///< a gap that the generator never saw in training
   kFlagSaturated = 1u << 2,     ///< values beyond the stored type's range were clipped to it
   kFlagVanished = 1u << 3,      ///< all values became zeros in the stored type, too small for it
+  /// more of the network's activations than kMostSaturated were clipped to what int8 was calibrated
+  /// for
+  kFlagBeyondCalibration = 1u << 4,
 };
 
 /// Numbers about one volume as generated, before it is quantised for storage.

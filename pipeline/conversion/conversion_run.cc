@@ -1,5 +1,6 @@
 #include "pipeline/conversion/conversion_run.h"
 
+#include <fmt/core.h>
 #include <oneapi/tbb/flow_graph.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
@@ -157,6 +158,35 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
   return arrived;
 }
 
+/// Volumes with kFlagBeyondCalibration, counted by one thread at a time.
+class BeyondCalibration {
+ public:
+  void add(const SampleMessage& message) {
+    ++samples_;
+    if (!(message.sample.statistics.flags & kFlagBeyondCalibration)) return;
+    ++found_;
+    if (message.notes.saturated_share <= largest_share_) return;
+    largest_share_ = message.notes.saturated_share;
+    worst_ = message.sample.sample_id;
+  }
+
+  void warn(const std::function<void(const std::string&)>& warn) const {
+    if (found_ == 0 || !warn) return;
+    warn(fmt::format(
+        "expected activations within the range that int8 was calibrated for, got {} of {} volumes "
+        "with more than {:g} % of them clipped, the worst with {:.2g} % ({}): calibrate again, "
+        "with "
+        "pictures like these",
+        found_, samples_, 100 * kMostSaturated, 100 * largest_share_, worst_));
+  }
+
+ private:
+  std::int64_t samples_ = 0;
+  std::int64_t found_ = 0;
+  double largest_share_ = 0;
+  std::string worst_;
+};
+
 }  // namespace
 
 std::vector<const PlannedShard*> run_conversion(const char* name, const ConversionJob& job,
@@ -184,6 +214,7 @@ std::vector<const PlannedShard*> run_conversion(const char* name, const Conversi
   const StopMonitor monitor(options.since_stop_request, options.grace_s,
                             [&] { return pace.work_left(); });
 
+  BeyondCalibration beyond_calibration;
   std::vector<const PlannedShard*> made_by_others;  // while they were made here, too
   const auto write = [&](const SampleMessage& message) {
     const PlannedShard& shard = *message.shard;
@@ -193,6 +224,7 @@ std::vector<const PlannedShard*> run_conversion(const char* name, const Conversi
       pace.open(samples);
     }
     sink.add(message);
+    beyond_calibration.add(message);
     pace.take(std::ssize(message.chunk));
     const bool ends_shard = message.slot + 1 == samples;
     if (ends_shard) {
@@ -220,6 +252,7 @@ std::vector<const PlannedShard*> run_conversion(const char* name, const Conversi
     progress->set_total(to_do - left_out);
     progress->finish();
   }
+  beyond_calibration.warn(options.warn);
   made_by_others.insert(made_by_others.end(), queue.done_by_others().begin(),
                         queue.done_by_others().end());
   return made_by_others;

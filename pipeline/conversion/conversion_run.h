@@ -31,6 +31,9 @@ struct RunOptions {
   std::function<std::optional<double>()> since_stop_request;
   /// Called with the number of pairs to do; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
+  /// Told what a person should know: shards that are made again, volumes not to be trusted. None:
+  /// silent.
+  std::function<void(const std::string&)> warn = {};
   TraceRecorder* trace = nullptr;  ///< of every stage and thread; null: nobody asks
 
   bool stop_requested() const { return since_stop_request && since_stop_request().has_value(); }
@@ -68,6 +71,8 @@ class SampleSink {
 /// `sink`, in their order: joins queue, stages, graph and stop orders. `shared` is the folder if
 /// other workers may write to it, too (see ShardQueue); null: no other does. `name` is the run's in
 /// the trace.
+///
+/// At the end it warns, once, if there were volumes with kFlagBeyondCalibration.
 ///
 /// On a request to stop, the shard under way is finished within the grace period or abandoned (see
 /// stop_order), and the run ends; also when the sink is closed. Returns the shards that others have

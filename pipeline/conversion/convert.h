@@ -17,8 +17,6 @@ struct ConversionOptions : RunOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
   bool overwrite = false;                       ///< discard what an earlier run left in the folder
   WorkerPart part;                              ///< this worker's shards
-  /// Told what a person should know: shards that are made again. None: silent.
-  std::function<void(const std::string&)> warn;
   /// Told what goes on: which part this is, that checking takes long. None: silent.
   std::function<void(const std::string&)> note;
 };

@@ -128,14 +128,14 @@ void SampleStages::generate(SampleMessage& message) const try {
   message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
   const ScopeSpec& scope = manifest_.generator.scope;
   if (scope.scope == Scope::kWhole) {
-    generator_.generate(prepared.input, prepared.content, message.volume);
+    message.notes = generator_.generate(prepared.input, prepared.content, message.volume);
   } else {
     const TileMask wanted =
         wanted_tiles(scope, prepared.input, prepared.content, prepared.content_y,
                      prepared.content_x, message.sample.labels);
     message.sample.tiles =
         tiles_of_volume(wanted, prepared.content_y, prepared.content_x, prepared.placement.volume);
-    generator_.generate_tiles(prepared.input, wanted, message.volume);
+    message.notes = generator_.generate_tiles(prepared.input, wanted, message.volume);
   }
   message.prepared.input = {};
 } catch (const std::exception&) {
@@ -160,6 +160,7 @@ void SampleStages::finish(SampleMessage& message) const try {
   if (trained && !trained->contains(message.planned().pair.gap_frames)) {
     statistics.flags |= kFlagExtrapolated;
   }
+  if (message.notes.saturated_share > kMostSaturated) statistics.flags |= kFlagBeyondCalibration;
   float largest = statistics.max;
   if (manifest_.volume.normalize == Normalization::kEta98) {
     normalize(message.volume, statistics.eta98);

@@ -36,6 +36,7 @@ struct SampleMessage {
   ShardSample sample;            ///< read: everything but statistics
   PreparedPair prepared;         ///< read → generate
   std::vector<float> volume;     ///< generate → finish: [2 bins, H, W] of the content
+  GenerationNotes notes;         ///< generate → write
   std::vector<std::byte> chunk;  ///< finish → write
   StageSeconds seconds{};
   std::int64_t traced_ns = 0;  ///< end of the last stage, by the trace; 0: none, or no trace

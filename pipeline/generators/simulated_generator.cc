@@ -51,8 +51,8 @@ class SimulatedGenerator final : public Generator {
     return static_cast<std::size_t>(std::min(needed, static_cast<double>(memory_bytes_) / 2));
   }
 
-  void generate(std::span<const float> frames, ImageSize size,
-                std::span<float> volume) const override {
+  GenerationNotes generate(std::span<const float> frames, ImageSize size,
+                           std::span<float> volume) const override {
     const VolumeShape shape{bins_, size};
     const std::size_t pixels = size.pixel_count();
     check_generator_spans(frames, size, volume, bins_);
@@ -61,6 +61,7 @@ class SimulatedGenerator final : public Generator {
     const GreyImage next = grey_image(frames.last(pixels), size);
     const std::vector<float> values = event_volume(events(previous, next), shape);
     std::ranges::copy(values, volume.begin());
+    return {};
   }
 
   std::string description() const override {

@@ -6,15 +6,16 @@
 
 namespace eventgan {
 
-void Generator::generate_tiles(std::span<const float> frames, const TileMask& wanted,
-                               std::span<float> volume) const {
+GenerationNotes Generator::generate_tiles(std::span<const float> frames, const TileMask& wanted,
+                                          std::span<float> volume) const {
   if (std::ranges::find(wanted.wanted, 1) == wanted.wanted.end()) {
     check_generator_spans(frames, wanted.size, volume, bins());
     std::ranges::fill(volume, 0.0f);
-    return;
+    return {};
   }
-  generate(frames, wanted.size, volume);
+  const GenerationNotes notes = generate(frames, wanted.size, volume);
   clear_unwanted(wanted, volume);
+  return notes;
 }
 
 void clear_unwanted(const TileMask& wanted, std::span<float> volume) {

@@ -18,6 +18,17 @@ struct GapRange {
   bool operator==(const GapRange&) const = default;
 };
 
+/// What an engine noticed while it made a volume.
+struct GenerationNotes {
+  /// Of the activations stored in 8 bits the share that stands at the end of the calibrated range,
+  /// where all beyond it is clipped; 0..1. 0 for engines that store none.
+  double saturated_share = 0;
+};
+
+/// A volume with a larger share is flagged (kFlagBeyondCalibration). manifests/guides/numerics.md
+/// has the errors that come with it.
+inline constexpr double kMostSaturated = 1e-3;
+
 /// The EventGAN generator (DESIGN section 4), ready to run; the seam between the pipeline and the
 /// inference engines, and where tests put a fake.
 ///
@@ -32,18 +43,19 @@ class Generator {
 
   /// frames: [frame, y, x] float32, C order, previous then next, in [-1, 1].
   /// volume: [2 bins, y, x] float32, C order, dimensionless, ≥ 0 without upper bound; positive
-  /// polarity in time order, then negative. Overwritten whole.
+  /// polarity in time order, then negative. Overwritten whole. A network computes with subnormal
+  /// numbers taken for zero, whatever the calling thread does otherwise (flush_subnormals.h).
   /// Throws std::invalid_argument if the spans do not have these sizes, std::runtime_error if the
   /// engine fails. Values that are not finite are left for the caller to find.
-  virtual void generate(std::span<const float> frames, ImageSize size,
-                        std::span<float> volume) const = 0;
+  virtual GenerationNotes generate(std::span<const float> frames, ImageSize size,
+                                   std::span<float> volume) const = 0;
 
   /// The same where `wanted`, a mask of the frames' size, says so, and zeros elsewhere. What is
   /// wanted is what `generate` gives; kernels for other shapes may add up in another order, which
   /// changes the last bits of float32 and bfloat16. Spends less than `generate` where it can, and
   /// next to nothing if no tile is wanted.
-  virtual void generate_tiles(std::span<const float> frames, const TileMask& wanted,
-                              std::span<float> volume) const;
+  virtual GenerationNotes generate_tiles(std::span<const float> frames, const TileMask& wanted,
+                                         std::span<float> volume) const;
 
   /// Memory that one call needs beyond its spans, about; calls at the same time need it each. 0:
   /// hardly any.

@@ -24,6 +24,10 @@ constexpr float kHeadroom = 1.1f;
 /// (almost) dead in calibration may wake up.
 constexpr double kNarrowest = 1e-3;
 
+/// The step of a tensor in which calibration saw nothing: whatever appears in it later lies beyond
+/// its range, and counts as that, rather than being rounded to zero.
+constexpr float kStepOfNothing = 0x1p-64f;
+
 using Layers = std::map<std::string, Convolution*>;
 
 std::size_t taps(const Convolution& layer) { return std::size_t(layer.kernel) * layer.kernel; }
@@ -123,7 +127,7 @@ TensorQuantization quantization(const TensorStatistics& statistics,
     result.mean.push_back(statistics.mean[c] / factors[c]);
   }
   const float scale = kHeadroom * highest / kLargestStored;
-  result.scale = std::isnormal(scale) ? scale : 1.0f;  // any will do for a tensor of zeros
+  result.scale = std::isnormal(scale) ? scale : kStepOfNothing;
   return result;
 }
 

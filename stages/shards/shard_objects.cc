@@ -5,6 +5,7 @@
 
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_objects_internal.h"
+#include "stages/shards/shard_summary.h"
 
 namespace eventgan {
 
@@ -130,8 +131,7 @@ void describe_columns(hid_t location, const ShardHeader& header) {
   if (!schema.joint_aliases.empty()) {
     write_attribute(open_object(location, "labels/poses"), "joint_aliases", schema.joint_aliases);
   }
-  write_attribute(open_object(location, "events/statistics/flags"), "bits",
-                  std::vector<std::string>{"empty", "extrapolated", "saturated", "vanished"});
+  write_attribute(open_object(location, "events/statistics/flags"), "bits", flag_names(~0u));
   write_attribute(open_object(location, "pairs/source_to_volume"), "meaning",
                   std::string("M with [x', y'] = M [x, y, 1], from a point in pixels of the source "
                               "picture to one in the volume; pixel centres are whole numbers"));

@@ -42,6 +42,7 @@ std::vector<std::string> flag_names(std::uint32_t flags) {
   if (flags & kFlagExtrapolated) names.emplace_back("extrapolated");
   if (flags & kFlagSaturated) names.emplace_back("saturated");
   if (flags & kFlagVanished) names.emplace_back("vanished");
+  if (flags & kFlagBeyondCalibration) names.emplace_back("beyond_calibration");
   return names;
 }
 

@@ -5,8 +5,8 @@
 
 namespace eventgan::testing {
 
-void FakeGenerator::generate(std::span<const float> frames, ImageSize size,
-                             std::span<float> volume) const {
+GenerationNotes FakeGenerator::generate(std::span<const float> frames, ImageSize size,
+                                        std::span<float> volume) const {
   ++calls_;
   const std::size_t plane = size.pixel_count();
   for (int bin = 0; bin < bins_; ++bin) {
@@ -18,6 +18,7 @@ void FakeGenerator::generate(std::span<const float> frames, ImageSize size,
     }
   }
   if (frames[0] == failing_value_) volume[0] = std::numeric_limits<float>::quiet_NaN();
+  return {saturated_share_};
 }
 
 }  // namespace eventgan::testing

@@ -17,16 +17,19 @@ class FakeGenerator final : public Generator {
   /// As if it had been trained.
   void train_on(GapRange gaps) { training_gaps_ = gaps; }
   std::optional<GapRange> training_gaps() const override { return training_gaps_; }
+  /// As if it computed in 8 bits, with this share of them at the end of their range.
+  void saturate(double share) { saturated_share_ = share; }
   int calls() const { return calls_; }
 
   int bins() const override { return bins_; }
-  void generate(std::span<const float> frames, ImageSize size,
-                std::span<float> volume) const override;
+  GenerationNotes generate(std::span<const float> frames, ImageSize size,
+                           std::span<float> volume) const override;
   std::string description() const override { return "fake"; }
 
  private:
   int bins_;
   std::optional<GapRange> training_gaps_;
+  double saturated_share_ = 0;
   float failing_value_ = -100;
   mutable std::atomic<int> calls_ = 0;
 };

@@ -1,6 +1,7 @@
 #include "stages/generator/onednn/activation_rows.h"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 
 #include "stages/generator/weights.h"
@@ -76,7 +77,30 @@ template <class T>
   store_each(row.skip, static_cast<std::size_t>(row.width) * row.channels, stored);
 }
 
+/// How many are 255. Counted in bytes, lane by lane, as long as these cannot overflow.
+EVENTGAN_CLONES
+std::size_t count_largest(const std::uint8_t* activations, std::size_t count) {
+  constexpr std::size_t kLanes = 64, kMostRows = 255;
+  std::size_t largest = 0;
+  while (count >= kLanes) {
+    const std::size_t rows = std::min(count / kLanes, kMostRows);
+    std::array<std::uint8_t, kLanes> lanes{};
+    for (std::size_t row = 0; row < rows; ++row, activations += kLanes) {
+      for (std::size_t lane = 0; lane < kLanes; ++lane) lanes[lane] += activations[lane] == 255;
+    }
+    for (const std::uint8_t lane : lanes) largest += lane;
+    count -= rows * kLanes;
+  }
+  for (std::size_t i = 0; i < count; ++i) largest += activations[i] == 255;
+  return largest;
+}
+
 }  // namespace
+
+void SaturationCount::add(const std::uint8_t* activations, std::size_t count) {
+  stored += count;
+  saturated += count_largest(activations, count);
+}
 
 EVENTGAN_CLONES
 void store_activations(const float* values, std::size_t count, float* stored) {

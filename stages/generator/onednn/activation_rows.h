@@ -21,6 +21,19 @@ void store_activations(const float* values, std::size_t count, float* stored);
 void store_activations(const float* values, std::size_t count, Bfloat16* stored);
 void store_activations(const float* values, std::size_t count, std::uint8_t* stored);
 
+/// Activations stored in 8 bits, and those of them that are 255: what lies beyond a tensor's range,
+/// which is clipped to it, and the little that lies at its end. Other types are not counted: they
+/// hold what they are given. Not thread safe.
+struct SaturationCount {
+  std::size_t stored = 0;
+  std::size_t saturated = 0;
+
+  void add(const std::uint8_t* activations, std::size_t count);
+  void add(const float*, std::size_t) {}
+  void add(const Bfloat16*, std::size_t) {}
+  double share() const { return stored == 0 ? 0 : double(saturated) / double(stored); }
+};
+
 /// Where one row of a decoder's output comes from.
 struct DecoderRow {
   int width = 0;         ///< of this part of the output row, pixels

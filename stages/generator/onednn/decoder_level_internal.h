@@ -21,7 +21,8 @@ struct EngineRun {
   dnnl::stream& stream;
   std::byte* block = nullptr;  ///< what BufferLayout's offsets count from
   std::byte* scratch = nullptr;
-  std::byte* tiles = nullptr;  ///< TiledLayers' buffers, where it is used
+  SaturationCount& saturation;  ///< of all activations that the run stores
+  std::byte* tiles = nullptr;   ///< TiledLayers' buffers, where it is used
 };
 
 /// One decoder for one picture size: the sums of its convolutions over the doubled picture and over

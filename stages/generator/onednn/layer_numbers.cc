@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <limits>
 #include <map>
 #include <stdexcept>
 #include <string>
@@ -68,8 +69,20 @@ bool all_finite(const std::vector<float>& values) {
   return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
 }
 
-void check_finite(const LayerNumbers& layer) {
-  if (all_finite(layer.weight) && all_finite(layer.bias) && all_finite(layer.output_scales)) return;
+/// No sum of inputs of at most `largest_input` may be infinite either: of two infinities of other
+/// signs comes NaN, which 8 bits hold as 0.
+void check_finite(const LayerNumbers& layer, double largest_input) {
+  bool finite = all_finite(layer.weight) && all_finite(layer.output_scales);
+  const std::size_t row_size = layer.weight.size() / layer.out_channels;
+  for (int o = 0; finite && o < layer.out_channels; ++o) {
+    double largest = layer.bias.empty() ? 0 : std::abs(layer.bias[o]);
+    for (std::size_t i = 0; i < row_size; ++i) {
+      largest += largest_input * std::abs(layer.weight[o * row_size + i]);
+    }
+    if (!layer.output_scales.empty()) largest *= std::max(layer.output_scales[o], 1.0f);
+    finite = largest <= std::numeric_limits<float>::max();
+  }
+  if (finite) return;
   throw std::invalid_argument("expected finite numbers in steps of the tensors, got others for " +
                               layer.name);
 }
@@ -95,7 +108,7 @@ class LayerQuantizer {
       numbers.bias.push_back(real_bias / quantized.scales[o]);
       numbers.output_scales.push_back(quantized.scales[o] / out_step);
     }
-    check_finite(numbers);
+    check_finite(numbers, kLargestStored);
     return numbers;
   }
 
@@ -133,7 +146,8 @@ NetworkNumbers int8_numbers(const Weights& weights, int largest_weight) {
           name, out, convolution.in_channels, side, convolution.weight, convolution.bias, {}};
       for (float& value : layer.weight) value /= out_step;
       for (float& value : layer.bias) value /= out_step;
-      check_finite(layer);
+      // Frames are in [-1, 1]; what `pred` makes is a volume, in which nothing gets lost.
+      check_finite(layer, name == "head" ? 1 : 0);
       numbers.layers.push_back(std::move(layer));
       continue;
     }
@@ -143,7 +157,9 @@ NetworkNumbers int8_numbers(const Weights& weights, int largest_weight) {
                                                convolution.bias, inputs[0], out_step));
       if (const auto addend = names.addend.find(name); addend != names.addend.end()) {
         const int block = name.starts_with("resblocks.0") ? 0 : 1;
-        numbers.residual_factors[block] = quantizer.step(addend->second) / out_step;
+        const float factor = quantizer.step(addend->second) / out_step;
+        check_finite({name, 1, 1, 1, {factor}, {}, {}}, kLargestStored);
+        numbers.residual_factors[block] = factor;
       }
       continue;
     }

@@ -141,6 +141,7 @@ void NetworkPlan::run_head(const EngineRun& run, const float* frames) const {
     const int count = std::min(head_rows_, size_.height - row);
     head_->run(run.stream, row, count, input, rows, run.scratch);
     store_activations(rows, count * row_values, stored + row * row_values);
+    run.saturation.add(stored + row * row_values, count * row_values);
   }
 }
 
@@ -154,7 +155,9 @@ void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* 
     decoder.compute(run, strip, small, skip);
     for (int y = strip.first_row; y < strip.first_row + strip.row_count; ++y) {
       const DecoderRow row = decoder.row(run, strip, y);
-      combine_phases(row, stored + static_cast<std::ptrdiff_t>(y) * row.width * row.channels);
+      const std::size_t row_values = static_cast<std::size_t>(row.width) * row.channels;
+      combine_phases(row, stored + y * row_values);
+      run.saturation.add(stored + y * row_values, row_values);
     }
   }
 }
@@ -193,19 +196,27 @@ void NetworkPlan::with_stored_type(Compute&& compute) const {
   }
 }
 
-void NetworkPlan::run(const float* frames, float* volume, std::byte* block) const {
+SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* block) const {
   dnnl::stream stream(engine_);
-  const EngineRun run{stream, block, block + scratch_};
+  SaturationCount saturation;
+  const EngineRun run{stream, block, block + scratch_, saturation};
   const auto at = [&](const Buffer& buffer) { return block + buffer.offset; };
   with_stored_type([&]<class Stored>(Stored) {
+    const auto count = [&](const Buffer& buffer) {
+      saturation.add(reinterpret_cast<const Stored*>(at(buffer)),
+                     buffer.size_bytes / sizeof(Stored));
+    };
     run_head<Stored>(run, frames);
     for (int level = 0; level < kNetworkLevels; ++level) {
       const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottom_;
       encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
+      count(target);
     }
     for (std::size_t i = 0; i < residuals_.size(); i += 2) {
       residuals_[i].run(stream, at(bottom_), at(between_), run.scratch);
+      count(between_);
       residuals_[i + 1].run(stream, at(between_), at(bottom_), run.scratch);
+      count(bottom_);
     }
     const std::byte* small = at(bottom_);
     for (int level = 0; level < kNetworkLevels - 1; ++level) {
@@ -214,6 +225,7 @@ void NetworkPlan::run(const float* frames, float* volume, std::byte* block) cons
     }
     run_last_decoder(run, small, volume);
   });
+  return saturation;
 }
 
 template <class Stored>
@@ -224,7 +236,9 @@ void NetworkPlan::run_decoder_tiles(const EngineRun& run, const TiledLayers& lay
   auto* stored = reinterpret_cast<Stored*>(run.block + decoded_[level].offset);
   const std::ptrdiff_t width = sizes_[kNetworkLevels - 1 - level].width;
   const auto store = [&](int y, int first_x, const DecoderRow& row) {
-    combine_phases(row, stored + (y * width + first_x) * row.channels);
+    Stored* part = stored + (y * width + first_x) * row.channels;
+    combine_phases(row, part);
+    run.saturation.add(part, static_cast<std::size_t>(row.width) * row.channels);
   };
   decoder.compute_edges(run, small);
   if (level == 0) {
@@ -270,11 +284,13 @@ void NetworkPlan::run_last_tiles(const EngineRun& run, const TiledLayers& layers
   }
 }
 
-void NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
-                            const TileMask& wanted, const float* frames, float* volume,
-                            std::byte* block, std::byte* tiles) const {
+SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
+                                       const TileMask& wanted, const float* frames, float* volume,
+                                       std::byte* block, std::byte* tiles) const {
   dnnl::stream stream(engine_);
-  const EngineRun run{stream, block, block + scratch_, tiles};
+  SaturationCount saturation;
+  SaturationCount* counted = stored_type_ == Type::u8 ? &saturation : nullptr;
+  const EngineRun run{stream, block, block + scratch_, saturation, tiles};
   const std::size_t value = dnnl::memory::data_type_size(stored_type_);
   const auto skip = [&](int level) {
     return Activations{block + skips_[level].offset, sizes_[level],
@@ -288,7 +304,7 @@ void NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
     run_head<Stored>(run, frames);
     for (int level = 0; level < kTiledEncoders; ++level) {
       for (const TilePlace place : work.encoders[level]) {
-        layers.encoders[level].run(stream, tiles, place, skip(level), skip(level + 1));
+        layers.encoders[level].run(stream, tiles, place, skip(level), skip(level + 1), counted);
       }
     }
     // The last encoder, then the blocks' first and second convolutions in turns.
@@ -296,7 +312,7 @@ void NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
     Activations target = at_bottom(bottom_);
     auto pixels = work.bottom.begin();
     for (const PixelConvolution& convolution : layers.bottom) {
-      convolution.run(stream, tiles, *pixels++, source, target);
+      convolution.run(stream, tiles, *pixels++, source, target, counted);
       source = target;
       target = at_bottom(source.data == block + bottom_.offset ? between_ : bottom_);
     }
@@ -307,6 +323,7 @@ void NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
     }
     run_last_tiles(run, layers, work, wanted, small, volume);
   });
+  return saturation;
 }
 
 std::vector<std::string> NetworkPlan::implementations() const {

@@ -31,12 +31,13 @@ class NetworkPlan {
 
   /// frames [2, y, x], volume [2 bins, y, x] as Generator::generate has them. `block`:
   /// block_bytes(), whatever stands in it.
-  void run(const float* frames, float* volume, std::byte* block) const;
+  SaturationCount run(const float* frames, float* volume, std::byte* block) const;
 
   /// The same for the tiles that are wanted, by what tiled_work says of them; nothing else of the
   /// volume is written. `tiles`: a block for layers.layout.
-  void run_tiles(const TiledLayers& layers, const TiledWork& work, const TileMask& wanted,
-                 const float* frames, float* volume, std::byte* block, std::byte* tiles) const;
+  SaturationCount run_tiles(const TiledLayers& layers, const TiledWork& work,
+                            const TileMask& wanted, const float* frames, float* volume,
+                            std::byte* block, std::byte* tiles) const;
 
   /// oneDNN's names of all kernels.
   std::vector<std::string> implementations() const;

@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/network_plan_internal.h"
@@ -128,23 +129,23 @@ class OnednnGenerator final : public Generator {
     return activation_bytes(size, layers_.base_channels(), stored_bytes(precision_));
   }
 
-  void generate(std::span<const float> frames, ImageSize size,
-                std::span<float> volume) const override {
+  GenerationNotes generate(std::span<const float> frames, ImageSize size,
+                           std::span<float> volume) const override {
     check_generator_spans(frames, size, volume, bins_);
     // Whole numbers cannot hold what is not a number: it would come out as a plausible volume.
     if (precision_ == Precision::kInt8 && !all_finite(frames)) {
       std::ranges::fill(volume, std::numeric_limits<float>::quiet_NaN());
-      return;
+      return {};
     }
-    compute(size, [&] {
+    return compute(size, [&] {
       const auto plan = plans_.plan(size);
       const BlockPool::Lease block = blocks_.take(plan->block_bytes());
-      plan->run(frames.data(), volume.data(), block.data());
+      return plan->run(frames.data(), volume.data(), block.data());
     });
   }
 
-  void generate_tiles(std::span<const float> frames, const TileMask& wanted,
-                      std::span<float> volume) const override {
+  GenerationNotes generate_tiles(std::span<const float> frames, const TileMask& wanted,
+                                 std::span<float> volume) const override {
     check_generator_spans(frames, wanted.size, volume, bins_);
     // Above it, computing all is not slower; what tiles depend on is more than they are.
     constexpr double kLargestShare = 0.9;
@@ -156,26 +157,26 @@ class OnednnGenerator final : public Generator {
       work = tiled_work(wanted);
     }
     if (work.share == 0 || work.share > kLargestShare) {
-      Generator::generate_tiles(frames, wanted, volume);
-      return;
+      return Generator::generate_tiles(frames, wanted, volume);
     }
     std::memset(volume.data(), 0, volume.size_bytes());
-    compute(wanted.size, [&] {
+    return compute(wanted.size, [&] {
       const TiledLayers& layers = tiled_layers();
       const auto plan = plans_.plan(wanted.size);
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
       const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
-      plan->run_tiles(layers, work, wanted, frames.data(), volume.data(), block.data(),
-                      block.data() + plan_bytes);
+      return plan->run_tiles(layers, work, wanted, frames.data(), volume.data(), block.data(),
+                             block.data() + plan_bytes);
     });
   }
 
  private:
   template <class Work>
-  void compute(ImageSize size, Work&& work) const {
+  GenerationNotes compute(ImageSize size, Work&& work) const {
     use_one_thread();
+    const FlushSubnormals flush;
     try {
-      work();
+      return {.saturated_share = work().share()};
     } catch (const dnnl::error&) {
       std::throw_with_nested(std::runtime_error("the generator failed in oneDNN"));
     } catch (const std::bad_alloc&) {

@@ -67,6 +67,11 @@ void copy_piece(const Activations& from, int top, int left, ImageSize size, std:
   }
 }
 
+void store(const std::byte* from, std::byte* to, std::size_t bytes, SaturationCount* counted) {
+  std::memcpy(to, from, bytes);
+  if (counted) counted->add(reinterpret_cast<const std::uint8_t*>(from), bytes);
+}
+
 }  // namespace
 
 EncoderTile::EncoderTile(NetworkLayers& layers, int level, ImageSize size, BufferLayout& layout)
@@ -78,7 +83,8 @@ EncoderTile::EncoderTile(NetworkLayers& layers, int level, ImageSize size, Buffe
 }
 
 void EncoderTile::run(dnnl::stream& stream, std::byte* block, TilePlace place,
-                      const Activations& source, const Activations& target) const {
+                      const Activations& source, const Activations& target,
+                      SaturationCount* counted) const {
   copy_piece(source, 2 * place.row - 1, 2 * place.column - 1, encoder_input(size_), block + input_);
   convolution_.run(stream, block + input_, block + output_, block + scratch_);
   const int rows = std::min(size_.height, target.size.height - place.row);
@@ -86,9 +92,8 @@ void EncoderTile::run(dnnl::stream& stream, std::byte* block, TilePlace place,
   for (int y = 0; y < rows; ++y) {
     const std::size_t to =
         static_cast<std::size_t>(place.row + y) * target.size.width + place.column;
-    std::memcpy(target.data + to * target.pixel_bytes,
-                block + output_ + static_cast<std::size_t>(y) * size_.width * target.pixel_bytes,
-                columns * target.pixel_bytes);
+    store(block + output_ + static_cast<std::size_t>(y) * size_.width * target.pixel_bytes,
+          target.data + to * target.pixel_bytes, columns * target.pixel_bytes, counted);
   }
 }
 
@@ -145,7 +150,8 @@ void PixelConvolution::gather(std::byte* block, int i, int y, int x,
 }
 
 void PixelConvolution::run(dnnl::stream& stream, std::byte* block, const std::vector<int>& pixels,
-                           const Activations& source, const Activations& target) const {
+                           const Activations& source, const Activations& target,
+                           SaturationCount* counted) const {
   const auto in_target = [&](int pixel) { return target.data + pixel * target.pixel_bytes; };
   for (std::size_t first = 0; first < pixels.size(); first += count_) {
     const int count = static_cast<int>(std::min<std::size_t>(count_, pixels.size() - first));
@@ -156,7 +162,7 @@ void PixelConvolution::run(dnnl::stream& stream, std::byte* block, const std::ve
     }
     compute(stream, block);
     for (int i = 0; i < count; ++i) {
-      std::memcpy(in_target(pixels[first + i]), output(block, i), output_bytes_);
+      store(output(block, i), in_target(pixels[first + i]), output_bytes_, counted);
     }
   }
 }

@@ -43,8 +43,9 @@ class EncoderTile {
   /// Throws dnnl::error.
   EncoderTile(NetworkLayers& layers, int level, ImageSize size, BufferLayout& layout);
 
+  /// Not null: `counted` counts what is stored in 8 bits; as below.
   void run(dnnl::stream& stream, std::byte* block, TilePlace place, const Activations& source,
-           const Activations& target) const;
+           const Activations& target, SaturationCount* counted) const;
 
  private:
   ImageSize size_;
@@ -73,7 +74,7 @@ class PixelConvolution {
   /// All of it for the pixels of `target` that have these numbers, some at a time; what stands
   /// there is added, if the setup says so.
   void run(dnnl::stream& stream, std::byte* block, const std::vector<int>& pixels,
-           const Activations& source, const Activations& target) const;
+           const Activations& source, const Activations& target, SaturationCount* counted) const;
 
  private:
   LayerWeights weights_;

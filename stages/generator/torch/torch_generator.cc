@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/torch/network_forward_internal.h"
 
@@ -37,10 +38,11 @@ class TorchGenerator final : public Generator {
     return 2 * activation_bytes(size, base_channels_, precision_ == Precision::kFloat32 ? 4 : 2);
   }
 
-  void generate(std::span<const float> frames, ImageSize size,
-                std::span<float> volume) const override {
+  GenerationNotes generate(std::span<const float> frames, ImageSize size,
+                           std::span<float> volume) const override {
     check_generator_spans(frames, size, volume, bins_);
     const c10::InferenceMode inference;
+    const FlushSubnormals flush;
     try {
       at::Tensor output = at::from_blob(volume.data(), {1, 2 * bins_, size.height, size.width});
       at::Tensor computed = forward_(frames, size);
@@ -48,6 +50,7 @@ class TorchGenerator final : public Generator {
       // time.
       if (precision_ == Precision::kBfloat16) computed = computed.contiguous();
       output.copy_(computed);
+      return {};
     } catch (const c10::Error&) {
       std::throw_with_nested(std::runtime_error("the generator failed in LibTorch"));
     }

@@ -293,7 +293,9 @@ const testing::FakeGenerator kGenerator;
 class LargeGenerator final : public Generator {
  public:
   int bins() const override { return 9; }
-  void generate(std::span<const float>, ImageSize, std::span<float>) const override {}
+  GenerationNotes generate(std::span<const float>, ImageSize, std::span<float>) const override {
+    return {};
+  }
   std::string description() const override { return "large"; }
   std::size_t working_bytes(ImageSize size) const override { return 1024 * size.pixel_count(); }
 };

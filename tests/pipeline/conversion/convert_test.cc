@@ -55,6 +55,17 @@ TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(shards("one"), shards("five"));
 }
 
+TEST_F(Convert, WarnsOnceOfVolumesBeyondTheCalibration) {
+  std::vector<std::string> warnings;
+  ConversionOptions telling = options();
+  telling.warn = [&](const std::string& text) { warnings.push_back(text); };
+  generator_.saturate(0.25);
+  run(telling);
+  EXPECT_THAT(warnings, ::testing::ElementsAre(::testing::HasSubstr(
+                            "got 11 of 11 volumes with more than 0.1 % of them clipped, the worst "
+                            "with 25 % (")));
+}
+
 TEST_F(Convert, DoesNotDependOnTheOrderOfTheFileSystem) {
   run("before");
   // The same files under the same names, created in the opposite order.

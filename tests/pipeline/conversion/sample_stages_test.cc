@@ -133,6 +133,13 @@ TEST_F(SampleStagesTest, AGapOutsideThoseTrainedOnIsMarkedAsExtrapolated) {
   EXPECT_TRUE(marked(4));
 }
 
+TEST_F(SampleStagesTest, ActivationsBeyondTheCalibratedRangeAreMarked) {
+  generator_.saturate(kMostSaturated);
+  EXPECT_EQ(run().sample.statistics.flags, 0u);
+  generator_.saturate(2 * kMostSaturated);
+  EXPECT_EQ(run().sample.statistics.flags, kFlagBeyondCalibration);
+}
+
 TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
   shard_.samples[0].pair.next = shard_.samples[0].pair.previous;
   manifest_.volume.normalize = Normalization::kEta98;
@@ -165,9 +172,11 @@ class FlatGenerator final : public Generator {
  public:
   explicit FlatGenerator(float value) : value_(value) {}
   int bins() const override { return 9; }
-  void generate(std::span<const float>, ImageSize, std::span<float> volume) const override {
+  GenerationNotes generate(std::span<const float>, ImageSize,
+                           std::span<float> volume) const override {
     if (value_ < 0) throw std::bad_alloc();
     std::ranges::fill(volume, value_);
+    return {};
   }
   std::string description() const override { return "flat"; }
 

@@ -114,6 +114,19 @@ TEST(LayerNumbers, OfInt8ThatLeaveFloat32AreRefusedByTheirLayersName) {
   }
 }
 
+TEST(LayerNumbers, OfInt8ThatCouldMakeInfinitiesOfTwoSignsAreRefused) {
+  // 9 taps of two frames of 1 against 2e37 each, in steps of the tensor of at least 1: 3.6e38.
+  Weights weights = calibrated_weights();
+  Convolution& head = weights.convolutions[0];
+  Calibration calibration = *weights.calibration;
+  std::ranges::fill(calibration.tensors[0].highest, 255 / 1.1f);
+  weights.calibration = std::make_shared<Calibration>(calibration);
+  std::ranges::fill(head.weight, 1.8e37f);
+  EXPECT_NO_THROW(int8_numbers(weights, kLargestWeight));
+  std::ranges::fill(head.weight, 2e37f);
+  EXPECT_THROW(int8_numbers(weights, kLargestWeight), std::invalid_argument);
+}
+
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
@@ -154,6 +167,23 @@ TEST(StoreActivations, ClipsAndRoundsToBytes) {
   std::vector<std::uint8_t> stored(values.size());
   store_activations(values.data(), values.size(), stored.data());
   EXPECT_THAT(stored, ElementsAre(0, 0, 0, 1, 1, 255, 255, 255, 255, 255));
+}
+
+TEST(SaturationCount, CountsTheLargestBytesOfAnyNumber) {
+  // All of 70000 bytes, more than bytes can count of any lane, and every third from a start on.
+  SaturationCount all;
+  all.add(std::vector<std::uint8_t>(70000, 255).data(), 70000);
+  EXPECT_EQ(all.saturated, 70000u);
+  EXPECT_EQ(all.share(), 1.0);
+  std::vector<std::uint8_t> some(1000, 254);
+  for (std::size_t i = 0; i < some.size(); i += 3) some[i] = 255;
+  for (const std::size_t count : {0, 1, 3, 63, 64, 65, 999, 1000}) {
+    SaturationCount counted;
+    counted.add(some.data(), count);
+    EXPECT_EQ(counted.saturated, (count + 2) / 3) << count;
+    EXPECT_EQ(counted.stored, count);
+  }
+  EXPECT_EQ(SaturationCount().share(), 0.0);
 }
 
 TEST(CombinePhases, TakesEachPixelFromItsPhase) {

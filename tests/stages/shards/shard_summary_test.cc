@@ -86,8 +86,8 @@ TEST_F(ShardSummary, Counts) {
 
 TEST_F(ShardSummary, FlagsHaveNames) {
   EXPECT_TRUE(flag_names(0).empty());
-  EXPECT_THAT(flag_names(kFlagEmpty | kFlagExtrapolated | kFlagSaturated | kFlagVanished),
-              ElementsAre("empty", "extrapolated", "saturated", "vanished"));
+  EXPECT_THAT(flag_names((1u << 5) - 1),
+              ElementsAre("empty", "extrapolated", "saturated", "vanished", "beyond_calibration"));
 }
 
 TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
