@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <fstream>
 #include <string>
+#include <string_view>
 
 namespace eventgan {
 namespace {
@@ -44,6 +45,22 @@ std::size_t memory_limit_bytes() {
     most = std::min<std::size_t>(most, address_space.rlim_cur);  // RLIM_INFINITY is the largest
   }
   return group_memory_limit_bytes("/sys/fs/cgroup", own_group(), most);
+}
+
+bool restart_peak_memory() {
+  malloc_trim(0);
+  std::ofstream references("/proc/self/clear_refs");
+  references << "5" << std::flush;  // proc(5): the peak becomes what is resident now
+  return references.good();
+}
+
+std::size_t peak_memory_bytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    constexpr std::string_view kPeak = "VmHWM:";
+    if (line.starts_with(kPeak)) return 1024 * std::stoull(line.substr(kPeak.size()));  // in kB
+  }
+  return 0;
 }
 
 namespace {

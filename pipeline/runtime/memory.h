@@ -15,6 +15,14 @@ std::size_t memory_limit_bytes();
 std::size_t group_memory_limit_bytes(const std::filesystem::path& root,
                                      const std::filesystem::path& group, std::size_t most);
 
+/// Gives freed memory back to the system and lets peak_memory_bytes begin anew. False where the
+/// kernel does not allow that: then the peak is that of the process's whole life. Thread safe.
+bool restart_peak_memory();
+
+/// The most memory that was resident in this process since restart_peak_memory, in bytes; 0 where
+/// the system does not tell. Thread safe.
+std::size_t peak_memory_bytes();
+
 /// Lets the process keep the big buffers it frees, for their next use. Without it glibc gives them
 /// back to the system on every free and faults them in again; volumes and LibTorch's tensors are
 /// such buffers. All threads share one arena then: buffers travel from thread to thread here, and

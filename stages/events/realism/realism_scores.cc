@@ -17,9 +17,6 @@
 namespace eventgan {
 namespace {
 
-/// A voxel, or a sum of voxels, above this counts as an event (V2CE, Zhang et al. 2024).
-inline constexpr float kEventThreshold = 0.01f;
-
 double mean(std::span<const double> values) {
   double sum = 0;
   for (const double value : values) sum += value;
@@ -99,21 +96,22 @@ double pearson(std::span<const double> a, std::span<const double> b) {
   return covariance / std::sqrt(variance_a * variance_b);
 }
 
-void check_sizes(std::size_t volume, std::size_t real, const VolumeShape& shape,
-                 const GreyImage& previous, const GreyImage& next) {
-  const bool sound = shape.bins >= 1 && shape.size.height >= 1 && shape.size.width >= 1 &&
-                     volume == shape.value_count() && real == shape.value_count() &&
-                     previous.size == shape.size && next.size == shape.size &&
-                     previous.pixels.size() == shape.size.pixel_count() &&
-                     next.pixels.size() == shape.size.pixel_count();
-  if (!sound) {
-    throw std::invalid_argument("expected two volumes [" + std::to_string(shape.channels()) +
-                                ", H, W] and two frames of " + std::to_string(shape.size.width) +
-                                "x" + std::to_string(shape.size.height) + " pixels, got " +
-                                std::to_string(volume) + " and " + std::to_string(real) +
-                                " values, frames of " + std::to_string(previous.pixels.size()) +
-                                " and " + std::to_string(next.pixels.size()) + " pixels");
+void check_sizes(std::size_t values, const VolumeShape& shape) {
+  if (shape.bins >= 1 && shape.size.height >= 1 && shape.size.width >= 1 &&
+      values == shape.value_count()) {
+    return;
   }
+  throw std::invalid_argument("expected a volume [" + std::to_string(shape.channels()) +
+                              ", H, W] of " + std::to_string(shape.size.width) + "x" +
+                              std::to_string(shape.size.height) + " pixels, got " +
+                              std::to_string(values) + " values");
+}
+
+void check_frame(const GreyImage& frame, ImageSize size) {
+  if (frame.size == size && frame.pixels.size() == size.pixel_count()) return;
+  throw std::invalid_argument("expected a frame of " + std::to_string(size.width) + "x" +
+                              std::to_string(size.height) + " pixels, got " +
+                              std::to_string(frame.pixels.size()) + " pixels");
 }
 
 std::vector<float> clipped(std::span<const float> volume, const char* name) {
@@ -132,7 +130,9 @@ struct SummedVolume {
   std::vector<float> sums;
 };
 
-SummedVolume summed(std::vector<float> volume, const VolumeShape& shape) {
+SummedVolume summed(std::span<const float> values, const VolumeShape& shape, const char* name) {
+  check_sizes(values.size(), shape);
+  std::vector<float> volume = clipped(values, name);
   const std::size_t plane = shape.size.pixel_count();
   std::vector<float> sums(2 * plane, 0.0f);
   for (std::size_t i = 0; i < volume.size(); ++i) {
@@ -195,24 +195,49 @@ void add_amounts(const std::vector<float>& volume, const VolumeShape& shape,
   scores.positive_share = total > 0 ? positive / total : std::numeric_limits<double>::quiet_NaN();
 }
 
-}  // namespace
-
-RealismScores realism_scores(std::span<const float> volume, std::span<const float> real,
-                             const VolumeShape& shape, const GreyImage& previous,
-                             const GreyImage& next) {
-  check_sizes(volume.size(), real.size(), shape, previous, next);
-  const SummedVolume ours = summed(clipped(volume, "compared"), shape);
-  const SummedVolume truth = summed(clipped(real, "real"), shape);
+/// What realism_scores says without the frames.
+RealismScores matches(const SummedVolume& ours, const SummedVolume& truth,
+                      const VolumeShape& shape) {
   RealismScores scores;
   scores.f1_raw = binary_match_f1(ours.volume, truth.volume);
   scores.f1_time = binary_match_f1(ours.sums, truth.sums);
   scores.f1_time_polarity =
       binary_match_f1(without_polarity(ours.sums), without_polarity(truth.sums));
+  scores.time_correlation = pearson(event_times(ours, shape), event_times(truth, shape));
+  return scores;
+}
+
+}  // namespace
+
+RealismScores realism_scores(std::span<const float> volume, std::span<const float> real,
+                             const VolumeShape& shape, const GreyImage& previous,
+                             const GreyImage& next) {
+  const SummedVolume ours = summed(volume, shape, "compared");
+  const SummedVolume truth = summed(real, shape, "real");
+  check_frame(previous, shape.size);
+  check_frame(next, shape.size);
+  RealismScores scores = matches(ours, truth, shape);
   scores.pool_mse_2 = pool_mse(ours.volume, truth.volume, shape.size, 2);
   scores.pool_mse_4 = pool_mse(ours.volume, truth.volume, shape.size, 4);
-  scores.time_correlation = pearson(event_times(ours, shape), event_times(truth, shape));
   scores.polarity_correlation = polarity_agreement(ours.sums, previous, next);
   add_amounts(ours.volume, shape, scores);
+  return scores;
+}
+
+std::vector<float> events_over_time(std::span<const float> volume, const VolumeShape& shape) {
+  return summed(volume, shape, "given").sums;
+}
+
+RealismScores match_scores(std::span<const float> volume, std::span<const float> real,
+                           const VolumeShape& shape) {
+  RealismScores scores =
+      matches(summed(volume, shape, "compared"), summed(real, shape, "real"), shape);
+  for (double RealismScores::*field :
+       {&RealismScores::pool_mse_2, &RealismScores::pool_mse_4,
+        &RealismScores::polarity_correlation, &RealismScores::events_per_pixel,
+        &RealismScores::positive_share}) {
+    scores.*field = std::numeric_limits<double>::quiet_NaN();
+  }
   return scores;
 }
 

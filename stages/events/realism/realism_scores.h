@@ -11,10 +11,12 @@
 
 namespace eventgan {
 
+/// A voxel, or a sum of voxels, above this counts as an event (V2CE, Zhang et al. 2024).
+inline constexpr float kEventThreshold = 0.01f;
+
 /// How one volume compares with the real one of the same frames, both normalised volumes V̂ (DESIGN
-/// section 5). F1 after V2CE (Zhang et al. 2024): a voxel counts as an event where it is above
-/// 0.01. NaN where a score has no meaning (a correlation with a constant), 1 for the F1 of two
-/// empty volumes.
+/// section 5). F1 after V2CE: of what is an event, above kEventThreshold. NaN where a score has no
+/// meaning (a correlation with a constant), 1 for the F1 of two empty volumes.
 struct RealismScores {
   double f1_raw = 0;            ///< voxel by voxel
   double f1_time = 0;           ///< summed over time, per polarity
@@ -42,6 +44,15 @@ struct RealismScores {
 RealismScores realism_scores(std::span<const float> volume, std::span<const float> real,
                              const VolumeShape& shape, const GreyImage& previous,
                              const GreyImage& next);
+
+/// The events a pixel: Σ over time of min(V, 1), [polarity, y, x] float32, positive first. For a
+/// volume as realism_scores takes it; throws std::invalid_argument as it does. Thread safe.
+std::vector<float> events_over_time(std::span<const float> volume, const VolumeShape& shape);
+
+/// The three F1 and `time_correlation` of realism_scores, which compare two volumes without their
+/// frames; all other fields are NaN. Throws as realism_scores does. Thread safe.
+RealismScores match_scores(std::span<const float> volume, std::span<const float> real,
+                           const VolumeShape& shape);
 
 /// Means over pairs, field by field; a NaN is left out of its mean (all NaN, or no pairs: NaN).
 /// Throws std::invalid_argument if the numbers of bins differ. Thread safe.

@@ -99,5 +99,18 @@ TEST(KeepBigBuffers, WhatIsFreedStaysWithTheProcess) {
   EXPECT_GE(mallinfo2().fordblks, kBytes);  // free, and not given back
 }
 
+TEST(PeakMemory, IsThatSinceItsRestart) {
+  constexpr std::size_t kBytes = 100'000'000;
+  const auto touch = [] { std::vector<char>(kBytes, 1).back() = 2; };
+  touch();
+  if (!restart_peak_memory()) GTEST_SKIP() << "the kernel keeps the peak";
+  const std::size_t before = peak_memory_bytes();
+  ASSERT_GT(before, 0u);
+  touch();
+  EXPECT_GE(peak_memory_bytes(), before + kBytes / 10 * 9);
+  ASSERT_TRUE(restart_peak_memory());
+  EXPECT_LT(peak_memory_bytes(), before + kBytes / 2);
+}
+
 }  // namespace
 }  // namespace eventgan

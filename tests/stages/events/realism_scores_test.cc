@@ -312,6 +312,28 @@ TEST(RealismScores, RefuseWhatIsNoVolumeOfTheFrames) {
   }
 }
 
+TEST(MatchScores, AreThoseThatNeedNoFrames) {
+  const VolumeShape shape{2, {1, 2}};
+  const std::vector<float> volume{0.5f, 0, 0, 0.5f, 0, 0, 0, 1};
+  const std::vector<float> real{0.5f, 0, 0, 0, 0, 1, 0, 0};
+  const RealismScores all = scores_of(volume, real, shape);
+  const RealismScores match = match_scores(volume, real, shape);
+  EXPECT_DOUBLE_EQ(match.f1_raw, 2.0 / 5);  // one voxel in common, of 3 and 2
+  EXPECT_EQ(match.f1_time, all.f1_time);
+  EXPECT_EQ(match.f1_time_polarity, all.f1_time_polarity);
+  EXPECT_EQ(match.time_correlation, all.time_correlation);
+  for (const double without : {match.pool_mse_2, match.pool_mse_4, match.polarity_correlation,
+                               match.events_per_pixel, match.positive_share}) {
+    EXPECT_THAT(without, IsNan());
+  }
+  EXPECT_THROW(match_scores(volume, std::span(real).first(4), shape), std::invalid_argument);
+}
+
+TEST(EventsOverTime, AreSumsPerPolarityOfValuesUpToOne) {
+  const std::vector<float> volume{0.25f, 3, 0.5f, 0, 0, 0, 0, 2};
+  EXPECT_THAT(events_over_time(volume, {2, {1, 2}}), ::testing::ElementsAre(0.75f, 1, 0, 1));
+}
+
 constexpr double kNoScore = std::numeric_limits<double>::quiet_NaN();
 
 TEST(MeanScores, AreFieldByField) {
