@@ -41,6 +41,7 @@ int main(int argc, char** argv) {
   eventgan::add_realism_command(app, exit_code);
   eventgan::add_simulate_command(app, exit_code);
   eventgan::add_train_command(app, exit_code);
+  eventgan::add_tradeoff_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

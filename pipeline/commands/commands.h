@@ -23,5 +23,6 @@ void add_calibrate_command(CLI::App& app, int& exit_code);
 void add_realism_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
 void add_train_command(CLI::App& app, int& exit_code);
+void add_tradeoff_command(CLI::App& app, int& exit_code);
 
 }  // namespace eventgan

@@ -21,6 +21,7 @@ FLOORS = [
     ["pipeline/conversion"],
     ["pipeline/generators", "pipeline/simulation", "pipeline/training", "pipeline/realism",
      "pipeline/exports"],
+    ["pipeline/tradeoff"],
     ["pipeline/commands"],
     ["pipeline/main.cc"],
 ]

@@ -1,0 +1,214 @@
+#include <CLI/CLI.hpp>
+#include <charconv>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/words.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/options.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
+#include "pipeline/tradeoff/tradeoff.h"
+#include "pipeline/tradeoff/tradeoff_report.h"
+#include "stages/base/files/atomic_file.h"
+
+namespace eventgan {
+namespace {
+
+struct TradeoffArguments {
+  std::string manifest;
+  std::vector<std::string> widths, precisions, methods, dtypes;
+  std::vector<double> sizes;
+  std::string reference;
+  std::vector<std::string> real;
+  TradeoffOptions options;
+  TradeoffDemand demand;
+  std::optional<std::string> out;
+  ProgressStyle progress = ProgressStyle::kAuto;
+};
+
+/// A whole number is a shipped width; anything else a name as the manifest writes it.
+std::string weights_name(const std::string& text) {
+  const bool is_width = !text.empty() && text.find_first_not_of("0123456789") == std::string::npos;
+  return is_width ? "shipped:" + text : text;
+}
+
+template <class T, std::size_t N>
+T value_of(const std::array<Word<T>, N>& words, const std::string& text, const char* option) {
+  std::string known;
+  for (const Word<T>& entry : words) {
+    if (entry.word == text) return entry.value;
+    known.append(known.empty() ? "" : ", ").append(entry.word);
+  }
+  throw UsageError(std::string(option) + ": expected one of " + known + ", got \"" + text + "\"");
+}
+
+template <class T, std::size_t N>
+void read_axis(const std::array<Word<T>, N>& words, const std::vector<std::string>& texts,
+               const char* option, std::vector<T>& axis) {
+  if (texts.empty()) return;
+  axis.clear();
+  for (const std::string& text : texts) axis.push_back(value_of(words, text, option));
+}
+
+TradeoffAxes axes_of(const TradeoffArguments& arguments, const JobManifest& manifest) {
+  TradeoffAxes axes = default_axes(manifest);
+  if (!arguments.widths.empty()) {
+    axes.weights.clear();
+    for (const std::string& width : arguments.widths) axes.weights.push_back(weights_name(width));
+  }
+  read_axis(kPrecisionWords, arguments.precisions, "--precisions", axes.precisions);
+  read_axis(kGeneratorWords, arguments.methods, "--methods", axes.methods);
+  read_axis(kStoredTypeWords, arguments.dtypes, "--dtypes", axes.dtypes);
+  if (!arguments.sizes.empty()) axes.sizes = arguments.sizes;
+  return axes;
+}
+
+/// WEIGHTS[,PRECISION[,SIZE]]
+Computation reference_of(const std::string& text) {
+  std::vector<std::string> parts(1);
+  for (const char letter : text) {
+    if (letter == ',') {
+      parts.emplace_back();
+    } else {
+      parts.back() += letter;
+    }
+  }
+  Computation reference;
+  reference.weights = weights_name(parts[0]);
+  if (parts.size() > 1) {
+    reference.precision = value_of(kPrecisionWords, parts[1], "--reference");
+  }
+  if (parts.size() > 2) {
+    const std::string& size = parts[2];
+    const char* const end = size.data() + size.size();
+    const auto [stop, error] = std::from_chars(size.data(), end, reference.size);
+    if (error != std::errc() || stop != end || !(reference.size >= 0.05 && reference.size <= 4) ||
+        parts.size() > 3) {
+      throw UsageError(
+          "--reference: expected WEIGHTS,PRECISION,SIZE with a size in 0.05..4, got \"" + text +
+          "\"");
+    }
+  }
+  return reference;
+}
+
+int run(TradeoffArguments& arguments) {
+  const StopSignal signal;
+  const JobManifest manifest = read_job_manifest(arguments.manifest);
+  TradeoffOptions& options = arguments.options;
+  options.axes = axes_of(arguments, manifest);
+  options.only_native = arguments.precisions.empty();
+  if (!arguments.reference.empty()) options.reference = reference_of(arguments.reference);
+  if (arguments.out && arguments.out->empty()) {  // a script's unset variable
+    throw UsageError("--out: expected a folder, got nothing");
+  }
+  options.out = arguments.out ? std::filesystem::path(*arguments.out)
+                              : manifest.directory / (manifest.name + "-tradeoff");
+  for (const std::string& real : arguments.real) {
+    options.real.push_back(open_recording(real, std::filesystem::is_directory(real)
+                                                    ? RecordingFormat::kEcd
+                                                    : RecordingFormat::kMvsec));
+  }
+  options.stop_requested = [&] { return signal.requested(); };
+  options.make_progress = [&](std::int64_t total) {
+    return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
+  };
+  const TradeoffReport report = measure_tradeoff(manifest, options);
+  const std::string json = to_json(report, arguments.demand);
+  write_file_atomically(options.out / "tradeoff.json", json);
+  write_file_atomically(options.out / "tradeoff.md", to_markdown(report, arguments.demand));
+  write_tradeoff_png(report, options.out / "tradeoff.png");
+  if (arguments.progress == ProgressStyle::kJson) {
+    std::cout << json << std::flush;
+  } else {
+    std::cout << to_text(report, arguments.demand) << options.out.string() << std::endl;
+  }
+  return kComplete;
+}
+
+void add_axes(CLI::App& command, TradeoffArguments& arguments) {
+  command
+      .add_option("--widths", arguments.widths,
+                  "Weights: base widths of shipped ones, or names as the manifest writes them; "
+                  "default: all shipped, and the manifest's")
+      ->delimiter(',')
+      ->option_text("WEIGHTS,...");
+  command
+      .add_option("--precisions", arguments.precisions,
+                  "Of float32,bfloat16,int8; default: those that this processor has instructions "
+                  "for")
+      ->delimiter(',')
+      ->option_text("PRECISION,...");
+  command
+      .add_option("--sizes", arguments.sizes,
+                  "Of the volume's sides, 1 as in the manifest, 0.05..4; default: 1,0.75,0.5")
+      ->delimiter(',')
+      ->check(CLI::Range(0.05, 4.0))
+      ->option_text("SIZE,...");
+  command.add_option("--methods", arguments.methods, "Of network,difference,esim; default: all")
+      ->delimiter(',')
+      ->option_text("METHOD,...");
+  command.add_option("--dtypes", arguments.dtypes, "Of float32,float16,uint8; default: all")
+      ->delimiter(',')
+      ->option_text("TYPE,...");
+  command
+      .add_option("--reference", arguments.reference,
+                  "What the others are compared with, WEIGHTS[,PRECISION[,SIZE]]; default: the "
+                  "widest weights, float32, 1")
+      ->option_text("CONFIGURATION");
+}
+
+}  // namespace
+
+void add_tradeoff_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "tradeoff",
+      "Measures on pairs of a job what weights, precision, size, method and stored type cost, and "
+      "what they lose against a reference (manifests/guides/tradeoff.md); run again, it does what "
+      "is left");
+  const auto arguments = std::make_shared<TradeoffArguments>();
+  command->add_option("MANIFEST", arguments->manifest, "The job")->required();
+  add_axes(*command, *arguments);
+  command
+      ->add_option("--real", arguments->real,
+                   "A recording of events and frames, to score the configurations by as realism "
+                   "does; may be given several times")
+      ->option_text("RECORDING")
+      ->allow_extra_args(false);
+  command
+      ->add_option("--pairs", arguments->options.pairs,
+                   "Pairs to take, spread evenly over the job; default: 32")
+      ->check(CLI::Range(1, 100000));
+  command
+      ->add_option("--rounds", arguments->options.rounds,
+                   "Rounds of measuring cost, in which all configurations take turns; default: 5")
+      ->check(CLI::Range(1, 1000));
+  command
+      ->add_option("--at-most-error", arguments->demand.at_most_error,
+                   "Print the manifest's lines for the fastest with this error (relative L2)")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("ERROR");
+  command
+      ->add_option("--at-least-speed", arguments->demand.at_least_speed,
+                   "Print the manifest's lines for the nearest with so many pairs a second")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("SPEED");
+  command
+      ->add_option("--out", arguments->out,
+                   "Folder for tables, picture and what is kept for the next run; default: "
+                   "NAME-tradeoff beside the manifest")
+      ->option_text("FOLDER");
+  command->add_option("--threads", arguments->options.threads, "Threads to use; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  add_progress_option(*command, arguments->progress);
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

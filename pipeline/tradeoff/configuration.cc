@@ -1,0 +1,88 @@
+#include "pipeline/tradeoff/configuration.h"
+
+#include <fmt/core.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
+
+namespace eventgan {
+
+std::vector<Computation> computations(const TradeoffAxes& axes) {
+  std::vector<Computation> all;
+  for (const GeneratorKind method : axes.methods) {
+    const bool is_network = method == GeneratorKind::kNetwork;
+    for (const std::string& weights : is_network ? axes.weights : std::vector<std::string>{""}) {
+      for (const Precision precision :
+           is_network ? axes.precisions : std::vector{Precision::kFloat32}) {
+        for (const double size : axes.sizes) all.push_back({method, weights, precision, size});
+      }
+    }
+  }
+  return all;
+}
+
+std::string name_of(const Computation& computation) {
+  const std::string method =
+      computation.method == GeneratorKind::kNetwork
+          ? fmt::format("{} {}", computation.weights, to_string(computation.precision))
+          : std::string(to_string(computation.method));
+  return fmt::format("{} x{:g}", method, computation.size);
+}
+
+std::string name_of(const Configuration& configuration) {
+  return fmt::format("{} {}", name_of(configuration.computation), to_string(configuration.dtype));
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json generator_keys(const Json& manifest, const JobManifest& job, const Computation& computation) {
+  Json keys = manifest.value("generator", Json::object());
+  const bool is_network = computation.method == GeneratorKind::kNetwork;
+  if (is_network != (job.generator.kind == GeneratorKind::kNetwork)) keys = Json::object();
+  if (is_network) {
+    keys["weights"] = computation.weights;
+    keys["precision"] = to_string(computation.precision);
+    return keys;
+  }
+  keys["kind"] = to_string(computation.method);
+  if (computation.method == GeneratorKind::kDifference) keys.erase("max_displacement_px");
+  return keys;
+}
+
+int scaled(int side, double size) { return static_cast<int>(std::lround(side * size)); }
+
+}  // namespace
+
+TrialJob trial_job(const JobManifest& manifest, const Configuration& configuration,
+                   std::optional<ImageSize> whole) {
+  const Computation& computation = configuration.computation;
+  Json json = Json::parse(manifest.text, nullptr, true, /*ignore_comments=*/true);
+  std::vector<std::string> changed{"generator", "output"};
+  if (computation.size != 1) {
+    if (manifest.image.size) whole = manifest.image.size;
+    if (!whole) {
+      throw UsageError(
+          "size: expected pictures of one size, or $.image.width and height in the manifest, got "
+          "pictures of several sizes");
+    }
+    json["image"]["width"] = scaled(whole->width, computation.size);
+    json["image"]["height"] = scaled(whole->height, computation.size);
+    changed.insert(changed.begin(), "image");
+  }
+  json["generator"] = generator_keys(json, manifest, computation);
+  json["output"]["dtype"] = to_string(configuration.dtype);
+  TrialJob trial{parse_job_manifest(dump_json(json), manifest.directory, name_of(configuration)),
+                 {}};
+  for (const std::string& key : changed) {
+    trial.lines.push_back(fmt::format("\"{}\": {}", key, dump_json(json[key])));
+  }
+  return trial;
+}
+
+}  // namespace eventgan

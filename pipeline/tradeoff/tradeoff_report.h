@@ -1,0 +1,58 @@
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/tradeoff/tradeoff.h"
+
+namespace eventgan {
+
+/// A trial in the numbers that reports tell: medians with the middle half over the rounds.
+struct TrialSummary {
+  std::string name;
+  Spread generator_s, conversion_s;   ///< processor time a pair
+  Spread pairs_per_s;                 ///< on all threads
+  Spread speedup;                     ///< the reference's conversion_s of the same round / its own
+  double peak_bytes = 0;              ///< median; 0: not known
+  double stored_bytes = 0;            ///< a pair
+  PairLoss loss;                      ///< overall_loss
+  std::optional<RealismScores> real;  ///< mean over the recordings, each counting alike
+};
+
+TrialSummary summary_of(const Trial& trial);
+
+/// The Pareto front, by index, from the slowest to the fastest: those than which no other is as
+/// fast (median of pairs_per_s) and nearer to the reference (relative_l2), or as near and faster.
+/// Of equals the first. Trials without loss or cost are not on it. Pure.
+std::vector<std::size_t> pareto_front(const std::vector<TrialSummary>& trials);
+
+/// What a user asks of a configuration.
+struct TradeoffDemand {
+  std::optional<double> at_most_error;   ///< relative_l2
+  std::optional<double> at_least_speed;  ///< pairs_per_s
+};
+
+/// The fastest that is near enough; without `at_most_error` the nearest that is fast enough. None
+/// if no trial is. Pure.
+std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
+                                      const TradeoffDemand& demand);
+
+/// A table for a person, the front marked, what could not be run with the reasons, and the lines
+/// for the manifest that serve the demand. UTF-8.
+std::string to_text(const TradeoffReport& report, const TradeoffDemand& demand);
+
+/// The same as Markdown.
+std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& demand);
+
+/// JSON, indented, with the spreads; null for what is no finite number.
+std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand);
+
+/// Draws speed against error, both logarithmic, a point for each trial, the front as a line with
+/// numbers, and beside it their names. Writes a PNG. Throws std::runtime_error naming the path if
+/// it cannot be written.
+void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::path& path);
+
+}  // namespace eventgan
