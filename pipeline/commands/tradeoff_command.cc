@@ -1,4 +1,6 @@
 #include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
 #include <charconv>
 #include <filesystem>
 #include <iostream>
@@ -49,24 +51,31 @@ T value_of(const std::array<Word<T>, N>& words, const std::string& text, const c
   throw UsageError(std::string(option) + ": expected one of " + known + ", got \"" + text + "\"");
 }
 
-template <class T, std::size_t N>
-void read_axis(const std::array<Word<T>, N>& words, const std::vector<std::string>& texts,
-               const char* option, std::vector<T>& axis) {
+/// Replaces an axis by what the user names, if that is anything.
+template <class Text, class Read>
+void read_axis(const char* option, const std::vector<Text>& texts, auto& axis, Read read) {
   if (texts.empty()) return;
   axis.clear();
-  for (const std::string& text : texts) axis.push_back(value_of(words, text, option));
+  for (const Text& text : texts) {
+    const auto value = read(text);
+    if (std::ranges::find(axis, value) != axis.end()) {
+      throw UsageError(std::string(option) + ": expected different values, got one twice");
+    }
+    axis.push_back(value);
+  }
 }
 
 TradeoffAxes axes_of(const TradeoffArguments& arguments, const JobManifest& manifest) {
   TradeoffAxes axes = default_axes(manifest);
-  if (!arguments.widths.empty()) {
-    axes.weights.clear();
-    for (const std::string& width : arguments.widths) axes.weights.push_back(weights_name(width));
-  }
-  read_axis(kPrecisionWords, arguments.precisions, "--precisions", axes.precisions);
-  read_axis(kGeneratorWords, arguments.methods, "--methods", axes.methods);
-  read_axis(kStoredTypeWords, arguments.dtypes, "--dtypes", axes.dtypes);
-  if (!arguments.sizes.empty()) axes.sizes = arguments.sizes;
+  const auto words = [](const auto& known, const char* option) {
+    return [&known, option](const std::string& text) { return value_of(known, text, option); };
+  };
+  read_axis("--widths", arguments.widths, axes.weights, weights_name);
+  read_axis("--precisions", arguments.precisions, axes.precisions,
+            words(kPrecisionWords, "--precisions"));
+  read_axis("--methods", arguments.methods, axes.methods, words(kGeneratorWords, "--methods"));
+  read_axis("--dtypes", arguments.dtypes, axes.dtypes, words(kStoredTypeWords, "--dtypes"));
+  read_axis("--sizes", arguments.sizes, axes.sizes, [](double size) { return size; });
   return axes;
 }
 

@@ -508,20 +508,26 @@ std::vector<RoundCost> Comparison::take_turn(const Computation& computation,
   return costs;
 }
 
+/// The reference first, with every stored type as the others have them: that costs a turn the same.
 void Comparison::run_round(std::size_t round,
                            const std::vector<std::vector<std::size_t>>& lacking) {
-  const double reference_s =
-      take_turn(report_.reference, {manifest_.output.dtype}).front().conversion_s;
+  std::vector<StoredType> types = options_.axes.dtypes;
+  if (std::ranges::find(types, manifest_.output.dtype) == types.end()) {
+    types.push_back(manifest_.output.dtype);
+  }
+  const auto cost_of = [&](const std::vector<RoundCost>& costs, StoredType type) {
+    return costs.at(static_cast<std::size_t>(std::ranges::find(types, type) - types.begin()));
+  };
+  const std::vector<RoundCost> reference = take_turn(report_.reference, types);
   for (const std::vector<std::size_t>& group : lacking) {
-    std::vector<StoredType> dtypes;
-    for (const std::size_t i : group) dtypes.push_back(report_.trials[i].configuration.dtype);
+    const Computation& computation = report_.trials[group.front()].configuration.computation;
     const std::vector<RoundCost> costs =
-        take_turn(report_.trials[group.front()].configuration.computation, dtypes);
-    for (std::size_t k = 0; k < group.size(); ++k) {
-      Trial& trial = report_.trials[group[k]];
+        computation == report_.reference ? reference : take_turn(computation, types);
+    for (const std::size_t i : group) {
+      Trial& trial = report_.trials[i];
       trial.rounds.resize(round);
-      trial.rounds.push_back(costs[k]);
-      trial.rounds.back().reference_s = reference_s;
+      trial.rounds.push_back(cost_of(costs, trial.configuration.dtype));
+      trial.rounds.back().reference_s = cost_of(reference, manifest_.output.dtype).conversion_s;
       kept_->save(trial);
     }
   }
@@ -610,7 +616,11 @@ TradeoffReport Comparison::run() {
   std::int64_t steps = std::ssize(without_loss) * report_.pairs;
   for (int round = 0; round < options_.rounds; ++round) {
     rounds.push_back(groups([&](const Trial& trial) { return std::ssize(trial.rounds) <= round; }));
-    if (!rounds.back().empty()) steps += (1 + std::ssize(rounds.back())) * report_.pairs;
+    if (rounds.back().empty()) continue;
+    const auto others = std::ranges::count_if(rounds.back(), [&](const auto& group) {
+      return report_.trials[group.front()].configuration.computation != report_.reference;
+    });
+    steps += (1 + others) * report_.pairs;
   }
   std::vector<std::vector<std::vector<std::size_t>>> without_real;
   for (const auto& recording : options_.real) {

@@ -24,9 +24,9 @@ struct TrialSummary {
 
 TrialSummary summary_of(const Trial& trial);
 
-/// The Pareto front, by index, from the slowest to the fastest: those than which no other is as
-/// fast (median of pairs_per_s) and nearer to the reference (relative_l2), or as near and faster.
-/// Of equals the first. Trials without loss or cost are not on it. Pure.
+/// The Pareto front, by index, from the slowest to the fastest: those than which no faster one
+/// (median of pairs_per_s) is as near to the reference (relative_l2), where a hundredth of the
+/// error is no difference. Of equals the first. Trials without loss or cost are not on it. Pure.
 std::vector<std::size_t> pareto_front(const std::vector<TrialSummary>& trials);
 
 /// What a user asks of a configuration.

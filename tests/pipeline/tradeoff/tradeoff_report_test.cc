@@ -75,6 +75,12 @@ TEST(ParetoFront, OfEqualsHasTheFirst) {
   EXPECT_THAT(pareto_front(summaries(report)), ElementsAre(0));
 }
 
+TEST(ParetoFront, TakesAHundredthOfTheErrorForNoDifference) {
+  TradeoffReport report;
+  report.trials = {trial_of("a", 2, 0.1), trial_of("b", 3, 0.1015), trial_of("c", 4, 0.102)};
+  EXPECT_THAT(pareto_front(summaries(report)), ElementsAre(0, 2));  // from c on: b is as near
+}
+
 TEST(BestTrial, IsTheFastestNearEnoughOrTheNearestFastEnough) {
   const std::vector<TrialSummary> trials = summaries(small_report());
   EXPECT_EQ(best_trial(trials, {0.03, {}}), 2u);

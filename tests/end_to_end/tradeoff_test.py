@@ -1,0 +1,108 @@
+"""`eventgan tradeoff` from outside: its table, files and lines for the manifest, and what it keeps between runs."""
+
+import json
+import signal
+import subprocess
+import time
+
+import program
+import small_job
+from program import PROGRAM, run
+
+AXES = {"widths": "untrained:2,8", "precisions": "float32,int8", "methods": "network,difference", "sizes": "1,0.75",
+        "dtypes": "float32,uint8", "pairs": "4", "rounds": "2"}
+
+
+class Tradeoff(program.InFolder):
+    def setUp(self):
+        super().setUp()
+        self.manifest = small_job.small_job(self.folder)  # 24x32 pixels, boxes and persons
+        self.out = self.folder / "compared"
+
+    def command(self, **changes):
+        options = {**AXES, "out": self.out, "progress": "none", **changes}
+        return ["tradeoff", self.manifest, *[part for name, value in options.items() for part in (f"--{name.replace('_', '-')}", value)]]
+
+    def tradeoff(self, expect=0, **changes):
+        return run(*self.command(**changes), expect=expect)
+
+    def report(self):
+        return json.loads((self.out / "tradeoff.json").read_text())
+
+    def test_every_configuration_is_measured_or_has_a_reason(self):
+        text, _ = self.tradeoff()
+        report = self.report()
+        self.assertEqual(report["reference"], "shipped:8 float32 x1")
+        names = [configuration["name"] for configuration in report["configurations"]]
+        left_out = {refused["name"]: refused["reason"] for refused in report["not_run"]}
+        self.assertEqual(len(names), len(set(names)))
+        # Untrained weights have no calibration; the shipped ones run in int8 where the processor does.
+        self.assertIn("untrained:2 int8 x0.75", left_out)
+        self.assertEqual(len(names) + 2 * len(left_out), 2 * 2 * (2 * 2 + 1))
+        for name in names:
+            self.assertIn(name, text)
+        for reason in left_out.values():
+            self.assertIn(reason, text)
+        by_name = {configuration["name"]: configuration for configuration in report["configurations"]}
+        itself = by_name["shipped:8 float32 x1 float32"]
+        self.assertEqual((itself["relative_l2"], itself["largest_error"], itself["f1_raw"], itself["lost_in_labels"]), (0, 0, 1, 0))
+        self.assertGreater(itself["labelled_events"], 0)
+        front = [by_name[name] for name in report["front"]]
+        for slower, faster in zip(front, front[1:]):
+            self.assertLess(slower["pairs_per_s"]["median"], faster["pairs_per_s"]["median"])
+            self.assertLess(slower["relative_l2"], faster["relative_l2"])
+        for configuration in report["configurations"]:
+            self.assertEqual(configuration["pairs"], 4)
+            self.assertGreater(configuration["pairs_per_s"]["median"], 0)
+            self.assertGreater(configuration["stored_bytes"], 0)
+        self.assertGreater(by_name["shipped:8 float32 x0.75 float32"]["relative_l2"], 0)
+        self.assertIn("mean, by area", " ".join(report["notes"]))
+        self.assertTrue((self.out / "tradeoff.png").read_bytes().startswith(b"\x89PNG"))
+        self.assertIn("| configuration |", (self.out / "tradeoff.md").read_text())
+
+    def test_the_lines_are_the_manifest_that_was_measured(self):
+        text, _ = self.tradeoff(at_most_error="1e9", methods="network", precisions="float32", sizes="0.75")
+        lines = [line.strip() for line in text.splitlines() if line.startswith("    \"")]
+        self.assertEqual(len(lines), 3)
+        keys = json.loads("{" + "".join(lines) + "}")
+        self.assertEqual((keys["image"]["width"], keys["image"]["height"]), (24, 18))
+        whole = json.loads(self.manifest.read_text())
+        self.manifest.write_text(json.dumps({**whole, **keys}))
+        run("convert", self.manifest, "--progress", "none")
+        chosen = self.report()["answer"]["name"]
+        self.assertIn(keys["generator"]["weights"], chosen)
+        self.assertTrue(chosen.endswith(keys["output"]["dtype"]))
+
+    def test_goes_on_where_it_was_stopped(self):
+        command = [PROGRAM, *map(str, self.command(rounds="40"))]
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        while process.poll() is None and len(list(self.out.glob("kept/*.json"))) < 3:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGTERM)
+        self.assertEqual(process.wait(), 75)
+        kept = {path: path.read_bytes() for path in self.out.glob("kept/*.json")}
+        losses = {json.loads(data)["configuration"]: json.loads(data)["losses"] for data in kept.values()}
+        self.assertFalse((self.out / "tradeoff.json").exists())
+        self.tradeoff()
+        after = {path.name: json.loads(path.read_text()) for path in self.out.glob("kept/*.json")}
+        for content in after.values():
+            self.assertEqual(content["losses"], losses.get(content["configuration"], content["losses"]))
+        first = (self.out / "tradeoff.json").read_bytes()
+        times = {path: path.stat().st_mtime_ns for path in self.out.glob("kept/*.json")}
+        self.tradeoff()
+        self.assertEqual((self.out / "tradeoff.json").read_bytes(), first)
+        self.assertEqual({path: path.stat().st_mtime_ns for path in self.out.glob("kept/*.json")}, times)
+
+    def test_what_cannot_be_is_refused(self):
+        for option, value, word in [("methods", "magic", "expected one of network"), ("sizes", "1,0.5,1", "expected different"),
+                                    ("reference", "8,float32,9", "expected WEIGHTS"), ("out", "", "expected a folder"),
+                                    ("reference", "untrained:2,int8", "expected a configuration that can be run")]:
+            with self.subTest(option=option, value=value):
+                _, error = self.tradeoff(**{option: value}, expect=64)
+                self.assertIn(f"--{option}: {word}", error)
+        self.tradeoff(widths="none.safetensors", expect=66)
+        self.tradeoff(real=self.folder / "none.hdf5", expect=66)
+
+
+if __name__ == "__main__":
+    program.main()
