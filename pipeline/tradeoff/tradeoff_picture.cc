@@ -27,51 +27,63 @@ void write_text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv
   cv::putText(canvas, text, at, cv::FONT_HERSHEY_SIMPLEX, kTextSize, colour, 1, cv::LINE_AA);
 }
 
-/// A logarithmic axis over whole decades.
+/// A logarithmic axis around some values.
 struct LogAxis {
   double first = 0, last = 1;  // decades
 
   static LogAxis around(const std::vector<double>& values) {
+    constexpr double kMargin = 0.1;
     const auto [low, high] = std::ranges::minmax(values);
-    LogAxis axis{std::floor(std::log10(low)), std::ceil(std::log10(high))};
-    if (axis.last == axis.first) axis.last += 1;
-    return axis;
+    return {std::log10(low) - kMargin, std::log10(high) + kMargin};
   }
   double share(double value) const { return (std::log10(value) - first) / (last - first); }
+
+  /// 1, 2, ... 9 times each power of ten that lies on it.
+  std::vector<double> ticks() const {
+    std::vector<double> values;
+    for (int decade = static_cast<int>(std::floor(first)); decade <= last; ++decade) {
+      for (int digit = 1; digit < 10; ++digit) {
+        const double value = digit * std::pow(10.0, decade);
+        if (share(value) >= 0 && share(value) <= 1) values.push_back(value);
+      }
+    }
+    return values;
+  }
 };
+
+/// Whether a tick has room for its number: 1, 2 and 5 of a decade.
+bool is_labelled(double value) {
+  const double digit = value / std::pow(10.0, std::floor(std::log10(value) + 1e-9));
+  return digit < 2.5 || (digit > 4.5 && digit < 5.5);
+}
 
 struct Plot {
   LogAxis speed, error;
 
-  cv::Point at(double pairs_per_s, double relative_l2) const {
+  cv::Point at(double times, double relative_l2) const {
     return {
-        kLeft + static_cast<int>(std::lround(speed.share(pairs_per_s) * kPlotWidth)),
+        kLeft + static_cast<int>(std::lround(speed.share(times) * kPlotWidth)),
         kTop + static_cast<int>(std::lround(
                    (1 - error.share(std::clamp(relative_l2, kLeastError, 1e6))) * kPlotHeight))};
   }
 
   void draw_axes(cv::Mat& canvas) const {
-    for (int decade = static_cast<int>(speed.first); decade <= speed.last; ++decade) {
-      for (int digit = 1; digit < 10; ++digit) {
-        const double value = digit * std::pow(10.0, decade);
-        if (std::log10(value) > speed.last + 1e-9) break;
-        const int x = at(value, kLeastError).x;
-        cv::line(canvas, {x, kTop}, {x, kTop + kPlotHeight}, kGrid);
-        if (digit == 1 || digit == 2 || digit == 5) {
-          write_text(canvas, fmt::format("{:g}", value), {x - 8, kTop + kPlotHeight + 16}, kInk);
-        }
-      }
+    for (const double value : speed.ticks()) {
+      const int x = at(value, kLeastError).x;
+      cv::line(canvas, {x, kTop}, {x, kTop + kPlotHeight}, kGrid);
+      if (!is_labelled(value)) continue;
+      write_text(canvas, fmt::format("{:g}", value), {x - 8, kTop + kPlotHeight + 16}, kInk);
     }
-    for (int decade = static_cast<int>(error.first); decade <= error.last; ++decade) {
-      const double value = std::pow(10.0, decade);
-      const int y = at(std::pow(10.0, speed.first), value).y;
+    for (const double value : error.ticks()) {
+      const int y = at(1, value).y;
       cv::line(canvas, {kLeft, y}, {kLeft + kPlotWidth, y}, kGrid);
+      if (!is_labelled(value)) continue;
       write_text(canvas, fmt::format("{}{:g}", value <= kLeastError ? "<" : "", value), {6, y + 4},
                  kInk);
     }
     cv::rectangle(canvas, cv::Rect(kLeft, kTop, kPlotWidth, kPlotHeight), kInk);
-    write_text(canvas, "pairs a second on all threads", {kLeft + 220, kTop + kPlotHeight + 40},
-               kInk);
+    write_text(canvas, "times the reference's speed (processor time of a pair)",
+               {kLeft + 140, kTop + kPlotHeight + 40}, kInk);
     write_text(canvas, "error: relative L2 from the reference", {6, kTop - 10}, kInk);
   }
 };
@@ -93,7 +105,7 @@ void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::pat
     const std::string family = family_of(trial.configuration.computation);
     if (std::ranges::find(families, family) == families.end()) families.push_back(family);
     if (!std::isfinite(summary.loss.relative_l2)) continue;
-    speeds.push_back(summary.pairs_per_s.median);
+    speeds.push_back(summary.speedup.median);
     errors.push_back(std::max(summary.loss.relative_l2, kLeastError));
   }
   const std::vector<std::size_t> front = pareto_front(trials);
@@ -112,7 +124,7 @@ void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::pat
     const Plot plot{LogAxis::around(speeds), LogAxis::around(errors)};
     plot.draw_axes(canvas);
     const auto place = [&](std::size_t i) {
-      return plot.at(trials[i].pairs_per_s.median, trials[i].loss.relative_l2);
+      return plot.at(trials[i].speedup.median, trials[i].loss.relative_l2);
     };
     for (std::size_t i = 1; i < front.size(); ++i) {
       cv::line(canvas, place(front[i - 1]), place(front[i]), kInk, 1, cv::LINE_AA);
@@ -132,8 +144,8 @@ void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::pat
   for (std::size_t i = 0; i < front.size(); ++i) {
     const TrialSummary& trial = trials[front[i]];
     write_text(canvas,
-               fmt::format("{}  {}: {:.1f} pairs/s, {:.2g}", i + 1, trial.name,
-                           trial.pairs_per_s.median, trial.loss.relative_l2),
+               fmt::format("{}  {}: {:.2f} times, {:.2g}", i + 1, trial.name, trial.speedup.median,
+                           trial.loss.relative_l2),
                {left, y += kLine}, colour(front[i]));
   }
   y += kLine;

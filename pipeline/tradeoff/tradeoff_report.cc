@@ -41,15 +41,15 @@ std::vector<std::size_t> pareto_front(const std::vector<TrialSummary>& trials) {
   std::vector<std::size_t> order;
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const TrialSummary& trial = trials[i];
-    if (!std::isnan(trial.pairs_per_s.median) && !std::isnan(trial.loss.relative_l2)) {
+    if (!std::isnan(trial.speedup.median) && !std::isnan(trial.loss.relative_l2)) {
       order.push_back(i);
     }
   }
   // From the fastest on, only what is nearer than all that are faster.
   constexpr double kNearer = 0.99;  // of the error: less is no difference that anybody could use
   std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
-    if (trials[a].pairs_per_s.median != trials[b].pairs_per_s.median) {
-      return trials[a].pairs_per_s.median > trials[b].pairs_per_s.median;
+    if (trials[a].speedup.median != trials[b].speedup.median) {
+      return trials[a].speedup.median > trials[b].speedup.median;
     }
     return trials[a].loss.relative_l2 < trials[b].loss.relative_l2;
   });
@@ -70,10 +70,10 @@ std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
   std::pair<double, double> best_rank;
   for (std::size_t i = 0; i < trials.size(); ++i) {
     const double error = trials[i].loss.relative_l2;
-    const double speed = trials[i].pairs_per_s.median;
+    const double speed = trials[i].speedup.median;
     // A NaN serves no demand.
     if (!(error <= demand.at_most_error.value_or(std::numeric_limits<double>::infinity())) ||
-        !(speed >= demand.at_least_speed.value_or(0))) {
+        !(trials[i].pairs_per_s.median >= demand.at_least_speed.value_or(0))) {
       continue;
     }
     const auto rank = demand.at_most_error ? std::pair(speed, -error) : std::pair(-error, speed);
@@ -99,8 +99,9 @@ struct Digest {
 };
 
 constexpr const char* kNotes[] = {
-    "pairs/s: on all threads, reading included, writing the file (1 to 2 % of a pair) not; times: "
-    "the reference's processor time of a pair over its own, in the same round; MB peak: of the "
+    "pairs/s: on all threads, reading included, writing the file (1 to 2 % of a pair) not, as busy "
+    "as the machine was; times: the reference's processor time of a pair over its own, in the same "
+    "round; the front goes by it. MB peak: of the "
     "whole program; MB stored: a pair's volume, compressed. Medians over the rounds, (the middle "
     "half).",
     "error: ‖V - R‖ / ‖R‖, R the reference's volume, median over the pairs; F1 and times: as "

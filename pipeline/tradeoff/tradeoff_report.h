@@ -25,8 +25,9 @@ struct TrialSummary {
 TrialSummary summary_of(const Trial& trial);
 
 /// The Pareto front, by index, from the slowest to the fastest: those than which no faster one
-/// (median of pairs_per_s) is as near to the reference (relative_l2), where a hundredth of the
-/// error is no difference. Of equals the first. Trials without loss or cost are not on it. Pure.
+/// (median of speedup: processor time, which other programs on the machine hardly change) is as
+/// near to the reference (relative_l2), where a hundredth of the error is no difference. Of equals
+/// the first. Trials without loss or cost are not on it. Pure.
 std::vector<std::size_t> pareto_front(const std::vector<TrialSummary>& trials);
 
 /// What a user asks of a configuration.
@@ -35,8 +36,8 @@ struct TradeoffDemand {
   std::optional<double> at_least_speed;  ///< pairs_per_s
 };
 
-/// The fastest that is near enough; without `at_most_error` the nearest that is fast enough. None
-/// if no trial is. Pure.
+/// The fastest (speedup) that is near enough; without `at_most_error` the nearest that is fast
+/// enough. None if no trial is. Pure.
 std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
                                       const TradeoffDemand& demand);
 
@@ -50,9 +51,9 @@ std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& dema
 /// JSON, indented, with the spreads; null for what is no finite number.
 std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand);
 
-/// Draws speed against error, both logarithmic, a point for each trial, the front as a line with
-/// numbers, and beside it their names. Writes a PNG. Throws std::runtime_error naming the path if
-/// it cannot be written.
+/// Draws speed (in the reference's) against error, both logarithmic, a point for each trial, the
+/// front as a line with numbers, and beside it their names. Writes a PNG. Throws std::runtime_error
+/// naming the path if it cannot be written.
 void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::path& path);
 
 }  // namespace eventgan

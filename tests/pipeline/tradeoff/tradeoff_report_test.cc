@@ -81,6 +81,16 @@ TEST(ParetoFront, TakesAHundredthOfTheErrorForNoDifference) {
   EXPECT_THAT(pareto_front(summaries(report)), ElementsAre(0, 2));  // from c on: b is as near
 }
 
+TEST(ParetoFront, GoesByProcessorTimeAndDemandsByPairsASecond) {
+  TradeoffReport report;
+  report.trials = {trial_of("a", 2, 0.1), trial_of("b", 1, 0.3)};
+  report.trials[1].rounds[0].pairs_per_s = 7;  // the machine had more time for it
+  const std::vector<TrialSummary> trials = summaries(report);
+  EXPECT_THAT(pareto_front(trials), ElementsAre(0));
+  EXPECT_EQ(best_trial(trials, {0.5, {}}), 0u);
+  EXPECT_EQ(best_trial(trials, {{}, 5}), 1u);
+}
+
 TEST(BestTrial, IsTheFastestNearEnoughOrTheNearestFastEnough) {
   const std::vector<TrialSummary> trials = summaries(small_report());
   EXPECT_EQ(best_trial(trials, {0.03, {}}), 2u);
