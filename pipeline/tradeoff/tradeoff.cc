@@ -63,7 +63,7 @@ std::optional<ImageSize> only_size(const Plan& plan) {
       return std::nullopt;
     }
   }
-  return plan.shards.front().volume_size;
+  return plan.shards.empty() ? std::nullopt : std::optional(plan.shards.front().volume_size);
 }
 
 /// "Intel(R) Xeon(R) Processor, avx512_core_vnni".
@@ -111,21 +111,19 @@ struct SizedPairs {
   }
 };
 
-/// A volume as it is read back from a shard, and in the form in which volumes are compared.
-std::vector<float> comparable(std::span<const float> stored, bool is_counts) {
-  std::vector<float> volume(stored.begin(), stored.end());
+/// In the form in which volumes are compared.
+std::vector<float> comparable(std::vector<float> volume, bool is_counts) {
   return is_counts ? normalized(std::move(volume)) : volume;
 }
 
-/// A job as one configuration runs it, with its generator.
+/// A job as one configuration runs it.
 struct Runner {
   JobManifest manifest;
-  const Generator& generator;
   SampleStages stages;
 
   Runner(JobManifest job, const std::vector<std::unique_ptr<Dataset>>& datasets,
-         const Generator& with)
-      : manifest(std::move(job)), generator(with), stages(manifest, datasets, with, 1) {}
+         const Generator& generator)
+      : manifest(std::move(job)), stages(manifest, datasets, generator, /*in_flight=*/1) {}
   Runner(const Runner&) = delete;
   Runner& operator=(const Runner&) = delete;
 
