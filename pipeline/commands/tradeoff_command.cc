@@ -25,7 +25,7 @@ namespace {
 
 struct TradeoffArguments {
   std::string manifest;
-  std::vector<std::string> widths, precisions, methods, dtypes;
+  std::vector<std::string> widths, precisions, scopes, methods, dtypes;
   std::vector<double> sizes;
   std::string reference;
   std::vector<std::string> real;
@@ -73,6 +73,7 @@ TradeoffAxes axes_of(const TradeoffArguments& arguments, const JobManifest& mani
   read_axis("--widths", arguments.widths, axes.weights, weights_name);
   read_axis("--precisions", arguments.precisions, axes.precisions,
             words(kPrecisionWords, "--precisions"));
+  read_axis("--scopes", arguments.scopes, axes.scopes, words(kScopeWords, "--scopes"));
   read_axis("--methods", arguments.methods, axes.methods, words(kGeneratorWords, "--methods"));
   read_axis("--dtypes", arguments.dtypes, axes.dtypes, words(kStoredTypeWords, "--dtypes"));
   read_axis("--sizes", arguments.sizes, axes.sizes, [](double size) { return size; });
@@ -161,6 +162,11 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
       ->delimiter(',')
       ->check(CLI::Range(0.05, 4.0))
       ->option_text("SIZE,...");
+  command
+      .add_option("--scopes", arguments.scopes,
+                  "Of whole,motion,labels,labels_only; default: the first three")
+      ->delimiter(',')
+      ->option_text("SCOPE,...");
   command.add_option("--methods", arguments.methods, "Of network,difference,esim; default: all")
       ->delimiter(',')
       ->option_text("METHOD,...");

@@ -18,7 +18,11 @@ std::vector<Computation> computations(const TradeoffAxes& axes) {
     for (const std::string& weights : is_network ? axes.weights : std::vector<std::string>{""}) {
       for (const Precision precision :
            is_network ? axes.precisions : std::vector{Precision::kFloat32}) {
-        for (const double size : axes.sizes) all.push_back({method, weights, precision, size});
+        for (const Scope scope : is_network ? axes.scopes : std::vector{Scope::kWhole}) {
+          for (const double size : axes.sizes) {
+            all.push_back({method, weights, precision, size, scope});
+          }
+        }
       }
     }
   }
@@ -26,10 +30,11 @@ std::vector<Computation> computations(const TradeoffAxes& axes) {
 }
 
 std::string name_of(const Computation& computation) {
-  const std::string method =
+  std::string method =
       computation.method == GeneratorKind::kNetwork
           ? fmt::format("{} {}", computation.weights, to_string(computation.precision))
           : std::string(to_string(computation.method));
+  if (computation.scope != Scope::kWhole) method.append(" ").append(to_string(computation.scope));
   return fmt::format("{} x{:g}", method, computation.size);
 }
 
@@ -48,6 +53,7 @@ Json generator_keys(const Json& manifest, const JobManifest& job, const Computat
   if (is_network) {
     keys["weights"] = computation.weights;
     keys["precision"] = to_string(computation.precision);
+    keys["scope"] = to_string(computation.scope);
     return keys;
   }
   keys["kind"] = to_string(computation.method);

@@ -16,6 +16,7 @@ struct Computation {
   std::string weights;                        ///< as the manifest writes them; a simulator: empty
   Precision precision = Precision::kFloat32;  ///< the network's
   double size = 1;                            ///< of the volume's sides, 1 as in the manifest
+  Scope scope = Scope::kWhole;                ///< the network's
   bool operator==(const Computation&) const = default;
 };
 
@@ -26,19 +27,20 @@ struct Configuration {
   bool operator==(const Configuration&) const = default;
 };
 
-/// What is compared: every combination. Simulators have neither weights nor precision.
+/// What is compared: every combination. Simulators have no weights, precision and scope.
 struct TradeoffAxes {
   std::vector<GeneratorKind> methods;
   std::vector<std::string> weights;
   std::vector<Precision> precisions;
   std::vector<double> sizes;  ///< in 0.05..4
   std::vector<StoredType> dtypes;
+  std::vector<Scope> scopes{Scope::kWhole};
 };
 
 /// All combinations, the last axis fastest, the stored type left out.
 std::vector<Computation> computations(const TradeoffAxes& axes);
 
-/// "shipped:16 float32 x0.75", "esim x1".
+/// "shipped:16 float32 motion x0.75", "shipped:16 int8 x1" (the whole), "esim x1".
 std::string name_of(const Computation& computation);
 
 /// The same with the stored type at the end.

@@ -27,6 +27,7 @@
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/generator/shipped_weights.h"
+#include "stages/generator/wanted_tiles.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 
@@ -45,6 +46,7 @@ TradeoffAxes default_axes(const JobManifest& manifest) {
   }
   axes.precisions = {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8};
   axes.sizes = {1, 0.75, 0.5};
+  axes.scopes = {Scope::kWhole, Scope::kMotion, Scope::kLabels};
   axes.dtypes = {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8};
   return axes;
 }
@@ -542,7 +544,8 @@ std::vector<FrameInterval> some_intervals(const Recording& recording, int most) 
 
 void Comparison::find_real(const std::vector<std::size_t>& group, const Recording& recording) {
   const Computation& computation = report_.trials[group.front()].configuration.computation;
-  const LoadedGenerator loaded = load_generator(job_of(computation, StoredType::kFloat32));
+  const JobManifest job = job_of(computation, StoredType::kFloat32);
+  const LoadedGenerator loaded = load_generator(job);
   const std::vector<FrameInterval> intervals = some_intervals(recording, options_.pairs);
   const ImageSize whole = recording.size();
   ImageSpec smaller;
@@ -561,7 +564,13 @@ void Comparison::find_real(const std::vector<std::size_t>& group, const Recordin
     frames.previous = resized(frames.previous, own_shape.size);
     frames.next = resized(frames.next, own_shape.size);
     std::vector<float> generated(own_shape.value_count());
-    loaded.generator->generate(network_input(frames), own_shape.size, generated);
+    const std::vector<float> input = network_input(frames);
+    if (job.generator.scope.scope == Scope::kWhole) {
+      loaded.generator->generate(input, own_shape.size, generated);
+    } else {  // a recording has no labels
+      loaded.generator->generate_tiles(
+          input, wanted_tiles(job.generator.scope, input, own_shape.size, 0, 0, {}), generated);
+    }
     for (std::size_t k = 0; k < group.size(); ++k) {
       const StoredType type = report_.trials[group[k]].configuration.dtype;
       const EncodedVolume stored = VolumeCodec(type, 0).encode(generated);

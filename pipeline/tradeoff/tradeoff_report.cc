@@ -303,6 +303,7 @@ nlohmann::json json_of(const Trial& trial, const TrialSummary& summary, bool on_
   if (is_network) {
     json["weights"] = computation.weights;
     json["precision"] = to_string(computation.precision);
+    json["scope"] = to_string(computation.scope);
   }
   return json;
 }

@@ -20,6 +20,17 @@ std::vector<std::string> names(const std::vector<Computation>& all) {
   return result;
 }
 
+TEST(Computations, AScopeIsTheNetworksAlone) {
+  TradeoffAxes axes;
+  axes.methods = {kNetwork, GeneratorKind::kDifference};
+  axes.weights = {"shipped:8"};
+  axes.precisions = {Precision::kInt8};
+  axes.sizes = {1};
+  axes.scopes = {Scope::kWhole, Scope::kMotion};
+  EXPECT_THAT(names(computations(axes)),
+              ElementsAre("shipped:8 int8 x1", "shipped:8 int8 motion x1", "difference x1"));
+}
+
 TEST(Computations, AreEveryCombinationAndASimulatorHasSizesAlone) {
   TradeoffAxes axes;
   axes.methods = {kNetwork, GeneratorKind::kEsim};
