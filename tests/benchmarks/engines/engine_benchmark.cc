@@ -3,6 +3,9 @@
 //   input HEIGHT WIDTH FILE   the frames [2, y, x], float32 in [-1, 1], raw; warms up
 //   run     one forward pass: {"wall_ms": ..., "cpu_ms": ...}
 //   error   against LibTorch in float32: {"relative_l2": ..., "relative_largest": ...}
+//   saturation   of 8-bit activations: {"share": ...}
+//   level TRIES, noise TRIES   what small changes of the frames do to the volume:
+//           {"l2": ..., "largest": ..., "relative_l2": ...}
 
 #include <CLI/CLI.hpp>
 #include <cstdint>
@@ -70,8 +73,16 @@ nlohmann::json answer(const std::string& request, EngineContender& contender) {
     const VolumeError error = contender.error();
     return {{"relative_l2", error.relative_l2}, {"relative_largest", error.relative_largest}};
   }
-  throw std::invalid_argument("expected input HEIGHT WIDTH FILE, run or error, got \"" + request +
-                              "\"");
+  if (word == "saturation") return {{"share", contender.saturated_share()}};
+  if (int tries = 0; (word == "level" || word == "noise") && words >> tries) {
+    const Amplification most = contender.amplification(
+        word == "level" ? SmallChange::kOneLevelOfOnePixel : SmallChange::kRoundingNoise, tries);
+    return {{"l2", most.l2}, {"largest", most.largest}, {"relative_l2", most.relative_l2}};
+  }
+  throw std::invalid_argument(
+      "expected input HEIGHT WIDTH FILE, run, error, saturation, level TRIES or noise TRIES, got "
+      "\"" +
+      request + "\"");
 }
 
 void serve(const ContenderSetup& setup, const std::string& weights) {
@@ -99,6 +110,7 @@ int run_program(int argc, char** argv) {
   app.add_option("--weights", weights, "FILE.safetensors, shipped:WIDTH or untrained:WIDTH");
   app.add_option("--instances", setup.instances)->check(CLI::Range(1, 1024));
   app.add_option("--intra-op", setup.intra_op)->check(CLI::Range(1, 1024));
+  app.add_option("--shrink", setup.shrink, "Divides the activations by two to this power");
   CLI11_PARSE(app, argc, argv);
   setup.engine = kEngines.at(engine);
   setup.precision = kPrecisions.at(precision);

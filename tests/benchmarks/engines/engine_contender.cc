@@ -3,11 +3,14 @@
 #include <ATen/Parallel.h>
 #include <omp.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <ctime>
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/values/counter_random.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/torch/torch_generator.h"
 
@@ -16,6 +19,18 @@ namespace {
 
 constexpr int kWarmUpPasses = 2;
 constexpr ImageSize kSmallSize{16, 16};
+
+constexpr std::uint64_t kChangesSeed = 11;
+constexpr float kOneLevel = 2.0f / 255;
+constexpr float kNoise = 1e-6f;
+
+double distance(const std::vector<float>& a, const std::vector<float>& b) {
+  double squares = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    squares += (double(a[i]) - double(b[i])) * (double(a[i]) - double(b[i]));
+  }
+  return std::sqrt(squares);
+}
 
 double process_ms() {
   timespec now{};
@@ -37,11 +52,23 @@ bool has_instructions(const ContenderSetup& setup) {
   return setup.precision == Precision::kFloat32 || onednn_support(setup.precision).native;
 }
 
+/// Every activation times 2^-exponent, half of it by the first layer's weights, the other by the
+/// frames, so that these stay normal numbers.
+Weights shrunk(Weights weights, int exponent) {
+  for (Convolution& layer : weights.convolutions) {
+    if (layer.name == "pred") continue;
+    for (float& number : layer.bias) number = std::ldexp(number, -exponent);
+    if (layer.name != "head") continue;
+    for (float& number : layer.weight) number = std::ldexp(number, -exponent / 2);
+  }
+  return weights;
+}
+
 }  // namespace
 
 EngineContender::EngineContender(const ContenderSetup& setup, Weights weights)
     : setup_(setup),
-      weights_(std::move(weights)),
+      weights_(shrunk(std::move(weights), setup.shrink)),
       native_(has_instructions(setup_)),
       generator_(make_generator(setup_, weights_)),
       instances_(
@@ -51,6 +78,7 @@ EngineContender::EngineContender(const ContenderSetup& setup, Weights weights)
 void EngineContender::set_input(ImageSize size, std::vector<float> frames) {
   size_ = size;
   frames_ = std::move(frames);
+  for (float& value : frames_) value = std::ldexp(value, setup_.shrink / 2 - setup_.shrink);
   volumes_.assign(static_cast<std::size_t>(setup_.instances), volume_of(weights_, size));
   for (int pass = 0; pass < kWarmUpPasses; ++pass) instances_.run();
 }
@@ -70,6 +98,38 @@ VolumeError EngineContender::error() {
   std::vector<float> expected = volume_of(weights_, size_);
   make_torch_generator(weights_)->generate(frames_, size_, expected);
   return volume_error(volumes_.front(), expected);
+}
+
+double EngineContender::saturated_share() const {
+  std::vector<float> volume = volume_of(weights_, size_);
+  return generator_->generate(frames_, size_, volume).saturated_share;
+}
+
+Amplification EngineContender::amplification(SmallChange change, int tries) const {
+  std::vector<float> before = volume_of(weights_, size_), after = before;
+  generator_->generate(frames_, size_, before);
+  const CounterRandom random(kChangesSeed);
+  std::uint64_t drawn = 0;
+  Amplification most;
+  for (int i = 0; i < tries; ++i) {
+    std::vector<float> changed = frames_;
+    if (change == SmallChange::kOneLevelOfOnePixel) {
+      float& value = changed[static_cast<std::size_t>(random.uniform(drawn++) *
+                                                      static_cast<double>(changed.size()))];
+      value += value > 0 ? -kOneLevel : kOneLevel;
+    } else {
+      for (float& value : changed) {
+        value += kNoise * static_cast<float>(2 * random.uniform(drawn++) - 1);
+      }
+    }
+    generator_->generate(changed, size_, after);
+    const double frames_moved = distance(changed, frames_), moved = distance(after, before);
+    const VolumeError error = volume_error(after, before);
+    most.l2 = std::max(most.l2, moved / frames_moved);
+    most.largest = std::max(most.largest, error.relative_largest);
+    most.relative_l2 = std::max(most.relative_l2, error.relative_l2);
+  }
+  return most;
 }
 
 /// The engines take one thread on the first call of each thread; after it the setting is ours.

@@ -17,12 +17,24 @@ struct ContenderSetup {
   Engine engine = Engine::kTorch;
   Precision precision = Precision::kFloat32;
   int instances = 1;  ///< threads that make a volume each, at the same time
+  int shrink = 0;     ///< activations are divided by two to this power
   int intra_op = 1;   ///< threads within each; more than one is what the program never does
 };
 
 struct PassTime {
   double wall_ms = 0;  ///< until all instances are done
   double cpu_ms = 0;   ///< of the whole process
+};
+
+/// What is done to frames: a random pixel of one of them gets another level of its 256, or every
+/// value uniform noise of up to 1e-6, as other rounding in preparing them would.
+enum class SmallChange { kOneLevelOfOnePixel, kRoundingNoise };
+
+/// The largest of several tries, v being the volume and x the frames.
+struct Amplification {
+  double l2 = 0;           ///< |Δv| / |Δx|, Euclidean
+  double largest = 0;      ///< max |Δv| / max v
+  double relative_l2 = 0;  ///< |Δv| / |v|
 };
 
 /// One engine with its weights, on one input at a time. Not thread safe.
@@ -43,6 +55,12 @@ class EngineContender {
 
   /// Against LibTorch in float32 on the same input.
   VolumeError error();
+
+  /// GenerationNotes::saturated_share of the input, which must have been set, as for the next.
+  double saturated_share() const;
+
+  /// Seeded: the same changes for every engine.
+  Amplification amplification(SmallChange change, int tries) const;
 
  private:
   void allow_intra_op_threads();

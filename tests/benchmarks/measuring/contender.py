@@ -50,6 +50,14 @@ class Contender(contextlib.AbstractContextManager):
         """{"relative_l2", "relative_largest"} against LibTorch in float32."""
         return self._ask("error")
 
+    def saturation(self):
+        """{"share"} of the 8-bit activations that are clipped."""
+        return self._ask("saturation")
+
+    def amplification(self, change, tries):
+        """{"l2", "largest", "relative_l2"}, the largest of so many changes of one "level" of one pixel, or of "noise" of 1e-6 everywhere."""
+        return self._ask(f"{change} {tries}")
+
     def _ask(self, request):
         print(request, file=self._process.stdin, flush=True)
         return self._answer()

@@ -53,3 +53,13 @@ def small_copies(folder, originals, height, width):
         copies.append(folder / f"{index:06d}.png")
         PIL.Image.open(original).convert("L").resize((width, height), PIL.Image.BILINEAR).save(copies[-1])
     return copies
+
+
+def fainter_copies(folder, originals, contrast):
+    """The originals in grey, their distance from mid-grey multiplied with `contrast` below 1."""
+    folder.mkdir(parents=True)
+    copies = []
+    for index, original in enumerate(originals):
+        copies.append(folder / f"{index:06d}.png")
+        PIL.Image.open(original).convert("L").point(lambda level: round(127.5 + (level - 127.5) * contrast)).save(copies[-1])
+    return copies

@@ -102,6 +102,12 @@ TEST(ScanValues, AddsInTheOrderItStates) {
   EXPECT_EQ(scan_values(values).sum, sum);
 }
 
+TEST(ScanValues, AddsTenMillionValuesWithoutLoss) {
+  // In float32 a sum near 1e6 moves in steps of 0.06, so that adding 0.1 is wrong by a tenth.
+  const std::vector<float> values(10'000'000, 0.1f);
+  EXPECT_NEAR(scan_values(values).sum, 1e7 * double(0.1f), 1e-5);
+}
+
 TEST(ScanValues, OfNothing) {
   for (const std::vector<float>& values : {std::vector<float>{}, std::vector<float>(300, -0.0f)}) {
     const ValueScan scan = scan_values(values);
@@ -147,6 +153,10 @@ TEST(Eta98, IsTheKthSmallestOfTheNonZeroValues) {
 TEST(Eta98, OfOneValueIsThatValue) {
   const std::vector<float> volume{0, 0.25f, 0};  // int(0.98) = 0, raised to 1
   EXPECT_EQ(eta98(volume), 0.25f);
+}
+
+TEST(Eta98, OfTwoValuesIsTheSmaller) {
+  EXPECT_EQ(eta98(std::vector<float>{0, 2, 0, 1}), 1.0f);  // k = int(1.96) = 1
 }
 
 TEST(Eta98, OfNoValuesIsZero) {
