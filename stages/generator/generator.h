@@ -27,7 +27,7 @@ struct GenerationNotes {
 
 /// A volume with a larger share is flagged (kFlagBeyondCalibration). manifests/guides/numerics.md
 /// has the errors that come with it.
-inline constexpr double kMostSaturated = 1e-3;
+inline constexpr double kMostSaturated = 5e-4;
 
 /// The EventGAN generator (DESIGN section 4), ready to run; the seam between the pipeline and the
 /// inference engines, and where tests put a fake.

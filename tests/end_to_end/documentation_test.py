@@ -1,4 +1,4 @@
-"""The pages against the program: commands, options, exit codes, links, and the tests that the page of guarantees names."""
+"""The pages against the program: commands, options, exit codes, links, and the tests that the pages of guarantees and of numbers name."""
 
 import functools
 import re
@@ -9,6 +9,7 @@ from program import SOURCE, run
 
 PAGES = [SOURCE / "README.md", SOURCE / "docker" / "running.md", *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
 GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
+NUMERICS = SOURCE / "manifests" / "guides" / "numerics.md"
 COMMAND = re.compile(r"\beventgan ([a-z][a-z-]*)([^#|;&]*)")
 
 
@@ -57,7 +58,7 @@ class Documentation(unittest.TestCase):
                 self.assertTrue((page.parent / link).exists(), f"{page}: {link}")
 
     def test_the_tests_that_hold_the_guarantees_are_there(self):
-        text = GUARANTEES.read_text(encoding="utf-8")
+        text = GUARANTEES.read_text(encoding="utf-8") + NUMERICS.read_text(encoding="utf-8")
         tests = SOURCE / "tests"
         sources = "\n".join(path.read_text(encoding="utf-8") for path in tests.rglob("*_test.cc"))
         in_cc = {f"{suite}.{name}" for suite, name in re.findall(r"\bTEST(?:_F|_P)?\((\w+),\s*(\w+)\)", sources)}

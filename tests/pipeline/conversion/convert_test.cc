@@ -62,7 +62,7 @@ TEST_F(Convert, WarnsOnceOfVolumesBeyondTheCalibration) {
   generator_.saturate(0.25);
   run(telling);
   EXPECT_THAT(warnings, ::testing::ElementsAre(::testing::HasSubstr(
-                            "got 11 of 11 volumes with more than 0.1 % of them clipped, the worst "
+                            "got 11 of 11 volumes with more than 0.05 % of them clipped, the worst "
                             "with 25 % (")));
 }
 
