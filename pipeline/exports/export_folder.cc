@@ -1,7 +1,10 @@
 #include "pipeline/exports/export_folder.h"
 
 #include <algorithm>
+#include <cerrno>
+#include <fstream>
 #include <nlohmann/json.hpp>
+#include <sstream>
 #include <system_error>
 
 #include "manifests/documents/json_text_internal.h"
@@ -17,6 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr char kReceipts[] = ".export";
 constexpr char kIdentity[] = "export.txt";
+constexpr char kBegun[] = ".begun";
 
 /// A receipt that parses; else null.
 nlohmann::json read_receipt(const fs::path& file) {
@@ -29,24 +33,55 @@ nlohmann::json read_receipt(const fs::path& file) {
   return is_sound ? *json : nlohmann::json();
 }
 
+/// The files that a receipt lists; none if it does not parse.
+std::set<std::string> files_of(const fs::path& receipt) {
+  std::set<std::string> names;
+  const nlohmann::json json = read_receipt(receipt);
+  if (json.is_null()) return names;
+  for (const auto& [relative, size] : json.at("files").items()) names.insert(relative);
+  return names;
+}
+
+/// The files that a journal names, in quotes and each with a line end before it: one that was
+/// broken off is none, and does not spoil the next one.
+std::set<std::string> read_journal(const fs::path& file) {
+  std::string reason;
+  std::istringstream lines(try_read_file(file, reason).value_or(""));
+  std::set<std::string> names;
+  for (std::string line; std::getline(lines, line);) {
+    const auto name = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
+    if (name.is_string()) names.insert(name.get<std::string>());
+  }
+  return names;
+}
+
+void append_to_journal(const fs::path& file, const std::set<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += "\n" + dump_json(nlohmann::json(name));
+  std::ofstream journal(file, std::ios::app);
+  if (!(journal << text).flush()) {
+    throw std::system_error(errno, std::generic_category(), "cannot write " + file.string());
+  }
+}
+
 }  // namespace
 
 ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool overwrite)
     : folder_(std::move(folder)) {
   const fs::path file = folder_ / kReceipts / kIdentity;
   std::string reason;
-  auto found = try_read_file(file, reason);
-  if (found && *found != identity) {
+  const auto found = try_read_file(file, reason);
+  const bool is_same = found && *found == identity;
+  if (found && !is_same) {
     if (!overwrite) {
       throw UsageError("expected a new folder, or one of the same export, got that of another, " +
                        folder_.string() + " (--overwrite starts again):\n" + *found +
                        "instead of\n" + identity);
     }
     discard();
-    found.reset();
   }
   std::error_code none;
-  if (!found && fs::exists(folder_, none)) {
+  if (!is_same && fs::exists(folder_, none)) {
     const bool is_empty =
         fs::is_directory(folder_) &&
         std::all_of(fs::directory_iterator(folder_), {}, [](const fs::directory_entry& entry) {
@@ -59,11 +94,16 @@ ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool ov
   }
   make_folder(folder_);
   make_folder(folder_ / kReceipts);
-  if (!found) write_file_atomically(file, identity);
+  // In place of another export's, which is whose folder it is as long as anything may be left.
+  if (!is_same) write_file_atomically(file, identity);
 }
 
 fs::path ExportFolder::receipt(const std::string& step) const {
   return folder_ / kReceipts / (step + ".json");
+}
+
+fs::path ExportFolder::journal(const std::string& step) const {
+  return folder_ / kReceipts / (step + kBegun);
 }
 
 void ExportFolder::make_folder(const fs::path& folder) {
@@ -74,29 +114,29 @@ void ExportFolder::make_folder(const fs::path& folder) {
 }
 
 void ExportFolder::discard() {
-  std::vector<fs::path> receipts;
+  std::set<fs::path> records, files;
   for (const auto& entry : fs::directory_iterator(folder_ / kReceipts)) {
-    if (entry.path().extension() == ".json") receipts.push_back(entry.path());
+    const fs::path& path = entry.path();
+    if (path.extension() != ".json" && path.extension() != kBegun) continue;
+    records.insert(path);
+    const auto named = path.extension() == kBegun ? read_journal(path) : files_of(path);
+    files.insert(named.begin(), named.end());
   }
-  std::set<fs::path> folders;
-  for (const fs::path& path : receipts) {
-    const nlohmann::json json = read_receipt(path);
-    if (!json.is_null()) {
-      for (const auto& [relative, size] : json.at("files").items()) {
-        fs::remove(folder_ / relative);
-        for (fs::path above = fs::path(relative).parent_path(); !above.empty();
-             above = above.parent_path()) {
-          folders.insert(above);
-        }
-      }
+  std::set<fs::path> folders{""};
+  std::error_code kept;  // somebody else's file keeps a folder
+  for (const fs::path& relative : files) {
+    fs::remove(folder_ / relative, kept);
+    for (fs::path above = relative; above.has_parent_path();) {
+      folders.insert(above = above.parent_path());
     }
-    fs::remove(path);
   }
-  std::error_code not_empty;  // somebody else's file keeps it
   for (auto below = folders.rbegin(); below != folders.rend(); ++below) {
-    fs::remove(folder_ / *below, not_empty);
+    const fs::path folder = folder_ / *below;
+    if (!fs::is_directory(folder)) continue;
+    remove_stale_temporaries(folder);
+    if (!below->empty()) fs::remove(folder, kept);
   }
-  fs::remove(folder_ / kReceipts / kIdentity);
+  for (const fs::path& path : records) fs::remove(path);
 }
 
 ExportFolder::Step::Step(ExportFolder& folder, std::string name, std::string input)
@@ -104,7 +144,9 @@ ExportFolder::Step::Step(ExportFolder& folder, std::string name, std::string inp
 
 bool ExportFolder::Step::is_done() const {
   const nlohmann::json json = read_receipt(folder_.receipt(name_));
-  if (json.is_null() || json.at("input") != input_) return false;
+  if (json.is_null() || json.at("input") != input_ || fs::exists(folder_.journal(name_))) {
+    return false;
+  }
   return std::ranges::all_of(json.at("files").items(), [&](const auto& file) {
     std::error_code missing;
     const auto size = fs::file_size(folder_.folder_ / file.key(), missing);
@@ -122,9 +164,15 @@ void ExportFolder::begin(const std::string& step) {
 fs::path ExportFolder::Step::file(const std::string& relative) {
   folder_.begin(name_);
   const fs::path path = folder_.folder_ / relative;
+  {
+    const std::lock_guard lock(mutex_);
+    std::set<std::string> names{relative};
+    // What an earlier run has made counts as begun: it may not be made again.
+    if (files_.empty()) names.merge(files_of(folder_.receipt(name_)));
+    append_to_journal(folder_.journal(name_), names);
+    files_.insert(relative);
+  }
   folder_.make_folder(path.parent_path());
-  const std::lock_guard lock(mutex_);
-  files_.push_back(relative);
   return path;
 }
 
@@ -137,14 +185,13 @@ void ExportFolder::Step::finish() {
   for (const std::string& relative : files_) {
     files[relative] = fs::file_size(folder_.folder_ / relative);
   }
-  const fs::path path = folder_.receipt(name_);
-  const nlohmann::json earlier = read_receipt(path);
-  write_file_atomically(path,
+  write_file_atomically(folder_.receipt(name_),
                         dump_json(nlohmann::json{{"input", input_}, {"files", files}}) + "\n");
-  if (earlier.is_null()) return;
-  for (const auto& [relative, size] : earlier.at("files").items()) {
-    if (!files.contains(relative)) fs::remove(folder_.folder_ / relative);
+  const fs::path journal = folder_.journal(name_);
+  for (const std::string& relative : read_journal(journal)) {
+    if (!files_.contains(relative)) fs::remove(folder_.folder_ / relative);
   }
+  fs::remove(journal);
 }
 
 }  // namespace eventgan

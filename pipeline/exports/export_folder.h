@@ -7,7 +7,6 @@
 #include <string>
 #include <string_view>
 #include <utility>
-#include <vector>
 
 namespace eventgan {
 
@@ -18,12 +17,13 @@ inline constexpr char kExportDescription[] = "export.json";
 /// export it is, .export/STEP.json is a receipt, written after all files of a step and listing them
 /// with their sizes. A step is done if its receipt is of the same input and each of its files has
 /// its size; else it is done again, and export.json, a step of its own, goes before anything else
-/// is written. Thread safe.
+/// is written. .export/STEP.begun, a journal, names each file of a step under way before it is
+/// written, so that a killed run's can be found. Thread safe.
 class ExportFolder {
  public:
   /// Begins, or goes on with, the export that `identity` describes, a line for each of its
   /// settings. Throws UsageError if the folder holds another one or other files; with `overwrite`
-  /// another export's files go first.
+  /// another export's files go first, those of a run that was killed too.
   ExportFolder(std::filesystem::path folder, const std::string& identity, bool overwrite);
 
   /// Files that are made together, and their receipt.
@@ -39,7 +39,7 @@ class ExportFolder {
     std::filesystem::path file(const std::string& relative);
     void write(const std::string& relative, std::string_view bytes);
 
-    /// Writes the receipt; files of an earlier one that were not made again go.
+    /// Writes the receipt; files of earlier runs that were not made again go.
     void finish();
 
    private:
@@ -47,13 +47,14 @@ class ExportFolder {
     std::string name_;
     std::string input_;
     std::mutex mutex_;
-    std::vector<std::string> files_;
+    std::set<std::string> files_;
   };
 
   const std::filesystem::path& path() const { return folder_; }
 
  private:
   std::filesystem::path receipt(const std::string& step) const;
+  std::filesystem::path journal(const std::string& step) const;
   void make_folder(const std::filesystem::path& folder);
   void discard();
   void begin(const std::string& step);
