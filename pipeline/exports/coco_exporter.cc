@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "pipeline/exports/exporter_internal.h"
 #include "stages/base/files/atomic_file.h"
+#include "stages/base/files/sha256.h"
 #include "stages/events/pictures/skeleton.h"
 #include "stages/exports/array_files.h"
 #include "stages/exports/detection_labels.h"
@@ -163,11 +165,32 @@ class CocoExporter : public Exporter {
     }
   }
 
+  /// The joints' names of each category of persons.
+  using Skeletons = std::vector<std::vector<std::string>>;
+
+  /// Of all splits, so that a category is the same in all of their files.
+  static Skeletons skeletons_of(const ExportInput& input) {
+    Skeletons skeletons;
+    for (const LabelSchema& schema : input.joint_schemas()) {
+      std::vector<std::string> names = choose_joints(schema).names;
+      if (std::ranges::find(skeletons, names) == skeletons.end()) {
+        skeletons.push_back(std::move(names));
+      }
+    }
+    return skeletons;
+  }
+
   void write_file(const ExportWork& work, const std::vector<const ExportShard*>& shards,
                   const std::string& split, bool persons) const {
     const std::string name = (persons ? "person_keypoints_" : "instances_") + split + ".json";
-    ExportFolder::Step step(work.folder, name, input_hash(shards));
+    Sha256 hash;
+    hash.update(input_hash(shards));
+    for (const ExportSource& source : work.input.sources()) {
+      for (const std::string& joint : source.joint_names) hash.update(joint + "\n");
+    }
+    ExportFolder::Step step(work.folder, name, persons ? hash.hex() : input_hash(shards));
     if (step.is_done()) return;
+    const Skeletons skeletons = persons ? skeletons_of(work.input) : Skeletons();
     CocoFile file(step.file(name));
     // A picture's number is its place in the split, in both of the split's files.
     std::int64_t image_id = 0;
@@ -181,7 +204,6 @@ class CocoExporter : public Exporter {
     file.begin_list("annotations");
     image_id = 0;
     std::int64_t id = 0;
-    std::vector<std::vector<std::string>> skeletons;  // joint names of each category of persons
     work.walk(shards, [&](const OutgoingSample& sample) {
       ++image_id;
       if (!is_for(sample.shard, work, persons)) return;
@@ -215,11 +237,10 @@ class CocoExporter : public Exporter {
   }
 
   static void add_persons(const OutgoingSample& sample, std::int64_t image_id, std::int64_t& id,
-                          std::vector<std::vector<std::string>>& skeletons, CocoFile& file) {
+                          const Skeletons& skeletons, CocoFile& file) {
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
     const auto known = std::ranges::find(skeletons, choice.names) - skeletons.begin();
-    if (static_cast<std::size_t>(known) == skeletons.size()) skeletons.push_back(choice.names);
     const ShardSample& labels = sample.labels;
     for (std::size_t p = 0; p < labels.labels.persons.size(); ++p) {
       const VolumePerson& person = labels.labels.persons[p];

@@ -110,8 +110,10 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
   for (const auto& shard : json.at("shards")) hashes[shard.at("name")] = shard.at("sha256");
   for (const ShardOutline& outline : frozen.plan.shards) {
     const auto hash = hashes.find(outline.name);
-    const std::string& split = sources_.at(static_cast<std::size_t>(outline.source)).split;
-    if (hash == hashes.end() || std::ranges::find(splits_, split) == splits_.end()) continue;
+    if (hash == hashes.end()) continue;
+    ExportSource& source = sources_.at(static_cast<std::size_t>(outline.source));
+    if (source.any_shard.empty()) source.any_shard = outline.name;
+    if (std::ranges::find(splits_, source.split) == splits_.end()) continue;
     ShardState state =
         require_shard(folder_, outline, plan_hash_, hash->second, ScanDepth::kMarker);
     shards_.push_back(
@@ -141,6 +143,22 @@ ShardReader ExportInput::open(const ExportShard& shard) const {
     }
   }
   return ShardReader(folder_ / name);
+}
+
+std::vector<LabelSchema> ExportInput::joint_schemas() const {
+  std::vector<LabelSchema> schemas;
+  for (const ExportSource& source : sources_) {
+    const auto is_of_it = [&](const auto& other) {
+      return other.joint_names == source.joint_names;
+    };
+    if (!source.has_joints() || std::ranges::any_of(schemas, is_of_it)) continue;
+    // Shards of the chosen splits are there; those of others may be elsewhere.
+    const auto chosen = std::ranges::find_if(
+        shards_, [&](const ExportShard& shard) { return is_of_it(source_of(shard)); });
+    const std::string& shard = chosen == shards_.end() ? source.any_shard : chosen->outline.name;
+    schemas.push_back(ShardReader(folder_ / shard).header().label_schema);
+  }
+  return schemas;
 }
 
 std::vector<ExportSet> ExportInput::sets(bool joints_only, bool by_size) const {

@@ -21,7 +21,8 @@ struct ExportSource {
   /// then DATASET and '+', from the second of one kind on DATASET-2 and '+'.
   std::string name_prefix;
   std::vector<std::string> class_names,
-      joint_names;  ///< empty as long as none of its shards is done
+      joint_names;        ///< empty as long as none of its shards is done
+  std::string any_shard;  ///< file name of one that is done; empty if none is
 
   bool has_boxes() const { return !class_names.empty(); }
   bool has_joints() const { return !joint_names.empty(); }
@@ -67,6 +68,10 @@ class ExportInput {
   /// Opens a shard, which is hashed before the first time: throws InputError if it is not the one
   /// that was finalized.
   ShardReader open(const ExportShard& shard) const;
+
+  /// Of all sources with joints, those of other splits too, in the manifest's order: what their
+  /// shards say of them, each list of joints once. Throws as ShardReader does.
+  std::vector<LabelSchema> joint_schemas() const;
 
   /// The sets of the shards whose source has joints, or, `joints_only` not given, of all.
   std::vector<ExportSet> sets(bool joints_only, bool by_size) const;

@@ -261,6 +261,24 @@ class Formats(Export):
                 np.testing.assert_allclose(points_to_source(sample, keypoints[there, :2] - 0.5), source[chosen][there], atol=PIXELS)
                 self.assertEqual(one["num_keypoints"], there.sum())
 
+    def test_coco_categories_of_persons_are_the_same_in_all_splits(self):
+        sources = [{"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2], side="around"), "split": "val"},
+                   {"dataset": "human36m", "root": "h36m", "layout": "fetch", "pairs": program.pairs([1], side="after")}]
+        manifest = folder / "demo" / "persons.json"
+        manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"}, output={"directory": "persons", "samples_per_shard": 8})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", folder / "demo" / "persons")
+        self.export("coco", source=folder / "demo" / "persons")
+        found = {split: json.loads((self.out / f"person_keypoints_{split}.json").read_text()) for split in ("val", "train")}
+        self.assertEqual(found["val"]["categories"], found["train"]["categories"])
+        self.assertEqual([len(category["keypoints"]) for category in found["val"]["categories"]], [16, 17])
+        for split, category in (("val", 1), ("train", 2)):
+            self.assertEqual({one["category_id"] for one in found[split]["annotations"]}, {category})
+        alone = self.out.parent / "alone"
+        self.export("coco", "--split", "train", source=folder / "demo" / "persons", out=alone)
+        self.assertEqual((alone / "person_keypoints_train.json").read_bytes(),
+                         (self.out / "person_keypoints_train.json").read_bytes())
+
     def test_mpii(self):
         self.export("mpii")
         self.assertEqual(sorted(path.name for path in (self.out / "annot").iterdir()),
