@@ -16,69 +16,121 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+// The shard's columns under their names (manifests/guides/shard_format.md), null for what is not
+// known; a NaN becomes null by itself.
+
 Json json_of(Point point) {
   return point == kMissingPoint ? Json() : Json::array({point.x, point.y});
 }
 
 Json json_of(const Rectangle& box) { return {box.left, box.top, box.right, box.bottom}; }
 
-Json json_of(const std::optional<Rectangle>& box) { return box ? json_of(*box) : Json(); }
+Json json_of(const Intrinsics& camera) {
+  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
+}
+
+Json json_of(const LensDistortion& lens) { return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2}; }
+
+Json json_of(const std::array<double, 3>& place) { return place; }
+
+/// A matrix of four columns as its rows.
+Json json_of(const std::array<double, 12>& matrix) {
+  Json rows = Json::array();
+  for (std::size_t i = 0; i < matrix.size(); i += 4) {
+    rows.push_back({matrix[i], matrix[i + 1], matrix[i + 2], matrix[i + 3]});
+  }
+  return rows;
+}
+
+template <class Value>
+Json json_of(const std::optional<Value>& value) {
+  return value ? json_of(*value) : Json();
+}
+
+/// What stands for "unknown" in the shard becomes null.
+template <class Value>
+Json unless(const Value& unknown, const Value& value) {
+  return value == unknown ? Json() : Json(value);
+}
 
 Json box_json(const Box& box, const VolumeBox& in_volume, const std::vector<std::string>& names) {
-  return {{"class", names.at(static_cast<std::size_t>(box.class_id))},
+  const Box unknown;
+  return {{"class_id", box.class_id},
+          {"class", names.at(static_cast<std::size_t>(box.class_id))},
           {"xyxy", json_of(in_volume.clipped)},
           {"xyxy_unclipped", json_of(in_volume.unclipped)},
           {"xyxy_source", json_of(box.xyxy)},
+          {"truncation", unless(unknown.truncation, box.truncation)},
+          {"occlusion", unless(unknown.occlusion, box.occlusion)},
+          {"alpha", unless(unknown.alpha, box.alpha)},
+          {"box3d", unless(unknown.box3d, box.box3d)},
           {"ignore", in_volume.ignore},
-          {"truncation", box.truncation},
-          {"occlusion", box.occlusion},
-          {"difficulty", box.difficulty},
-          {"alpha", box.alpha},
-          {"box3d", box.box3d},
-          {"track_id", box.track_id}};
+          {"ignore_source", box.ignore},
+          {"track_id", unless(unknown.track_id, box.track_id)},
+          {"difficulty", unless(unknown.difficulty, box.difficulty)}};
 }
 
 Json person_json(const Person& person, const VolumePerson& in_volume) {
+  const Person unknown;
   Json joints = Json::array();
   Json joints_source = Json::array();
   Json visible = Json::array();
   for (std::size_t j = 0; j < person.joints.size(); ++j) {
     joints.push_back(json_of(in_volume.joints.at(j)));
     joints_source.push_back(json_of(person.joints[j].at));
-    visible.push_back(person.joints[j].visible);
+    visible.push_back(unless(Joint().visible, person.joints[j].visible));
   }
-  Json json = {{"joints", joints},
-               {"joints_source", joints_source},
-               {"visible", visible},
-               {"center", json_of(in_volume.center)},
-               {"scale", in_volume.scale > 0 ? Json(in_volume.scale) : Json()},
-               {"head_box", json_of(in_volume.head_box)},
-               {"box", json_of(in_volume.box)}};
-  if (!person.joints3d_mm.empty()) {
-    Json& joints3d = json["joints3d_mm"] = Json::array();
-    for (const auto& joint : person.joints3d_mm) joints3d.push_back(joint ? Json(*joint) : Json());
-  }
-  if (in_volume.camera) {
-    const Intrinsics& camera = *in_volume.camera;
-    json["camera"] = {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
-  }
-  return json;
+  Json joints3d;
+  for (const auto& joint : person.joints3d_mm) joints3d.push_back(json_of(joint));
+  return {{"joints", joints},
+          {"joints_source", joints_source},
+          {"visible", visible},
+          {"center", json_of(in_volume.center)},
+          {"center_source", json_of(person.center)},
+          {"scale", unless(unknown.scale, person.scale)},
+          {"scale_volume", unless(unknown.scale, in_volume.scale)},
+          {"head_box", json_of(in_volume.head_box)},
+          {"head_box_source", json_of(person.head_box)},
+          {"box", json_of(in_volume.box)},
+          {"box_source", json_of(person.box)},
+          {"joints3d_mm", joints3d},
+          {"camera", json_of(in_volume.camera)},
+          {"camera_source", json_of(person.camera)},
+          {"camera_distortion", json_of(person.distortion)}};
 }
 
 std::string labels_json(const OutgoingSample& sample) {
   const ShardSample& labels = sample.labels;
+  const FramePair& pair = labels.pair;
   const LabelSchema& schema = sample.reader.header().label_schema;
+  const FrameRef unknown;
+  const std::string none;
+  const std::array<double, 6>& map = labels.source_to_volume;
   Json json = {{"sample_id", labels.sample_id},
                {"dataset", sample.source.dataset},
                {"split", sample.source.split},
-               {"sequence", labels.sequence},
-               {"previous", labels.pair.previous.path},
-               {"next", labels.pair.next.path},
-               {"gap_frames", labels.pair.gap_frames},
-               {"gap_s", labels.pair.gap_s()},
-               {"label_position", labels.pair.label_position},
+               {"sequence", unless(none, labels.sequence)},
+               {"prev_path", pair.previous.path},
+               {"next_path", pair.next.path},
+               {"prev_index", pair.previous.index},
+               {"next_index", pair.next.index},
+               {"prev_video_frame", unless(unknown.video_frame, pair.previous.video_frame)},
+               {"next_video_frame", unless(unknown.video_frame, pair.next.video_frame)},
+               {"gap_frames", pair.gap_frames},
+               {"gap_s", pair.gap_s()},
+               {"label_index", pair.label_index},
+               {"label_position", pair.label_position},
+               {"prev_time_s", pair.previous.time_s},
+               {"next_time_s", pair.next.time_s},
+               {"subject", unless(none, labels.origin.subject)},
+               {"action", unless(none, labels.origin.action)},
+               {"camera", unless(none, labels.origin.camera)},
+               {"drive", unless(none, labels.origin.drive)},
                {"source_size", {labels.source_size.height, labels.source_size.width}},
-               {"source_to_volume", labels.source_to_volume}};
+               {"source_to_volume",
+                Json::array({Json{map[0], map[1], map[2]}, Json{map[3], map[4], map[5]}})},
+               {"projection", json_of(labels.labels.projection)},
+               {"projection_source", json_of(labels.annotation.projection)}};
   if (sample.source.has_boxes()) {
     Json& boxes = json["boxes"] = Json::array();
     for (std::size_t i = 0; i < labels.annotation.boxes.size(); ++i) {
@@ -88,6 +140,7 @@ std::string labels_json(const OutgoingSample& sample) {
   }
   if (sample.source.has_joints()) {
     json["joint_names"] = schema.joint_names;
+    if (!schema.joint_aliases.empty()) json["joint_aliases"] = schema.joint_aliases;
     Json& persons = json["persons"] = Json::array();
     for (std::size_t i = 0; i < labels.annotation.persons.size(); ++i) {
       persons.push_back(person_json(labels.annotation.persons[i], labels.labels.persons[i]));

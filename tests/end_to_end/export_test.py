@@ -29,6 +29,11 @@ from program import run, text
 TRAINERS = program.SHARED.parent / "trainers"
 PIXELS = 0.01  # the largest error of a label that is mapped back
 FORMATS = ["yolo", "coco", "mpii", "davis", "webdataset", "events"]
+BY_POINT = ("joints", "joints_source", "joints3d_mm", "visible")  # null is said of each joint
+PAIR_UNKNOWN = {"prev_video_frame": -1, "next_video_frame": -1}
+LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10], "track_id": -1,
+                 "difficulty": -1, "visible": -1, **{name + source: -1 for source in ("", "_source")
+                                                     for name in ("joints", "center", "head_box")}, "scale": -1, "scale_volume": -1}
 BROKEN = "000003"  # of KITTI: quarantined
 
 
@@ -75,6 +80,9 @@ def read_samples(out):
                     sample[kind] = {key: group[key][rows] for key in group if key != "offsets"}
                 for column in ("source_to_volume", "gap_s", "label_index"):
                     sample[column] = shard["pairs"][column][i]
+                sample["pairs"] = {key: column[i] for key, column in shard["pairs"].items()}
+                sample["pairs"].update((key, shard["labels"][key][i]) for key in ("projection", "projection_source")
+                                       if key in shard["labels"])
                 key = (text(shard.attrs["split"]), text(shard.attrs["dataset"]), text(shard["pairs/sample_id"][i]))
                 found[key] = sample
     return found
@@ -392,7 +400,11 @@ class Formats(Export):
                     np.testing.assert_array_equal(arrays["volume"], sample["volume"])
                     self.assertEqual(arrays["volume"].dtype, np.float16)
                     self.assertEqual(arrays["scale"], 1)
-                np.testing.assert_allclose(labels["source_to_volume"], sample["source_to_volume"].ravel())
+                self.check_columns(labels, sample["pairs"], PAIR_UNKNOWN)
+                for key, kind in (("boxes", "boxes"), ("persons", "poses")):
+                    self.assertEqual(len(labels.get(key, [])), len(next(iter(sample[kind].values()))))
+                    for row, entry in enumerate(labels.get(key, [])):
+                        self.check_columns(entry, {name: column[row] for name, column in sample[kind].items()}, LABEL_UNKNOWN)
                 np.testing.assert_allclose(np.array([box["xyxy"] for box in labels.get("boxes", [])]).reshape(-1, 4),
                                            sample["boxes"]["xyxy"])
                 for person, joints in zip(labels.get("persons", []), sample["poses"]["joints"]):
@@ -400,6 +412,22 @@ class Formats(Export):
                     np.testing.assert_allclose(found, joints)
                 seen += 1
         self.assertEqual(seen, len(samples))
+
+    def check_columns(self, entry, columns, unknown):
+        """Each column of a shard's row stands in the JSON, in its shape, with null for what is unknown."""
+        for name, value in columns.items():
+            if isinstance(value, (bytes, str)):
+                self.assertEqual(entry[name], text(value) or None, name)
+                continue
+            value = np.asarray(value, float)
+            points = value[None] if value.ndim == 0 or name not in BY_POINT else value
+            found = [entry[name]] if value.ndim == 0 or name not in BY_POINT else entry[name] or [None] * len(value)
+            self.assertEqual(len(found), len(points), name)
+            for one, expected in zip(found, points):
+                if np.isnan(expected).all() or name in unknown and (expected == unknown[name]).all():
+                    self.assertIsNone(one, name)
+                else:
+                    np.testing.assert_allclose(one, expected, err_msg=name)
 
     def test_events_as_text(self):
         self.export("events", "--counts", "rounded", "--split", "val")
