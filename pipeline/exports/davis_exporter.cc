@@ -60,6 +60,21 @@ std::size_t kitti_row(const std::string& sample_id) {
   return row;
 }
 
+/// The samples' ids by their rows, of a source without persons.
+using RowIds = std::map<std::size_t, std::string>;
+
+/// The next sample's row.
+std::size_t add_row(RowIds& ids, const ExportSource& source, const std::string& id) {
+  const std::size_t row = source.dataset == "kitti_object" ? kitti_row(id) : ids.size();
+  if (const auto [earlier, is_new] = ids.emplace(row, id); !is_new) {
+    throw UsageError(
+        fmt::format("expected one sample of each image for --to davis, got {} and "
+                    "{} (in the manifest: \"choose\": \"one\")",
+                    earlier->second, id));
+  }
+  return row;
+}
+
 /// SET.hdf5, and beside it SET.npz for persons, else SET.txt.
 class DavisExporter : public Exporter {
  public:
@@ -68,6 +83,22 @@ class DavisExporter : public Exporter {
   std::string settings() const override { return fmt::format("dtype {}\n", to_string(dtype_)); }
 
   bool works_by_shard() const override { return false; }
+
+  void check(const ExportInput& input, const std::function<void()>& check_stop) const override {
+    for (const ExportSet& set : input.sets(/*joints_only=*/false, /*by_size=*/true)) {
+      const ExportSource& source = input.source_of(*set.shards[0]);
+      if (source.has_joints()) continue;
+      RowIds ids;
+      for (const ExportShard* shard : set.shards) {
+        const ShardReader reader = input.open(*shard);
+        for (int slot = 0; slot < reader.header().sample_count; ++slot) {
+          check_stop();
+          const ShardSample sample = reader.sample(slot);
+          if (sample.valid) add_row(ids, source, sample.sample_id);
+        }
+      }
+    }
+  }
 
   void finish(const ExportWork& work, const std::vector<const ExportShard*>&) const override {
     for (const ExportSet& set : work.input.sets(/*joints_only=*/false, /*by_size=*/true)) {
@@ -117,17 +148,9 @@ class DavisExporter : public Exporter {
       layout.list = columns.npz(choice);
       return layout;
     }
-    const bool is_kitti = source.dataset == "kitti_object";
-    std::map<std::size_t, std::string> ids;
+    RowIds ids;
     work.walk(set.shards, [&](const OutgoingSample& sample) {
-      const std::string& id = sample.labels.sample_id;
-      const std::size_t row = is_kitti ? kitti_row(id) : ids.size();
-      if (const auto [earlier, is_new] = ids.emplace(row, id); !is_new) {
-        throw UsageError(
-            fmt::format("expected one sample of each image for --to davis, got {} and "
-                        "{} (in the manifest: \"choose\": \"one\")",
-                        earlier->second, id));
-      }
+      const std::size_t row = add_row(ids, source, sample.labels.sample_id);
       layout.rows_of[{sample.shard.outline.name, sample.slot}] = {row};
       layout.row_count = std::max(layout.row_count, row + 1);
     });

@@ -66,6 +66,11 @@ void append_to_journal(const fs::path& file, const std::set<std::string>& names)
 
 }  // namespace
 
+bool ExportFolder::is_of(const fs::path& folder, const std::string& identity) {
+  std::string reason;
+  return try_read_file(folder / kReceipts / kIdentity, reason) == identity;
+}
+
 ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool overwrite)
     : folder_(std::move(folder)) {
   const fs::path file = folder_ / kReceipts / kIdentity;

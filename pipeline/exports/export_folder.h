@@ -21,6 +21,9 @@ inline constexpr char kExportDescription[] = "export.json";
 /// written, so that a killed run's can be found. Thread safe.
 class ExportFolder {
  public:
+  /// Whether the folder is that of the export already.
+  static bool is_of(const std::filesystem::path& folder, const std::string& identity);
+
   /// Begins, or goes on with, the export that `identity` describes, a line for each of its
   /// settings. Throws UsageError if the folder holds another one or other files; with `overwrite`
   /// another export's files go first, those of a run that was killed too.

@@ -278,15 +278,14 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
                                  word_of(options.to), folder.string()));
   }
   const std::string identity = identity_text(input, options, *exporter);
+  const auto check_stop = [&] {
+    if (options.stop && options.stop()) throw Stopped("stopped; the same command goes on");
+  };
+  if (!ExportFolder::is_of(options.out, identity)) exporter->check(input, check_stop);
   ExportFolder out(options.out, identity, options.overwrite);
   std::unique_ptr<Progress> progress =
       options.make_progress ? options.make_progress(report.samples) : nullptr;
-  const ExportWork work{input, out, thread_count(options.threads),
-                        [&] {
-                          if (options.stop && options.stop()) {
-                            throw Stopped("stopped; the same command goes on");
-                          }
-                        },
+  const ExportWork work{input, out, thread_count(options.threads), check_stop,
                         [&](std::int64_t count) {
                           for (; progress && count > 0; --count) progress->advance(false, 0);
                         }};

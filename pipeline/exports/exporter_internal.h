@@ -59,6 +59,10 @@ class Exporter {
   /// Whether the format has a use for a source.
   virtual bool takes(const ExportSource&) const { return true; }
 
+  /// Throws UsageError if the samples do not go into the format; before a new export has its
+  /// folder.
+  virtual void check(const ExportInput&, const std::function<void()>& /*check_stop*/) const {}
+
   /// Writes the files of a shard's samples.
   virtual void write_shard(const ExportWork&, const ExportShard&, const ShardReader&,
                            ExportFolder::Step&) const {}

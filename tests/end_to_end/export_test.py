@@ -375,8 +375,10 @@ class Formats(Export):
                 valid[path.name] = (file["davis/events"].shape, list(file["davis/valid"][:]))
         self.assertEqual(valid, {"one-kitti_object-24x32.hdf5": ((4, 24, 32, 18), [1, 1, 0, 1]),
                                  "one-kitti_object-30x40.hdf5": ((3, 30, 40, 18), [0, 0, 1])})
-        _, err = self.export("davis", "--split", "all", source=self.out.parent / "out", out=self.out / "all", expect=64)
-        self.assertIn("000000@before1 and 000000@before2", err)
+        for splits in (["--split", "all"], []):
+            _, err = self.export("davis", *splits, source=self.out.parent / "out", out=self.out.parent / "yolo", expect=64)
+            self.assertIn("000000@before1 and 000000@before2", err)
+            self.assertFalse((self.out.parent / "yolo").exists())
         self.export("yolo", "--split", "all", source=self.out.parent / "out", out=self.out.parent / "yolo")
         self.assertTrue((self.out.parent / "yolo" / "images" / "all" / "000002@before2.npy").exists())
 
