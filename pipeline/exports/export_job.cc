@@ -87,7 +87,6 @@ void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut
 }
 
 ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& options, int first) {
-  constexpr char kDontCare[] = "DontCare";
   std::vector<std::string> known;
   for (const ExportSource& source : input.sources()) {
     if (std::ranges::find(input.splits(), source.split) == input.splits().end()) continue;

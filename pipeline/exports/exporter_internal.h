@@ -45,6 +45,9 @@ struct ExportWork {
             const std::function<void(const OutgoingSample&)>& work) const;
 };
 
+/// KITTI's class of regions to ignore, no class of objects.
+inline constexpr char kDontCare[] = "DontCare";
+
 /// Counts what an export leaves out, by what it is and why.
 using LeftOut = std::map<std::string, std::int64_t>;
 

@@ -15,6 +15,12 @@ class YoloExporter : public Exporter {
       : numbers_(input, options, 0),
         keep_ignored_(options.keep_ignored.value_or(false)),
         full_scale_(options.full_scale) {
+    if (const auto entry = numbers_.of(kDontCare); entry.fate == ClassNumbers::Fate::kKept) {
+      throw UsageError(fmt::format(
+          "--classes: expected no number for {}, whose boxes are all to be ignored, got {} "
+          "(without it in the map --ignored keep makes them a class of their own)",
+          kDontCare, entry.number));
+    }
     int next = 0;
     for (const auto& [number, name] : numbers_.names()) {
       if (number != next++) {

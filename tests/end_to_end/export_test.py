@@ -690,6 +690,7 @@ class BadInput(Export):
     def test_a_wrong_class_map(self):
         classes = folder / "wrong.json"
         for content_, what in [('{"Car": 0, "Cat": 1}', "DontCare"), ('{"Car": 1}', "no 0"), ('{"Car": "a"}', "whole number"),
+                               ('{"DontCare": 0, "Car": 1}', "--ignored keep"),
                                ('[1]', "class names"), ('{"Car": 0', "JSON"), ('{"Car": null}', "one class")]:
             with self.subTest(classes=content_):
                 classes.write_text(content_)
