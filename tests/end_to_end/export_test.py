@@ -512,6 +512,37 @@ class Trainers(Export):
         self.assertAlmostEqual(float(score[2]), 0)
 
 
+    def test_pose_resnet_changed_as_the_guide_says_reads_human36m(self):
+        guide = (program.SOURCE / "manifests" / "guides" / "exports.md").read_text()
+        self.export("mpii")
+        score = self.python([TRAINERS / "pose_resnet" / "lib", TRAINERS / "stubs"], f"guide = {guide!r}\n" + textwrap.dedent("""
+            import importlib
+            import inspect
+            import numpy as np
+            from easydict import EasyDict
+            mpii = importlib.import_module("dataset.mpii")
+            code = inspect.getsource(mpii)
+            for start in ("self.num_joints =", "self.flip_pairs =", "self.parent_ids =", "pckAll = np.zeros", "PCKh.mask[", "jnt_count.mask["):
+                old, new = ([line.split("#")[0].strip() for line in text.splitlines() if line.strip().startswith(start)]
+                            for text in (code, guide))
+                assert len(old) == len(new) == 1, (old, new)
+                code = code.replace(old[0], new[0])
+            exec(code, mpii.__dict__)
+            cfg = EasyDict(OUTPUT_DIR="", DATASET=dict(ROOT=".", TEST_SET="train-human36m", DATA_FORMAT="png", SCALE_FACTOR=0.25,
+                           ROT_FACTOR=30, FLIP=True, SELECT_DATA=False),
+                           MODEL=dict(IMAGE_SIZE=np.array([256, 256]),
+                                      EXTRA=dict(TARGET_TYPE="gaussian", HEATMAP_SIZE=np.array([64, 64]), SIGMA=2)))
+            data = mpii.MPIIDataset(cfg, ".", "train-human36m", True)
+            assert data[0][1].shape == (17, 64, 64)
+            truth = np.array([entry["joints_3d"] for entry in data.db])
+            _, mean = data.evaluate(cfg, truth, "")
+            print(len(data), mean)
+            """)).split()[-2:]
+        persons = sum(int((sample["poses"]["scale"] > 0).sum()) for sample in of("train", "human36m").values())
+        self.assertEqual(int(score[0]), persons)
+        self.assertAlmostEqual(float(score[1]), 100)
+
+
 class AgainAndAgain(Export):
     def stamps(self):
         return {path: path.stat().st_mtime_ns for path in self.out.rglob("*")}
