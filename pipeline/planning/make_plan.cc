@@ -236,7 +236,7 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
   SourceSummary summary;
   std::int64_t pairs = 0;
   layout.begin_source(index, spec.split);
-  const std::vector<LabelledFrame> frames =
+  const auto [frames, selection_notes] =
       select_frames(dataset.labelled_frames(), spec, manifest.directory, manifest.seed);
   for (const LabelledFrame& frame : frames) {
     before_frame();
@@ -260,6 +260,7 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
                             std::to_string(dataset.labelled_frames().size()) +
                             " labelled frames left out, as the manifest selects");
   }
+  summary.notes.insert(summary.notes.end(), selection_notes.begin(), selection_notes.end());
   if (pairs < spec.pairs.min_pairs) {
     throw InputError("expected at least " + std::to_string(spec.pairs.min_pairs) +
                      " pairs (pairs.min_pairs), got " + std::to_string(pairs) + " of " +

@@ -24,12 +24,13 @@ std::string some_of(const std::set<std::string>& names) {
   return text;
 }
 
-/// A line each; blank ones, and white space around, are passed over.
+/// A line each; blank ones, white space around, and a byte order mark are passed over.
 std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) {
   constexpr std::string_view kBlank = " \t\r";
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
   const std::string text = base.read_or_throw(path);
   std::set<std::string> ids;
-  for (std::size_t begin = 0; begin < text.size();) {
+  for (std::size_t begin = text.starts_with(kMark) ? kMark.size() : 0; begin < text.size();) {
     const std::size_t end = std::min(text.find('\n', begin), text.size());
     const std::string line = text.substr(begin, end - begin);
     begin = end + 1;
@@ -56,13 +57,21 @@ void keep(std::vector<LabelledFrame>& frames, const std::set<std::string>& wante
                    " that it does not have (" + some_of(missing) + "), in " + where);
 }
 
+/// What `fraction` keeps together: a sequence; of Human3.6M all cameras' of one take, which show
+/// the same poses.
+std::string group_of(DatasetKind dataset, const LabelledFrame& frame) {
+  if (frame.sequence.empty()) return frame.sample_id;
+  const FrameOrigin origin = frame_origin(dataset, frame.sequence);
+  return origin.action.empty() ? frame.sequence : origin.subject + "/" + origin.action;
+}
+
 }  // namespace
 
-std::vector<LabelledFrame> select_frames(const std::vector<LabelledFrame>& frames,
-                                         const SourceSpec& spec, const std::filesystem::path& base,
-                                         std::uint64_t seed) {
+FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const SourceSpec& spec,
+                             const std::filesystem::path& base, std::uint64_t seed) {
   const SelectionSpec& selection = spec.selection;
-  std::vector<LabelledFrame> selected = frames;
+  FrameSelection result{frames, {}};
+  std::vector<LabelledFrame>& selected = result.frames;
   if (selection.ids) {
     keep(
         selected, read_ids(SourceRoot("", base), *selection.ids),
@@ -84,9 +93,14 @@ std::vector<LabelledFrame> select_frames(const std::vector<LabelledFrame>& frame
 
   const CounterRandom random = CounterRandom(seed).keyed("fraction");
   const auto [first, last] = selection.fraction;
+  const auto alone = std::ranges::count_if(
+      selected, [](const LabelledFrame& frame) { return frame.sequence.empty(); });
+  if (alone > 0 && (first > 0 || last < 1)) {
+    result.notes.push_back(std::to_string(alone) +
+                           " labelled frames without a sequence count by themselves (fraction)");
+  }
   std::erase_if(selected, [&, first = first, last = last](const LabelledFrame& frame) {
-    const double place =
-        random.keyed(frame.sequence.empty() ? frame.sample_id : frame.sequence).uniform(0);
+    const double place = random.keyed(group_of(spec.dataset, frame)).uniform(0);
     return place < first || place >= last;
   });
   if (selected.empty() && !frames.empty()) {
@@ -95,7 +109,7 @@ std::vector<LabelledFrame> select_frames(const std::vector<LabelledFrame>& frame
         "leave, got none of " +
         std::to_string(frames.size()) + ", in " + spec.root);
   }
-  return selected;
+  return result;
 }
 
 }  // namespace eventgan

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <map>
+
 #include "manifests/values/faults.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -10,11 +12,14 @@
 namespace eventgan {
 namespace {
 
+using ::testing::_;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
+using ::testing::Pair;
 using ::testing::SizeIs;
 using ::testing::ThrowsMessage;
 
@@ -50,7 +55,7 @@ class FrameSelectionTest : public ::testing::Test {
   }
 
   std::vector<LabelledFrame> selected() const {
-    return select_frames(frames_, spec_, folder_.path(), 7);
+    return select_frames(frames_, spec_, folder_.path(), 7).frames;
   }
 
   std::vector<std::string> ids() const {
@@ -67,7 +72,7 @@ class FrameSelectionTest : public ::testing::Test {
 TEST_F(FrameSelectionTest, TakesAllUnlessAsked) { EXPECT_THAT(selected(), SizeIs(24)); }
 
 TEST_F(FrameSelectionTest, TakesTheIdsOfAListInTheDatasetsOrder) {
-  testing::write_file(folder_ / "ids.txt", " S5/Walking-1/8/11\r\n\nS1/Eating-1/7/6");
+  testing::write_file(folder_ / "ids.txt", "\xEF\xBB\xBF S5/Walking-1/8/11\r\n\nS1/Eating-1/7/6");
   spec_.selection.ids = "ids.txt";
   EXPECT_THAT(ids(), ElementsAre("S1/Eating-1/7/6", "S5/Walking-1/8/11"));
 }
@@ -106,12 +111,24 @@ TEST_F(FrameSelectionTest, FractionsAreOfWholeSequencesAndComplement) {
   for (const std::string& id : first) EXPECT_THAT(second, Not(Contains(id)));
 }
 
+TEST_F(FrameSelectionTest, FractionsKeepTheCamerasOfATakeTogether) {
+  spec_.selection.fraction = {0, 0.5};
+  std::map<std::string, int> frames_of_take;
+  for (const std::string& id : ids()) ++frames_of_take[id.substr(0, id.find("-1"))];
+  EXPECT_THAT(frames_of_take, Each(Pair(_, 6)));
+  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes, IsEmpty());
+}
+
 TEST_F(FrameSelectionTest, FramesWithoutASequenceCountByThemselves) {
   for (LabelledFrame& frame : frames_) frame.sequence.clear();
   spec_.selection.fraction = {0, 0.5};
   const std::size_t count = selected().size();
   EXPECT_GT(count, 4u);
   EXPECT_LT(count, 20u);
+  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes,
+              ElementsAre(HasSubstr("24 labelled frames without a sequence")));
+  spec_.selection.fraction = {0, 1};
+  EXPECT_THAT(select_frames(frames_, spec_, folder_.path(), 7).notes, IsEmpty());
 }
 
 TEST_F(FrameSelectionTest, NothingLeftIsAnError) {
