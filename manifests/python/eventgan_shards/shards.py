@@ -7,13 +7,16 @@ import copy
 import json
 import os
 import pathlib
-from collections.abc import Iterable, Mapping, Sequence
+import re
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Union
 
 import h5py
 import numpy as np
 
 FORMAT, FORMAT_VERSION = "eventgan-shard", 1
+PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", 1
 VIEW = "dataset.h5"
 FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "original")
@@ -33,62 +36,74 @@ class Shards(Sequence):
 
     paths: a folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
         shards that its dataset.json lists, in the order of the plan: a shard that is gone or another one by now is a
-        ValueError. Of any other folder all shards that are done, so those with a marker, by name.
+        ValueError. Of any other folder all shards that are done, so those with a marker, by name. No shard at all is a ValueError.
+    partial: True takes what is done of a folder that is not whole; without it a shard that dataset.json or plan.json misses,
+        one without marker, and a marker without its shard are a ValueError.
     split: only the shards of this split ("train"...).
-    ids: only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards.
+    ids: only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards. The id of
+        a frame ("000001") stands for all its samples ("000001@before1"...).
     where: only samples whose value is one of those given, by column: {"gap": 1, "class": ["Car", "Van"]}. `class` means
         a box of that class that is not to be ignored, `gap` is gap_frames; any other key is a column of /pairs:
-        sequence, subject, action, camera, dataset...
-    A split, an id or a value that no sample has is a ValueError: nothing is silently missing.
+        sequence, subject, action, camera, dataset... (see `column`).
+    A split, an id or a value that no sample (of the split) has is a ValueError: nothing is silently missing. So is a class
+        that has a name but no box that counts. Values that exist, but in no sample together, give an empty sequence.
     invalid: what to do about quarantined samples. "skip": they are not part of the sequence. "raise": they are, and
-        reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False.
+        reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False. Those that `ids` names are
+        skipped with a warning.
     fields: what a sample holds; of FIELDS. What is not asked for is not read.
     decode: False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be
         decoded elsewhere: value = stored number x scale.
     open_files: how many shards stay open at a time (about half a megabyte each).
 
     The labels of a shard are read once, when they are first needed, and kept. Files are opened anew in every process:
-    an object can go to workers that are forked or spawned. One object must not be used by several threads at a time.
+    an object can go to workers that are forked or spawned. Slices share the files of what they were cut from: one thread at
+    a time for all of them.
     """
 
     def __init__(self, paths: PathLike | Iterable[PathLike], *, split: str | None = None,
                  ids: PathLike | Iterable[str] | None = None, where: Mapping[str, Any] | None = None,
-                 invalid: str = "skip", fields: Iterable[str] = FIELDS, decode: bool = True, open_files: int = 128):
+                 invalid: str = "skip", fields: Iterable[str] = FIELDS, decode: bool = True, open_files: int = 128,
+                 partial: bool = False) -> None:
         _one_of("invalid", [invalid], ("skip", "raise", "keep"))
-        _one_of("fields", fields, FIELDS)
         if open_files < 1:
             raise ValueError(f"expected open_files of at least 1, got {open_files}")
-        self._invalid, self._fields, self._decode = invalid, frozenset(fields), decode
+        self._invalid, self._fields, self._decode = invalid, _known_fields(fields), decode
         self._files = _Files(open_files)
-        self._where_from = str(paths)
-        shards = _find_shards(paths)
+        if not isinstance(paths, (str, os.PathLike)):
+            paths = list(paths)
+        self._described_as = str(paths)
+        shards = _find_shards(paths, partial)
         if split is not None:
             shards = [shard for shard in shards if self._split(shard) == split]
             if not shards:
-                raise ValueError(f"expected shards of split {split!r}, got none, in {self._where_from}")
+                raise ValueError(f"expected shards of split {split!r}, got none, in {self._described_as}")
         self.paths = [shard.path for shard in shards]
-        slots = [self._slots_of(shard) for shard in shards]
-        self._shard = np.repeat(np.arange(len(slots), dtype=np.int32), [len(each) for each in slots])
-        self._slot = np.concatenate([*slots, np.empty(0, np.int32)]).astype(np.int32)
+        valid = [self._files[shard.path].column("valid") if shard.valid is None else shard.valid for shard in shards]
+        self._shard = np.repeat(np.arange(len(valid), dtype=np.int32), [len(each) for each in valid])
+        self._slot = np.concatenate([np.arange(len(each), dtype=np.int32) for each in valid])
+        sound = np.concatenate(valid).astype(bool) | (invalid != "skip")
+        chosen = [self._with_values(key, values) for key, values in (where or {}).items()]
         if ids is not None:
-            self._keep(self._with_ids(ids))
-        for key, values in (where or {}).items():
-            self._keep(self._with_values(key, values))
+            chosen.append(self._with_ids(ids, sound))
+        self._keep(np.logical_and.reduce([sound, *chosen]))
+        if chosen:  # sources that were not asked for have no say in what classes and columns there are
+            used, self._shard = np.unique(self._shard, return_inverse=True)
+            self.paths = [self.paths[number] for number in used] or self.paths
 
     def __len__(self) -> int:
         return len(self._slot)
 
-    def __getitem__(self, index):
+    def __getitem__(self, index: Any) -> Any:
         if isinstance(index, (slice, Sequence, np.ndarray)):
             chosen = copy.copy(self)
             chosen._keep(index)
             return chosen
-        return self.sample(index, self._fields)
+        return self.sample(index)
 
     def __enter__(self) -> Shards:
         return self
 
-    def __exit__(self, *_) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -99,18 +114,19 @@ class Shards(Sequence):
         """Sample `index` without its volume, which is not touched."""
         return self.sample(index, self._fields - {"volume"})
 
-    def sample(self, index: int, fields: Iterable[str] = FIELDS) -> Sample:
-        """One sample, a dictionary of the fields asked for; keys are shard_format.md's names:
+    def sample(self, index: int, fields: Iterable[str] | None = None) -> Sample:
+        """One sample, a dictionary of the fields asked for (None: the constructor's); keys are shard_format.md's names:
 
         volume        float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
-        pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if it is there
-        statistics    everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as int64,
-                      since PyTorch has no uint32
+        pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if there
+        statistics    everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as
+                      int64, since PyTorch has no uint32
         boxes         arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
         persons       arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
         original      bytes, the annotation as the dataset holds it
         and always    valid, bool; shard, slot: where it comes from
         """
+        fields = self._fields if fields is None else _known_fields(fields)
         path, slot = self._place(index)
         file = self._files[path]
         valid = bool(file.column("valid")[slot])
@@ -121,12 +137,13 @@ class Shards(Sequence):
             sample.update(file.volume(slot, self._decode))
         if "pair" in fields:
             sample["pair"] = file.row("pairs", slot)
-            for name in file.optional("labels/projection", "labels/projection_source"):
-                sample["pair"][name.removeprefix("labels/")] = file.column(name)[slot]
+            for name in ("projection", "projection_source"):
+                if file.has("labels/" + name):
+                    sample["pair"][name] = file.column("labels/" + name)[slot]
         if "statistics" in fields:
             sample["statistics"] = {**file.row("events/statistics", slot), "eta98": file.column("events/eta98")[slot]}
-            for name in file.optional("events/tiles"):
-                sample["statistics"]["tiles"] = file.column(name)[slot]
+            if file.has("events/tiles"):
+                sample["statistics"]["tiles"] = file.column("events/tiles")[slot]
         if "boxes" in fields:
             sample["boxes"] = file.rows("labels/boxes", slot)
         if "persons" in fields:
@@ -136,9 +153,18 @@ class Shards(Sequence):
         return {**sample, "valid": valid, "shard": str(path), "slot": slot}
 
     def column(self, name: str) -> np.ndarray:
-        """[len(self), ...]: a column of /pairs (or "gap") of every sample, read without volumes or boxes."""
-        name = {"gap": "gap_frames"}.get(name, name)
-        return self._gathered(lambda file: file.column("pairs/" + name))
+        """[len(self), ...]: a column of /pairs (or "gap") of every sample, read without volumes or boxes. Samples of shards that do not
+        have it, since none of theirs has such a thing, get "", NaN or -1; a column that no shard has is a ValueError."""
+        name = "pairs/" + {"gap": "gap_frames"}.get(name, name)
+        like = next((file.column(name) for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
+        if like is None:
+            raise ValueError(f"expected a column {name}, got none, in {self._described_as}")
+        nothing = {"O": "", "f": np.nan}.get(like.dtype.kind, -1)
+
+        def of_shard(file: _OpenShard) -> np.ndarray:
+            return file.column(name) if file.has(name) else np.full((len(file.column("valid")), *like.shape[1:]), nothing, like.dtype)
+
+        return self._gathered(of_shard)
 
     @property
     def persons(self) -> np.ndarray:
@@ -148,31 +174,64 @@ class Shards(Sequence):
         samples = np.repeat(np.arange(len(self)), counts)
         return np.stack([samples, np.arange(len(samples)) - first[samples]], axis=1) if len(samples) else np.empty((0, 2), int)
 
+    def annotated(self, joints: Iterable[str]) -> np.ndarray:
+        """bool [persons]: of every row of `persons` whether any of these joints (see `joint_places`) is annotated."""
+        joints, persons = list(joints), self.persons
+        if not len(persons):
+            return np.empty(0, bool)
+        rows = self._gathered(lambda file: file.column("labels/poses/offsets")[:-1])[persons[:, 0]] + persons[:, 1]
+
+        def of_shard(file: _OpenShard) -> np.ndarray:
+            return (file.column("labels/poses/joints_source")[:, file.joint_places(joints)] != -1).any((1, 2))
+
+        return self._gathered(of_shard, self._shard[persons[:, 0]], rows)
+
     def picture_area(self) -> np.ndarray:
-        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' pictures cover, all together. What
-        is outside is the border that a letterbox adds and never holds events."""
+        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' pictures cover, all together.
+        What is outside is the border that a letterbox adds and never holds events."""
         maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
         if np.isnan(maps).all():
-            raise ValueError(f"expected samples with pictures, got none, in {self._where_from}")
+            raise ValueError(f"expected samples with pictures, got none, in {self._described_as}")
         scale = maps[:, [0, 1], [0, 1]]
         low = maps[:, :, 2] - scale / 2 + 0.5
         volumes = self._gathered(lambda file: np.tile(file.size[::-1], (len(file.column("valid")), 1)))
         high = np.minimum(low + scale * sizes[:, ::-1], volumes)
         return np.concatenate([np.nanmin(np.maximum(low, 0), axis=0), np.nanmax(high, axis=0)])
 
+    def groups(self, by: str = "sequence") -> np.ndarray:
+        """str [len(self)]: what each sample must not be parted from. "sequence": Human3.6M's take (subject and action, whatever the
+        camera), else the drive, else the sequence, else the labelled frame, as far as each sample's is known. "sample_id": the labelled
+        frame. Any other column: its value, or as "sequence" for samples without."""
+        frames = np.array([_frame_of(name) for name in self.column("sample_id")], object)
+        if by == "sample_id":
+            return frames
+        texts = {name: self.column(name) if self._have(name) else np.full(len(self), "", object)
+                 for name in ("subject", "action", "drive", "sequence")}
+        known = (self.column("dataset") == "human36m") & (texts["subject"] != "") & (texts["action"] != "")
+        take = np.where(known, texts["subject"] + "/" + texts["action"], "")
+        recordings = frames
+        for better in (texts["sequence"], texts["drive"], take):
+            recordings = np.where(better != "", better, recordings)
+        values = recordings if by == "sequence" else self.column(by).astype(str).astype(object)
+        return np.where(values != "", values, recordings)
+
     def divide(self, fraction: float, by: str = "sequence", seed: int = 0) -> tuple[Shards, Shards]:
-        """Two parts, the first of about `fraction` of the samples, that share no value of column `by`: no drive, no
-        subject is in both. Which groups are in the first is a function of seed and their names."""
+        """Two parts, the first of about `fraction` of the samples, that share none of `groups(by)`: no drive, no subject, no labelled
+        frame is in both. Which groups are in the first is a function of seed and their names."""
         if not 0 < fraction < 1:
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
-        names, group, counts = np.unique(self.column(by), return_inverse=True, return_counts=True)
+        names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
         if len(names) < 2:
-            raise ValueError(f"expected two or more values of {by} to divide by, got {len(names)}, in {self._where_from}")
+            raise ValueError(f"expected two or more values of {by} to divide by, got {len(names)}, in {self._described_as}")
         order = np.random.default_rng(seed).permutation(len(names))
         ends = np.cumsum(counts[order])[:-1]
         cut = 1 + int(np.abs(ends - fraction * len(self)).argmin())
         first = np.isin(group, order[:cut])
         return self[np.flatnonzero(first)], self[np.flatnonzero(~first)]
+
+    def known_classes(self) -> list[str]:
+        """The names that the shards have for classes, in their order, whether or not a sample here has such a box."""
+        return list(dict.fromkeys(name for path in self.paths for name in self._files[path].names("labels/boxes/class_id", "class_names")))
 
     def class_counts(self) -> dict[str, int]:
         """How many boxes that are not to be ignored the samples have of each class, by name, in the order the shards name them."""
@@ -186,6 +245,12 @@ class Shards(Sequence):
             for name, count in zip(names, found.tolist()):
                 counts[name] = counts.get(name, 0) + count
         return counts
+
+    def default_joints(self) -> list[str]:
+        """The joints of the first source that has any: the 17 in common use where it names them (`joint_aliases`), else all."""
+        files = (self._files[self.paths[number]] for number in np.unique(self._shard))
+        sets = ([name for name in file.names("labels/poses", "joint_aliases") if name] or file.names("labels/poses", "joint_names") for file in files)
+        return next(filter(None, sets), [])
 
     def joint_sets(self) -> list[tuple[str, ...]]:
         """The different lists of joint names that occur, in the order the shards have them."""
@@ -203,18 +268,11 @@ class Shards(Sequence):
     def joint_places(self, index: int, names: Iterable[str]) -> list[int]:
         """Where these joints stand among those of sample `index`, found by their names or by those of the 17 joints in common
         use (`joint_aliases`); a name that is neither is a ValueError."""
-        file = self._files[self._place(index)[0]]
-        known = file.names("labels/poses", "joint_names")
-        places = {alias: i for i, alias in enumerate(file.names("labels/poses", "joint_aliases")) if alias}
-        places.update({name: i for i, name in enumerate(known)})
-        unknown = [name for name in names if name not in places]
-        if unknown:
-            raise ValueError(f"expected joints of {', '.join(known)}, got {', '.join(unknown)}, in {file.file.filename}")
-        return [places[name] for name in names]
+        return self._files[self._place(index)[0]].joint_places(names)
 
     def _place(self, index: int) -> tuple[pathlib.Path, int]:
         if not -len(self) <= index < len(self):
-            raise IndexError(f"expected a sample of {len(self)}, got number {index}, in {self._where_from}")
+            raise IndexError(f"expected a sample of {len(self)}, got number {index}, in {self._described_as}")
         return self.paths[self._shard[index]], int(self._slot[index])
 
     def _keep(self, chosen) -> None:
@@ -227,64 +285,76 @@ class Shards(Sequence):
     def _split(self, shard: _Shard) -> str:
         return shard.split or self._files[shard.path].file.attrs["split"]
 
-    def _slots_of(self, shard: _Shard) -> np.ndarray:
-        valid = self._files[shard.path].column("valid") if shard.valid is None else shard.valid
-        return np.flatnonzero(valid) if self._invalid == "skip" else np.arange(len(valid))
+    def _have(self, column: str) -> bool:
+        return any(self._files[path].has("pairs/" + column) for path in self.paths)
 
-    def _gathered(self, of_shard) -> np.ndarray:
-        """[len(self), ...]: what `of_shard` gives of a shard, [its samples, ...], for the samples here."""
-        if not len(self):
-            return np.empty(0, int)
-        parts, places = [], np.empty(len(self), np.int64)
-        for number in np.unique(self._shard):
-            here = np.flatnonzero(self._shard == number)
-            places[here] = sum(map(len, parts)) + np.arange(len(here))
-            parts.append(of_shard(self._files[self.paths[number]])[self._slot[here]])
+    def _gathered(self, of_shard: Callable[[_OpenShard], np.ndarray], shard: np.ndarray | None = None, rows: np.ndarray | None = None) -> np.ndarray:
+        """[n, ...]: what `of_shard` gives of a shard, [its rows, ...], for rows [n] of shards [n]; None: for the samples here."""
+        shard, rows = (self._shard, self._slot) if shard is None else (shard, rows)
+        if not len(shard):
+            return of_shard(self._files[self.paths[0]])[:0]
+        parts, places, done = [], np.empty(len(shard), np.int64), 0
+        for number in np.unique(shard):
+            here = np.flatnonzero(shard == number)
+            places[here] = done + np.arange(len(here))
+            done += len(here)
+            parts.append(of_shard(self._files[self.paths[number]])[rows[here]])
         return np.concatenate(parts)[places]
 
-    def _with_ids(self, ids) -> np.ndarray:
+    def _with_ids(self, ids: PathLike | Iterable[str], sound: np.ndarray) -> np.ndarray:
+        """bool [len(self)]: whether the sample's id, or its frame's, is one of these."""
         source = "ids"
         if isinstance(ids, (str, os.PathLike)):
             source = str(ids)
-            ids = [line.strip() for line in pathlib.Path(ids).read_text(encoding="utf-8").splitlines() if line.strip()]
-        return self._among(self.column("sample_id"), list(ids), "sample ids", source)
-
-    def _with_values(self, key: str, values) -> np.ndarray:
-        values = [values] if isinstance(values, str) or not isinstance(values, Iterable) else list(values)
-        if key != "class":
-            return self._among(self.column(key), values, f"values of {key}", "where")
-        names, kept = set(), []
-        for number, path in enumerate(self.paths):
-            file, slots = self._files[path], self._slot[self._shard == number]
-            here = file.names("labels/boxes/class_id", "class_names")
-            names.update(here)
-            wanted = np.isin(np.array([*here, ""])[file.column("labels/boxes/class_id")], values)
-            wanted &= file.column("labels/boxes/ignore") == 0
-            before = np.concatenate([[0], np.cumsum(wanted)])
-            kept.append(np.diff(before[file.column("labels/boxes/offsets")])[slots] > 0)
-        self._require_known(values, names, "classes", "where")
-        order = np.argsort(self._shard, kind="stable")
-        chosen = np.empty(len(self), bool)
-        chosen[order] = np.concatenate([*kept, np.empty(0, bool)])
+            ids = [line.strip() for line in pathlib.Path(ids).read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+        wanted = dict.fromkeys(ids)
+        names = [(name, _frame_of(name)) for name in self.column("sample_id")]
+        self._require_known(wanted, {name for pair in names for name in pair}, "sample ids", source)
+        chosen = np.array([name in wanted or frame in wanted for name, frame in names], bool)
+        skipped = [names[i][0] for i in np.flatnonzero(chosen & ~sound)]
+        if skipped:
+            warnings.warn(f"{len(skipped)} samples that {source} names are quarantined and skipped ({_first(skipped)}), in {self._described_as}",
+                          stacklevel=3)
         return chosen
 
-    def _among(self, column: np.ndarray, values: list, what: str, source: str) -> np.ndarray:
-        self._require_known(values, set(column.tolist()), what, source)
-        return np.isin(column, values) if values else np.zeros(len(column), bool)
+    def _with_values(self, key: str, values: Any) -> np.ndarray:
+        """bool [len(self)]: whether the sample's value is one of these."""
+        wanted = dict.fromkeys([values] if isinstance(values, str) or not isinstance(values, Iterable) else values)
+        if key != "class":
+            column = self.column(key).tolist()
+            self._require_known(wanted, set(column), f"values of {key}", "where")
+            return np.array([value in wanted for value in column], bool)
+        self._require_known(wanted, {name for name, count in self.class_counts().items() if count}, "classes", "where")
 
-    def _require_known(self, values: list, known: set, what: str, source: str) -> None:
+        def of_shard(file: _OpenShard) -> np.ndarray:
+            numbers = [i for i, name in enumerate(file.names("labels/boxes/class_id", "class_names")) if name in wanted]
+            found = np.isin(file.column("labels/boxes/class_id"), numbers) & (file.column("labels/boxes/ignore") == 0)
+            return np.diff(np.concatenate([[0], np.cumsum(found)])[file.column("labels/boxes/offsets")]) > 0
+
+        return self._gathered(of_shard)
+
+    def _require_known(self, values: Iterable[Any], known: set, what: str, source: str) -> None:
         unknown = [value for value in values if value not in known]
         if unknown:
-            raise ValueError(f"expected {what} of {self._where_from}, got {len(unknown)} that it does not have "
-                             f"({', '.join(map(repr, unknown[:5]))}{', ...' if unknown[5:] else ''}), in {source}")
+            raise ValueError(f"expected {what} of {self._described_as}, got {len(unknown)} that it does not have ({_first(map(repr, unknown))}), in {source}")
+
+
+class _Kept:
+    """What was read of a shard and stays when its file is closed."""
+
+    def __init__(self) -> None:
+        self.columns: dict[str, np.ndarray] = {}
+        self.groups: dict[str, list[tuple[str, np.ndarray]]] = {}
+        self.names: dict[tuple[str, str], list[str]] = {}
+        self.paths: set[str] = set()  # of everything in the file
 
 
 class _OpenShard:
     """A shard's file and those of its columns that were read."""
 
-    def __init__(self, path: pathlib.Path, columns: dict[str, Any]):
+    def __init__(self, path: pathlib.Path, kept: _Kept) -> None:
         self.file = open_shard(path)
-        self._columns = columns
+        self._kept = kept
         self._volume = self.file["events/volume"]
         self.size = self._volume.shape[2:]  # H, W
 
@@ -296,20 +366,20 @@ class _OpenShard:
 
     def column(self, name: str) -> np.ndarray:
         """[N, ...] the whole column, kept; text as str."""
-        if name not in self._columns:
+        columns = self._kept.columns
+        if name not in columns:
             if name not in self.file:
                 raise ValueError(f"expected a column {name}, got none, in {self.file.filename}")
             dataset = self.file[name]
             text = h5py.check_string_dtype(dataset.dtype)
             column = (dataset.asstr() if text else dataset)[:]
-            self._columns[name] = column.astype(np.int64) if column.dtype == np.uint32 else column
-        return self._columns[name]
+            columns[name] = column.astype(np.int64) if column.dtype == np.uint32 else column
+        return columns[name]
 
-    def optional(self, *names: str) -> list[str]:
-        if "" not in self._columns:  # every name, asked for once
-            self._columns[""] = set()
-            self.file.visit(self._columns[""].add)
-        return [name for name in names if name in self._columns[""]]
+    def has(self, name: str) -> bool:
+        if not self._kept.paths:
+            self.file.visit(self._kept.paths.add)
+        return name in self._kept.paths
 
     def row(self, group: str, slot: int) -> Sample:
         return {name: column[slot] for name, column in self._group(group)}
@@ -319,18 +389,32 @@ class _OpenShard:
         return {name: column[first:last] for name, column in self._group(group) if name != "offsets"}
 
     def names(self, item: str, attribute: str) -> list[str]:
-        return list(self.file[item].attrs.get(attribute, ()))
+        names = self._kept.names
+        if (item, attribute) not in names:
+            names[item, attribute] = list(self.file[item].attrs.get(attribute, ()))
+        return names[item, attribute]
+
+    def joint_places(self, names: Iterable[str]) -> list[int]:
+        known, aliases = self.names("labels/poses", "joint_names"), self.names("labels/poses", "joint_aliases")
+        places = {**{alias: i for i, alias in enumerate(aliases) if alias}, **{name: i for i, name in enumerate(known)}}
+        unknown = [name for name in names if name not in places]
+        if unknown:
+            also = [alias for alias in aliases if alias and alias not in known]
+            raise ValueError(f"expected joints of {', '.join(known)}{' or ' if also else ''}{', '.join(also)}, got {', '.join(unknown)}, "
+                             f"in {self.file.filename}")
+        return [places[name] for name in names]
 
     def _group(self, group: str) -> list[tuple[str, np.ndarray]]:
-        if group not in self._columns:
-            self._columns[group] = [(name, self.column(f"{group}/{name}")) for name in self.file[group]]
-        return self._columns[group]
+        groups = self._kept.groups
+        if group not in groups:
+            groups[group] = [(name, self.column(f"{group}/{name}")) for name in self.file[group]]
+        return groups[group]
 
 
 class _Files:
     """The shards that are open in this process, the one used longest ago closed first, and the columns of all that were."""
 
-    def __init__(self, most: int):
+    def __init__(self, most: int) -> None:
         self._most = most
         self._forget()
 
@@ -340,7 +424,7 @@ class _Files:
         if path not in self._open:
             while len(self._open) >= self._most:
                 self._open.popitem(last=False)[1].file.close()
-            self._open[path] = _OpenShard(path, self._columns[path])
+            self._open[path] = _OpenShard(path, self._kept[path])
         self._open.move_to_end(path)
         return self._open[path]
 
@@ -359,8 +443,9 @@ class _Files:
 
     def _forget(self) -> None:
         self._open: collections.OrderedDict[pathlib.Path, _OpenShard] = collections.OrderedDict()
-        self._columns: dict[pathlib.Path, dict[str, Any]] = collections.defaultdict(dict)
+        self._kept: dict[pathlib.Path, _Kept] = collections.defaultdict(_Kept)
         self._process = os.getpid()
+
 
 def open_shard(path: PathLike) -> h5py.File:
     """The shard's file. Raises ValueError if it is none of a known version."""
@@ -376,6 +461,24 @@ def _one_of(what: str, words: Iterable[str], known: Sequence[str]) -> None:
     for word in words:
         if word not in known:
             raise ValueError(f"expected {what} to be of {', '.join(known)}, got {word!r}")
+
+
+def _known_fields(fields: Iterable[str]) -> frozenset[str]:
+    if isinstance(fields, str):
+        raise ValueError(f"expected a list of fields, got the text {fields!r}")
+    fields = frozenset(fields)
+    _one_of("fields", sorted(fields.difference(FIELDS)), FIELDS)
+    return fields
+
+
+def _frame_of(sample_id: str) -> str:
+    """The labelled frame's id: of "000005@before1", one of all pairs of a frame, 000005."""
+    return re.sub(r"@(before|after|around)\d+$", "", sample_id)
+
+
+def _first(texts: Iterable[str]) -> str:
+    texts = list(texts)
+    return ", ".join(texts[:5]) + (", ..." if texts[5:] else "")
 
 
 def _marker(path: PathLike) -> pathlib.Path:
@@ -397,8 +500,15 @@ class _Shard(NamedTuple):
     valid: np.ndarray | None = None  # bool, of each slot
 
 
-def _find_shards(paths: PathLike | Iterable[PathLike]) -> list[_Shard]:
-    if not isinstance(paths, (str, os.PathLike)):
+def _find_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Shard]:
+    shards = _listed_shards(paths, partial)
+    if not shards:
+        raise ValueError(f"expected shards that are done, got none, in {paths}")
+    return shards
+
+
+def _listed_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Shard]:
+    if isinstance(paths, list):
         return [_Shard(pathlib.Path(path)) for path in paths]
     paths = pathlib.Path(paths)
     if paths.name == VIEW and paths.is_file():
@@ -408,8 +518,33 @@ def _find_shards(paths: PathLike | Iterable[PathLike]) -> list[_Shard]:
     if not paths.is_dir():
         return [_Shard(paths)]
     if (paths / DESCRIPTION).exists():
-        return _described_shards(paths)
-    return [_Shard(path) for path in sorted(paths.glob("*.h5")) if _is_done(path)]
+        return _described_shards(paths, partial)
+    done = [path.name for path in sorted(paths.glob("*.h5")) if _is_done(path)]
+    if not partial:
+        _require_whole(done, sorted(_expected_shards(paths).difference(done)), paths)
+    return [_Shard(paths / name) for name in done]
+
+
+def _expected_shards(folder: pathlib.Path) -> set[str]:
+    """The names of shards that are there, or planned, or have a marker."""
+    names = {path.name for path in folder.glob("*.h5")} - {VIEW}
+    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json") if path.with_suffix(".h5").name not in names and _is_marker(path))
+    if (folder / PLAN).exists():
+        names.update(shard["name"] for shard in json.loads((folder / PLAN).read_text(encoding="utf-8"))["shards"])
+    return names
+
+
+def _is_marker(path: pathlib.Path) -> bool:
+    try:
+        return path.name != PLAN and json.loads(path.read_text(encoding="utf-8")).get("shard") == path.with_suffix(".h5").name
+    except (OSError, ValueError, AttributeError):
+        return False
+
+
+def _require_whole(done: Sequence[str], missing: Sequence[str], folder: pathlib.Path) -> None:
+    if missing:
+        raise ValueError(f"expected {len(done) + len(missing)} shards that are done, got {len(missing)} that are not ({_first(missing)}), in {folder} "
+                         "(partial=True takes the others)")
 
 
 def read_description(folder: PathLike) -> dict[str, Any]:
@@ -422,8 +557,10 @@ def read_description(folder: PathLike) -> dict[str, Any]:
     return description
 
 
-def _described_shards(folder: pathlib.Path) -> list[_Shard]:
+def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
     description = read_description(folder)
+    if not partial:
+        _require_whole(description["shards"], description.get("missing", ()), folder)
     shards = []
     for entry in description["shards"]:
         path = folder / entry["name"]

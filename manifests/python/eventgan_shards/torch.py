@@ -9,8 +9,8 @@
         ...
 
 A volume is a tensor [2B, H, W], float32: channels 0..B-1 are the positive polarity in time order, B..2B-1 the negative. Points are
-x, y in pixels whose centres are whole numbers; boxes are left, top, right, bottom with edges at half pixels, so that a whole picture is
-0, 0, W, H in box coordinates: an edge at e lies half a pixel left of the centre e (shard_format.md, Geometry).
+x, y in pixels whose centres are whole numbers; boxes are left, top, right, bottom of edges between pixels, so that a whole picture is
+0, 0, W, H: the edge x is the left edge of pixel x, half a pixel left of its centre, the point x (shard_format.md, Geometry).
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ class EventAugmentation:
     """What may happen to events without making them unlike a camera's. Drawn by torch's random numbers.
 
     flip: probability of left and right exchanged.
-    reverse: probability of time running backwards, which exchanges polarities and turns the bins round.
+    reverse: probability of time running backwards, which exchanges polarities and turns the bins round. Labels stay where they are
+        and so come to the other end of time: only samples whose labels lie half-way (`label_position` 0.5) are reversed.
+    reverse_all: True reverses others, too.
     drop: probability of one polarity (either) being lost, as in a sensor with one threshold set high.
     scale: factors between which the picture is enlarged, uniformly in its logarithm; what lies outside is cut, what is
         missing is filled with 0, no events.
@@ -50,6 +52,14 @@ class EventAugmentation:
     drop: float = 0.0
     scale: tuple[float, float] = (1.0, 1.0)
     shift: float = 0.0
+    reverse_all: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ("flip", "reverse", "drop"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise ValueError(f"expected {name} to be a probability, got {getattr(self, name)}")
+        if not 0 < self.scale[0] <= self.scale[1] < math.inf or not 0 <= self.shift < math.inf:
+            raise ValueError(f"expected factors above 0, the smaller one first, and a shift of at least 0, got {self.scale}, {self.shift}")
 
     def affine(self, height: int, width: int) -> np.ndarray:
         """[2, 3]: where a point of the volume goes, drawn anew."""
@@ -60,14 +70,14 @@ class EventAugmentation:
         linear = np.diag([-s if flip < self.flip else s, s])
         return np.column_stack([linear, moved - linear @ middle])
 
-    def events(self, volume: torch.Tensor) -> torch.Tensor:
-        """[2B, H, W]: the volume, perhaps backwards in time, perhaps without one polarity."""
+    def events(self, volume: torch.Tensor, label_position: float = 0.5) -> torch.Tensor:
+        """[2B, H, W]: the volume, perhaps backwards in time (see `reverse`), perhaps without one polarity."""
         reverse, drop, which = (float(each) for each in torch.rand(3))
-        if reverse < self.reverse:
+        if reverse < self.reverse and (self.reverse_all or label_position == 0.5):
             volume = volume.flip(0)
         if drop < self.drop:
             volume = volume.clone()
-            volume.chunk(2)[which < 0.5].zero_()
+            volume.chunk(2)[int(which < 0.5)].zero_()
         return volume
 
 
@@ -124,6 +134,12 @@ def fitted(area: Sequence[float], size: tuple[int, int]) -> np.ndarray:
     return np.column_stack([s * np.eye(2), to_middle + (s - 1) / 2])
 
 
+def _decoded(sample: Mapping[str, Any]) -> torch.Tensor:
+    """[2B, H, W] float32: the sample's volume, also where its shards leave it as it is stored (decode=False)."""
+    volume = sample["volume"]
+    return torch.from_numpy(np.multiply(volume, sample["scale"], dtype=np.float32) if "scale" in sample else volume)
+
+
 def _move(view: np.ndarray | None, augmentation: EventAugmentation | None, height: int, width: int) -> np.ndarray:
     """[2, 3]: where a point of the volume goes: by `view`, then by the augmentation."""
     view = np.eye(2, 3) if view is None else view
@@ -141,8 +157,8 @@ class DetectionDataset(Dataset):
     index    int, of the sample in `shards`
 
     classes: names in the order of their numbers, or name → number, which may join classes: {"Car": 0, "Van": 0}. Boxes of
-        other classes are left out, unless to be ignored. A name that no shard knows is a ValueError. None: all names,
-        without those that are only ever ignored.
+        other classes are left out, unless to be ignored. A name that no shard knows is a ValueError. None: all names that
+        the shards have, in their order, without DontCare: the same numbers for any part of them.
     size: (H, W) that volumes are filled up to with zeros, or cut to, at the right and at the bottom; None: as they are.
     augmentation: changes volume and boxes alike; None: nothing.
     visible: share of a box's area that must be left for it not to be ignored.
@@ -151,11 +167,11 @@ class DetectionDataset(Dataset):
 
     def __init__(self, shards: Shards, classes: Sequence[str] | Mapping[str, int] | None = None,
                  size: tuple[int, int] | None = None, augmentation: EventAugmentation | None = None, visible: float = 0.25,
-                 view: np.ndarray | None = None):
+                 view: np.ndarray | None = None) -> None:
         self._shards = shards
-        known = shards.class_counts()
+        known = shards.known_classes()
         if classes is None:
-            classes = [name for name, count in known.items() if count]
+            classes = [name for name in known if name != "DontCare"]
         self.classes = dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
         unknown = [name for name in self.classes if name not in known]
         if unknown:
@@ -167,7 +183,7 @@ class DetectionDataset(Dataset):
 
     def __getitem__(self, index: int) -> Item:
         sample = self._shards.sample(index, {"volume", "pair", "boxes"})
-        volume = torch.from_numpy(sample["volume"])
+        volume = _decoded(sample)
         rows = sample["boxes"]
         names = self._shards.class_names(index)
         labels = np.array([self.classes.get(names[each], -1) for each in rows["class_id"]], np.int64)
@@ -175,7 +191,7 @@ class DetectionDataset(Dataset):
         boxes = rows["xyxy"]
         height, width = self._size or volume.shape[1:]
         if self._augmentation:
-            volume = self._augmentation.events(volume)
+            volume = self._augmentation.events(volume, sample["pair"]["label_position"])
         if self._augmentation or self._size or self._view is not None:
             affine = _move(self._view, self._augmentation, height, width)
             volume, boxes = warp(volume, affine, height, width), move_boxes(boxes, affine)
@@ -235,10 +251,9 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
 class _Joints:
     """The wanted joints, whatever order a source has them in."""
 
-    def __init__(self, shards: Shards, names: Sequence[str] | None):
-        of_sources = shards.joint_sets()
+    def __init__(self, shards: Shards, names: Sequence[str] | None) -> None:
         self._shards = shards
-        self.names = list(names if names is not None else of_sources[0] if of_sources else [])
+        self.names = list(names) if names is not None else shards.default_joints()
         self.pairs = flip_pairs(self.names)
         self._places: dict[tuple[str, ...], list[int]] = {}
 
@@ -266,11 +281,12 @@ class KeypointDataset(Dataset):
     keypoints   [n, J, 3] float32: x, y, and 0 not annotated or outside, 1 hidden, 2 visible or annotated without a word on that
 
     A person's box holds its annotated joints and a margin of `margin` of its longer side around them; one without any
-    annotated joint inside is to be ignored. joints: names to take, in that order; None: all of the first source.
+    annotated joint inside is to be ignored. joints: names to take, in that order; None: those of the first source, of Human3.6M the
+    17 in common use.
     """
 
     def __init__(self, shards: Shards, joints: Sequence[str] | None = None, size: tuple[int, int] | None = None,
-                 augmentation: EventAugmentation | None = None, margin: float = 0.15, view: np.ndarray | None = None):
+                 augmentation: EventAugmentation | None = None, margin: float = 0.15, view: np.ndarray | None = None) -> None:
         self._shards, self._joints = shards, _Joints(shards, joints)
         self._size, self._augmentation, self._margin, self._view = size, augmentation, margin, view
         self.classes, self.joint_names = {"person": 0}, self._joints.names
@@ -281,10 +297,10 @@ class KeypointDataset(Dataset):
     def __getitem__(self, index: int) -> Item:
         sample = self._shards.sample(index, {"volume", "pair", "persons"})
         joints, annotated, hidden = self._joints.of(sample["persons"], index)
-        volume = torch.from_numpy(sample["volume"])
+        volume = _decoded(sample)
         height, width = self._size or volume.shape[1:]
         if self._augmentation:
-            volume = self._augmentation.events(volume)
+            volume = self._augmentation.events(volume, sample["pair"]["label_position"])
         if self._augmentation or self._size or self._view is not None:
             affine = _move(self._view, self._augmentation, height, width)
             volume, joints = warp(volume, affine, height, width), move_points(joints, affine)
@@ -335,24 +351,24 @@ class PoseDataset(Dataset):
                    the crop in volume pixels, rotation (degrees), score 1, flipped, image (sample_id), index, person;
                    to_volume and to_source [2, 3] float64: maps of input points to those of the volume and of the source
 
-    The crop is a square of 200 x scale pixels around the person's centre, turned by `rotation`, which fills the input's shorter
-    side; an input that is not square shows more at its longer ends. MPII's centres are moved down by 15 x scale and its scales enlarged by 1.25 first, as there. A person without annotated
-    centre and scale has those of its annotated joints' bounding box, enlarged by 1.25; one without annotated joints is left out.
+    The crop is 200 x scale volume pixels wide, around the person's centre, turned by `rotation`; it fills the input's width, so a
+    higher input shows more above and below, a lower one less. MPII's centres are moved down by 15 x scale and its scales enlarged by
+    1.25 first, as there. A person without annotated centre and scale has those of its annotated joints' bounding box, enlarged by
+    1.25; one without annotated joints is left out.
     moved: True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
 
-    size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: all of the first source.
+    size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: those of the first source, of
+        Human3.6M the 17 in common use.
     """
 
     def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
-                 sigma: float = 2.0, augmentation: PoseAugmentation | None = None, moved: bool = False):
+                 sigma: float = 2.0, augmentation: PoseAugmentation | None = None, moved: bool = False) -> None:
         if size[0] % 4 or size[1] % 4:
             raise ValueError(f"expected sides that are multiples of 4, got {size}")
         self._shards, self._joints = shards, _Joints(shards, joints)
         self.joint_names, self.flip_pairs = self._joints.names, self._joints.pairs
         self._size, self._sigma, self._augmentation, self._moved = size, sigma, augmentation, moved
-        self.persons = shards.persons
-        annotated = [self._person(index, row)[1].any() for index, row in self.persons]
-        self.persons = self.persons[np.array(annotated, bool)]
+        self.persons = shards.persons[shards.annotated(self.joint_names)]
 
     def __len__(self) -> int:
         return len(self.persons)
@@ -361,10 +377,10 @@ class PoseDataset(Dataset):
         index, row = self.persons[number]
         joints, annotated, center, scale, sample = self._person(index, row)
         height, width = self._size
-        volume = torch.from_numpy(self._shards.sample(index, {"volume"})["volume"])
+        volume = _decoded(self._shards.sample(index, {"volume"}))
         rotation, flipped = 0.0, False
         if self._augmentation:
-            volume = self._augmentation.events.events(volume)
+            volume = self._augmentation.events.events(volume, sample["pair"]["label_position"])
             scale, rotation, flipped = self._varied(scale)
         to_input = _crop(center, scale, rotation, height, width)
         if flipped:
@@ -382,7 +398,7 @@ class PoseDataset(Dataset):
                 "to_volume": to_volume, "to_source": to_source}
         return warp(volume, to_input, height, width), torch.from_numpy(target), torch.from_numpy(weight), meta
 
-    def _person(self, index: int, row: int):
+    def _person(self, index: int, row: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, Item]:
         sample = self._shards.sample(index, {"pair", "persons"})
         joints, annotated, _ = (each[row] for each in self._joints.of(sample["persons"], index))
         center, scale = sample["persons"]["center"][row].copy(), float(sample["persons"]["scale_volume"][row])
@@ -404,10 +420,9 @@ class PoseDataset(Dataset):
 
 
 def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width: int) -> np.ndarray:
-    """[2, 3], volume → input: the square of 200 x scale px around `center` fills the shorter side; the centre comes to
-    (W / 2, H / 2), as in Simple Baselines' get_affine_transform."""
+    """[2, 3], volume → input: 200 x scale px around `center` fill the width; the centre comes to (W / 2, H / 2), as in Simple Baselines' get_affine_transform."""
     turn = math.radians(rotation)
-    zoom = min(height, width) / (200 * scale)
+    zoom = width / (200 * scale)
     linear = zoom * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
     return np.column_stack([linear, np.array([width / 2, height / 2]) - linear @ center])
 

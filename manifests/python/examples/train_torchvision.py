@@ -14,7 +14,6 @@ import numpy as np
 import torch
 import torchvision
 import training
-from eventgan_shards import Shards
 from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
 
 

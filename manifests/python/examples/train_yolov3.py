@@ -63,7 +63,6 @@ def adapted(cfg: str, classes: int, anchors: np.ndarray) -> str:
 def main() -> None:
     args = read_args()
     folder = training.use_trainer(args.trainer, "models.py", "train.py", "cfg")
-    import tensorboard_stub  # noqa: F401  (train.py asks for tensorboard)
     from models import Darknet
     from train import hyp
     from utils.utils import ap_per_class, clip_coords, compute_loss, non_max_suppression

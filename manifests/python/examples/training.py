@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import math
 import os
@@ -10,6 +11,7 @@ import pathlib
 import pickle
 import sys
 import time
+import types
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -24,8 +26,7 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 from eventgan_shards import Shards, read_description  # noqa: E402
 
 CHECKED_SPLITS = ("validation", "valid", "val", "test")
-# From the column that keeps the most together; sample_id is always there.
-GROUPS = ("subject", "drive", "sequence", "sample_id")
+GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every"}  # when a run goes on
 GREEN, YELLOW, GREY = (80, 220, 80), (60, 230, 255), (150, 150, 150)
 
@@ -55,6 +56,10 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
 
 def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     args = parser.parse_args()
+    for name, least in (("epochs", 1), ("steps", 1), ("every", 1), ("batch", 1), ("minutes", 0)):
+        value = getattr(args, name)
+        if value is not None and (value < least or not value):
+            sys.exit(f"expected --{name} {'above 0' if name == 'minutes' else 'of at least 1'}, got {value}")
     if args.epochs is None and args.steps is None and args.minutes is None:
         args.minutes = 30.0
     if args.device == "cuda" and not torch.cuda.is_available():
@@ -67,31 +72,48 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
 
 
 def use_trainer(folder: str, *modules: str) -> pathlib.Path:
-    """Puts the trainer's folder of modules first on the path, and `stubs` beside it, if there."""
+    """Puts the trainer's folder of modules first on the path, and stand-ins that keep nothing in place of the TensorBoards that its
+    modules ask for, if they are not installed."""
     path = pathlib.Path(folder).resolve()
     for module in modules:
         if not (path / module).exists():
             sys.exit(f"expected the trainer's {module}, got none, in {path}")
     first = path / modules[0]
-    sys.path[:0] = [str(first.parent), str(path.parent / "stubs")]
+    sys.path.insert(0, str(first.parent))
+    for name in ("torch.utils.tensorboard", "tensorboardX"):
+        try:
+            importlib.import_module(name)
+        except (ImportError, AttributeError):  # AttributeError: an old PyTorch with new setuptools
+            sys.modules[name] = types.ModuleType(name)
+            sys.modules[name].SummaryWriter = _NoWriter
     return path
+
+
+class _NoWriter:
+    """In place of a SummaryWriter: takes everything and keeps nothing."""
+
+    def __init__(self, *_: Any, **__: Any) -> None:
+        pass
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *_, **__: None
 
 
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
     """The samples to learn and those to check, of which `usable` gives the positions of those with labels: by the folder's
-    splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no sample."""
+    splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no labelled frame."""
     where = {"dataset": args.dataset} if args.dataset else None
     try:
         description = read_description(args.data)
         splits = description["counts"]["by_split"]
         checked = next((name for name in CHECKED_SPLITS if name in splits), None)
         if checked and "train" in splits and not args.overfit:
-            parts, how = [Shards(args.data, split=split, where=where) for split in ("train", checked)], f"of split {checked}"
+            parts, how = [Shards(args.data, split=split, where=where, partial=True) for split in ("train", checked)], f"of split {checked}"
             parts = [part[list(usable(part))] for part in parts]
         else:
-            shards = Shards(args.data, where=where)
+            shards = Shards(args.data, where=where, partial=True)
             shards = shards[list(usable(shards))]
-            by = next((column for column in GROUPS if _divides(shards, column)), "sample_id")
+            by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
             parts, how = ([shards, shards], "the same") if args.overfit else (shards.divide(0.8, by, args.seed), f"of another {by}")
     except FileNotFoundError as error:
         sys.exit(f"expected a folder that eventgan finalize has completed, got no {error.filename}")
@@ -99,18 +121,19 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
         sys.exit(f"expected labelled samples to learn and to check, got {len(parts[0])} and {len(parts[1])}, in {args.data}")
+    if description.get("missing"):
+        print(f"{len(description['missing'])} shards are missing in {args.data}, as finalize --partial was told")
     if description["quarantined"]:
         print(f"{len(description['quarantined'])} samples are in quarantine and left out")
     print(f"{len(parts[0])} samples to learn, {len(parts[1])} to check, {how}")
     return parts[0], parts[1]
 
 
-def _divides(shards: Shards, column: str) -> bool:
+def _divides(shards: Shards, by: str) -> bool:
     try:
-        values = set(shards.column(column).tolist())
-    except ValueError:  # not all shards have it
+        return len(set(shards.groups(by).tolist())) > 1 and (by != "subject" or len({*shards.column(by).tolist()} - {""}) > 1)
+    except ValueError:  # no shard has it
         return False
-    return len(values) > 1 and "" not in values
 
 
 def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None, learn: bool = False) -> DataLoader:
@@ -152,12 +175,12 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     for group in optimizer.param_groups:
         group.setdefault("initial_lr", group["lr"])
     began = time.monotonic() - state["seconds"]
-    steps = min(args.steps or math.inf, (args.epochs or math.inf) * len(loader))
+    steps = min(math.inf if args.steps is None else args.steps, math.inf if args.epochs is None else args.epochs * len(loader))
     checking = 0.0
 
     def progress() -> float:
         minutes = (time.monotonic() - began + checking) / 60
-        return max(state["step"] / steps, minutes / args.minutes if args.minutes else 0)
+        return max(state["step"] / steps, 0 if args.minutes is None else minutes / args.minutes)
 
     def report(loss: float | None) -> None:
         nonlocal checking

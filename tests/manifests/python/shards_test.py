@@ -1,7 +1,9 @@
 """eventgan_shards.Shards: reading, selecting, dividing, in workers of all kinds."""
 
+import json
 import multiprocessing
 import pickle
+import time
 
 import h5py
 import numpy as np
@@ -130,8 +132,41 @@ def test_ids_from_a_list_or_a_file(two_shards, tmp_path):
     listed.write_text("000004\n\n000000\n")
     assert ids_of(Shards(two_shards, ids=listed)) == ["000000", "000004"] * 2
     assert len(Shards(two_shards, ids=[])) == 0
-    with pytest.raises(ValueError, match="expected sample ids of .*, got 2 that it does not have .'7', '000002'., in ids"):
+    listed.write_text("000004\n", encoding="utf-8-sig")  # as Windows' editors begin a file
+    assert ids_of(Shards(two_shards, ids=listed)) == ["000004"] * 2
+    with pytest.raises(ValueError, match="expected sample ids of .*, got 1 that it does not have .'7'., in ids"):
         Shards(two_shards, ids=["7", "000000", "000002"])  # 000002 is in quarantine
+
+
+def test_ids_in_quarantine_are_skipped_with_a_word(folder):
+    with pytest.warns(UserWarning, match="1 samples that ids names are quarantined and skipped .000002., in"):
+        assert ids_of(Shards(folder, ids=["000001", "000002"])) == ["000001"]
+    assert len(Shards(folder, ids=["000002"], invalid="keep")) == 1
+
+
+def write_column(path, name, values=None):
+    with h5py.File(path, "r+") as file:
+        if "pairs/" + name in file:
+            del file["pairs/" + name]
+        if values is not None:
+            file["pairs/" + name] = values
+    marker = path.with_suffix(".json")
+    marker.write_text(json.dumps({**json.loads(marker.read_text()), "size_bytes": path.stat().st_size}))
+
+
+def test_a_frame_s_id_stands_for_all_its_samples(folder):
+    write_column(folder / NAME, "sample_id", ["000001@before1", "000001@before2", "000002", "a@b", "000001@b@after1"])
+    assert ids_of(Shards(folder, ids=["000001"])) == ["000001@before1", "000001@before2"]
+    assert ids_of(Shards(folder, ids=["000001@before2", "a@b"])) == ["000001@before2", "a@b"]
+
+
+def test_many_ids_are_found_at_once(folder):
+    shards = Shards(folder)
+    shards.column = lambda name: np.array([f"{i}@before1" for i in range(100_000)], object)
+    start = time.monotonic()
+    chosen = shards._with_ids([str(i) for i in range(0, 100_000, 2)], np.ones(100_000, bool))
+    assert chosen.tolist() == [True, False] * 50_000
+    assert time.monotonic() - start < 5
 
 
 def test_where(two_shards):
@@ -139,12 +174,34 @@ def test_where(two_shards):
     assert ids_of(Shards(two_shards, where={"class": "Car"})) == ["000000", "000003"] * 2
     assert ids_of(Shards(two_shards, where={"class": ["Car"], "sequence": ["drive_1"]})) == ["000003"] * 2
     assert len(Shards(two_shards, where={"gap": 2})) == 8
-    assert len(Shards(two_shards, where={"class": "DontCare"})) == 0  # a box to be ignored is none
-    for where in ({"gap": [1, 2]}, {"sequence": "drive_7"}, {"class": "Bus"}):
+    for where in ({"gap": [1, 2]}, {"sequence": "drive_7"}, {"class": "Bus"}, {"class": "DontCare"}):  # a box to be ignored is none
         with pytest.raises(ValueError, match="that it does not have"):
             Shards(two_shards, where=where)
     with pytest.raises(ValueError, match="expected a column pairs/weather, got none"):
         Shards(two_shards, where={"weather": "rain"})
+
+
+def test_columns_that_only_some_shards_have(two_shards):
+    write_column(two_shards / NAME, "subject", ["S1", "S1", "S5", "S5", "S7"])
+    write_column(two_shards / SECOND, "subject")
+    write_column(two_shards / NAME, "prev_time_s")
+    write_column(two_shards / SECOND, "prev_time_s", np.arange(5.0))
+    shards = Shards(two_shards)
+    assert shards.column("subject").tolist() == ["S1", "S1", "S5", "S7", "", "", "", ""]
+    assert shards[4:].column("subject").tolist() == [""] * 4
+    np.testing.assert_equal(shards.column("prev_time_s"), [np.nan] * 4 + [0, 1, 3, 4])
+    assert len(Shards(two_shards, where={"subject": ["S1", "S7"]})) == 3
+    assert ids_of(Shards(two_shards, where={"subject": ""})) == ids_of(shards)[4:]
+    first, second = shards.divide(0.5, by="subject")
+    assert not set(first.groups("subject")) & set(second.groups("subject"))
+
+
+def test_the_order_of_where_does_not_matter(two_shards):
+    for where in ({"class": "Car", "sequence": "drive_1"}, {"sequence": "drive_1", "class": "Car"}):
+        assert ids_of(Shards(two_shards, where=where)) == ["000003"] * 2
+    one, other = {"ids": ["000001"]}, {"sequence": "drive_1"}
+    assert len(Shards(two_shards, where=other, **one)) == 0  # both exist, but in no sample together
+    assert len(Shards(two_shards, where={**other, "sample_id": "000001"})) == len(Shards(two_shards, where={"sample_id": "000001", **other})) == 0
 
 
 def test_divided_parts_share_no_sequence(two_shards):
@@ -160,6 +217,27 @@ def test_divided_parts_share_no_sequence(two_shards):
         first[:1].divide(0.5)
     with pytest.raises(ValueError, match="between 0 and 1"):
         shards.divide(1)
+
+
+def test_divided_parts_share_no_frame_and_no_take(two_shards):
+    for path in (NAME, SECOND):
+        for column in ("subject", "action", "drive"):
+            write_column(two_shards / path, column)
+        write_column(two_shards / path, "sequence", ["drive_0", "", "", "", ""])
+        write_column(two_shards / path, "sample_id", ["0@before1", "1@before1", "2", "1@before2", "4"])
+    shards = Shards(two_shards)
+    assert shards.groups().tolist() == ["drive_0", "1", "1", "4"] * 2
+    assert shards.groups("sample_id").tolist() == ["0", "1", "1", "4"] * 2
+    shards.close()
+    write_column(two_shards / NAME, "dataset", ["human36m"] * 5)
+    write_column(two_shards / NAME, "subject", ["S1"] * 5)
+    write_column(two_shards / NAME, "action", ["Walking", "Walking", "", "Eating", ""])
+    write_column(two_shards / SECOND, "drive", ["d", "", "", "d", ""])
+    shards = Shards(two_shards)
+    assert shards.groups().tolist() == ["S1/Walking", "S1/Walking", "S1/Eating", "4", "d", "1", "d", "4"]
+    for seed in range(4):
+        first, second = shards.divide(0.5, seed=seed)
+        assert len(first) and len(second) and not set(first.groups()) & set(second.groups())
 
 
 def test_columns(two_shards):
@@ -180,13 +258,45 @@ def test_what_pictures_cover(folder):
         shards[:0].picture_area()
 
 
-def test_shards_that_are_not_done_are_left_out(two_shards):
+def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
     (two_shards / SECOND).with_suffix(".json").unlink()
+    with pytest.raises(ValueError, match=f"expected 2 shards that are done, got 1 that are not .{SECOND}., in"):
+        Shards(two_shards)
+    assert len(Shards(two_shards, partial=True)) == 4
+    (two_shards / SECOND).unlink()
     assert len(Shards(two_shards)) == 4
-    with open(two_shards / NAME, "ab") as file:
-        file.write(b"x")
-    assert len(Shards(two_shards)) == 0
-    assert len(Shards(two_shards.parent)) == 0
+    (two_shards / "plan.json").write_text(json.dumps({"shards": [{"name": NAME}, {"name": "demo-train-00001-of-00003.h5"}]}))
+    with pytest.raises(ValueError, match="expected 2 shards that are done, got 1 that are not .demo-train-00001-of-00003.h5."):
+        Shards(two_shards)
+    (two_shards / "plan.json").unlink()
+    (two_shards / NAME).rename(two_shards / "other")  # a marker alone
+    with pytest.raises(ValueError, match=f"expected 1 shards that are done, got 1 that are not .{NAME}."):
+        Shards(two_shards)
+    for none in (two_shards, two_shards.parent, []):
+        with pytest.raises(ValueError, match="expected shards that are done, got none"):
+            Shards(none, partial=True)
+
+
+def test_a_description_that_misses_shards(folder):
+    marker = json.loads((folder / NAME).with_suffix(".json").read_text())
+    entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": marker["size_bytes"], "sha256": marker["sha256"]}
+    quarantined = [{"shard": NAME, "slot": 2}]
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "missing": [SECOND],
+                                                     "quarantined": quarantined}))
+    with pytest.raises(ValueError, match=f"expected 2 shards that are done, got 1 that are not .{SECOND}."):
+        Shards(folder)
+    assert len(Shards(folder, partial=True)) == 4
+
+
+def test_the_fields_asked_for(folder):
+    shards = Shards(folder, fields=["pair"])
+    assert shards.sample(0).keys() == {"pair", "valid", "shard", "slot"}
+    assert shards.sample(0, ["boxes"]).keys() == {"boxes", "valid", "shard", "slot"}
+    for wrong in (["volumes"], "pair"):
+        with pytest.raises(ValueError, match="expected "):
+            shards.sample(0, wrong)
+        with pytest.raises(ValueError, match="expected "):
+            Shards(folder, fields=wrong)
 
 
 def test_other_files_and_words_are_refused(folder):

@@ -16,6 +16,7 @@ from eventgan_shards.torch import (DetectionDataset, EventAugmentation, Keypoint
                                    PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
                                    flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
+JOINTS = ["nose", "left hand", "right hand"]
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 
 
@@ -73,6 +74,27 @@ def test_an_augmentation_s_events():
     assert volume.flatten().tolist() == [1, 2, 3, 4, 5, 6]
 
 
+def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
+    volume = torch.arange(1.0, 7).reshape(6, 1, 1)
+    assert torch.equal(EventAugmentation(reverse=1).events(volume, 1.0), volume)
+    assert torch.equal(EventAugmentation(reverse=1, reverse_all=True).events(volume, 1.0), volume.flip(0))
+    plain = DetectionDataset(shards)[0]["volume"]
+    shards.close()
+    backwards = EventAugmentation(flip=0, reverse=1)
+    for position, expected in ((1.0, plain), (0.5, plain.flip(0))):
+        with h5py.File(folder / NAME, "r+") as file:
+            file["pairs/label_position"][...] = position
+        with Shards(folder) as again:
+            assert torch.equal(DetectionDataset(again, augmentation=backwards)[0]["volume"], expected)
+            assert torch.equal(KeypointDataset(again, augmentation=backwards)[0]["volume"], expected)
+
+
+@pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)}, {"scale": (1.2, 0.8)}, {"shift": -1}])
+def test_augmentations_that_cannot_be(wrong):
+    with pytest.raises(ValueError, match="expected "):
+        EventAugmentation(**wrong)
+
+
 def test_an_augmentation_s_map():
     torch.manual_seed(1)
     only_flip = EventAugmentation(flip=1).affine(24, 32)
@@ -115,6 +137,21 @@ def test_detection_items_of_another_size(shards):
     assert DetectionDataset(shards, size=(2, 8), visible=0.5)[0]["ignore"].tolist() == [True, True]  # 1/3.5 is left
 
 
+def test_classes_are_numbered_alike_in_all_parts(folder):
+    with h5py.File(folder / NAME, "r+") as file:
+        file["labels/boxes/class_id"].attrs["class_names"] = ["Van", "Car", "DontCare"]
+        file["labels/boxes/class_id"][...] += 1
+    assert [DetectionDataset(part).classes for part in (Shards(folder / NAME), Shards(folder / NAME)[1:2])] == [{"Van": 0, "Car": 1}] * 2
+
+
+def test_volumes_that_the_shards_leave_stored_are_decoded(folder):
+    stored, plain = Shards(folder, decode=False), Shards(folder)
+    assert stored[0]["volume"].dtype == np.uint8
+    for dataset in (DetectionDataset, KeypointDataset):
+        assert torch.equal(dataset(stored)[0]["volume"], dataset(plain)[0]["volume"])
+    assert torch.equal(PoseDataset(stored, size=(64, 64))[0][0], PoseDataset(plain, size=(64, 64))[0][0])
+
+
 def test_boxes_are_mirrored_with_their_events(shards):
     plain, mirrored = DetectionDataset(shards)[0], DetectionDataset(shards, augmentation=EventAugmentation(flip=1))[0]
     assert torch.equal(mirrored["volume"], plain["volume"].flip(2))
@@ -129,7 +166,7 @@ def test_an_area_of_the_volume_fills_the_item(shards):
     mirrored = DetectionDataset(shards, size=(24, 32), view=affine, augmentation=EventAugmentation(flip=1))[0]
     assert mirrored["boxes"][0].tolist() == [14, 4, 32, 24]
     np.testing.assert_allclose(mirrored["volume"], item["volume"].flip(2), atol=1e-5)
-    keypoints = KeypointDataset(shards, size=(24, 32), view=affine)[0]["keypoints"][0]
+    keypoints = KeypointDataset(shards, JOINTS, size=(24, 32), view=affine)[0]["keypoints"][0]
     np.testing.assert_allclose(keypoints[1, :2], [(2.25 + 0.5 - 2) * 8 - 0.5, (2.875 + 0.5 - 1) * 8 + 4 - 0.5])
 
 
@@ -149,14 +186,14 @@ def test_what_torchvision_takes(shards):
 
 
 def test_keypoint_items(shards):
-    item = KeypointDataset(shards, margin=0)[0]
+    item = KeypointDataset(shards, JOINTS, margin=0)[0]
     # 1.5, 1.75 and 2.25, 2.875; the second person also has 3.25, 3.25. The centre of a pixel is 0.5 right of its left edge.
     np.testing.assert_allclose(item["boxes"], [[1.5, 1.75, 3.25, 3.875], [1.5, 1.75, 4.25, 4.25]])
     assert item["keypoints"][0].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [0, 0, 0]]
     assert item["keypoints"][1].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [3.25, 3.25, 2]]
-    mirrored = KeypointDataset(shards, augmentation=EventAugmentation(flip=1))[0]["keypoints"][1]
+    mirrored = KeypointDataset(shards, JOINTS, augmentation=EventAugmentation(flip=1))[0]["keypoints"][1]
     assert mirrored.tolist() == [[5.5, 1.75, 2], [3.75, 3.25, 2], [4.75, 2.875, 1]]
-    assert KeypointDataset(shards)[1]["keypoints"].shape == (0, 3, 3)
+    assert KeypointDataset(shards, JOINTS)[1]["keypoints"].shape == (0, 3, 3)
     images, targets = collate_torchvision([item])
     assert targets[0]["keypoints"].shape == (2, 3, 3)
 
@@ -183,12 +220,12 @@ def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
 
 def test_joints_by_the_names_in_common_use(shards):
     assert PoseDataset(shards, joints=["right_wrist", "nose"], size=(64, 64))[1][3]["joints_vis"].tolist() == [[1, 1, 0]] * 2
-    with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand, got tail"):
+    with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand or left_wrist, right_wrist, got tail"):
         PoseDataset(shards, joints=["tail"])
 
 
 def test_pose_items(shards):
-    persons = PoseDataset(shards, size=(64, 64))
+    persons = PoseDataset(shards, size=(64, 64), joints=JOINTS)
     assert len(persons) == 3 and persons.joint_names == ["nose", "left hand", "right hand"]
     input, target, weight, meta = persons[1]  # centre 2.75, 2.25 and scale 0.875 as annotated: not MPII's
     assert input.shape == (4, 64, 64) and target.shape == (3, 16, 16) and weight.tolist() == [[1], [1], [1]]
@@ -199,8 +236,27 @@ def test_pose_items(shards):
     assert (meta["image"], meta["index"], meta["person"]) == ("000000", 0, 1)
 
 
+def test_joints_in_common_use_are_taken_unless_told_otherwise(shards):
+    assert PoseDataset(shards, size=(64, 64)).joint_names == KeypointDataset(shards).joint_names == ["left_wrist", "right_wrist"]
+    sources = [shards.labels(index)["persons"]["joints_source"][row, 2].tolist() for index, row in shards.persons]
+    annotated = [source != [-1, -1] for source in sources]
+    assert shards.annotated(["right hand"]).tolist() == annotated and len(set(annotated)) == 2
+    assert PoseDataset(shards, joints=["right hand"], size=(64, 64)).persons.tolist() == shards.persons[annotated].tolist()
+    assert len(PoseDataset(shards[1:2])) == 0
+
+
+def test_persons_are_counted_without_reading_each(shards, monkeypatch):
+    monkeypatch.setattr(Shards, "sample", None)
+    assert len(PoseDataset(shards)) == 3
+
+
+def test_a_wide_crop_is_filled_by_its_width(shards):
+    meta = PoseDataset(shards, size=(32, 64), joints=JOINTS)[1][3]
+    np.testing.assert_allclose(meta["joints"][0], [32 + (1.5 - 2.75) * 64 / 175, 16 + (1.75 - 2.25) * 64 / 175, 0])
+
+
 def test_a_person_without_a_scale_has_that_of_its_joints(shards):
-    meta = PoseDataset(shards, size=(64, 64))[0][3]  # joints 1.5, 1.75 and 2.25, 2.875
+    meta = PoseDataset(shards, size=(64, 64), joints=JOINTS)[0][3]  # joints 1.5, 1.75 and 2.25, 2.875
     np.testing.assert_allclose(meta["center"], [1.875, 2.3125])
     np.testing.assert_allclose(meta["scale"], 1.25 * 1.125 / 200)
     assert meta["joints_vis"].tolist() == [[1, 1, 0], [1, 1, 0], [0, 0, 0]]
@@ -208,7 +264,7 @@ def test_a_person_without_a_scale_has_that_of_its_joints(shards):
 
 def test_varied_poses_still_lead_back(shards):
     torch.manual_seed(3)
-    persons = PoseDataset(shards, size=(64, 48), augmentation=PoseAugmentation(rotated=1))
+    persons = PoseDataset(shards, size=(64, 48), joints=JOINTS, augmentation=PoseAugmentation(rotated=1))
     flips = set()
     for _ in range(12):
         meta = persons[1][3]
@@ -233,9 +289,9 @@ def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
     transforms = pytest.importorskip("utils.transforms")
     from eventgan_shards.torch import _crop
     joints_dataset = pytest.importorskip("dataset.JointsDataset")
-    for center, scale, rotation in (((100, 80), 0.7, 0), ((31.5, 47.25), 1.3, -40), ((0, 0), 2.0, 75)):
-        np.testing.assert_allclose(_crop(np.array(center, float), scale, rotation, 256, 256),
-                                   transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation, [256, 256]), atol=1e-3)
+    for center, scale, rotation, (width, height) in (((100, 80), 0.7, 0, (256, 256)), ((31.5, 47.25), 1.3, -40, (192, 256)), ((0, 0), 2.0, 75, (256, 192))):
+        expected = transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation, [width, height])
+        np.testing.assert_allclose(_crop(np.array(center, float), scale, rotation, height, width), expected, atol=1e-3)
     theirs = joints_dataset.JointsDataset.__new__(joints_dataset.JointsDataset)
     theirs.num_joints, theirs.target_type, theirs.sigma = 4, "gaussian", 2
     theirs.image_size, theirs.heatmap_size = np.array([256, 256]), np.array([64, 64])
@@ -273,7 +329,7 @@ def test_the_first_convolution_is_exchanged():
 def test_loaders_with_workers(shards, start):
     loader = DataLoader(DetectionDataset(shards), batch_size=2, num_workers=2, multiprocessing_context=start, collate_fn=collate_yolo)
     assert [ids for _, _, ids in loader] == [["000000", "000001"], ["000003", "000004"]]
-    poses = DataLoader(PoseDataset(shards, size=(32, 32)), batch_size=3, num_workers=1, multiprocessing_context=start)
+    poses = DataLoader(PoseDataset(shards, size=(32, 32), joints=JOINTS), batch_size=3, num_workers=1, multiprocessing_context=start)
     input, target, weight, meta = next(iter(poses))
     assert input.shape == (3, 4, 32, 32) and target.shape == (3, 3, 8, 8) and meta["image"] == ["000000", "000000", "000004"]
     assert meta["to_source"].shape == (3, 2, 3)
