@@ -153,8 +153,8 @@ class Shards(Sequence):
         return {**sample, "valid": valid, "shard": str(path), "slot": slot}
 
     def column(self, name: str) -> np.ndarray:
-        """[len(self), ...]: a column of /pairs (or "gap") of every sample, read without volumes or boxes. Samples of shards that do not
-        have it, since none of theirs has such a thing, get "", NaN or -1; a column that no shard has is a ValueError."""
+        """[len(self), ...]: a column of /pairs (or "gap") of every sample, read without volumes or boxes. Samples of shards that
+        do not have it, since none of theirs has such a thing, get "", NaN or -1; a column that no shard has is a ValueError."""
         name = "pairs/" + {"gap": "gap_frames"}.get(name, name)
         like = next((file.column(name) for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
         if like is None:
@@ -200,8 +200,8 @@ class Shards(Sequence):
 
     def groups(self, by: str = "sequence") -> np.ndarray:
         """str [len(self)]: what each sample must not be parted from. "sequence": Human3.6M's take (subject and action, whatever the
-        camera), else the drive, else the sequence, else the labelled frame, as far as each sample's is known. "sample_id": the labelled
-        frame. Any other column: its value, or as "sequence" for samples without."""
+        camera), else the drive, else the sequence, else the labelled frame, as far as each sample's is known. "sample_id": the
+        labelled frame. Any other column: its value, or as "sequence" for samples without."""
         frames = np.array([_frame_of(name) for name in self.column("sample_id")], object)
         if by == "sample_id":
             return frames
@@ -216,8 +216,8 @@ class Shards(Sequence):
         return np.where(values != "", values, recordings)
 
     def divide(self, fraction: float, by: str = "sequence", seed: int = 0) -> tuple[Shards, Shards]:
-        """Two parts, the first of about `fraction` of the samples, that share none of `groups(by)`: no drive, no subject, no labelled
-        frame is in both. Which groups are in the first is a function of seed and their names."""
+        """Two parts, the first of about `fraction` of the samples, that share none of `groups(by)`: no drive, no subject, no
+        labelled frame is in both. Which groups are in the first is a function of seed and their names."""
         if not 0 < fraction < 1:
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
         names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
@@ -252,11 +252,6 @@ class Shards(Sequence):
         sets = ([name for name in file.names("labels/poses", "joint_aliases") if name] or file.names("labels/poses", "joint_names") for file in files)
         return next(filter(None, sets), [])
 
-    def joint_sets(self) -> list[tuple[str, ...]]:
-        """The different lists of joint names that occur, in the order the shards have them."""
-        files = (self._files[self.paths[number]] for number in np.unique(self._shard))
-        return [names for names in dict.fromkeys(tuple(file.names("labels/poses", "joint_names")) for file in files) if names]
-
     def class_names(self, index: int) -> list[str]:
         """What the class ids of sample `index` mean, the same for a whole source."""
         return self._files[self._place(index)[0]].names("labels/boxes/class_id", "class_names")
@@ -275,7 +270,7 @@ class Shards(Sequence):
             raise IndexError(f"expected a sample of {len(self)}, got number {index}, in {self._described_as}")
         return self.paths[self._shard[index]], int(self._slot[index])
 
-    def _keep(self, chosen) -> None:
+    def _keep(self, chosen: slice | Sequence[int] | np.ndarray) -> None:
         if not isinstance(chosen, slice):
             chosen = np.asarray(chosen)
             if chosen.dtype != bool:
@@ -288,7 +283,8 @@ class Shards(Sequence):
     def _have(self, column: str) -> bool:
         return any(self._files[path].has("pairs/" + column) for path in self.paths)
 
-    def _gathered(self, of_shard: Callable[[_OpenShard], np.ndarray], shard: np.ndarray | None = None, rows: np.ndarray | None = None) -> np.ndarray:
+    def _gathered(self, of_shard: Callable[[_OpenShard], np.ndarray], shard: np.ndarray | None = None,
+                  rows: np.ndarray | None = None) -> np.ndarray:
         """[n, ...]: what `of_shard` gives of a shard, [its rows, ...], for rows [n] of shards [n]; None: for the samples here."""
         shard, rows = (self._shard, self._slot) if shard is None else (shard, rows)
         if not len(shard):
@@ -336,7 +332,8 @@ class Shards(Sequence):
     def _require_known(self, values: Iterable[Any], known: set, what: str, source: str) -> None:
         unknown = [value for value in values if value not in known]
         if unknown:
-            raise ValueError(f"expected {what} of {self._described_as}, got {len(unknown)} that it does not have ({_first(map(repr, unknown))}), in {source}")
+            raise ValueError(f"expected {what} of {self._described_as}, got {len(unknown)} that it does not have "
+                             f"({_first(map(repr, unknown))}), in {source}")
 
 
 class _Kept:

@@ -420,7 +420,8 @@ class PoseDataset(Dataset):
 
 
 def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width: int) -> np.ndarray:
-    """[2, 3], volume → input: 200 x scale px around `center` fill the width; the centre comes to (W / 2, H / 2), as in Simple Baselines' get_affine_transform."""
+    """[2, 3], volume → input: 200 x scale px around `center` fill the width; the centre comes to (W / 2, H / 2), as in Simple
+    Baselines' get_affine_transform."""
     turn = math.radians(rotation)
     zoom = width / (200 * scale)
     linear = zoom * np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])

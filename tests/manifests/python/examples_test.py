@@ -3,6 +3,7 @@
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import sys
 import time
@@ -68,7 +69,7 @@ def assert_trained(out, steps, pictures):
 def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     options = ["--dataset", "kitti_object", "--batch", "2", "--scale", "0.5", "--regions", "16", "--every", "9"]
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
-    assert "10 samples to learn, 2 to check, of another sample_id" in said and "(untrained)" in said
+    assert "10 samples to learn, 2 to check, of another sequence" in said and "(untrained)" in said
     assert "goes on after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
     assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
@@ -84,7 +85,7 @@ def test_keypoint_rcnn_learns(data, tmp_path):
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
-    trainer = need_trainer("pose_resnet", "easydict", "json_tricks", "scipy", "yaml")
+    trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "json_tricks", "scipy", "yaml"), tmp_path / "trainer")  # nothing beside it
     options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4, 6], pictures=1)
@@ -98,7 +99,7 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
 
 
 def test_yolov3_learns(data, tmp_path):
-    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
+    trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
     train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2", "--batch", "2", "--scale", "1",
           "--every", "9", "--classes", "Car,Van")
     assert_trained(tmp_path / "out", [0, 2], pictures=2)
@@ -112,5 +113,8 @@ def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     assert f"got no {tmp_path / 'dataset.json'}" in said and "Traceback" not in said
     said = train("train_torchvision", data, tmp_path / "out", "--dataset", "kitti_raw", expect=1)
     assert "kitti_raw" in said and "Traceback" not in said
+    for limit in ("--epochs", "--steps", "--minutes", "--every"):
+        said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)
+        assert f"expected {limit} " in said and "got 0" in said
     said = train("train_pose", data, tmp_path / "out", "--trainer", tmp_path, expect=1)
     assert f"expected the trainer's lib/models, got none, in {tmp_path}" in said

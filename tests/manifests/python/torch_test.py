@@ -284,7 +284,6 @@ def test_heatmaps():
 
 @pytest.mark.skipif(not TRAINERS.is_dir(), reason="no ../shared/trainers")
 def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
-    monkeypatch.syspath_prepend(str(TRAINERS / "stubs"))
     monkeypatch.syspath_prepend(str(TRAINERS / "pose_resnet" / "lib"))
     transforms = pytest.importorskip("utils.transforms")
     from eventgan_shards.torch import _crop
