@@ -72,8 +72,8 @@ struct PairSpec {
 struct SelectionSpec {
   std::optional<std::string> ids;  ///< a text file, as written in the manifest: a sample_id a line
   std::vector<std::string> subjects, cameras, actions;  ///< human36m: one of these; empty: any
-  /// Sequences (frames without one: each by its sample_id) whose number in [0, 1), which the seed
-  /// gives them, lies in [first, last): [0, 0.8] and [0.8, 1] share no sequence.
+  /// Sequences (human36m: subject and action; frames without: sample_id) whose number in [0, 1),
+  /// which the seed gives them, lies in [first, last): [0, 0.8] and [0.8, 1] share no sequence.
   std::array<double, 2> fraction{0, 1};
 };
 
