@@ -72,9 +72,10 @@ TEST(TrialJob, HasTheConfigurationsKeysAndAllOthersOfTheManifest) {
   EXPECT_EQ(trial.manifest.directory, manifest.directory);
   EXPECT_THAT(
       trial.lines,
-      ElementsAre(R"("image": {"width":51,"height":20,"fit":"crop","preset":"kitti"})",
-                  R"("generator": {"weights":"shipped:8","engine":"torch","precision":"int8"})",
-                  R"("output": {"directory":"out","deflate_level":3,"dtype":"uint8"})"));
+      ElementsAre(
+          R"("image": {"width":51,"height":20,"fit":"crop","preset":"kitti"})",
+          R"("generator": {"weights":"shipped:8","engine":"torch","precision":"int8","scope":"whole"})",
+          R"("output": {"directory":"out","deflate_level":3,"dtype":"uint8"})"));
 }
 
 TEST(TrialJob, OfSizeOneLeavesTheImageAlone) {
