@@ -38,7 +38,8 @@ class Tradeoff(program.InFolder):
         self.assertEqual(len(names), len(set(names)))
         # Untrained weights have no calibration; the shipped ones run in int8 where the processor does.
         self.assertIn("untrained:2 int8 x0.75", left_out)
-        self.assertEqual(len(names) + 2 * len(left_out), 2 * 2 * (2 * 2 + 1))
+        # Stored types x sizes x (weights x precisions x scopes, and a simulator).
+        self.assertEqual(len(names) + 2 * len(left_out), 2 * 2 * (2 * 2 * 3 + 1))
         for name in names:
             self.assertIn(name, text)
         for reason in left_out.values():
