@@ -144,11 +144,7 @@ class CocoExporter : public Exporter {
   /// `take(category, box, is_crowd)`; `leave(why)`.
   template <class Take, class Leave>
   void for_each_box(const OutgoingSample& sample, Take take, Leave leave) const {
-    const std::vector<Box>& boxes = sample.labels.annotation.boxes;
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-      const VolumeBox& box = sample.labels.labels.boxes[i];
-      const std::string& name =
-          sample.source.class_names.at(static_cast<std::size_t>(boxes[i].class_id));
+    for_each_class_box(sample, [&](const VolumeBox& box, const std::string& name) {
       const ClassNumbers::Entry entry = numbers_.of(name);
       if (is_empty(box.clipped)) {
         leave("boxes of which nothing is left in the volume");
@@ -162,7 +158,7 @@ class CocoExporter : public Exporter {
       } else {
         leave("boxes of class " + name);
       }
-    }
+    });
   }
 
   /// The joints' names of each category of persons.

@@ -105,6 +105,16 @@ void write_picture_pair(const OutgoingSample& sample, const std::string& folder,
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
 
+/// Calls visit(VolumeBox, name of its class) for each box of a sample.
+template <class Visit>
+void for_each_class_box(const OutgoingSample& sample, Visit&& visit) {
+  const std::vector<Box>& boxes = sample.labels.annotation.boxes;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    visit(sample.labels.labels.boxes[i],
+          sample.source.class_names.at(static_cast<std::size_t>(boxes[i].class_id)));
+  }
+}
+
 /// values [channel, pixel] as [pixel, channel].
 template <class Value>
 std::vector<Value> channels_last(const std::vector<Value>& values, std::size_t channels) {

@@ -77,11 +77,7 @@ class YoloExporter : public Exporter {
  private:
   template <class Take, class Leave>
   void for_each_box(const OutgoingSample& sample, Take take, Leave leave) const {
-    const std::vector<Box>& boxes = sample.labels.annotation.boxes;
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
-      const VolumeBox& box = sample.labels.labels.boxes[i];
-      const std::string& name =
-          sample.source.class_names.at(static_cast<std::size_t>(boxes[i].class_id));
+    for_each_class_box(sample, [&](const VolumeBox& box, const std::string& name) {
       const ClassNumbers::Entry entry = numbers_.of(name);
       if (is_empty(box.clipped)) {
         leave("boxes of which nothing is left in the volume");
@@ -96,7 +92,7 @@ class YoloExporter : public Exporter {
       } else {
         take(entry.number, box.clipped);
       }
-    }
+    });
   }
 
   std::string labels_of(const OutgoingSample& sample) const {

@@ -242,8 +242,7 @@ void NetworkPlan::run_decoder_tiles(const EngineRun& run, const TiledLayers& lay
   };
   decoder.compute_edges(run, small);
   if (level == 0) {
-    decoder.compute_pixels(run, layers.first_decoder.front(), work.first_decoder, small, skip,
-                           store);
+    decoder.compute_pixels(run, *layers.first_decoder, work.first_decoder, small, skip, store);
     return;
   }
   for (const TilePlace place : work.decoders[level - 1]) {

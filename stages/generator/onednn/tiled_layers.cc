@@ -258,7 +258,7 @@ TiledLayers::TiledLayers(NetworkLayers& layers) {
     setup.add_target = layers.residual_factor(block);
     bottom.emplace_back(layers, name + ".conv2", setup, kPixelsAtOnce, layout);
   }
-  first_decoder.emplace_back(layers, 0, layout);
+  first_decoder.emplace(layers, 0, layout);
   for (int level = 1; level < kNetworkLevels; ++level) {
     decoders.emplace_back(layers, level, kDecoderPhases[static_cast<std::size_t>(level - 1)],
                           layout);

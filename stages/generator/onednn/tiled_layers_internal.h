@@ -167,10 +167,10 @@ struct TiledLayers {
   float* decoded(std::byte* block) const { return reinterpret_cast<float*>(block + decoded_); }
 
   BufferLayout layout;
-  std::vector<EncoderTile> encoders;       ///< kTiledEncoders
-  std::list<PixelConvolution> bottom;      ///< kBottomLayers: the last encoder, residual blocks
-  std::list<DecoderPixels> first_decoder;  ///< one
-  std::vector<DecoderTile> decoders;       ///< kTiledDecoders, the finest last
+  std::vector<EncoderTile> encoders;   ///< kTiledEncoders
+  std::list<PixelConvolution> bottom;  ///< kBottomLayers: the last encoder, residual blocks
+  std::optional<DecoderPixels> first_decoder;
+  std::vector<DecoderTile> decoders;  ///< kTiledDecoders, the finest last
 
  private:
   std::optional<FusedConvolution> prediction_;
