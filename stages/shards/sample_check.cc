@@ -180,6 +180,22 @@ Found look_at(std::span<const float> volume) {
   return found;
 }
 
+/// Whether a value lies in a tile that the sample says was not generated.
+bool has_values_outside_tiles(const ShardHeader& header, const ShardSample& sample,
+                              std::span<const float> volume) {
+  const int columns = tile_grid(header).width;
+  const auto [height, width] = header.volume.size;
+  const float* row = volume.data();
+  for (int y = 0; y < header.volume.channels() * height; ++y, row += width) {
+    const std::uint8_t* tiles =
+        &sample.tiles[static_cast<std::size_t>(y % height / header.tile_px) * columns];
+    for (int x = 0; x < width; ++x) {
+      if (row[x] != 0 && tiles[x / header.tile_px] == 0) return true;
+    }
+  }
+  return false;
+}
+
 /// How far a stored value can lie from the generated one: relative (and as much again for the
 /// statistics' own rounding) and absolute.
 struct Error {
@@ -213,6 +229,10 @@ std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSa
   if (!sample.valid) {
     if (found.nonzero == 0) return std::nullopt;
     return "expected zeros for a quarantined sample, got other values";
+  }
+
+  if (header.tile_px > 0 && has_values_outside_tiles(header, sample, volume)) {
+    return "expected zeros outside the tiles that were generated, got other values";
   }
 
   const VolumeStatistics& recorded = sample.statistics;

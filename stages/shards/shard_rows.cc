@@ -199,6 +199,10 @@ void append_row(const ShardHeader& header, const ShardSample& sample, ShardTable
   append_events(sample, tables.events);
   tables.events.tiles.insert(tables.events.tiles.end(), sample.tiles.begin(), sample.tiles.end());
   tables.events.tiles.resize(tiles * (row + 1));  // a quarantined sample has none
+  if (tiles > 0) {
+    const double fraction = sample.valid ? generated_fraction(sample) : 0;
+    tables.events.generated_fraction.push_back(static_cast<float>(fraction));
+  }
   append_pair(header, sample, tables.pairs);
   tables.original.emplace_back(sample.annotation.original.begin(),
                                sample.annotation.original.end());

@@ -15,6 +15,7 @@
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/events.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 
@@ -177,6 +178,8 @@ std::string describe_sample(const ShardReader& reader, int slot) {
     line("volume", "largest {:g}, 98th percentile {:g}, non-zero {:g} %, sums +{:g} -{:g}",
          statistics.max, statistics.eta98, 100 * statistics.nonzero_fraction,
          statistics.sum_positive, statistics.sum_negative);
+    if (!sample.tiles.empty())
+      line("generated", "{:.3g} % of its tiles", 100 * generated_fraction(sample));
     if (statistics.flags != 0) line.add("flags", joined(flag_names(statistics.flags)));
   }
   line("original", "{} bytes", sample.annotation.original.size());
@@ -334,6 +337,7 @@ std::string sample_json(const ShardReader& reader, int slot) {
                  {"nonzero_fraction", statistics.nonzero_fraction},
                  {"sum_positive", statistics.sum_positive},
                  {"sum_negative", statistics.sum_negative},
+                 {"generated_fraction", generated_fraction(sample)},
                  {"flags", flag_names(statistics.flags)}}},
                {"original", sample.annotation.original},
                {"boxes", boxes},

@@ -1,5 +1,6 @@
 #include "stages/shards/shard_tables.h"
 
+#include <algorithm>
 #include <cstddef>
 #include <utility>
 
@@ -21,6 +22,12 @@ ImageSize tile_grid(const ShardHeader& header) {
   if (side == 0) return {};
   const ImageSize size = header.volume.size;
   return {(size.height + side - 1) / side, (size.width + side - 1) / side};
+}
+
+double generated_fraction(const ShardSample& sample) {
+  if (sample.tiles.empty()) return 1;
+  const auto generated = std::count(sample.tiles.begin(), sample.tiles.end(), 1);
+  return static_cast<double>(generated) / static_cast<double>(sample.tiles.size());
 }
 
 ShardContents contents_of(const ShardTables& tables, const ShardHeader& header) {

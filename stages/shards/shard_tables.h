@@ -20,7 +20,8 @@ struct EventColumns {
   std::vector<float> nonzero_fraction, max;
   std::vector<double> sum_positive, sum_negative;
   std::vector<std::uint32_t> flags;
-  std::vector<std::uint8_t> tiles;  ///< empty if whole volumes are generated
+  std::vector<std::uint8_t> tiles;  ///< this and the next: empty if whole volumes are generated
+  std::vector<float> generated_fraction;
 };
 
 /// `/pairs/*`, one row a sample. The last two lines are empty as long as no sample has such a
@@ -79,6 +80,9 @@ struct ShardTables {
 /// Rows and columns of ShardSample::tiles; {0, 0} if there are none.
 ImageSize tile_grid(const ShardHeader& header);
 
+/// Share of a sample's tiles that are generated, 0..1; 1 if it has none.
+double generated_fraction(const ShardSample& sample);
+
 /// What a column has one row for. kOffsets: one more row than samples.
 enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
 
@@ -110,6 +114,8 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
                    {static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)},
                    true},
         e.tiles);
+  visit(ColumnSpec{"/events/statistics/generated_fraction", Rows::kSamples, {}, true},
+        e.generated_fraction);
 
   auto& p = tables.pairs;
   visit(ColumnSpec{"/pairs/sample_id", Rows::kSamples, {}}, p.sample_id);

@@ -126,6 +126,15 @@ TEST_F(ShardCheck, AVolumeThatVanishedInFloat16IsSoundIfMarked) {
   EXPECT_THAT(faults(), Contains(HasSubstr("the flag \"vanished\"")));
 }
 
+TEST_F(ShardCheck, AValueOutsideTheGeneratedTilesIsAFault) {
+  write(testing::example_shard(StoredType::kFloat16));
+  std::vector<std::uint8_t> tiles(5 * 4, 1);
+  tiles[1] = 0;  // of sample 0: rows 0-3, columns 4-7
+  overwrite("/events/tiles", H5T_NATIVE_UINT8, tiles);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("zeros outside the tiles"),
+                                          HasSubstr("(sample 0, 000000)"))));
+}
+
 TEST_F(ShardCheck, NormalizedVolumesAreSound) {
   testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
   example.header.normalization = Normalization::kEta98;

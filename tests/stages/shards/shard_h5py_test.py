@@ -23,6 +23,12 @@ class ShardInH5py(unittest.TestCase):
         self.addCleanup(file.close)
         return file
 
+    def test_tiles_and_their_share(self):
+        events = self.open("float16-1")["events"]
+        share = events["tiles"][:].mean(axis=(1, 2))
+        np.testing.assert_array_equal(share, [0.75, 0.75, 0, 0.75, 0.75])  # the third is quarantined
+        np.testing.assert_array_equal(events["statistics/generated_fraction"][:], share)
+
     def test_volumes_of_every_type_and_level(self):
         # Half a unit in the last of float16's 11 bits; half a step of uint8.
         tolerances = {"float32": lambda v, s: 0 * v, "float16": lambda v, s: v * 2.0**-11,

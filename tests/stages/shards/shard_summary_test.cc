@@ -40,10 +40,11 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
   EXPECT_EQ(marker.contents.gaps, gaps);
   EXPECT_THAT(
       marker.contents.optional_columns,
-      ElementsAre("/events/tiles", "/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject",
-                  "/pairs/action", "/pairs/camera", "/pairs/drive", "/labels/projection",
-                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
-                  "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
+      ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
+                  "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
+                  "/pairs/drive", "/labels/projection", "/labels/projection_source",
+                  "/labels/boxes/difficulty", "/labels/poses/box", "/labels/poses/box_source",
+                  "/labels/poses/joints3d_mm", "/labels/poses/camera",
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
@@ -106,6 +107,7 @@ TEST_F(ShardSummary, TextSaysWhatIsInASample) {
   EXPECT_THAT(first, HasSubstr("DontCare [0 0 0.5 0.5], source [0 0 1 1], ignore\n"));
   EXPECT_THAT(first, HasSubstr("nose (1.5 1.75), visible\n"));
   EXPECT_THAT(first, HasSubstr("0.2 s"));
+  EXPECT_THAT(first, HasSubstr("75 % of its tiles"));  // 3 of 4
   EXPECT_THAT(describe_sample(reader_, 1), Not(HasSubstr("nan")));
   EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
   EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
