@@ -130,7 +130,8 @@ std::string libraries(bool with_videos) {
   std::string text = "HDF5 " + hdf5_version() + ", zlib " + zlibVersion() + ", OpenCV " +
                      cv::getVersionString() + ", libpng " + png_get_libpng_ver(nullptr) + ", " +
                      loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
-                     loaded_library("libwebp") + ", " + loaded_library("libtiff");
+                     loaded_library("libisal") + ", " + loaded_library("libwebp") + ", " +
+                     loaded_library("libtiff");
   // Those of FFmpeg's libraries that decode, and make colours of it.
   if (with_videos)
     text += ", " + loaded_library("libavcodec") + ", " + loaded_library("libswscale");
@@ -151,6 +152,7 @@ std::string instruction_sets() {
   std::string sets = "x86-64";
 #if defined(__x86_64__)
   __builtin_cpu_init();
+  if (__builtin_cpu_supports("sse4.2")) sets += " sse4.2";
   if (__builtin_cpu_supports("avx2")) sets += " avx2";
   if (__builtin_cpu_supports("fma")) sets += " fma";
   if (__builtin_cpu_supports("avx512f")) sets += " avx512f";

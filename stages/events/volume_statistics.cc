@@ -5,9 +5,12 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <functional>
 #include <limits>
 #include <stdexcept>
+
+#include "stages/base/processor_clones.h"
 
 namespace eventgan {
 namespace {
@@ -17,9 +20,6 @@ namespace {
 constexpr std::size_t kLanes = 16;
 constexpr std::size_t kRows = 16;
 constexpr std::size_t kBlock = kLanes * kRows;
-
-template <class T>
-using Lanes = std::array<T, kLanes>;
 
 /// Calls work(number of the block, its values); the last block is filled up with zeros.
 template <class Work>
@@ -31,14 +31,6 @@ void for_each_block(std::span<const float> values, Work work) {
   std::array<float, kBlock> last{};
   std::copy(rest.begin(), rest.end(), last.begin());
   work(whole, last.data());
-}
-
-/// Calls step(value, lane) row by row.
-template <class Step>
-void for_each_value(const float* block, Step step) {
-  for (std::size_t row = 0; row < kRows; ++row) {
-    for (std::size_t lane = 0; lane < kLanes; ++lane) step(block[row * kLanes + lane], lane);
-  }
 }
 
 /// A bound that at least `k` of the maxima reach, if so many are not zero; else 0. All that is
@@ -78,28 +70,56 @@ std::vector<float> values_from(std::span<const ValueScan> scans, float bound) {
 
 }  // namespace
 
+namespace {
+
+/// A row of a block; GCC's and Clang's vectors, since loops over lanes that keep maximum and
+/// minimum do not become vector instructions by themselves.
+typedef float Row __attribute__((vector_size(kLanes * sizeof(float))));
+typedef double DoubleRow __attribute__((vector_size(kLanes * sizeof(double))));
+typedef std::int32_t CountRow __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+
+struct LaneScan {
+  Row max{}, min{};
+  DoubleRow sum{};
+  CountRow nonzero{};
+};
+
+EVENTGAN_CLONES void scan_lanes(std::span<const float> values, LaneScan& lanes,
+                                float* group_maxima) {
+  LaneScan found;
+  for_each_block(values, [&](std::size_t block, const float* numbers) {
+    Row maxima{};
+    for (std::size_t row = 0; row < kRows; ++row) {
+      Row value;
+      std::memcpy(&value, numbers + row * kLanes, sizeof value);
+      maxima = value > maxima ? value : maxima;
+      found.min = value < found.min ? value : found.min;
+      found.sum += __builtin_convertvector(value, DoubleRow);
+      found.nonzero -= value != 0;  // true is -1
+    }
+    found.max = maxima > found.max ? maxima : found.max;
+    std::memcpy(group_maxima + block * kLanes, &maxima, sizeof maxima);
+  });
+  lanes = found;
+}
+
+}  // namespace
+
 ValueScan scan_values(std::span<const float> values) {
   ValueScan scan;
   scan.values = values;
   scan.group_maxima.resize((values.size() + kBlock - 1) / kBlock * kLanes);
-  Lanes<double> sums{};
-  Lanes<float> minima{};
-  Lanes<std::uint32_t> nonzero{};
-  for_each_block(values, [&](std::size_t block, const float* numbers) {
-    Lanes<float> maxima{};
-    for_each_value(numbers, [&](float value, std::size_t lane) {
-      maxima[lane] = value > maxima[lane] ? value : maxima[lane];
-      minima[lane] = value < minima[lane] ? value : minima[lane];
-    });
-    std::copy(maxima.begin(), maxima.end(), scan.group_maxima.begin() + block * kLanes);
-    for_each_value(numbers, [&](float value, std::size_t lane) { sums[lane] += value; });
-    for_each_value(numbers, [&](float value, std::size_t lane) { nonzero[lane] += value != 0.0f; });
-  });
-  for (const double sum : sums) scan.sum += sum;
-  for (const std::uint32_t count : nonzero) scan.nonzero += count;
-  for (const float maximum : scan.group_maxima) scan.max = std::max(scan.max, maximum);
+  LaneScan lanes;
+  scan_lanes(values, lanes, scan.group_maxima.data());
+  float min = 0;
+  for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    scan.sum += lanes.sum[lane];
+    scan.nonzero += static_cast<std::uint32_t>(lanes.nonzero[lane]);
+    scan.max = std::max(scan.max, lanes.max[lane]);
+    min = std::min(min, lanes.min[lane]);
+  }
   // NaN and infinity stay in a sum; floats that are finite cannot overflow one in double precision.
-  scan.sound = std::isfinite(scan.sum) && *std::min_element(minima.begin(), minima.end()) >= 0;
+  scan.sound = std::isfinite(scan.sum) && min >= 0;
   return scan;
 }
 

@@ -22,6 +22,7 @@ import numerics
 import pair_counts
 import picture_sizes
 import reading
+import scopes
 import stages
 import storage
 import threads
@@ -32,7 +33,8 @@ from measuring.picture import draw
 from measuring.report import markdown
 
 PARTS = {"engines": engines, "intra_op": intra_op, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
-         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading}
+         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading,
+         "scopes": scopes}
 
 
 def measure_parts(bench, names):

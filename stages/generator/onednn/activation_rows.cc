@@ -4,16 +4,8 @@
 #include <array>
 #include <bit>
 
+#include "stages/base/processor_clones.h"
 #include "stages/generator/weights.h"
-
-// Compiled for several processors, chosen when the program starts. A sanitizer is not set up yet
-// when that choice is made.
-#if defined(__x86_64__) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-#define EVENTGAN_CLONES \
-  __attribute__((target_clones("arch=x86-64-v4", "arch=x86-64-v3", "default")))
-#else
-#define EVENTGAN_CLONES
-#endif
 
 namespace eventgan {
 namespace {

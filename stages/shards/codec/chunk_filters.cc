@@ -1,13 +1,18 @@
 #include "stages/shards/codec/chunk_filters.h"
 
+#include <isa-l/igzip_lib.h>
 #include <libdeflate.h>
 
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <stdexcept>
+#include <string>
+
+#include "stages/base/processor_clones.h"
 
 namespace eventgan {
 namespace {
@@ -27,25 +32,50 @@ void split(std::span<const Number> numbers, std::byte* planes, std::size_t plane
 
 }  // namespace
 
-void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes,
-                       std::size_t plane_size) {
+EVENTGAN_CLONES void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes,
+                                       std::size_t plane_size) {
   split(numbers, planes, plane_size);
 }
 
-void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
-                       std::size_t plane_size) {
+EVENTGAN_CLONES void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
+                                       std::size_t plane_size) {
   split(numbers, planes, plane_size);
 }
 
 struct Deflater::Compressor {
-  explicit Compressor(int level) : library(libdeflate_alloc_compressor(level)) {
-    if (library == nullptr) throw std::bad_alloc();
+  explicit Compressor(int level) {
+    if (level == 1) {
+      isal_memory.resize(ISAL_DEF_LVL1_DEFAULT);
+    } else if (library = libdeflate_alloc_compressor(level); library == nullptr) {
+      throw std::bad_alloc();
+    }
   }
   ~Compressor() { libdeflate_free_compressor(library); }
   Compressor(const Compressor&) = delete;
   Compressor& operator=(const Compressor&) = delete;
 
-  libdeflate_compressor* library;
+  /// Both return the size of what they wrote; 0 if `room` did not do.
+  std::size_t with_isal(std::span<const std::byte> bytes, std::span<std::byte> room) {
+    isal_zstream stream;
+    isal_deflate_stateless_init(&stream);
+    stream.level = 1;
+    stream.level_buf = isal_memory.data();
+    stream.level_buf_size = static_cast<std::uint32_t>(isal_memory.size());
+    stream.gzip_flag = IGZIP_ZLIB;
+    stream.end_of_stream = 1;
+    // The library's interface is not const, but it only reads its input.
+    stream.next_in = reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(bytes.data()));
+    stream.avail_in = static_cast<std::uint32_t>(bytes.size());
+    stream.next_out = reinterpret_cast<std::uint8_t*>(room.data());
+    stream.avail_out = static_cast<std::uint32_t>(room.size());
+    return isal_deflate_stateless(&stream) == COMP_OK ? stream.total_out : 0;
+  }
+  std::size_t with_libdeflate(std::span<const std::byte> bytes, std::span<std::byte> room) {
+    return libdeflate_zlib_compress(library, bytes.data(), bytes.size(), room.data(), room.size());
+  }
+
+  libdeflate_compressor* library = nullptr;  ///< none at level 1
+  std::vector<std::uint8_t> isal_memory;     ///< at level 1
 };
 
 Deflater::Deflater(int level) : compressor_(std::make_unique<Compressor>(level)) {}
@@ -53,13 +83,20 @@ Deflater::Deflater(int level) : compressor_(std::make_unique<Compressor>(level))
 Deflater::~Deflater() = default;
 
 std::span<const std::byte> Deflater::deflate(std::span<const std::byte> bytes) {
-  const std::size_t bound = libdeflate_zlib_compress_bound(compressor_->library, bytes.size());
+  // For both libraries: at worst they store the bytes as they are.
+  const std::size_t bound = libdeflate_zlib_compress_bound(nullptr, bytes.size());
+  if (bound > std::numeric_limits<std::uint32_t>::max()) {
+    throw std::length_error("expected at most 4 GiB to compress, got " +
+                            std::to_string(bytes.size()) + " bytes");
+  }
   if (buffer_.size() < bound) buffer_.resize(bound);
   // Always the same room for the same input, however large the buffer has grown.
-  const std::size_t size = libdeflate_zlib_compress(compressor_->library, bytes.data(),
-                                                    bytes.size(), buffer_.data(), bound);
-  if (size == 0) throw std::logic_error("libdeflate broke its own bound");
-  return {buffer_.data(), size};
+  const std::span<std::byte> room(buffer_.data(), bound);
+  const std::size_t size = compressor_->library == nullptr
+                               ? compressor_->with_isal(bytes, room)
+                               : compressor_->with_libdeflate(bytes, room);
+  if (size == 0) throw std::logic_error("a compressor broke libdeflate's bound");
+  return room.first(size);
 }
 
 namespace {

@@ -18,9 +18,11 @@ void split_into_planes(std::span<const std::uint16_t> numbers, std::byte* planes
 void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes,
                        std::size_t plane_size);
 
-/// Compresses into zlib's format with libdeflate, again and again with the same memory. What comes
-/// out depends on the bytes and the level alone, not on what was compressed before. Thread safety:
-/// one thread at a time.
+/// Compresses into zlib's format, again and again with the same memory: at level 1 with ISA-L,
+/// three times as fast as libdeflate at its quickest and a few percent larger; above with
+/// libdeflate. What comes out depends on the bytes and the level alone, not on what was compressed
+/// before; ISA-L's also on whether the processor has SSE4.2 (its kernels for AVX2 and AVX-512 give
+/// the same bytes). Thread safety: one thread at a time.
 class Deflater {
  public:
   /// `level` 1..9. Throws std::bad_alloc.
@@ -29,7 +31,8 @@ class Deflater {
   Deflater(const Deflater&) = delete;
   Deflater& operator=(const Deflater&) = delete;
 
-  /// The compressed bytes; they stand until the next call.
+  /// The compressed bytes; they stand until the next call. At most 4 GiB, as a chunk of HDF5;
+  /// throws std::length_error for more.
   std::span<const std::byte> deflate(std::span<const std::byte> bytes);
 
  private:

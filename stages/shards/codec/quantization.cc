@@ -9,6 +9,7 @@
 #include <limits>
 #include <stdexcept>
 
+#include "stages/base/processor_clones.h"
 #include "stages/shards/codec/chunk_filters.h"
 
 #if defined(__x86_64__)
@@ -109,7 +110,7 @@ void quantize_blocks(std::span<const float> values, std::byte* planes, std::size
 
 /// Division, minimum and conversion become vector instructions; there is no multiplication that a
 /// compiler could contract with the addition, so every processor gives the same codes.
-void quantize_uint8(std::span<const float> values, float scale, std::byte* codes) {
+EVENTGAN_CLONES void quantize_uint8(std::span<const float> values, float scale, std::byte* codes) {
   const float* __restrict in = values.data();
   auto* __restrict out = reinterpret_cast<std::uint8_t*>(codes);
   for (std::size_t i = 0; i < values.size(); ++i) {

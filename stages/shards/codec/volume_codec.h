@@ -37,8 +37,8 @@ struct EncodedVolume {
   bool vanished = false;
 };
 
-/// Quantises and compresses volumes: type, then HDF5's filters shuffle, deflate (with libdeflate,
-/// in zlib's format) and fletcher32, applied here so that they run in parallel and outside HDF5's
+/// Quantises and compresses volumes: type, then HDF5's filters shuffle, deflate (zlib's format,
+/// chunk_filters.h) and fletcher32, applied here so that they run in parallel and outside HDF5's
 /// global lock. Any HDF5 reads the result with its own filters.
 ///
 /// uint8: scale = largest value / 255 (1 for an empty volume), code = round(value / scale), so
