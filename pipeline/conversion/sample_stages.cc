@@ -121,11 +121,24 @@ void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) c
   message.sample.annotation.persons.clear();
 }
 
+std::vector<float> SampleStages::take_volume(std::size_t value_count) const {
+  std::vector<float> volume;
+  {
+    const std::lock_guard lock(spare_volumes_mutex_);
+    if (!spare_volumes_.empty()) {
+      volume = std::move(spare_volumes_.back());
+      spare_volumes_.pop_back();
+    }
+  }
+  volume.resize(value_count);
+  return volume;
+}
+
 void SampleStages::generate(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
-  message.volume.resize(VolumeShape{generator_.bins(), prepared.content}.value_count());
+  message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
   const ScopeSpec& scope = manifest_.generator.scope;
   if (scope.scope == Scope::kWhole) {
     message.notes = generator_.generate(prepared.input, prepared.content, message.volume);
@@ -172,6 +185,10 @@ void SampleStages::finish(SampleMessage& message) const try {
   if (encoded.vanished) statistics.flags |= kFlagVanished;
   message.sample.scale = encoded.scale;
   message.chunk = std::move(encoded.chunk);
+  {
+    const std::lock_guard lock(spare_volumes_mutex_);
+    spare_volumes_.push_back(std::move(message.volume));
+  }
   message.volume = {};
   message.prepared = {};
 } catch (const std::bad_alloc&) {

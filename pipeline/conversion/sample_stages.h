@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -69,12 +70,17 @@ class SampleStages {
 
  private:
   void read_labels(SampleMessage& message, const Dataset& dataset) const;
+  /// A volume that went through `finish`, as large as that, to be overwritten; else a new one. A
+  /// new vector is set to zero first, which of a large volume costs as much as a stage of ours.
+  std::vector<float> take_volume(std::size_t value_count) const;
 
   const JobManifest& manifest_;
   const std::vector<std::unique_ptr<Dataset>>& datasets_;
   const Generator& generator_;
   PairReader reader_;
   VolumeCodec codec_;
+  mutable std::mutex spare_volumes_mutex_;
+  mutable std::vector<std::vector<float>> spare_volumes_;  ///< as many as were under way at once
 };
 
 }  // namespace eventgan

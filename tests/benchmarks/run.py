@@ -18,6 +18,7 @@ import time
 
 import engines
 import intra_op
+import layers
 import numerics
 import pair_counts
 import picture_sizes
@@ -32,7 +33,7 @@ from measuring.machine import description, processor_name
 from measuring.picture import draw
 from measuring.report import markdown
 
-PARTS = {"engines": engines, "intra_op": intra_op, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
+PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
          "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading,
          "scopes": scopes}
 

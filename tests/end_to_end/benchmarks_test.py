@@ -38,8 +38,9 @@ class Benchmarks(program.InFolder):
     def test_every_part_fills_its_tables(self):
         page = self.run_all(environment=DATASET_FREE)
         sections = sections_of(page)
-        self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Numbers at the extremes", "Stages",
-                                          "The whole conversion", "Against the picture's size", "Against the number of pairs", "Against threads", "Storage", "Reading"])
+        self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
+                                          "The whole conversion", "Against the picture's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
+                                          "Scope"])
         for title, rows in sections.items():
             with self.subTest(title):
                 self.assertGreater(len(rows), 1)
