@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <span>
 
+#include "stages/base/archives/cdf_matrix.h"
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/safetensors.h"
@@ -23,8 +24,8 @@ class FuzzCorpus : public ::testing::TestWithParam<Reader> {};
 INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus,
                          ::testing::Values(testing::read_checkpoint_input,
                                            testing::read_zip_pickle_input,
-                                           testing::read_safetensors_input,
-                                           testing::read_mat_input));
+                                           testing::read_safetensors_input, testing::read_mat_input,
+                                           testing::read_cdf_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const testing::TemporaryFolder folder;
@@ -55,6 +56,12 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
     EXPECT_EQ(
         mat_to_json(release.array).dump(),
         R"({"annolist":[{"name":"a.jpg","x":[1,2.5]},{"name":"b","x":[]}],"img_train":[true,false]})")
+        << name;
+  }
+  for (const char* name : {"plain", "big_endian", "packed_values", "packed_file"}) {
+    const TypedArray pose = read_cdf_matrix(corpus / "cdf" / name, "Pose");
+    EXPECT_EQ(pose.shape, (std::vector<std::size_t>{2, 3})) << name;
+    EXPECT_EQ(std::get<std::vector<float>>(pose.values), (std::vector<float>{0, 1, 2, 3, 4, 5}))
         << name;
   }
 }

@@ -1,4 +1,5 @@
-"""Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, small weights files, small MATLAB files.
+"""Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, small weights files, small MATLAB and
+CDF files.
 
     python3 tests/fuzz/make_corpus.py tests/fuzz/corpus
 
@@ -7,6 +8,7 @@ stand inputs that the fuzzer made of them to reach other branches of the readers
 """
 
 import collections
+import gzip
 import io
 import json
 import pathlib
@@ -163,6 +165,39 @@ class Mat:
         return self.numbers(15, len(stream)) + stream
 
 
+class Cdf:
+    """CDF files, version 3: records of size, type and fields, which tell where others lie."""
+
+    VARIABLE, VALUES = 432, 792
+
+    def __init__(self, encoding=6, row_major=True, packs_values=False, packs_file=False):
+        self.encoding, self.row_major, self.packs_values, self.packs_file = encoding, row_major, packs_values, packs_file
+
+    @staticmethod
+    def record(kind, fields, *values, tail=b""):
+        body = struct.pack(">" + fields, *values) + tail
+        return struct.pack(">QI", 12 + len(body), kind) + body
+
+    def file(self, rows=2, columns=3, following=0):
+        numbers = struct.pack("<6f" if self.encoding == 6 else ">6f", *(range(6) if self.row_major else (0, 3, 1, 4, 2, 5)))
+        packed = gzip.compress(numbers, mtime=0)
+        values = self.record(13, "IQ", 0, len(packed), tail=packed) if self.packs_values else self.record(7, "", tail=numbers)
+        index = self.VALUES + len(values)
+        compression = self.record(11, "4I", 5, 0, 1, 6)
+        records = b"".join([
+            self.record(1, "QIIIIIIIIi256x", 320, 3, 9, self.encoding, 2 + self.row_major, 0, 0, 0, 2, -1),
+            self.record(2, "QQQQIIiIIQIIi", 0, self.VARIABLE, 0, index + 44, 0, 0, -1, 0, 1, 0, 0, 20170101, -1),
+            compression,
+            self.record(8, "QIIQQIIIiiIIQI256sIIIii", following, 21, 0, index, index, 5 if self.packs_values else 1, 0, 0, -1, -1, 1,
+                        0, 404, 1, b"Pose", 2, rows, columns, -1, -1),
+            values, self.record(6, "QIIIIQ", 0, 1, 1, 0, 0, self.VALUES)])
+        if not self.packs_file:
+            return struct.pack(">II", 0xCDF30001, 0xFFFF) + records
+        packed = gzip.compress(records, mtime=0)
+        whole = self.record(10, "QQI", 40 + len(packed), len(records), 0, tail=packed)
+        return struct.pack(">II", 0xCDF30001, 0xCCCC0001) + whole + compression
+
+
 def main(folder):
     mat = Mat()
     values = checkpoint()
@@ -195,6 +230,12 @@ def main(folder):
             7, [1, 1], mat.element(7, bytes(4))) + mat.array(15, [1, 1], mat.element(13, b"\xff" * 8)) + mat.array(
                 4, [2, 2], mat.element(17, "abcd".encode("utf-16-le"))) + mat.array(5, [1, 1], b""), b"annolist_keyframes")),
         "mat/huge": mat.file(mat.array(6, [0x7fffffff, 1], mat.numbers(9, 0xfffffff8), b"RELEASE")),
+        "cdf/plain": Cdf().file(),
+        "cdf/big_endian": Cdf(encoding=1, row_major=False).file(),
+        "cdf/packed_values": Cdf(packs_values=True).file(),
+        "cdf/packed_file": Cdf(packs_file=True).file(),
+        "cdf/huge": Cdf(packs_values=True).file(rows=0x7FFFFFFF),
+        "cdf/bomb": Cdf(packs_file=True).file()[:28] + struct.pack(">Q", 1 << 40) + Cdf(packs_file=True).file()[36:],
         "mat/bomb": mat.file(mat.compressed(mat.numbers(14, 1 << 20) + bytes(1 << 20))),
     }
     for name, content in seeds.items():

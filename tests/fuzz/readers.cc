@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
+#include "stages/base/archives/cdf_matrix.h"
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
@@ -82,6 +83,15 @@ void read_mat_input(std::span<const std::uint8_t> input, const std::filesystem::
     } catch (const InputError&) {
     } catch (const std::invalid_argument&) {  // of what lies below the variable's own header
     }
+  }
+}
+
+void read_cdf_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  try {
+    const TypedArray matrix = read_cdf_matrix(scratch, "Pose");
+    if (matrix.size() != matrix.shape.at(0) * matrix.shape.at(1)) std::abort();
+  } catch (const std::runtime_error&) {
   }
 }
 

@@ -34,4 +34,11 @@ constexpr std::uint64_t most_mat_memory(std::uint64_t file_size) {
 /// A MATLAB file: its variables "RELEASE" and "annolist_keyframes", with all that is in them.
 void read_mat_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 
+/// What reading a CDF file may take: the file inflated, its variable inflated, and the numbers of
+/// that, each at most 64 MiB.
+constexpr std::uint64_t most_cdf_memory(std::uint64_t) { return std::uint64_t{200} << 20; }
+
+/// A CDF file: its variable "Pose".
+void read_cdf_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
 }  // namespace eventgan::testing
