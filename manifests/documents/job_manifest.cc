@@ -126,6 +126,12 @@ SourceSpec read_source(const StrictValue& value) {
   spec.sequences = keys.find_path("sequences", {kMpii, kMpiiList});
   const auto layout = keys.find("layout", {kHuman36m});
   if (layout || dataset == kHuman36m) spec.layout = object.at("layout").choice(kLayoutWords);
+  if (const auto every = keys.find("every", {kHuman36m})) {
+    spec.every = every->integer(1, 1000);
+    if (spec.layout != Human36mLayout::kOfficial) {
+      every->fault("no such key for this layout (of official only)");
+    }
+  }
   if (const auto rate = keys.find("frames_per_second", {kFrames})) {
     spec.frames_per_second = rate->number(1e-6, 1e6);
   }

@@ -55,13 +55,22 @@ struct FrameOrigin {
 struct FramePair {
   FrameRef previous;
   FrameRef next;
-  int gap_frames = 0;             ///< frames from previous to next, counted in stored frames, 1..6
+  int gap_frames = 0;  ///< frames from previous to next, 1..6: of those stored, or taken of a video
   std::int64_t label_index = -1;  ///< FrameRef::index of the labelled frame
   /// Where the labelled frame lies: 0 = previous frame, 1 = next frame, 0.5 = in the middle.
   double label_position = 1;
 
   /// NaN if either time is unknown.
   double gap_s() const { return next.time_s - previous.time_s; }
+
+  /// Of two frames of one video: how many of its frames one step is, where it is thinned and its
+  /// frames at the multiples of that are taken; else 1.
+  std::int64_t video_stride() const {
+    const std::int64_t frames = next.video_frame - previous.video_frame;
+    const std::int64_t stride = gap_frames > 0 ? frames / gap_frames : 1;
+    const bool fits = stride > 0 && frames % stride == 0 && next.video_frame % stride == 0;
+    return fits ? stride : 1;
+  }
 };
 
 }  // namespace eventgan

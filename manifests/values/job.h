@@ -50,7 +50,7 @@ enum class DatasetKind {
 };
 
 /// How the Human3.6M source is laid out on disk (DESIGN section 8).
-enum class Human36mLayout { kFetch, kExtracted };
+enum class Human36mLayout { kFetch, kExtracted, kOfficial };
 
 /// Where the labelled frame lies in its pair: at the end, at the start, or in the middle.
 enum class PairSide { kBefore, kAfter, kAround };
@@ -80,6 +80,7 @@ struct SelectionSpec {
 /// One dataset on disk. Paths are as written in the manifest.
 struct SourceSpec {
   DatasetKind dataset = DatasetKind::kFrames;
+  int every = 1;  ///< human36m, official: takes one of so many frames, 1..1000; a gap counts these
   std::string root;
   std::string split = "train";          ///< part of file names, as JobManifest::name
   std::optional<std::string> raw_root;  ///< kitti_object: KITTI raw, for gaps 4-6

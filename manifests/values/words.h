@@ -42,7 +42,8 @@ inline constexpr std::array kDatasetWords{
 
 inline constexpr std::array kLayoutWords{
     Word<Human36mLayout>{"fetch", Human36mLayout::kFetch},
-    Word<Human36mLayout>{"extracted", Human36mLayout::kExtracted}};
+    Word<Human36mLayout>{"extracted", Human36mLayout::kExtracted},
+    Word<Human36mLayout>{"official", Human36mLayout::kOfficial}};
 
 inline constexpr std::array kSideWords{Word<PairSide>{"before", PairSide::kBefore},
                                        Word<PairSide>{"after", PairSide::kAfter},

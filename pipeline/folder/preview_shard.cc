@@ -36,7 +36,7 @@ std::vector<std::uint8_t> frame_picture(const FrameDecoder& decoder, const Frame
                                         const ShardSample& sample, const ImageSpec& image,
                                         std::vector<std::string>& warnings) {
   if (!sample.valid) return {};
-  const Outcome<ColourFrame> decoded = decoder.decode(frame);
+  const Outcome<ColourFrame> decoded = decoder.decode(frame, sample.pair.video_stride());
   if (is_fault(decoded)) {
     warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
     return {};

@@ -41,7 +41,8 @@ struct Neighbour {
 /// for KITTI object with its raw drives, a picture of each drive, and videos.
 ///
 /// Steps between frames are counted in *stored* frames: where a sequence stores every fifth frame
-/// of a video, one step is five frames of that video, and FrameRef::index and time_s tell so.
+/// of a video (or takes them, SourceSpec::every), one step is five frames of that video, and
+/// FrameRef::index and time_s tell so.
 ///
 /// Thread safety: all methods may be called from several threads at once.
 class Dataset {

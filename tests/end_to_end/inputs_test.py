@@ -144,6 +144,11 @@ class Files(program.InFolder):
                      "plan", self.of_source(dataset="human36m", layout="fetch", root="h"))
         self.refused(self.folder / "x" / "list.npz", "plan", self.of_source(
             dataset="human36m", layout="extracted", root="x", annotations="x/list.npz"))
+        videos = self.folder / "o" / "S1" / "Videos"
+        videos.mkdir(parents=True)
+        (videos / "Walking.7.mp4").write_bytes(b"")
+        self.refused(self.folder / "o" / "S1" / "MyPoseFeatures" / "D2_Positions" / "Walking.7.cdf",
+                     "plan", self.of_source(dataset="human36m", layout="official", root="o"))
         weights = self.write_manifest(program.manifest([{"dataset": "frames", "root": "m", "pairs": program.pairs([1])}],
                                                        generator={"weights": "w.safetensors"}))
         save_picture(self.folder / "m" / "0.png", np.random.default_rng(0))

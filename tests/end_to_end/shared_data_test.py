@@ -143,6 +143,32 @@ class SharedData(program.InFolder):
         # One step is five frames of the 50 Hz original.
         np.testing.assert_allclose(shard["pairs/gap_s"][:], shard["pairs/gap_frames"][:] * 0.1, atol=1e-9)
 
+    def test_human36m_as_it_is_downloaded(self):
+        _, shards = self.convert(manifest([{"dataset": "human36m", "root": str(SHARED / "human36m_official"), "layout": "official",
+                                            "every": 5, "pairs": pairs([1, 6], "after", "all")}],
+                                          image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"},
+                                          generator={"kind": "difference"}))
+        shard, = shards
+        ids = [text(sample) for sample in shard["pairs/sample_id"]]
+        # Of 40 frames 1, 6, ..., 36 are taken: 7 have a next one, 2 one six steps on, in each of two videos.
+        self.assertEqual(len(ids), 18)
+        self.assertEqual(ids[0], "S1/Directions 1/54138969/000001@after1")
+        np.testing.assert_array_equal(shard["pairs/prev_index"][:3], [1, 1, 6])
+        np.testing.assert_array_equal(shard["pairs/next_index"][:3], [6, 31, 11])
+        np.testing.assert_allclose(shard["pairs/gap_s"][:], shard["pairs/gap_frames"][:] * 0.1, atol=1e-9)
+        expected = np.load(SHARED / "human36m_official" / "expected.npz")
+        poses = shard["labels/poses"]
+        for slot, sample in enumerate(ids):
+            subject, action, camera, number = sample.split("@")[0].split("/")
+            row = int(number) - 1
+            original = json.loads(bytes(shard["labels/original"][slot]))
+            for kind, stored in (("D2_Positions", "joints_source"), ("D3_Positions_mono", "joints3d_mm")):
+                pose = expected[f"{kind}/{camera}"][0, row].reshape(32, -1)
+                np.testing.assert_array_equal(np.float32(original[kind]), pose)
+                np.testing.assert_array_equal(np.float32(poses[stored][slot]), pose)
+        self.assertEqual([text(name) for name in poses.attrs["joint_names"]][13], "Neck")
+        self.assertEqual(text(shard["pairs/action"][0]), "Directions 1")
+
     def test_human36m_extracted_and_mpii_lists_have_no_partners(self):
         sources = [{"dataset": "human36m", "root": str(SHARED / "human36m_lists"), "layout": "extracted",
                     "annotations": str(SHARED / "human36m_lists" / "test_h36m_body3d.npz"), "pairs": pairs([1])},

@@ -31,11 +31,11 @@ FrameDecoder::FrameDecoder(std::filesystem::path base, int kept_frames)
     : base_(std::move(base)),
       videos_(std::make_unique<OpenVideos<ColourFrame>>(kept_frames, copy_of)) {}
 
-Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame) const {
+Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame, std::int64_t video_stride) const {
   const std::filesystem::path path = base_ / frame.path;
   try {
     return frame.video_frame < 0 ? decode_picture_file(path)
-                                 : videos_->frames<1>(path, {frame.video_frame})[0];
+                                 : videos_->frames<1>(path, {frame.video_frame}, video_stride)[0];
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + frame.path};
   }

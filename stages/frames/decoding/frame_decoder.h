@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <memory>
 
@@ -31,8 +32,9 @@ class FrameDecoder {
   explicit FrameDecoder(std::filesystem::path base, int kept_frames = kDefaultKeptFrames);
 
   /// A fault if the file is missing, empty, truncated, not a picture, or larger than
-  /// kMaxPicturePixels, or if a video ends before the frame; it names the frame's path.
-  Outcome<ColourFrame> decode(const FrameRef& frame) const;
+  /// kMaxPicturePixels, or if a video ends before the frame; it names the frame's path. Of a video
+  /// whose frames are asked for at multiples of `video_stride`, only these are kept.
+  Outcome<ColourFrame> decode(const FrameRef& frame, std::int64_t video_stride = 1) const;
 
  private:
   std::filesystem::path base_;

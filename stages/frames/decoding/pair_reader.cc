@@ -96,7 +96,8 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair) co
   const FrameRef* current = &previous;
   try {
     if (previous.video_frame >= 0 && next.video_frame >= 0 && previous.path == next.path) {
-      return videos_->frames<2>(base_ / previous.path, {previous.video_frame, next.video_frame});
+      return videos_->frames<2>(base_ / previous.path, {previous.video_frame, next.video_frame},
+                                pair.video_stride());
     }
     both[0] = frame(previous);
     current = &next;

@@ -45,44 +45,47 @@ class VideoFile {
 };
 
 /// A window on one video: its latest frames, since pairs of close frames are asked for by turns.
-/// Asking for an earlier one opens the video anew, which costs all the frames before it. What is
-/// kept of a frame (its pixels, or less) is up to `keep`. Not thread safe.
+/// Asking for an earlier one opens the video anew, which costs all the frames before it. Of a video
+/// that is thinned those at multiples of `stride` count alone: others are passed over. What is kept
+/// of a frame (its pixels, or less) is up to `keep`. Not thread safe.
 template <class Kept>
 class VideoWindow {
  public:
   using Keep = std::function<Kept(const ColourView&)>;
 
   /// Keeps the latest `most` frames (at least one). Throws std::runtime_error as VideoFile does.
-  VideoWindow(std::filesystem::path path, int most, Keep keep)
-      : path_(std::move(path)), most_(std::max(most, 1)), keep_(std::move(keep)), file_(path_) {}
+  VideoWindow(std::filesystem::path path, int most, Keep keep, std::int64_t stride = 1)
+      : path_(std::move(path)),
+        most_(std::max(most, 1)),
+        keep_(std::move(keep)),
+        stride_(stride),
+        file_(path_) {}
 
-  /// The frame at `position`, counted from 0; valid until the next call. Throws std::runtime_error
-  /// as VideoFile does, or if the video ends before it.
+  /// The frame at `position`, counted from 0, a multiple of the stride; valid until the next call.
+  /// Throws std::runtime_error as VideoFile does, or if the video ends before it.
   const Kept& frame(std::int64_t position) {
     if (position < first_kept()) {
       file_ = VideoFile(path_);
       latest_.clear();
     }
     // What will have left the window when `position` is reached is not even looked at.
-    const std::int64_t first_wanted = position + 1 - most_;
+    const std::int64_t first_wanted = position - (most_ - 1) * stride_;
+    if (file_.position() < first_wanted) latest_.clear();
     while (file_.position() <= position) {
-      if (!(file_.position() < first_wanted ? skip() : keep_next())) {
+      const bool wanted = file_.position() >= first_wanted && file_.position() % stride_ == 0;
+      if (!(wanted ? keep_next() : file_.skip())) {
         throw std::runtime_error("expected a frame at position " + std::to_string(position) +
                                  ", got a video whose frames end after " +
                                  std::to_string(file_.position()));
       }
     }
-    return latest_[static_cast<std::size_t>(position - first_kept())];
+    return latest_[static_cast<std::size_t>((position - first_kept()) / stride_)];
   }
 
  private:
   std::int64_t first_kept() const {
-    return file_.position() - static_cast<std::int64_t>(latest_.size());
-  }
-
-  bool skip() {
-    latest_.clear();
-    return file_.skip();
+    const std::int64_t behind = (file_.position() + stride_ - 1) / stride_;  // frames that count
+    return latest_.empty() ? file_.position() : (behind - std::ssize(latest_)) * stride_;
   }
 
   bool keep_next() {
@@ -101,8 +104,9 @@ class VideoWindow {
   std::filesystem::path path_;
   std::int64_t most_;
   Keep keep_;
+  std::int64_t stride_;
   VideoFile file_;
-  std::deque<Kept> latest_;  ///< the frames just before file_.position(), in order
+  std::deque<Kept> latest_;  ///< the frames that count just before file_.position(), in order
 };
 
 /// The videos used last, each with its latest frames. Thread safe: frames are decoded, and kept,
@@ -116,12 +120,14 @@ class OpenVideos {
   OpenVideos(int kept_frames, Keep keep) : kept_frames_(kept_frames), keep_(std::move(keep)) {}
 
   /// Several frames of one video, with no other thread's frames in between, so that these cannot
-  /// push the first one's neighbours out. Throws std::runtime_error as VideoWindow does.
+  /// push the first one's neighbours out. Of a video from which each `stride`th is asked for, only
+  /// these are kept. Throws std::runtime_error as VideoWindow does.
   template <std::size_t kCount>
   std::array<Kept, kCount> frames(const std::filesystem::path& path,
-                                  const std::array<std::int64_t, kCount>& positions) {
+                                  const std::array<std::int64_t, kCount>& positions,
+                                  std::int64_t stride = 1) {
     const std::lock_guard lock(mutex_);
-    VideoWindow<Kept>& video = open(path);
+    VideoWindow<Kept>& video = open(path, stride);
     std::array<Kept, kCount> frames;
     std::ranges::transform(positions, frames.begin(),
                            [&](std::int64_t position) { return video.frame(position); });
@@ -132,18 +138,23 @@ class OpenVideos {
   static constexpr std::size_t kMostOpen = 2;
 
   struct OpenVideo {
-    OpenVideo(const std::filesystem::path& video_path, int kept_frames, const Keep& keep)
-        : path(video_path), window(video_path, kept_frames, keep) {}
+    OpenVideo(const std::filesystem::path& video_path, int kept_frames, const Keep& keep,
+              std::int64_t frame_stride)
+        : path(video_path),
+          stride(frame_stride),
+          window(video_path, kept_frames, keep, frame_stride) {}
     std::filesystem::path path;
+    std::int64_t stride;
     VideoWindow<Kept> window;
   };
 
-  VideoWindow<Kept>& open(const std::filesystem::path& path) {
-    const auto video = std::ranges::find(videos_, path, &OpenVideo::path);
+  VideoWindow<Kept>& open(const std::filesystem::path& path, std::int64_t stride) {
+    const auto video = std::ranges::find_if(
+        videos_, [&](const OpenVideo& one) { return one.path == path && one.stride == stride; });
     if (video != videos_.end()) {
       videos_.splice(videos_.begin(), videos_, video);
     } else {
-      videos_.emplace_front(path, kept_frames_, keep_);
+      videos_.emplace_front(path, kept_frames_, keep_, stride);
       if (videos_.size() > kMostOpen) videos_.pop_back();
     }
     return videos_.front().window;

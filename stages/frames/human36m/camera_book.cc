@@ -122,6 +122,18 @@ CameraBook read_camera_book(const std::filesystem::path& path) try {
   throw InputError(error.what());
 }
 
+const Human36mCamera* find_camera(const CameraBook& cameras, const std::string& subject,
+                                  const std::string& camera) {
+  const auto found = cameras.find({subject, camera});
+  return found == cameras.end() ? nullptr : &found->second;
+}
+
+std::string no_intrinsics_note(const std::set<std::string>& without) {
+  return "no intrinsics for " + std::to_string(without.size()) +
+         " cameras of subjects, the first " + *without.begin() +
+         ": not in a cameras.pkl in the root";
+}
+
 double projection_error_px(const Person& person) {
   double largest = 0;
   if (!person.camera) return largest;

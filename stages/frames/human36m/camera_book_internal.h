@@ -4,6 +4,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +27,13 @@ using CameraBook = std::map<std::pair<std::string, std::string>, Human36mCamera>
 /// numpy arrays f and c of two elements, in pixels; k of three (k1, k2, k3) and p of two (p1, p2)
 /// are the lens distortion, if they are there. Executes nothing of it. Throws InputError.
 CameraBook read_camera_book(const std::filesystem::path& file);
+
+/// That of a subject; null if the book has none.
+const Human36mCamera* find_camera(const CameraBook& cameras, const std::string& subject,
+                                  const std::string& camera);
+
+/// What to tell of `without`, cameras of subjects ("S1 54138969") that the book does not have.
+std::string no_intrinsics_note(const std::set<std::string>& without);
 
 /// How far a camera may put a joint in 3-D from the joint in the picture. A camera fitted without
 /// lens distortion, as h36m-fetch does it, is up to 11 px off at Human3.6M's borders.

@@ -110,11 +110,7 @@ NpzTable::NpzTable(const std::filesystem::path& file, const std::string& shown, 
     }
     if (camera(row) == nullptr) unknown.insert(names_[row].subject + " " + names_[row].camera);
   }
-  if (!unknown.empty()) {
-    notes_.push_back("no intrinsics for " + std::to_string(unknown.size()) +
-                     " cameras of subjects, the first " + *unknown.begin() +
-                     ": not in a cameras.pkl in the root");
-  }
+  if (!unknown.empty()) notes_.push_back(no_intrinsics_note(unknown));
   std::vector<double> errors_px;
   for (std::size_t row = 0; row < rows; ++row)
     errors_px.push_back(projection_error_px(person(row)));
@@ -123,8 +119,7 @@ NpzTable::NpzTable(const std::filesystem::path& file, const std::string& shown, 
 }
 
 const Human36mCamera* NpzTable::camera(std::size_t row) const {
-  const auto found = cameras_.find({names_[row].subject, names_[row].camera});
-  return found == cameras_.end() ? nullptr : &found->second;
+  return find_camera(cameras_, names_[row].subject, names_[row].camera);
 }
 
 Person NpzTable::person(std::size_t row) const {
@@ -191,8 +186,6 @@ std::string why_no_human36m_npz(const std::filesystem::path& file) try {
 }
 
 namespace {
-
-constexpr char kCameraFile[] = "cameras.pkl";
 
 /// The annotation file under both its names.
 struct Annotations {
@@ -284,9 +277,9 @@ void add_videos(const SourceRoot& root, const std::map<std::string, Video>& vide
   for (const auto& [folder, sequences] : sequences_by_folder) {
     auto stored = stored_in(root, folder, dataset);
     for (const std::string& sequence : sequences) {
-      dataset.add_video(
-          sequence, FrameFolder(root.written(folder), sequence + "_", std::move(stored[sequence]),
-                                videos.at(sequence).labelled));
+      dataset.add_take(sequence, std::make_unique<FrameFolder>(root.written(folder), sequence + "_",
+                                                               std::move(stored[sequence]),
+                                                               videos.at(sequence).labelled));
     }
   }
   std::vector<std::string> without_labels;
@@ -316,14 +309,8 @@ std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
         counted(annotations.left_out, "annotation files left out beside " + annotations.written));
   }
 
-  CameraBook cameras;
-  const auto files = root.files_in("");
-  if (std::ranges::binary_search(files, kCameraFile)) {
-    cameras = read_camera_book(root.on_disk(kCameraFile));
-    dataset->add_annotation_file(root.written(kCameraFile));
-  }
-  auto table =
-      std::make_unique<NpzTable>(annotations.on_disk, annotations.written, std::move(cameras));
+  auto table = std::make_unique<NpzTable>(annotations.on_disk, annotations.written,
+                                          dataset->add_cameras(root));
   add_videos(root, videos_of(*table, annotations.written), *dataset);
 
   const std::string key = annotations.on_disk.filename().string();

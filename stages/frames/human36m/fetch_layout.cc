@@ -1,7 +1,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -119,16 +118,8 @@ std::optional<Intrinsics> FetchTable::intrinsics(std::size_t row) const {
 }
 
 Person FetchTable::person(std::size_t row) const {
-  const auto joints = columns_.row_of("pose/2d", row);
-  const auto joints3d = columns_.row_of(pose_3d_, row);
-  Person person;
-  for (std::size_t j = 0; j < joint_count_; ++j) {
-    person.joints.push_back({.at = {joints[2 * j], joints[2 * j + 1]}, .visible = -1});
-    person.joints3d_mm.push_back(
-        std::array{joints3d[3 * j], joints3d[3 * j + 1], joints3d[3 * j + 2]});
-  }
+  Person person = person_of_joints(columns_.row_of("pose/2d", row), columns_.row_of(pose_3d_, row));
   person.camera = intrinsics(row);
-  derive_frame(person);
   return person;
 }
 
@@ -184,8 +175,9 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
     if (const auto& others = stored.left_out(); !others.empty()) {
       dataset.add_note(counted(others, "files left out in " + root.written(folder)));
     }
-    dataset.add_video(action + "/" + camera, FrameFolder(root.written(folder), kPrefix,
-                                                         std::move(stored), labelled_numbers));
+    dataset.add_take(action + "/" + camera,
+                     std::make_unique<FrameFolder>(root.written(folder), kPrefix, std::move(stored),
+                                                   labelled_numbers));
   }
   for (std::size_t row = 0; labelled && row < table->row_count(); ++row) {
     const std::string sequence = action + "/" + std::to_string(table->camera(row));

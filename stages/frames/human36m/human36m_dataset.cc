@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <stdexcept>
 #include <utility>
 
 #include "manifests/values/faults.h"
@@ -67,6 +68,10 @@ std::vector<std::string> human36m_joint_aliases(std::size_t count) {
   return aliases;
 }
 
+double human36m_time_s(std::int64_t number) {
+  return static_cast<double>(number - 1) / kHuman36mFramesPerSecond;
+}
+
 FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequence stored,
                          const std::vector<std::int64_t>& labelled)
     : folder_(std::move(folder)),
@@ -85,7 +90,7 @@ FrameRef FrameFolder::frame(std::int64_t number) const {
   return {.path = folder_ + "/" + name,
           .index = number,
           .video_frame = -1,
-          .time_s = static_cast<double>(number - 1) / kHuman36mFramesPerSecond};
+          .time_s = human36m_time_s(number)};
 }
 
 Neighbour FrameFolder::neighbour(std::int64_t number, int steps) const {
@@ -120,17 +125,25 @@ void IndexedDataset::add_annotation_file(const std::string& written) {
   annotation_files_.push_back(written);
 }
 
-void IndexedDataset::add_video(const std::string& sequence, FrameFolder frames) {
-  videos_.emplace(sequence, std::move(frames));
+CameraBook IndexedDataset::add_cameras(const SourceRoot& root) {
+  constexpr char kFile[] = "cameras.pkl";
+  if (!std::ranges::binary_search(root.files_in(""), kFile)) return {};
+  add_annotation_file(root.written(kFile));
+  return read_camera_book(root.on_disk(kFile));
+}
+
+void IndexedDataset::add_take(const std::string& sequence, std::unique_ptr<TakenFrames> frames) {
+  takes_.emplace(sequence, std::move(frames));
 }
 
 void IndexedDataset::add_labelled(std::string sample_id, const std::string& sequence,
                                   std::int64_t number, const std::string& table_key,
-                                  std::size_t row) {
+                                  std::size_t row, std::string fault) {
   labelled_.push_back({.sample_id = std::move(sample_id),
                        .sequence = sequence,
-                       .frame = videos_.at(sequence).frame(number),
-                       .label_key = table_key + "#" + std::to_string(row)});
+                       .frame = takes_.at(sequence)->frame(number),
+                       .label_key = table_key + "#" + std::to_string(row),
+                       .fault = std::move(fault)});
 }
 
 void IndexedDataset::finish(const std::string& root) {
@@ -146,9 +159,9 @@ void IndexedDataset::finish(const std::string& root) {
 }
 
 Neighbour IndexedDataset::neighbour(const LabelledFrame& frame, int steps) const {
-  const auto video = videos_.find(frame.sequence);
-  if (video == videos_.end()) return {};
-  return video->second.neighbour(frame.frame.index, steps);
+  const auto take = takes_.find(frame.sequence);
+  if (take == takes_.end()) return {};
+  return take->second->neighbour(frame.frame.index, steps);
 }
 
 const IndexedDataset::Table* IndexedDataset::table_of(const std::string& label_key) const {
@@ -181,11 +194,18 @@ std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
                                                const std::filesystem::path& base) {
   if (!spec.layout) {
     throw UsageError(
-        "expected a layout (fetch or extracted) for human36m, got none, in the source " +
+        "expected a layout (fetch, extracted or official) for human36m, got none, in the source " +
         spec.root);
   }
-  return *spec.layout == Human36mLayout::kFetch ? open_human36m_fetch(spec, base)
-                                                : open_human36m_extracted(spec, base);
+  switch (*spec.layout) {
+    case Human36mLayout::kFetch:
+      return open_human36m_fetch(spec, base);
+    case Human36mLayout::kExtracted:
+      return open_human36m_extracted(spec, base);
+    case Human36mLayout::kOfficial:
+      return open_human36m_official(spec, base);
+  }
+  throw std::logic_error("open_human36m_dataset: not a layout");
 }
 
 }  // namespace eventgan

@@ -21,13 +21,23 @@ namespace eventgan {
 /// `imgname`,
 ///   `center` [N, 2] px, `scale` [N], `part` [N, J, 3] (x, y, confidence) and `S` [N, J, 4] (x, y,
 ///   z in metres, confidence): `spec.annotations`, or else the only such file of 17 joints in the
-///   root. `imgname` is a path below the root, or a bare file name. Intrinsics and distortion come
-///   from cameras.pkl in the root, if it is there. Sample "S1_Directions_1.54138969_000001", label
-///   key "FILE.npz#0".
+///   root. `imgname` is a path below the root, or a bare file name. Sample
+///   "S1_Directions_1.54138969_000001", label key "FILE.npz#0".
+/// - official (as it is downloaded): S1/Videos/Directions 1.54138969.mp4 with
+///   S1/MyPoseFeatures/D2_Positions/Directions 1.54138969.cdf, whose `Pose` [M, 64] (x, y) px are
+///   32 joints, and, if it is there, D3_Positions_mono/Directions 1.54138969.cdf [M, 96] (x, y, z)
+///   mm in the camera's frame. Of the frames 1 to M those numbered 1 + a multiple of `spec.every`
+///   are taken. Sample "S1/Directions 1/54138969/000001", label key
+///   "S1/MyPoseFeatures/D2_Positions/Directions 1.54138969.cdf#0".
+///
+/// Of the last two, intrinsics and distortion come from cameras.pkl in the root, if it is there.
 ///
 /// Every row is a sample of one person. Frame numbers are the official ones, from 1 at 50 frames a
-/// second, so time_s = (number - 1) / 50; one step is one frame of those stored or labelled. A row
-/// whose picture is absent stays a labelled frame, a hole. Visibility is not annotated:
+/// second, so time_s = (number - 1) / 50; one step is one frame of those stored or labelled, or
+/// taken of a video. A row whose picture is absent stays a labelled frame, a hole. A video tells
+/// how many frames it has; rows beyond that are no labelled frames, and notes() count them, as they
+/// do videos and files of poses without the other. A video that cannot be read, or is not one of 50
+/// frames a second, is a fault of its frames. Visibility is not annotated:
 /// Joint::visible is -1. In an .npz a joint at (0, 0) without confidence is one without annotation,
 /// kMissingPoint; elsewhere it stays, with visible 0; a joint in 3-D without confidence is unknown.
 /// A person whose camera does not project the joints in 3-D onto those in the picture
@@ -35,9 +45,9 @@ namespace eventgan {
 /// fault of their row; in fields that this program does not use, JSON makes them null.
 /// Annotation::original is an object with every field of the row, and the camera's.
 ///
-/// The annotations are read whole into memory here (about 1-2 kB a row), so that nothing uses HDF5
-/// later: it is not thread safe, and open_human36m_dataset must not run while another thread is in
-/// HDF5.
+/// The annotations of all frames taken are read into memory here (about 1-2 kB each), so that
+/// nothing uses HDF5 later: it is not thread safe, and open_human36m_dataset must not run while
+/// another thread is in HDF5. Of a video the first frame is decoded.
 ///
 /// Throws InputError if a folder or file is missing or malformed or a frame is annotated twice,
 /// UsageError if there is not exactly one .npz to choose.

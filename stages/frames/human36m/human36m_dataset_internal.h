@@ -12,8 +12,10 @@
 
 #include "manifests/values/job.h"
 #include "stages/frames/dataset.h"
+#include "stages/frames/human36m/camera_book_internal.h"
 #include "stages/frames/human36m/pose_table_internal.h"
 #include "stages/frames/numbered_sequence.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -29,20 +31,33 @@ std::vector<std::string> human36m_joint_aliases(std::size_t count);
 /// Human3.6M's videos run at this rate, and its frame numbers count all of their frames from 1.
 inline constexpr double kHuman36mFramesPerSecond = 50;
 
-/// The stored frames of one video: where they lie, and which numbers ought to be there.
-class FrameFolder {
+/// When a frame was taken, in seconds since frame 1.
+double human36m_time_s(std::int64_t number);
+
+/// The frames of one camera's take, by their numbers.
+class TakenFrames {
+ public:
+  virtual ~TakenFrames() = default;
+
+  virtual FrameRef frame(std::int64_t number) const = 0;
+
+  /// The frame `steps` frames after `number`.
+  virtual Neighbour neighbour(std::int64_t number, int steps) const = 0;
+};
+
+/// Frames stored as pictures: where they lie, and which numbers ought to be there.
+class FrameFolder final : public TakenFrames {
  public:
   /// `folder` as FrameRef::path writes it. `labelled` are the numbers that have a label, in any
   /// order; a picture may be absent. `prefix` stands before the six digits of a name.
   FrameFolder(std::string folder, std::string prefix, NumberedSequence stored,
               const std::vector<std::int64_t>& labelled);
 
-  FrameRef frame(std::int64_t number) const;
+  FrameRef frame(std::int64_t number) const override;
 
-  /// The frame `steps` frames after `number` of those that are stored or labelled, however far
-  /// apart their numbers: h36m-fetch keeps a frame when the person has moved. One that is labelled
-  /// but not stored is a hole.
-  Neighbour neighbour(std::int64_t number, int steps) const;
+  /// Of those that are stored or labelled, however far apart their numbers: h36m-fetch keeps a
+  /// frame when the person has moved. One that is labelled but not stored is a hole.
+  Neighbour neighbour(std::int64_t number, int steps) const override;
 
  private:
   std::string folder_;
@@ -51,7 +66,7 @@ class FrameFolder {
   std::vector<std::int64_t> numbers_;  ///< stored or labelled; ascending, each once
 };
 
-/// What both layouts come down to: labelled frames, videos, and annotation files.
+/// What all layouts come down to: labelled frames, takes, and annotation files.
 class IndexedDataset final : public Dataset {
  public:
   /// Adds an annotation file; `key` is what stands before "#ROW" in its label keys, `written` its
@@ -60,10 +75,12 @@ class IndexedDataset final : public Dataset {
   void add_table(const std::string& key, const std::string& written,
                  std::unique_ptr<PoseTable> table);
   void add_annotation_file(const std::string& written);
-  void add_video(const std::string& sequence, FrameFolder frames);
-  /// The video must have been added.
+  /// The cameras of cameras.pkl in the root; none if it is not there. Throws InputError.
+  CameraBook add_cameras(const SourceRoot& root);
+  void add_take(const std::string& sequence, std::unique_ptr<TakenFrames> frames);
+  /// The take must have been added. `fault`: see LabelledFrame.
   void add_labelled(std::string sample_id, const std::string& sequence, std::int64_t number,
-                    const std::string& table_key, std::size_t row);
+                    const std::string& table_key, std::size_t row, std::string fault = {});
   void add_note(std::string note) { notes_.push_back(std::move(note)); }
 
   /// Call once, last. Throws InputError if a frame is labelled twice, or none is; `root` names the
@@ -90,7 +107,7 @@ class IndexedDataset final : public Dataset {
   std::string root_;
   LabelSchema schema_;
   std::vector<LabelledFrame> labelled_;
-  std::unordered_map<std::string, FrameFolder> videos_;
+  std::unordered_map<std::string, std::unique_ptr<TakenFrames>> takes_;
   std::map<std::string, Table> tables_;
   std::vector<std::string> annotation_files_;
   std::vector<std::string> notes_;
@@ -101,5 +118,7 @@ std::unique_ptr<Dataset> open_human36m_fetch(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 std::unique_ptr<Dataset> open_human36m_extracted(const SourceSpec& spec,
                                                  const std::filesystem::path& base);
+std::unique_ptr<Dataset> open_human36m_official(const SourceSpec& spec,
+                                                const std::filesystem::path& base);
 
 }  // namespace eventgan

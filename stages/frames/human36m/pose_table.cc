@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -82,6 +83,19 @@ Json TableColumns::fields(std::size_t row, std::size_t row_count,
     object[name] = to_json(array, row);
   }
   return object;
+}
+
+Person person_of_joints(const std::vector<double>& joints, const std::vector<double>& joints3d_mm) {
+  Person person;
+  for (std::size_t i = 0; i < joints.size(); i += 2) {
+    person.joints.push_back({.at = {joints[i], joints[i + 1]}, .visible = -1});
+  }
+  for (std::size_t i = 0; i < joints3d_mm.size(); i += 3) {
+    person.joints3d_mm.push_back(
+        std::array{joints3d_mm[i], joints3d_mm[i + 1], joints3d_mm[i + 2]});
+  }
+  derive_frame(person);
+  return person;
 }
 
 void derive_box(Person& person) {

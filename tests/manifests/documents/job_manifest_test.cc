@@ -58,6 +58,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.sources[0].pairs.max_gap_s, std::nullopt);
   EXPECT_EQ(manifest.sources[0].raw_root, std::nullopt);
   EXPECT_EQ(manifest.sources[0].layout, std::nullopt);
+  EXPECT_EQ(manifest.sources[0].every, 1);
   EXPECT_EQ(manifest.sources[0].frames_per_second, std::nullopt);
   EXPECT_EQ(manifest.image.fit, ImageFit::kStretch);
   EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
@@ -82,7 +83,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
                  "max_gap_s": 0.4}},
       {"dataset": "mpii", "root": "d", "annotations": "e", "sequences": "f",
        "pairs": {"gaps": [4], "side": "around"}},
-      {"dataset": "human36m", "root": "g", "layout": "extracted", "pairs": {"gaps": [2]}},
+      {"dataset": "human36m", "root": "g", "layout": "official", "every": 5,
+       "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97, "pairs": {"gaps": [2]}}],
     "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
     "generator": {"weights": "untrained:8", "engine": "onednn", "precision": "int8",
@@ -108,7 +110,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.sources[1].annotations, "e");
   EXPECT_EQ(manifest.sources[1].sequences, "f");
   EXPECT_EQ(manifest.sources[1].pairs.side, PairSide::kAround);
-  EXPECT_EQ(manifest.sources[2].layout, Human36mLayout::kExtracted);
+  EXPECT_EQ(manifest.sources[2].layout, Human36mLayout::kOfficial);
+  EXPECT_EQ(manifest.sources[2].every, 5);
   EXPECT_EQ(manifest.sources[3].frames_per_second, 29.97);
   EXPECT_EQ(manifest.image.size, (ImageSize{.height = 260, .width = 861}));
   EXPECT_EQ(manifest.image.fit, ImageFit::kCrop);

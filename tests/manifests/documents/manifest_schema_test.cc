@@ -70,6 +70,7 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   const SourceSpec source;
   EXPECT_EQ(stated("/properties/seed"), manifest.seed);
   EXPECT_EQ(stated("/definitions/source/properties/split"), source.split);
+  EXPECT_EQ(stated("/definitions/source/properties/every"), source.every);
   EXPECT_EQ(stated("/definitions/pairs/properties/side"), to_string(source.pairs.side));
   EXPECT_EQ(stated("/definitions/pairs/properties/choose"), to_string(source.pairs.choose));
   EXPECT_EQ(stated("/definitions/pairs/properties/min_pairs"), source.pairs.min_pairs);
@@ -151,7 +152,7 @@ TEST(ManifestExamples, SayWhatTheirNamesSay) {
   EXPECT_EQ(example("kitti.json").sources.at(0).dataset, DatasetKind::kKittiObject);
   EXPECT_EQ(example("kitti_raw_gaps.json").sources.at(0).pairs.gaps.size(), 6u);
   EXPECT_EQ(example("mpii.json").sources.at(0).pairs.side, PairSide::kAround);
-  EXPECT_EQ(example("human36m.json").sources.at(0).layout, Human36mLayout::kFetch);
+  EXPECT_EQ(example("human36m.json").sources.at(0).layout, Human36mLayout::kOfficial);
   EXPECT_EQ(example("frames.json").image.size, std::nullopt);
   EXPECT_EQ(example("all.json").sources.size(), 4u);
 }

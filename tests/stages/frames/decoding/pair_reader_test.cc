@@ -178,6 +178,48 @@ TEST(PairReader, PairsUnderWayMayComeInAnyOrderAndTheVideoIsOpenedOnce) {
   }
 }
 
+TEST(PairReader, OfAThinnedVideoTheFramesTakenAreKept) {
+  const TemporaryFolder folder;
+  testing::write_counting_video(folder / "clip.avi", 127);
+  // One frame in five: pairs that reach 6 steps, 30 frames, back, the later of two first. A window
+  // of 2 + 6 + 2 frames in a row would have opened the video again.
+  const PairReader reader(folder.path(), {}, /*pairs_under_way=*/2);
+  for (int first = 30; first + 5 < 127; first += 10) {
+    for (const int next : {first + 5, first}) {
+      FramePair pair;
+      pair.previous = testing::video_ref("clip.avi", next - 30);
+      pair.next = testing::video_ref("clip.avi", next);
+      pair.gap_frames = 6;
+      const auto outcome = reader.read(pair);
+      ASSERT_FALSE(is_fault(outcome)) << next << ": " << std::get<SampleFault>(outcome).reason;
+      const auto& input = std::get<PreparedPair>(outcome).input;
+      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 30), 1);
+      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
+      // The open video outlives its name; opening it a second time fails.
+      std::filesystem::remove(folder / "clip.avi");
+    }
+  }
+}
+
+TEST(PairReader, OneVideoIsReadWholeAndThinnedByTurns) {
+  const TemporaryFolder folder;
+  testing::write_counting_video(folder / "clip.avi", 60);
+  const PairReader reader(folder.path(), {});
+  for (int next = 12; next < 60; next += 12) {
+    for (const int stride : {1, 4, 6}) {
+      FramePair pair;
+      pair.previous = testing::video_ref("clip.avi", next - 2 * stride);
+      pair.next = testing::video_ref("clip.avi", next);
+      pair.gap_frames = 2;
+      const auto outcome = reader.read(pair);
+      ASSERT_FALSE(is_fault(outcome)) << next << ": " << std::get<SampleFault>(outcome).reason;
+      const auto& input = std::get<PreparedPair>(outcome).input;
+      EXPECT_NEAR(level(input[input.size() / 4]), 2 * (next - 2 * stride), 1);
+      EXPECT_NEAR(level(input[input.size() / 4 * 3]), 2 * next, 1);
+    }
+  }
+}
+
 std::string reason(const Outcome<PreparedPair>& outcome) {
   return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
 }

@@ -16,9 +16,11 @@
 namespace eventgan::testing {
 
 /// A video of 64x48 pixels whose frame i is plain grey of value 2 i; at most 128 frames.
-inline void write_counting_video(const std::filesystem::path& path, int frames) {
+inline void write_counting_video(const std::filesystem::path& path, int frames,
+                                 double frames_per_second = 25) {
   cv::VideoWriter writer(path.string(), cv::CAP_OPENCV_MJPEG,
-                         cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 25, cv::Size(64, 48));
+                         cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), frames_per_second,
+                         cv::Size(64, 48));
   if (!writer.isOpened()) throw std::runtime_error("cannot write " + path.string());
   for (int i = 0; i < frames; ++i) writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(2 * i)));
 }

@@ -1,0 +1,302 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/decoding/pair_reader.h"
+#include "stages/frames/human36m/human36m_dataset.h"
+#include "tests/stages/frames/decoding/test_video.h"
+#include "tests/testing/cdf_file.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+using State = Neighbour::State;
+
+constexpr int kJoints = 32;
+
+class OfficialLayoutTest : public ::testing::Test {
+ protected:
+  static std::string stem(const std::string& action) { return action + ".54138969"; }
+
+  void add_video(const std::string& action, int frames, double frames_per_second = 50) {
+    const auto avi = folder_ / "video.avi";
+    testing::write_counting_video(avi, frames, frames_per_second);
+    const auto video = folder_ / "h36m" / "S1" / "Videos" / (stem(action) + ".mp4");
+    std::filesystem::create_directories(video.parent_path());
+    std::filesystem::rename(avi, video);
+  }
+
+  /// In row r, joint j lies at (100 + r, 200 + 2 j) px; in 3-D it is (r, j, 5000) mm.
+  void add_poses(const std::string& action, int rows) {
+    write_poses("D2_Positions", action, rows, 2, [](int r, int j) {
+      return std::array{100.0f + r, 200.0f + 2 * j};
+    });
+  }
+  void add_poses_3d(const std::string& action, int rows) {
+    write_poses("D3_Positions_mono", action, rows, 3, [](int r, int j) {
+      return std::array{1.0f * r, 1.0f * j, 5000.0f};
+    });
+  }
+  template <class PlaceOf>
+  void write_poses(const std::string& kind, const std::string& action, int rows, int coordinates,
+                   PlaceOf place_of) {
+    std::vector<float> values;
+    for (int r = 0; r < rows; ++r) {
+      for (int j = 0; j < kJoints; ++j) {
+        for (const float value : place_of(r, j)) values.push_back(value);
+      }
+    }
+    testing::write_file(
+        file_of(kind, action),
+        testing::cdf_bytes({static_cast<std::uint32_t>(rows),
+                            static_cast<std::uint32_t>(coordinates * kJoints), std::move(values)}));
+  }
+  std::filesystem::path file_of(const std::string& kind, const std::string& action) {
+    return folder_ / "h36m" / "S1" / "MyPoseFeatures" / kind / (stem(action) + ".cdf");
+  }
+
+  std::unique_ptr<Dataset> open(int every = 1) {
+    SourceSpec spec;
+    spec.dataset = DatasetKind::kHuman36m;
+    spec.root = "h36m";
+    spec.layout = Human36mLayout::kOfficial;
+    spec.every = every;
+    return open_human36m_dataset(spec, folder_.path());
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(OfficialLayoutTest, GivesEveryFrameOfEveryTakeAsASample) {
+  for (const char* action : {"Walking", "Walking 1"}) {
+    add_video(action, 3);
+    add_poses(action, 3);
+    add_poses_3d(action, 3);
+  }
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 6u);
+  EXPECT_EQ(frames[0].sample_id, "S1/Walking 1/54138969/000001");
+  EXPECT_EQ(frames[0].sequence, "S1/Walking 1/54138969");
+  EXPECT_EQ(frame_origin(DatasetKind::kHuman36m, frames[0].sequence),
+            (FrameOrigin{.subject = "S1", .action = "Walking 1", .camera = "54138969"}));
+  EXPECT_EQ(frames[0].frame.path, "h36m/S1/Videos/Walking 1.54138969.mp4");
+  EXPECT_EQ(frames[5].sample_id, "S1/Walking/54138969/000003");
+  EXPECT_EQ(frames[5].frame.index, 3);
+  EXPECT_EQ(frames[5].frame.video_frame, 2);
+  EXPECT_EQ(frames[5].frame.time_s, 0.04);
+  EXPECT_EQ(frames[5].fault, "");
+  EXPECT_EQ(frames[5].label_key, "S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#2");
+  EXPECT_EQ(dataset->label_place(frames[5].label_key),
+            "h36m/S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#2");
+  EXPECT_THAT(dataset->annotation_files(),
+              ElementsAre("h36m/S1/MyPoseFeatures/D2_Positions/Walking 1.54138969.cdf",
+                          "h36m/S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf",
+                          "h36m/S1/MyPoseFeatures/D3_Positions_mono/Walking 1.54138969.cdf",
+                          "h36m/S1/MyPoseFeatures/D3_Positions_mono/Walking.54138969.cdf"));
+  const LabelSchema& schema = dataset->label_schema();
+  ASSERT_EQ(schema.joint_names.size(), 32u);
+  EXPECT_EQ(schema.joint_names[13], "Neck");
+  EXPECT_EQ(schema.joint_aliases[1], "right_hip");
+  EXPECT_THAT(dataset->notes(), ElementsAre("no intrinsics for 1 cameras of subjects, the first S1 "
+                                            "54138969: not in a cameras.pkl in the root"));
+}
+
+TEST_F(OfficialLayoutTest, ReadsThePersonOfAFrame) {
+  add_video("Walking", 8);
+  add_poses("Walking", 8);
+  add_poses_3d("Walking", 8);
+  for (const int every : {1, 3}) {
+    const auto dataset = open(every);
+    const auto outcome =
+        dataset->annotation("S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#6");
+    ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+    const Annotation& annotation = std::get<Annotation>(outcome);
+    const Person& person = annotation.persons.at(0);
+    ASSERT_EQ(person.joints.size(), 32u);
+    EXPECT_EQ(person.joints[31], (Joint{{106, 262}, -1}));
+    EXPECT_EQ(person.joints3d_mm.at(31), (std::array{6.0, 31.0, 5000.0}));
+    EXPECT_EQ(person.box, (Rectangle{106, 200, 107, 263}));
+    EXPECT_EQ(person.center, (Point{106, 231}));
+    EXPECT_DOUBLE_EQ(person.scale, 1.2 * 62 / 200);
+    EXPECT_FALSE(person.camera);
+    const auto original = nlohmann::json::parse(annotation.original);
+    EXPECT_EQ(original.size(), 2u);
+    EXPECT_EQ(original["D2_Positions"][31], nlohmann::json::parse("[106.0, 262.0]"));
+    EXPECT_EQ(original["D3_Positions_mono"][31], nlohmann::json::parse("[6.0, 31.0, 5000.0]"));
+  }
+  for (const char* row : {"#5", "#8", "#", "#x"}) {  // not taken, or not there
+    EXPECT_TRUE(is_fault(open(3)->annotation("S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf" +
+                                             std::string(row))))
+        << row;
+  }
+}
+
+TEST_F(OfficialLayoutTest, AStepIsAFrameOfThoseTaken) {
+  add_video("Walking", 12);
+  add_poses("Walking", 11);
+  const auto dataset = open(5);
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[1].sample_id, "S1/Walking/54138969/000006");
+  EXPECT_EQ(frames[1].label_key, "S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#5");
+  const Neighbour before = dataset->neighbour(frames[1], -1);
+  EXPECT_EQ(before.state, State::kPresent);
+  EXPECT_EQ(before.frame.index, 1);
+  EXPECT_EQ(before.frame.video_frame, 0);
+  EXPECT_EQ(dataset->neighbour(frames[1], 0).frame.index, 6);
+  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.video_frame, 10);
+  EXPECT_NEAR(dataset->neighbour(frames[1], 1).frame.time_s - before.frame.time_s, 0.2, 1e-12);
+  EXPECT_EQ(dataset->neighbour(frames[1], 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(frames[1], -2).state, State::kBeyond);
+  // A frame without a pose is a neighbour like any other.
+  EXPECT_EQ(open(1)->neighbour(open(1)->labelled_frames().back(), 1).state, State::kPresent);
+}
+
+TEST_F(OfficialLayoutTest, PosesBeyondTheVideosEndAreTold) {
+  add_video("Walking", 10);
+  add_poses("Walking", 12);
+  add_video("Walking 1", 10);
+  add_poses("Walking 1", 11);
+  EXPECT_EQ(open(1)->labelled_frames().size(), 20u);
+  EXPECT_THAT(open(1)->notes()[0],
+              "2 labelled frames beyond the end of their video left out: 1 of "
+              "h36m/S1/Videos/Walking 1.54138969.mp4 (11 poses, 10 frames), 2 of "
+              "h36m/S1/Videos/Walking.54138969.mp4 (12 poses, 10 frames)");
+  const auto thinned = open(5);  // frames 1 and 6 of both, and 11
+  EXPECT_EQ(thinned->labelled_frames().size(), 4u);
+  EXPECT_THAT(open(7)->notes(), ::testing::Each(::testing::Not(HasSubstr("beyond"))));
+}
+
+TEST_F(OfficialLayoutTest, FilesWithoutTheirPartnersAreTold) {
+  add_video("Walking", 2);
+  add_poses("Walking", 2);
+  add_video("Eating", 2);
+  add_poses("Posing", 2);
+  add_video("_ALL 1", 2);  // calibration, no activity
+  add_poses("_ALL 1", 2);
+  const auto dataset = open();
+  EXPECT_EQ(dataset->labelled_frames().size(), 2u);
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("2 videos without poses left out: h36m/S1/Videos/Eating.54138969.mp4, "
+                          "h36m/S1/Videos/_ALL 1.54138969.mp4",
+                          "1 files of poses without a video left out: "
+                          "h36m/S1/MyPoseFeatures/D2_Positions/Posing.54138969.cdf",
+                          "1 videos without joints in 3-D: h36m/S1/Videos/Walking.54138969.mp4",
+                          HasSubstr("no intrinsics")));
+  const auto outcome = dataset->annotation(dataset->labelled_frames()[0].label_key);
+  EXPECT_THAT(std::get<Annotation>(outcome).persons[0].joints3d_mm, IsEmpty());
+}
+
+TEST_F(OfficialLayoutTest, AVideoThatCannotBeReadIsAFaultOfItsFrames) {
+  add_poses("Directions", 3);
+  testing::write_file(folder_ / "h36m/S1/Videos/Directions.54138969.mp4", "no video");
+  add_poses("Eating", 3);
+  add_video("Eating", 3, 25);
+  const auto dataset = open(2);
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_THAT(frames[0].fault, AllOf(HasSubstr("expected a video, got "),
+                                     EndsWith("S1/Videos/Directions.54138969.mp4")));
+  EXPECT_EQ(dataset->neighbour(frames[0], 1).state, State::kPresent) << "the fault is the frame's";
+  EXPECT_EQ(dataset->notes()[0], "2 videos whose samples will be quarantined: " + frames[0].fault +
+                                     ", " + frames[2].fault);
+  EXPECT_EQ(frames[2].fault,
+            "expected a video of 50 frames a second, as its poses are, got 25, in "
+            "h36m/S1/Videos/Eating.54138969.mp4");
+}
+
+TEST_F(OfficialLayoutTest, PosesThatCannotBeReadAreAnErrorOfTheSource) {
+  add_video("Walking", 2);
+  add_poses("Walking", 2);
+  add_poses_3d("Walking", 3);
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(
+                  "expected numbers [2, 96], got numbers [3, 96], in "
+                  "h36m/S1/MyPoseFeatures/D3_Positions_mono/Walking.54138969.cdf (Pose)"));
+  add_poses_3d("Walking", 2);
+  testing::write_file(file_of("D2_Positions", "Walking"), "no CDF");
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(AllOf(HasSubstr("expected a CDF file of version 3"),
+                                              EndsWith("Walking.54138969.cdf (Pose)"))));
+  write_poses("D2_Positions", "Walking", 2, 3, [](int, int) { return std::array{0.f, 0.f, 0.f}; });
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("expected numbers [at least 1, 64], got")));
+}
+
+TEST_F(OfficialLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirFrame) {
+  constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
+  add_video("Walking", 3);
+  add_poses("Walking", 3);
+  write_poses("D3_Positions_mono", "Walking", 3, 3, [](int r, int j) {
+    return std::array{0.f, 0.f, r == 2 && j == 7 ? kNan : 1.f};
+  });
+  const auto dataset = open(2);
+  const auto& frames = dataset->labelled_frames();
+  EXPECT_FALSE(is_fault(dataset->annotation(frames[0].label_key)));
+  const auto outcome = dataset->annotation(frames[1].label_key);
+  ASSERT_TRUE(is_fault(outcome));
+  EXPECT_EQ(std::get<SampleFault>(outcome).reason,
+            "expected finite numbers, got nan, in "
+            "h36m/S1/MyPoseFeatures/D3_Positions_mono/Walking.54138969.cdf (Pose, row 2)");
+}
+
+TEST_F(OfficialLayoutTest, WithoutAnyTakeItIsAnError) {
+  EXPECT_THROW(open(), InputError);
+  add_poses("Walking", 3);
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
+                                   AllOf(HasSubstr("expected SUBJECT/Videos/ACTION.CAMERA.mp4"),
+                                         EndsWith("got none, in h36m"))));
+}
+
+TEST_F(OfficialLayoutTest, PairsOfAThinnedVideoAreItsFrames) {
+  add_video("Walking", 61);
+  add_poses("Walking", 61);
+  const auto dataset = open(5);
+  const LabelledFrame& last = dataset->labelled_frames().back();  // frame 61
+  const FramePair pair{dataset->neighbour(last, -6).frame, dataset->neighbour(last, 0).frame, 6,
+                       last.frame.index, 1};
+  EXPECT_NEAR(pair.gap_s(), 0.6, 1e-12);
+  const auto outcome = PairReader(folder_.path(), {}).read(pair);
+  ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+  const auto& input = std::get<PreparedPair>(outcome).input;
+  // Frame i, counted from 0, is grey of value 2 i.
+  EXPECT_NEAR((input.front() / 2 + 0.5) * 255, 2 * 30, 1);
+  EXPECT_NEAR((input.back() / 2 + 0.5) * 255, 2 * 60, 1);
+}
+
+TEST_F(OfficialLayoutTest, ReadsSharedData) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kHuman36m;
+  spec.root = "human36m_official";
+  spec.layout = Human36mLayout::kOfficial;
+  spec.every = 5;
+  const auto dataset = open_human36m_dataset(spec, data);
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 16u);  // 1, 6, ..., 36 of two cameras
+  EXPECT_EQ(frames[0].sample_id, "S1/Directions 1/54138969/000001");
+  EXPECT_EQ(frames[15].sample_id, "S1/Directions 1/55011271/000036");
+  const auto first = std::get<Annotation>(dataset->annotation(frames[0].label_key));
+  // As numpy prints expected.npz: 309.5788, 437.9982; 480.4014, 308.1903, 482.39233.
+  EXPECT_NEAR(first.persons[0].joints[0].at.x, 309.5788, 1e-4);
+  EXPECT_NEAR(first.persons[0].joints[0].at.y, 437.9982, 1e-4);
+  EXPECT_NEAR(first.persons[0].joints3d_mm[0].value()[2], 482.39233, 1e-4);
+}
+
+}  // namespace
+}  // namespace eventgan
