@@ -178,21 +178,6 @@ TEST(TableColumnsTest, FindsValuesThatAreNotFinite) {
             "expected finite numbers, got -inf, in file.h5 (points, row 4)");
 }
 
-// A pickled numpy array of bytes, shape [n].
-std::string byte_array(const std::string& bytes) {
-  const std::string count(1, static_cast<char>(bytes.size()));
-  return "cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01"s +
-         "b\x87R(K\x01K" + count + "\x85" +
-         "cnumpy\ndtype\nU\x02u1K\x00K\x01\x87R(K\x03U\x01|tb\x89U"s + count + bytes + "tb";
-}
-
-// {("S1", "7"): {CONTENT}}
-std::string book(const std::string& content) {
-  return "}U\x02S1U\x01"
-         "7\x86}(" +
-         content + "us.";
-}
-
 CameraBook read(const std::string& pickle) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "cameras.pkl", pickle);
@@ -201,14 +186,14 @@ CameraBook read(const std::string& pickle) {
 
 TEST(CameraBookTest, ReadsIntrinsicsAndAllFields) {
   const CameraBook cameras =
-      read(book("U\x01"
-                "f" +
-                byte_array("\x0b\x0c") +
-                "U\x01"
-                "c" +
-                byte_array("\x05\x06") +
-                "U\x04nameX\x04\x00\x00\x00"
-                "cam1U\x01wM\xe8\x03U\x01oNU\x01xG\x3f\xf0\x00\x00\x00\x00\x00\x00"s));
+      read(camera_pickle("U\x01"
+                         "f" +
+                         pickled_bytes("\x0b\x0c") +
+                         "U\x01"
+                         "c" +
+                         pickled_bytes("\x05\x06") +
+                         "U\x04nameX\x04\x00\x00\x00"
+                         "cam1U\x01wM\xe8\x03U\x01oNU\x01xG\x3f\xf0\x00\x00\x00\x00\x00\x00"s));
   ASSERT_EQ(cameras.size(), 1u);
   const Human36mCamera& camera = cameras.at({"S1", "7"});
   EXPECT_EQ(camera.intrinsics, (Intrinsics{11, 12, 5, 6}));
@@ -220,17 +205,18 @@ TEST(CameraBookTest, ReadsTheLensDistortion) {
   const std::string intrinsics =
       "U\x01"
       "f" +
-      byte_array("\x0b\x0c") +
+      pickled_bytes("\x0b\x0c") +
       "U\x01"
       "c" +
-      byte_array("\x05\x06");
-  const std::string k = "U\x01k" + byte_array("\x01\x02\x03");
-  const std::string p = "U\x01p" + byte_array("\x04\x05");
-  EXPECT_EQ(read(book(intrinsics + k + p)).at({"S1", "7"}).distortion,
+      pickled_bytes("\x05\x06");
+  const std::string k = "U\x01k" + pickled_bytes("\x01\x02\x03");
+  const std::string p = "U\x01p" + pickled_bytes("\x04\x05");
+  EXPECT_EQ(read(camera_pickle(intrinsics + k + p)).at({"S1", "7"}).distortion,
             (LensDistortion{.k1 = 1, .k2 = 2, .k3 = 3, .p1 = 4, .p2 = 5}));
-  EXPECT_FALSE(read(book(intrinsics)).at({"S1", "7"}).distortion);
-  EXPECT_THAT([&] { read(book(intrinsics + k)); }, ThrowsMessage<InputError>(HasSubstr("(p)")));
-  EXPECT_THAT([&] { read(book(intrinsics + p + "U\x01k" + byte_array("\x01\x02"))); },
+  EXPECT_FALSE(read(camera_pickle(intrinsics)).at({"S1", "7"}).distortion);
+  EXPECT_THAT([&] { read(camera_pickle(intrinsics + k)); },
+              ThrowsMessage<InputError>(HasSubstr("(p)")));
+  EXPECT_THAT([&] { read(camera_pickle(intrinsics + p + "U\x01k" + pickled_bytes("\x01\x02"))); },
               ThrowsMessage<InputError>(HasSubstr("expected 3 numbers, got [2]")));
 }
 
@@ -272,24 +258,24 @@ TEST(CameraBookTest, RefusesOtherPickles) {
   const std::string focal =
       "U\x01"
       "f" +
-      byte_array("\x0b\x0c");
+      pickled_bytes("\x0b\x0c");
   const std::string centre =
       "U\x01"
       "c" +
-      byte_array("\x05\x06");
+      pickled_bytes("\x05\x06");
   for (const std::string& pickle :
        {"N."s, "no pickle"s, ""s, "}NNs."s,
         "}U\x01"
         "aU\x01"
         "b\x86Ns."s,
-        book(focal), book(centre),
-        book(focal + "U\x01"
-                     "cN"),
-        book(focal +
-             "U\x01"
-             "c" +
-             byte_array("\x05")),
-        book(focal + centre + "U\x01x]"), "}]]\x86}(" + focal + centre + "us.",
+        camera_pickle(focal), camera_pickle(centre),
+        camera_pickle(focal + "U\x01"
+                              "cN"),
+        camera_pickle(focal +
+                      "U\x01"
+                      "c" +
+                      pickled_bytes("\x05")),
+        camera_pickle(focal + centre + "U\x01x]"), "}]]\x86}(" + focal + centre + "us.",
         "cos\nsystem\n(S'true'\ntR."s}) {
     EXPECT_THAT([&] { read(pickle); },
                 ThrowsMessage<InputError>(AllOf(HasSubstr("expected "), HasSubstr("cameras.pkl"))))

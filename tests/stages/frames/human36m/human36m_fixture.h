@@ -37,4 +37,19 @@ inline std::map<std::string, testing::Hdf5Dataset> fetch_annotations(
           {"intrinsics/7", {{4}, std::vector<double>{1250, 512.5, 1000, 515.5}}}};
 }
 
+/// A pickled numpy array of bytes, shape [n].
+inline std::string pickled_bytes(const std::string& bytes) {
+  using namespace std::string_literals;
+  const std::string count(1, static_cast<char>(bytes.size()));
+  return "cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85U\x01"s +
+         "b\x87R(K\x01K" + count + "\x85" +
+         "cnumpy\ndtype\nU\x02u1K\x00K\x01\x87R(K\x03U\x01|tb\x89U"s + count + bytes + "tb";
+}
+
+/// A cameras.pkl: {("S1", CAMERA): {CONTENT}}.
+inline std::string camera_pickle(const std::string& content, const std::string& camera = "7") {
+  return "}U\x02S1U" + std::string(1, static_cast<char>(camera.size())) + camera + "\x86}(" +
+         content + "us.";
+}
+
 }  // namespace eventgan

@@ -10,6 +10,7 @@
 #include "stages/frames/decoding/pair_reader.h"
 #include "stages/frames/human36m/human36m_dataset.h"
 #include "tests/stages/frames/decoding/test_video.h"
+#include "tests/stages/frames/human36m/human36m_fixture.h"
 #include "tests/testing/cdf_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -144,6 +145,38 @@ TEST_F(OfficialLayoutTest, ReadsThePersonOfAFrame) {
                                              std::string(row))))
         << row;
   }
+}
+
+TEST_F(OfficialLayoutTest, TakesTheCameraThatProjectsTheJoints) {
+  // f = (11, 12) and c = (5, 6) px: at a depth of 132 mm a pixel is 12 mm wide and 11 mm high.
+  testing::write_file(folder_ / "h36m" / "cameras.pkl",
+                      camera_pickle("U\x01"
+                                    "f" +
+                                        pickled_bytes("\x0b\x0c") +
+                                        "U\x01"
+                                        "c" +
+                                        pickled_bytes("\x05\x06"),
+                                    "54138969"));
+  add_video("Walking", 2);
+  add_poses("Walking", 2);
+  write_poses("D3_Positions_mono", "Walking", 2, 3, [](int r, int j) {
+    const float off = r == 1 && j == 31 ? 12 * 25 : 0;  // 25 px
+    return std::array{12.0f * (95 + r) + off, 11.0f * (194 + 2 * j), 132.0f};
+  });
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  const auto person = [&](int row) {
+    return std::get<Annotation>(
+               dataset->annotation(frames.at(static_cast<std::size_t>(row)).label_key))
+        .persons.at(0);
+  };
+  EXPECT_EQ(person(0).camera, (Intrinsics{11, 12, 5, 6}));
+  EXPECT_FALSE(person(1).camera);
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("no camera for 1 of 2 rows: by cameras.pkl and D3_Positions_mono a joint "
+                          "lies up to 25 px from where it is annotated (expected at most 20), in "
+                          "h36m/S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf"));
+  EXPECT_THAT(dataset->annotation_files(), ::testing::Contains("h36m/cameras.pkl"));
 }
 
 TEST_F(OfficialLayoutTest, AStepIsAFrameOfThoseTaken) {
