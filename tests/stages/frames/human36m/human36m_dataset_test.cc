@@ -9,6 +9,7 @@
 #include "stages/frames/human36m/camera_book_internal.h"
 #include "stages/frames/human36m/human36m_dataset_internal.h"
 #include "stages/frames/human36m/pose_table_internal.h"
+#include "tests/stages/frames/human36m/human36m_fixture.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
