@@ -161,7 +161,7 @@ std::vector<ManifestCase> source_cases() {
        {{"/sources/0/dataset", R"("human36m")"},
         {"/sources/0/layout", R"("official")"},
         {"/sources/0/every", "0"}},
-       {"$.sources[0].every: expected an integer in 1..1000, got 0"}},
+       {"$.sources[0].every: expected an integer 1..1000, got 0"}},
       {"Human3.6M thinned in another layout",
        {{"/sources/0/dataset", R"("human36m")"},
         {"/sources/0/layout", R"("fetch")"},
