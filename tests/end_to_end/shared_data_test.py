@@ -147,7 +147,7 @@ class SharedData(program.InFolder):
         _, shards = self.convert(manifest([{"dataset": "human36m", "root": str(SHARED / "human36m_official"), "layout": "official",
                                             "every": 5, "pairs": pairs([1, 6], "after", "all")}],
                                           image={"width": 250, "height": 250, "fit": "stretch", "preset": "mpii"},
-                                          generator={"kind": "difference"}))
+                                          generator={"kind": "difference"}, output={"directory": "out", "samples_per_shard": 64}))
         shard, = shards
         ids = [text(sample) for sample in shard["pairs/sample_id"]]
         # Of 40 frames 1, 6, ..., 36 are taken: 7 have a next one, 2 one six steps on, in each of two videos.
