@@ -3,13 +3,14 @@
 
     cmake --preset release && cmake --build --preset release
     docker/bootstrap.sh packages benchmark
-    tests/benchmarks/run.py [--quick] [--out OUT]
+    tests/benchmarks/run.py [--quick] [--out OUT] [--v2e V2E]
 
 Leave the machine alone meanwhile. What takes turns in a round meets the same noise, so ratios can be trusted further than
 times. Each part can also be run by itself, for instance tests/benchmarks/engines.py.
 """
 
 import argparse
+import dataclasses
 import pathlib
 import shlex
 import sys
@@ -27,6 +28,7 @@ import scopes
 import stages
 import storage
 import threads
+import v2e
 import whole_conversion
 from measuring.bench import Bench, add_arguments, check_programs
 from measuring.machine import description, processor_name
@@ -35,15 +37,14 @@ from measuring.report import markdown
 
 PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
          "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading,
-         "scopes": scopes}
+         "scopes": scopes, "v2e": v2e}
 
 
 def measure_parts(bench, names):
     for name in names:
         start = time.monotonic()
         print(f"{name} ...", end=" ", file=sys.stderr, flush=True)
-        part_bench = Bench(bench.build, bench.effort, bench.folder(name))
-        yield PARTS[name].measure(part_bench)
+        yield PARTS[name].measure(dataclasses.replace(bench, scratch=bench.folder(name)))
         print(f"{time.monotonic() - start:.0f} s", file=sys.stderr, flush=True)
 
 
@@ -56,7 +57,7 @@ def main():
     check_programs(arguments.build)
     arguments.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(prefix="eventgan-benchmark-") as scratch:
-        bench = Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch))
+        bench = Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch), arguments.v2e)
         sections = list(measure_parts(bench, arguments.parts))
         libraries = {text for section in sections for text in section.libraries}
         machine = "\n".join(description(bench, shlex.join(sys.argv), libraries))

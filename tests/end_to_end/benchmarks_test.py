@@ -15,6 +15,7 @@ BENCHMARKS = SOURCE / "tests" / "benchmarks"
 NEEDED = ["matplotlib", "torch"]
 SPECTRAL_EPSILON = 1e-12
 ENGINES_OF_EVERY_BUILD = ["eager PyTorch float32", "torch float32"]
+V2E = SOURCE.parent / "shared" / "peers" / "v2e"
 DATASET_FREE = {**os.environ, "EVENTGAN_TEST_DATA": "/nowhere"}
 
 
@@ -40,7 +41,9 @@ class Benchmarks(program.InFolder):
         sections = sections_of(page)
         self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
                                           "The whole conversion", "Against the picture's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
-                                          "Scope"])
+                                          "Scope", "Beside v2e"])
+        self.assertEqual(sections.pop("Beside v2e"), [])
+        self.assertIn("Skipped: no --v2e", page)
         for title, rows in sections.items():
             with self.subTest(title):
                 self.assertGreater(len(rows), 1)
@@ -59,6 +62,17 @@ class Benchmarks(program.InFolder):
         sections = sections_of(self.run_all("--parts", "storage"))
         self.assertEqual(list(sections), ["Storage"])
         self.assertFalse((self.folder / "benchmarks.png").exists())
+
+    @unittest.skipUnless(SHARED.is_dir() and V2E.is_dir(), "no ../shared/data or no ../shared/peers/v2e")
+    def test_v2e_takes_turns_with_the_project_and_its_scores_agree_with_realism(self):
+        rows = sections_of(self.run_all("--parts", "v2e", "--v2e", V2E))["Beside v2e"]
+        headings = [row for row in rows if row[0] == "made by"]
+        self.assertEqual([len(heading) for heading in headings], [5, 5, 11])  # times twice, scores
+        scores = {row[0]: dict(zip(headings[-1], row)) for row in rows[rows.index(headings[-1]) + 1:]}
+        self.assertEqual(scores["real"]["F1 over time"], "1")
+        self.assertEqual(scores["v2e, pair by pair"], scores["v2e, as one video"] | {"made by": "v2e, pair by pair"})  # one pair
+        for contender in ("v2e, pair by pair", "difference", "shipped:8 float32"):
+            self.assertTrue(0.5 < float(scores[contender]["F1 over time"]) < 0.7, scores[contender])  # esim, of another motion, has 0.3
 
     @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
     def test_the_baseline_is_the_published_network(self):

@@ -18,6 +18,7 @@ class Bench:
     build: pathlib.Path    # the build folder; its programs are measured
     effort: str            # one of EFFORTS, the keys of each part's settings
     scratch: pathlib.Path  # an empty folder, deleted afterwards
+    v2e: pathlib.Path | None = None  # a checkout of SensorsINI/v2e, for v2e.py
 
     @property
     def program(self):
@@ -40,6 +41,7 @@ def add_arguments(parser):
     effort.add_argument("--trial", dest="effort", action="store_const", const="trial",
                         help="only sees that all of it runs; the numbers mean nothing")
     parser.set_defaults(effort="full")
+    parser.add_argument("--v2e", type=pathlib.Path, help="a checkout of SensorsINI/v2e; without it its part is skipped")
 
 
 def check_programs(build):
@@ -55,4 +57,4 @@ def run_part(documentation, measure):
     arguments = parser.parse_args()
     check_programs(arguments.build)
     with tempfile.TemporaryDirectory(prefix="eventgan-benchmark-") as scratch:
-        print(markdown([measure(Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch)))]))
+        print(markdown([measure(Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch), arguments.v2e))]))

@@ -15,19 +15,21 @@ class Job:
     frames: str                  # folder of frames; one pair fewer
     height: int
     width: int
-    weights: str                 # as the manifest's generator.weights
+    weights: str = "shipped"     # as the manifest's generator.weights
     precision: str = "float32"
     dtype: str = "uint8"
     deflate_level: int = 1
     threads: int = 1
     samples_per_shard: int = 64
+    preset: str = "kitti"
+    generator: dict | None = None  # the manifest's, in place of weights and precision
 
     def manifest(self):
         return {
             "format": "eventgan-manifest", "version": 1, "name": "benchmark", "seed": 7,
             "sources": [{"dataset": "frames", "root": str(self.frames), "pairs": {"gaps": [1], "side": "before", "choose": "one"}}],
-            "image": {"height": self.height, "width": self.width, "fit": "stretch", "preset": "kitti"},
-            "generator": {"weights": self.weights, "precision": self.precision},
+            "image": {"height": self.height, "width": self.width, "fit": "stretch", "preset": self.preset},
+            "generator": self.generator or {"weights": self.weights, "precision": self.precision},
             "output": {"directory": "out", "samples_per_shard": self.samples_per_shard, "dtype": self.dtype,
                        "deflate_level": self.deflate_level},
         }
