@@ -19,6 +19,10 @@ namespace eventgan {
 /// no need of a child.
 int read_guarded(const std::filesystem::path& shard, const std::function<int()>& read);
 
+/// The same for what reads parts of many shards, which to hash would take hours: always in such a
+/// child. `where`: their folder, for messages.
+int read_apart(const std::filesystem::path& where, const std::function<int()>& read);
+
 /// Between the steps of `read`: the limit of time counts anew, or not at all where HDF5 is not at
 /// work (frames may take as long as they take). Outside of such a child they do nothing.
 void renew_time_limit();

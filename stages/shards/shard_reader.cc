@@ -50,6 +50,23 @@ bool is_counted(const ColumnSpec& spec) {
          std::ranges::find(kCounted, std::string_view(spec.path)) != std::end(kCounted);
 }
 
+bool is_overview(const ColumnSpec& spec) {
+  constexpr const char* kSeen[] = {"/events/statistics/sum_positive",
+                                   "/events/statistics/sum_negative",
+                                   "/events/statistics/flags",
+                                   "/pairs/sample_id",
+                                   "/pairs/sequence",
+                                   "/pairs/gap_frames",
+                                   "/pairs/gap_s",
+                                   "/pairs/label_index",
+                                   "/labels/boxes/offsets",
+                                   "/labels/boxes/xyxy",
+                                   "/labels/boxes/class_id",
+                                   "/labels/boxes/ignore",
+                                   "/valid"};
+  return std::ranges::find(kSeen, std::string_view(spec.path)) != std::end(kSeen);
+}
+
 /// Reads column after column and notes what is wrong.
 class ColumnReader {
  public:
@@ -60,6 +77,7 @@ class ColumnReader {
   template <class Element>
   void operator()(const ColumnSpec& spec, std::vector<Element>& column) {
     if (columns_ == Columns::kCounted && !is_counted(spec)) return;
+    if (columns_ == Columns::kOverview && !is_overview(spec)) return;
     if (spec.optional && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
     Dims dims;
     try {
@@ -169,6 +187,26 @@ std::vector<std::byte> read_stored_chunk(const ShardFile& shard, int slot) {
   return chunk;
 }
 
+namespace {
+
+/// With a line for each fault.
+void throw_if_any(const std::vector<std::string>& faults) {
+  if (faults.empty()) return;
+  std::string message;
+  for (const std::string& fault : faults) message += (message.empty() ? "" : "\n") + fault;
+  throw std::runtime_error(message);
+}
+
+}  // namespace
+
+ShardOverview read_overview(const std::filesystem::path& file) {
+  std::vector<std::string> faults;
+  const Hdf5Lock lock;
+  ShardFile shard = open_shard(file, faults, Columns::kOverview);
+  throw_if_any(faults);
+  return {std::move(shard.header), std::move(shard.tables)};
+}
+
 struct ShardReader::State {
   std::string path;
   ShardFile shard;
@@ -195,10 +233,7 @@ ShardReader::ShardReader(const std::filesystem::path& file) : state_(std::make_u
     const Hdf5Lock lock;
     state_->shard = open_shard(file, faults);
   }
-  if (faults.empty()) return;
-  std::string message;
-  for (const std::string& fault : faults) message += (message.empty() ? "" : "\n") + fault;
-  throw std::runtime_error(message);
+  throw_if_any(faults);
 }
 
 ShardReader::~ShardReader() = default;

@@ -43,4 +43,16 @@ class ShardReader {
   std::unique_ptr<State> state_;
 };
 
+/// What tells of many samples which are worth a look. Of `tables` it has the volumes' sums and
+/// flags, sample_id, sequence, gaps and label_index, offsets, xyxy, class_id and ignore of boxes,
+/// and valid; everything else is empty.
+struct ShardOverview {
+  ShardHeader header;
+  ShardTables tables;
+};
+
+/// Reads these columns alone: quick also for shards with many labels. Throws as ShardReader's
+/// constructor does. Thread safe, as it is.
+ShardOverview read_overview(const std::filesystem::path& file);
+
 }  // namespace eventgan

@@ -22,7 +22,8 @@ struct ShardFile {
 /// Which columns to read.
 enum class Columns {
   kAll,
-  kCounted  ///< those that a marker's numbers are counts of, and the ids of samples
+  kCounted,  ///< those that a marker's numbers are counts of, and the ids of samples
+  kOverview  ///< see read_overview
 };
 
 /// Opens a shard and reads its columns. Every dataset that is missing, or has another type or shape

@@ -14,12 +14,19 @@
 namespace eventgan {
 namespace {
 
-TEST(PanelScale, WholeFactorsWithinBounds) {
-  EXPECT_EQ(panel_scale({260, 861}).factor, 1);
-  EXPECT_EQ(panel_scale({260, 346}).factor, 2);  // 692 <= 720 < 1038
-  EXPECT_EQ(panel_scale({240, 96}).factor, 3);
-  EXPECT_EQ(panel_scale({1, 1}).factor, 8);
-  EXPECT_EQ(panel_scale({4000, 4000}).factor, 1);
+TEST(PreviewLayout, IsAsLargeAsAPageHasRoomFor) {
+  const auto expect = [](ImageSize volume, int factor, int columns) {
+    const PreviewLayout layout = preview_layout(volume);
+    EXPECT_EQ(layout.scale.factor, factor) << volume.height << "x" << volume.width;
+    EXPECT_EQ(layout.columns, columns) << volume.height << "x" << volume.width;
+  };
+  expect({260, 861}, 1, 1);  // 3 x 861 is far beyond 1420
+  expect({375, 1242}, 1, 1);
+  expect({260, 346}, 2, 2);  // 2 x 692 + 3 x 6 = 1402
+  expect({240, 320}, 2, 2);
+  expect({128, 128}, 5, 2);    // 640 twice each way; in a row 3 x 384
+  expect({1, 1}, 8, 3);        // no larger, and then the fewest rows
+  expect({4000, 4000}, 1, 1);  // too large for any page
 }
 
 TEST(PanelScale, APixelsCentreStaysInTheMiddleOfItsSquare) {

@@ -1,21 +1,16 @@
 #include "stages/events/pictures/preview_picture.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <numeric>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "stages/events/pictures/skeleton.h"
-#include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
 namespace {
-
-using testing::TemporaryFolder;
 
 const std::vector<std::string> kMpii{"r_ankle",    "r_knee",     "r_hip",   "l_hip",
                                      "l_knee",     "l_ankle",    "pelvis",  "thorax",
@@ -114,9 +109,10 @@ TEST(Skeleton, UnknownNamesHaveNoLimbs) {
   EXPECT_TRUE(limbs_of({"joint 0", "joint 1", "pelvis"}).empty());
 }
 
-// 720 / 180 = 4: panels of 720x480 between gaps of 6, below a title of 24.
-constexpr ImageSize kDrawnSize{120, 180};
+// Stacked, four times as large: side by side they could be three times, (1420 - 18) / 2 / 180.
+constexpr ImageSize kDrawnSize{110, 180};
 constexpr int kFactor = 4;
+constexpr int kPanelHeight = kFactor * kDrawnSize.height;
 
 PreviewContent content_with(std::uint8_t grey) {
   PreviewContent content;
@@ -146,15 +142,18 @@ void add_person(PreviewContent& content, const std::vector<Joint>& joints) {
   content.labels.persons.push_back(placed);
 }
 
-cv::Mat drawn(const PreviewContent& content) {
-  const TemporaryFolder folder;
-  write_preview_png(content, folder / "preview.png");
-  return cv::imread((folder / "preview.png").string());
+/// The picture's pixels, of its own.
+cv::Mat pixels_of(const ColourFrame& picture) {
+  return cv::Mat(picture.size.height, picture.size.width, CV_8UC3,
+                 const_cast<std::uint8_t*>(picture.bgr.data()))
+      .clone();
 }
 
+cv::Mat drawn(const PreviewContent& content) { return pixels_of(draw_preview(content)); }
+
 cv::Mat panel(const cv::Mat& picture, int number) {
-  const cv::Size size(kFactor * kDrawnSize.width, kFactor * kDrawnSize.height);
-  return picture(cv::Rect({6 + number * (size.width + 6), 24}, size));
+  const cv::Size size(kFactor * kDrawnSize.width, kPanelHeight);
+  return picture(cv::Rect({6, 24 + number * (size.height + 20)}, size));
 }
 
 /// Pixels of a panel that differ from those of the same picture without labels.
@@ -173,40 +172,117 @@ int brightness(const cv::Mat& picture, int x, int y) {
   return std::max({pixel[0], pixel[1], pixel[2]});
 }
 
-TEST(PreviewPicture, ThreePanelsBesideEachOther) {
+TEST(PreviewPicture, ThreePanels) {
   const cv::Mat picture = drawn(content_with(90));
-  EXPECT_EQ(picture.size(), cv::Size(3 * 720 + 4 * 6, 24 + 480 + 20));
+  EXPECT_EQ(picture.size(), cv::Size(720 + 2 * 6, 24 + 3 * (440 + 20)));
   EXPECT_EQ(panel(picture, 0).at<cv::Vec3b>(10, 10), cv::Vec3b(90, 90, 90));
-  EXPECT_EQ(panel(picture, 1).at<cv::Vec3b>(479, 719), cv::Vec3b(90, 90, 90));
+  EXPECT_EQ(panel(picture, 1).at<cv::Vec3b>(439, 719), cv::Vec3b(90, 90, 90));
   EXPECT_EQ(cv::countNonZero(panel(picture, 2).reshape(1)), 0) << "no events are black";
 }
 
-TEST(PreviewPicture, ABoxStandsAtItsPlaceInAllPanels) {
+TEST(PreviewPicture, ABoxStandsAtItsPlace) {
   PreviewContent content = content_with(90);
   add_box(content, {40, 50, 90, 80}, /*ignore=*/false);
   for (int number = 0; number < 3; ++number) {
     const cv::Mat marks = labels_only(content, number);
     // Below the caption: the lines run along edges x 4, two pixels wide with softened borders.
-    const cv::Rect bounds = cv::boundingRect(marks.rowRange(4 * 50 - 2, 480));
+    const cv::Rect bounds = cv::boundingRect(marks.rowRange(4 * 50 - 2, kPanelHeight));
     EXPECT_NEAR(bounds.x, 4 * 40, 3);
     EXPECT_NEAR(bounds.x + bounds.width, 4 * 90, 3);
     EXPECT_NEAR(bounds.y + bounds.height + 4 * 50 - 2, 4 * 80, 3);
     EXPECT_EQ(marks.at<std::uint8_t>(4 * 65, 4 * 65), 0) << "the inside stays free";
-    EXPECT_GT(cv::countNonZero(marks.rowRange(0, 4 * 50 - 2)), 0) << "the caption stands above";
+    EXPECT_EQ(cv::countNonZero(marks.rowRange(0, 4 * 50 - 2)) > 0, number > 0)
+        << "the caption stands above, where the label belongs";
   }
+}
+
+TEST(PreviewPicture, TheLabelledFrameIsMarkedAndTheOtherHasThinDashes) {
+  PreviewContent content = content_with(90);
+  add_box(content, {40, 50, 90, 80}, /*ignore=*/false);
+  const auto marked = [&](int number) {
+    return cv::countNonZero(labels_only(content, number)(cv::Rect(4 * 40 - 3, 4 * 55, 7, 80)));
+  };
+  const auto border = [&](int number) {
+    const cv::Vec3b pixel = drawn(content).at<cv::Vec3b>(24 + number * 460 + 100, 4);
+    return pixel[2] > 200;
+  };
+  for (const int labelled : {0, 1}) {
+    content.label_position = labelled;
+    EXPECT_GE(marked(labelled), 2 * 80) << "a whole line of two pixels";
+    EXPECT_GE(marked(1 - labelled), 20);
+    EXPECT_LE(marked(1 - labelled), 80) << "dashes of one";
+    EXPECT_TRUE(border(labelled));
+    EXPECT_FALSE(border(1 - labelled));
+  }
+  content.label_position = 0.5;
+  for (const int frame : {0, 1}) {
+    EXPECT_LE(marked(frame), 80);
+    EXPECT_FALSE(border(frame));
+  }
+  EXPECT_GE(marked(2), 2 * 80) << "the events have the labels always";
+}
+
+TEST(PreviewPicture, NamesDoNotHideSmallBoxes) {
+  PreviewContent content = content_with(90);
+  // Below one another, so that a name above the lower box would hide the upper one.
+  add_box(content, {40, 50, 45, 53}, false);
+  add_box(content, {40, 54, 45, 57}, false);
+  const cv::Mat picture = panel(drawn(content), 1);
+  for (const int top : {50, 54}) {
+    const cv::Rect inside(4 * 40 + 3, 4 * top + 3, 12, 4);
+    cv::Mat distance;
+    cv::absdiff(picture(inside), cv::Scalar::all(90), distance);
+    EXPECT_EQ(cv::countNonZero(distance.reshape(1)), 0) << top;
+  }
+  content.annotation.boxes.clear();
+  content.labels.boxes.clear();
+  for (int i = 0; i < 800; ++i) {  // one beside the other, smaller than a name: none has room
+    const double left = 4.5 * (i % 40), top = 5.5 * (i / 40);
+    add_box(content, {left, top, left + 4.5, top + 5.5}, false);
+  }
+  EXPECT_EQ(panel(drawn(content), 1).at<cv::Vec3b>(4 * 55 + 11, 4 * 45 + 9), cv::Vec3b(90, 90, 90));
+}
+
+TEST(PreviewPicture, ATileHasTheLabelledFrameAndTheEvents) {
+  PreviewContent content = content_with(90);
+  content.next_bgr.assign(content.next_bgr.size(), 200);
+  cv::Mat tile = pixels_of(draw_tile(content, 378));
+  EXPECT_EQ(tile.size(), cv::Size(378, 24 + 110 + 6)) << "(378 - 18) / 2 = 180";
+  EXPECT_EQ(tile.at<cv::Vec3b>(60, 60), cv::Vec3b(200, 200, 200));
+  EXPECT_EQ(tile.at<cv::Vec3b>(60, 300), cv::Vec3b(0, 0, 0));
+  content.label_position = 0;
+  EXPECT_EQ(pixels_of(draw_tile(content, 378)).at<cv::Vec3b>(60, 60), cv::Vec3b(90, 90, 90));
+
+  PreviewContent wide;
+  wide.shape = {9, {10, 100}};
+  tile = pixels_of(draw_tile(wide, 112));
+  EXPECT_EQ(tile.size(), cv::Size(112, 24 + 2 * (10 + 6))) << "one above the other";
+}
+
+TEST(PreviewPicture, ASheetHasRowsOfTiles) {
+  const auto tile = [](int height, std::uint8_t grey) {
+    return ColourFrame{{height, 10}, std::vector<std::uint8_t>(std::size_t(30 * height), grey)};
+  };
+  const std::vector<ColourFrame> tiles{tile(20, 50), tile(30, 100), tile(5, 150)};
+  const cv::Mat sheet = pixels_of(draw_sheet(tiles, 2));
+  EXPECT_EQ(sheet.size(), cv::Size(20, 35));
+  EXPECT_EQ(sheet.at<cv::Vec3b>(19, 9)[0], 50);
+  EXPECT_EQ(sheet.at<cv::Vec3b>(29, 10)[0], 100);
+  EXPECT_EQ(sheet.at<cv::Vec3b>(34, 0)[0], 150);
+  EXPECT_THROW(draw_sheet({}, 2), std::invalid_argument);
 }
 
 TEST(PreviewPicture, ABoxThatFillsTheVolumeShowsAllFourSides) {
   PreviewContent content = content_with(90);
-  add_box(content, {0, 0, 180, 120}, /*ignore=*/false);
-  const cv::Rect bounds = cv::boundingRect(labels_only(content, 0));
-  EXPECT_EQ(bounds, cv::Rect(0, 0, 720, 480));
+  add_box(content, {0, 0, 180, 110}, /*ignore=*/false);
+  const cv::Rect bounds = cv::boundingRect(labels_only(content, 1));
+  EXPECT_EQ(bounds, cv::Rect(0, 0, 720, 440));
 }
 
 TEST(PreviewPicture, IgnoredRegionsAreDashedAndGrey) {
   PreviewContent content = content_with(20);
   add_box(content, {40, 50, 90, 80}, /*ignore=*/true);
-  const cv::Mat picture = panel(drawn(content), 0);
+  const cv::Mat picture = panel(drawn(content), 1);
   int on = 0;
   int off = 0;
   for (int x = 4 * 40; x < 4 * 90; ++x) {
@@ -221,7 +297,7 @@ TEST(PreviewPicture, JointsStandAtTheirPlaceAndHiddenOnesAreHollow) {
   PreviewContent content = content_with(90);
   add_person(content, {{{30, 30}, 1}, {{100, 60}, 0}, {kMissingPoint, 0}});
   content.schema.joint_names = {"a", "b", "c"};
-  for (int number = 0; number < 3; ++number) {
+  for (const int number : {1, 2}) {
     const cv::Mat marks = labels_only(content, number);
     // Volume pixel 30 is panel pixels 120..123.
     EXPECT_NE(marks.at<std::uint8_t>(121, 121), 0);
@@ -237,7 +313,7 @@ TEST(PreviewPicture, LimbsJoinKnownJointsOnly) {
   PreviewContent content = content_with(90);
   content.schema.joint_names = {"r_ankle", "r_knee", "r_hip"};
   add_person(content, {{{20, 60}, 1}, {{120, 60}, 1}, {kMissingPoint, 0}});
-  const cv::Mat marks = labels_only(content, 0);
+  const cv::Mat marks = labels_only(content, 1);
   EXPECT_NE(marks.at<std::uint8_t>(4 * 60 + 1, 4 * 70), 0) << "shin";
   EXPECT_EQ(cv::countNonZero(marks(cv::Rect(0, 0, 60, 60))), 0) << "no thigh towards (-1, -1)";
 }
@@ -267,17 +343,6 @@ TEST(PreviewPicture, LongTitlesAreCut) {
   content.title.assign(2000, 'W');
   const cv::Mat picture = drawn(content);
   EXPECT_EQ(picture.at<cv::Vec3b>(12, picture.cols - 2), picture.at<cv::Vec3b>(1, 1));
-}
-
-TEST(PreviewPicture, ErrorsNameThePath) {
-  const TemporaryFolder folder;
-  try {
-    write_preview_png(content_with(90), folder / "none/preview.png");
-    FAIL() << "expected an exception";
-  } catch (const std::runtime_error& error) {
-    // Of the temporary file that it is first.
-    EXPECT_THAT(error.what(), ::testing::HasSubstr((folder / "none/.preview.png").string()));
-  }
 }
 
 TEST(PreviewPicture, SizesThatDifferAreRefused) {

@@ -48,6 +48,37 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
+TEST(ShardOverview, HasItsColumnsAndNoOthers) {
+  const testing::TemporaryFolder folder;
+  const testing::ExampleShard example = testing::example_shard();
+  const ShardMarker marker = write_shard(folder.path(), example);
+  const ShardOverview overview = read_overview(folder / marker.shard);
+  EXPECT_EQ(overview.header.name, marker.shard);
+  const ShardTables& tables = overview.tables;
+  ASSERT_EQ(tables.valid.size(), example.samples.size());
+  std::size_t boxes = 0;
+  for (std::size_t i = 0; i < example.samples.size(); ++i) {
+    const ShardSample& sample = example.samples[i];
+    EXPECT_EQ(tables.valid[i], sample.valid);
+    EXPECT_EQ(tables.pairs.sample_id[i], sample.sample_id);
+    EXPECT_EQ(tables.pairs.sequence[i], sample.sequence);
+    EXPECT_EQ(tables.pairs.gap_frames[i], sample.pair.gap_frames);
+    EXPECT_EQ(tables.pairs.label_index[i], sample.pair.label_index);
+    EXPECT_EQ(tables.events.flags[i], sample.statistics.flags);
+    EXPECT_EQ(tables.events.sum_positive[i], sample.statistics.sum_positive);
+    EXPECT_EQ(tables.events.sum_negative[i], sample.statistics.sum_negative);
+    for (const VolumeBox& box : sample.labels.boxes) {
+      EXPECT_EQ(tables.boxes.xyxy[4 * boxes], box.clipped.left);
+      EXPECT_EQ(tables.boxes.ignore[boxes], box.ignore);
+      ++boxes;
+    }
+  }
+  EXPECT_EQ(tables.boxes.class_id.size(), boxes);
+  EXPECT_TRUE(tables.original.empty());
+  EXPECT_TRUE(tables.pairs.prev_path.empty());
+  EXPECT_TRUE(tables.poses.joints.empty());
+}
+
 TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
   const testing::TemporaryFolder folder;
   const ShardMarker marker = write_shard(folder.path(), testing::unlabelled_shard());

@@ -1,0 +1,420 @@
+#include "pipeline/folder/preview.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/placement.h"
+#include "pipeline/folder/dataset_description.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/shard_guard.h"
+#include "pipeline/folder/shard_scan.h"
+#include "stages/events/pictures/picture_output.h"
+#include "stages/frames/decoding/frame_decoder.h"
+#include "stages/frames/decoding/prepared_frame.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string picture_name(const fs::path& shard, int slot) {
+  std::string number = std::to_string(slot);
+  number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
+  return shard.stem().string() + "_" + number + ".png";
+}
+
+/// The colour frame laid into the volume; empty, with a warning, if it cannot be had.
+std::vector<std::uint8_t> frame_picture(const FrameDecoder& decoder, const FrameRef& frame,
+                                        const ShardSample& sample, const ImageSpec& image,
+                                        std::vector<std::string>& warnings) {
+  if (!sample.valid) return {};
+  const Outcome<ColourFrame> decoded = decoder.decode(frame, sample.pair.video_stride());
+  if (is_fault(decoded)) {
+    warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
+    return {};
+  }
+  const ColourFrame& colour = std::get<ColourFrame>(decoded);
+  const Placement placement = place(sample.source_size, image);
+  if (colour.size != placement.source) {
+    warnings.push_back("expected the frame's size of when it was converted, got another, in " +
+                       frame.path + " (" + sample.sample_id + ")");
+    return {};
+  }
+  return place_colour(colour, placement);
+}
+
+}  // namespace
+
+struct PreviewReader::State {
+  fs::path frames;
+  std::vector<std::string>& warnings;
+  FrameDecoder decoder;
+  fs::path shard;  ///< that `reader` has open
+  std::optional<ShardReader> reader;
+  ImageSpec image;
+
+  void open(const fs::path& file) {
+    if (reader && shard == file) return;
+    reader.reset();
+    renew_time_limit();
+    reader.emplace(file);
+    lift_time_limit();
+    image = parse_job_manifest(reader->header().manifest_text, frames, file.string()).image;
+    shard = file;
+  }
+};
+
+PreviewReader::PreviewReader(fs::path frames, std::vector<std::string>& warnings)
+    : state_(new State{frames, warnings, FrameDecoder(frames), {}, std::nullopt, {}}) {}
+PreviewReader::~PreviewReader() = default;
+PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;
+
+PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
+  state_->open(shard);
+  const ShardReader& reader = *state_->reader;
+  const ShardHeader& header = reader.header();
+  renew_time_limit();
+  ShardSample sample = reader.sample(slot);
+  PreviewContent content;
+  content.shape = header.volume;
+  if (sample.valid) content.volume = reader.volume(slot);
+  lift_time_limit();
+  const auto frame = [&](const FrameRef& which) {
+    return frame_picture(state_->decoder, which, sample, state_->image, state_->warnings);
+  };
+  content.previous_bgr = frame(sample.pair.previous);
+  content.next_bgr = frame(sample.pair.next);
+  content.title = header.dataset + " " + sample.sample_id + ", gap " +
+                  std::to_string(sample.pair.gap_frames) + (sample.valid ? "" : ", QUARANTINED");
+  content.label_position = sample.pair.label_position;
+  content.annotation = std::move(sample.annotation);
+  content.labels = std::move(sample.labels);
+  content.schema = header.label_schema;
+  return content;
+}
+
+namespace {
+
+[[noreturn]] void refuse_slots(const std::string& text, int sample_count) {
+  throw UsageError("--samples: expected slots 0.." + std::to_string(sample_count - 1) +
+                   " such as 0,3-5, got \"" + text + "\"");
+}
+
+/// What is looked at.
+struct Shards {
+  fs::path folder;
+  std::vector<fs::path> files;
+  std::vector<int> samples;  ///< of each
+  std::vector<int> sources;  ///< of each: the manifest's source
+  bool is_folder = false;
+};
+
+Shards find_shards(const fs::path& where) {
+  if (!fs::is_directory(where) && where.filename() != kViewName) {
+    renew_time_limit();
+    const int samples = ShardReader(where).header().sample_count;
+    lift_time_limit();
+    return {fs::absolute(where).parent_path(), {where}, {samples}, {0}};
+  }
+  Shards shards;
+  shards.is_folder = true;
+  shards.folder = fs::is_directory(where) ? where : fs::absolute(where).parent_path();
+  const FrozenOutline frozen = read_frozen_outline(shards.folder);
+  for (const ShardState& shard : scan_shards(shards.folder, frozen.plan.shards, frozen.hash)) {
+    if (!shard.done()) continue;
+    shards.files.push_back(shards.folder / shard.outline.name);
+    shards.samples.push_back(shard.outline.samples);
+    shards.sources.push_back(shard.outline.source);
+  }
+  if (shards.files.empty()) {
+    throw InputError("expected shards that are done, got none, in " + shards.folder.string());
+  }
+  return shards;
+}
+
+/// A sample by its shard's place in Shards.
+struct Chosen {
+  std::size_t shard = 0;
+  int slot = 0;
+  auto operator<=>(const Chosen&) const = default;
+};
+
+ShardOverview overview_of(const Shards& shards, std::size_t shard) {
+  renew_time_limit();
+  ShardOverview overview = read_overview(shards.files[shard]);
+  lift_time_limit();
+  return overview;
+}
+
+bool has_box_of(const std::string& class_name, const ShardOverview& shard, int slot) {
+  const auto& names = shard.header.label_schema.class_names;
+  const BoxColumns& boxes = shard.tables.boxes;
+  const auto at = static_cast<std::size_t>(slot);
+  for (auto box = static_cast<std::size_t>(boxes.offsets[at]);
+       box < static_cast<std::size_t>(boxes.offsets[at + 1]); ++box) {
+    const auto id = static_cast<std::size_t>(boxes.class_id[box]);
+    if (boxes.ignore[box] == 0 && id < names.size() && names[id] == class_name) return true;
+  }
+  return false;
+}
+
+/// Calls visit(place, overview) for every sample that `options` leaves to choose from.
+template <class Visit>
+void visit_samples(const Shards& shards, const PreviewOptions& options, Visit&& visit) {
+  std::set<std::string> known;
+  bool any = false;
+  for (std::size_t i = 0; i < shards.files.size(); ++i) {
+    const ShardOverview overview = overview_of(shards, i);
+    const auto& names = overview.header.label_schema.class_names;
+    known.insert(names.begin(), names.end());
+    for (int slot = 0; slot < overview.header.sample_count; ++slot) {
+      if (!options.class_name.empty() && !has_box_of(options.class_name, overview, slot)) continue;
+      any = true;
+      visit(Chosen{i, slot}, overview);
+    }
+  }
+  if (any || options.class_name.empty()) return;
+  std::string list;
+  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
+  throw UsageError("--class: expected a class that a box has" +
+                   (list.empty() ? ", of samples without boxes" : " (" + list + ")") + ", got \"" +
+                   options.class_name + "\"");
+}
+
+std::vector<Chosen> worst_samples(const Shards& shards, const PreviewOptions& options) {
+  std::map<Extreme, std::set<std::pair<double, Chosen>>> best;  // the least extreme first
+  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
+    for (const Extreme extreme : {Extreme::kEmptiest, Extreme::kFullest, Extreme::kExtrapolated}) {
+      const auto ranked = rank(extreme, overview, place.slot);
+      if (!ranked) continue;
+      best[extreme].emplace(*ranked, place);
+      if (std::ssize(best[extreme]) > options.worst) best[extreme].erase(best[extreme].begin());
+    }
+  });
+  std::vector<Chosen> chosen;
+  for (const auto& [extreme, samples] : best) {
+    for (auto sample = samples.rbegin(); sample != samples.rend(); ++sample) {
+      if (std::ranges::find(chosen, sample->second) == chosen.end()) {
+        chosen.push_back(sample->second);
+      }
+    }
+  }
+  return chosen;
+}
+
+std::vector<Chosen> named_samples(const Shards& shards, const PreviewOptions& options) {
+  std::vector<Chosen> chosen;
+  std::set<std::string> missing(options.sample_ids.begin(), options.sample_ids.end());
+  const std::set<std::string> wanted = missing;
+  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
+    const std::string& id = overview.tables.pairs.sample_id[static_cast<std::size_t>(place.slot)];
+    if (!wanted.contains(id)) return;
+    missing.erase(id);
+    chosen.push_back(place);
+  });
+  if (missing.empty()) return chosen;
+  throw UsageError("--sample: expected the id of a sample, got \"" + *missing.begin() + "\", in " +
+                   shards.folder.string());
+}
+
+std::vector<Chosen> choose(const Shards& shards, const PreviewOptions& options) {
+  if (!options.slots.empty()) {
+    if (shards.is_folder) {
+      throw UsageError("--samples: expected a shard to have these slots, got the folder " +
+                       shards.folder.string() + " (--sample ID)");
+    }
+    std::vector<Chosen> chosen;
+    for (const int slot : parse_slots(options.slots, shards.samples[0])) {
+      chosen.push_back({0, slot});
+    }
+    return chosen;
+  }
+  if (!options.sample_ids.empty()) return named_samples(shards, options);
+  if (options.worst > 0) return worst_samples(shards, options);
+  constexpr int kPictures = 8, kTiles = 24;
+  const int count = options.count.value_or(options.sheet ? kTiles : kPictures);
+  std::vector<Chosen> all;
+  if (!options.class_name.empty()) {
+    visit_samples(shards, options, [&](Chosen place, const auto&) { all.push_back(place); });
+  } else {
+    for (std::size_t i = 0; i < shards.files.size(); ++i) {
+      for (int slot = 0; slot < shards.samples[i]; ++slot) all.push_back({i, slot});
+    }
+  }
+  std::vector<Chosen> chosen;
+  for (const std::int64_t at : spread(count, std::ssize(all))) {
+    chosen.push_back(all[static_cast<std::size_t>(at)]);
+  }
+  return chosen;
+}
+
+/// The sequence's samples in order, and how fast they go.
+struct Sequence {
+  std::string name;
+  std::vector<Chosen> samples;
+  double frames_per_second = 10;  ///< where the dataset tells no times
+};
+
+/// Source and name.
+using SequenceKey = std::pair<int, std::string>;
+
+SequenceKey sequence_of(const Shards& shards, Chosen place, const ShardOverview& overview) {
+  return {shards.sources[place.shard],
+          overview.tables.pairs.sequence[static_cast<std::size_t>(place.slot)]};
+}
+
+SequenceKey wanted_sequence(const Shards& shards, const PreviewOptions& options) {
+  if (!options.slots.empty() || !options.sample_ids.empty()) {
+    const Chosen first = choose(shards, options).front();
+    return sequence_of(shards, first, overview_of(shards, first.shard));
+  }
+  std::map<SequenceKey, int> lengths;
+  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
+    ++lengths[sequence_of(shards, place, overview)];
+  });
+  return std::ranges::max_element(lengths, {}, [](const auto& entry) { return entry.second; })
+      ->first;
+}
+
+Sequence read_sequence(const Shards& shards, const PreviewOptions& options) {
+  struct Frame {
+    Chosen place;
+    int gap = 0;
+    double seconds_a_frame = 0;
+  };
+  const SequenceKey key = wanted_sequence(shards, options);
+  std::map<std::int64_t, Frame> frames;  // by the labelled frame's number
+  for (std::size_t i = 0; i < shards.files.size(); ++i) {
+    if (shards.sources[i] != key.first) continue;
+    const ShardOverview overview = overview_of(shards, i);
+    const PairColumns& pairs = overview.tables.pairs;
+    for (std::size_t slot = 0; slot < pairs.sequence.size(); ++slot) {
+      if (pairs.sequence[slot] != key.second) continue;
+      const int gap = pairs.gap_frames[slot];
+      const auto [known, is_new] = frames.try_emplace(pairs.label_index[slot]);
+      if (is_new || gap < known->second.gap) {
+        known->second = {{i, static_cast<int>(slot)}, gap, pairs.gap_s[slot] / gap};
+      }
+    }
+  }
+  Sequence sequence{key.second, {}};
+  std::vector<double> steps;
+  for (const auto& [index, frame] : frames) {
+    sequence.samples.push_back(frame.place);
+    if (std::isfinite(frame.seconds_a_frame)) steps.push_back(frame.seconds_a_frame);
+  }
+  if (!steps.empty()) {
+    std::nth_element(steps.begin(), steps.begin() + std::ssize(steps) / 2, steps.end());
+    sequence.frames_per_second = std::clamp(1 / steps[steps.size() / 2], 1.0, 60.0);
+  }
+  return sequence;
+}
+
+/// A sequence's name as that of a file.
+std::string file_name(std::string sequence) {
+  if (sequence.empty()) return "sequence";
+  std::ranges::replace(sequence, '/', '_');
+  return sequence;
+}
+
+}  // namespace
+
+std::optional<double> rank(Extreme extreme, const ShardOverview& shard, int slot) {
+  const auto at = static_cast<std::size_t>(slot);
+  const EventColumns& events = shard.tables.events;
+  if (shard.tables.valid[at] == 0) return std::nullopt;
+  const double sum = (events.sum_positive[at] + events.sum_negative[at]) /
+                     static_cast<double>(shard.header.volume.size.pixel_count());
+  switch (extreme) {
+    case Extreme::kEmptiest:
+      return -sum;
+    case Extreme::kFullest:
+      return sum;
+    case Extreme::kExtrapolated:
+      if ((events.flags[at] & (kFlagExtrapolated | kFlagBeyondCalibration)) == 0) break;
+      return shard.tables.pairs.gap_frames[at];
+  }
+  return std::nullopt;
+}
+
+std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& options,
+                              std::vector<std::string>& warnings) {
+  lift_time_limit();
+  const Shards shards = find_shards(where);
+  const fs::path frames = !options.frames.empty()
+                              ? fs::absolute(options.frames)
+                              : recorded_manifest_folder(shards.folder).value_or(shards.folder);
+  PreviewReader reader(frames, warnings);
+  const auto content = [&](Chosen place) {
+    return reader.content(shards.files[place.shard], place.slot);
+  };
+  if (options.video) {
+    const Sequence sequence = read_sequence(shards, options);
+    fs::create_directories(options.out);
+    const fs::path video = options.out / (file_name(sequence.name) + ".mp4");
+    auto sample = sequence.samples.begin();
+    write_video(video, sequence.frames_per_second, [&]() -> std::optional<ColourFrame> {
+      if (sample == sequence.samples.end()) return std::nullopt;
+      return draw_preview(content(*sample++));
+    });
+    return {video};
+  }
+  const std::vector<Chosen> chosen = choose(shards, options);
+  fs::create_directories(options.out);
+  std::vector<fs::path> pictures;
+  if (options.sheet) {
+    constexpr int kColumns = 3, kTileWidth = 400;
+    std::vector<ColourFrame> tiles;
+    for (const Chosen& place : chosen) tiles.push_back(draw_tile(content(place), kTileWidth));
+    pictures.push_back(options.out / "sheet.png");
+    write_png(draw_sheet(tiles, kColumns), pictures.back());
+    return pictures;
+  }
+  for (const Chosen& place : chosen) {
+    pictures.push_back(options.out / picture_name(shards.files[place.shard], place.slot));
+    write_png(draw_preview(content(place)), pictures.back());
+  }
+  return pictures;
+}
+
+std::vector<int> parse_slots(const std::string& text, int sample_count) {
+  std::set<int> slots;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const auto number = [&] {
+    int value = -1;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 0 || value >= sample_count)
+      refuse_slots(text, sample_count);
+    at = next;
+    return value;
+  };
+  while (true) {
+    const int first = number();
+    int last = first;
+    if (at != end && *at == '-') {
+      ++at;
+      last = number();
+    }
+    if (last < first) refuse_slots(text, sample_count);
+    for (int slot = first; slot <= last; ++slot) slots.insert(slot);
+    if (at == end) break;
+    if (*at++ != ',') refuse_slots(text, sample_count);
+  }
+  return {slots.begin(), slots.end()};
+}
+
+std::vector<std::int64_t> spread(std::int64_t count, std::int64_t all) {
+  std::vector<std::int64_t> places;
+  const std::int64_t taken = std::min(count, all);
+  for (std::int64_t i = 0; i < taken; ++i) places.push_back(i * all / taken);
+  return places;
+}
+
+}  // namespace eventgan

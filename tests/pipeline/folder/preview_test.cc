@@ -1,0 +1,263 @@
+#include "pipeline/folder/preview.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "manifests/documents/marker.h"
+#include "manifests/values/faults.h"
+#include "pipeline/conversion/convert.h"
+#include "pipeline/folder/shard_guard.h"
+#include "stages/base/files/sha256.h"
+#include "stages/frames/decoding/frame_decoder.h"
+#include "tests/testing/fake_generator.h"
+#include "tests/testing/picture_file.h"
+#include "tests/testing/small_job.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+class ReadGuarded : public ::testing::Test {
+ protected:
+  ReadGuarded() { testing::write_file(shard_, "bytes"); }
+
+  void write_marker_of(const std::string& bytes) const {
+    ShardMarker marker;
+    marker.shard = shard_.filename().string();
+    marker.plan_hash = std::string(64, 'a');
+    marker.sha256 = sha256_hex(bytes);
+    marker.size_bytes = static_cast<std::int64_t>(bytes.size());
+    testing::write_file(folder_ / "job-00000-of-00001.json", to_json(marker));
+  }
+
+  /// Whether `read` runs in this very process.
+  bool is_trusted() const {
+    bool here = false;
+    EXPECT_EQ(read_guarded(shard_, [&] { return here = true, 7; }), 7);
+    return here;
+  }
+
+  void expect_damaged(const std::function<int()>& read, const std::string& why) const {
+    EXPECT_THAT([&] { read_guarded(shard_, read); },
+                ThrowsMessage<std::runtime_error>(
+                    AllOf(HasSubstr("damaged"), HasSubstr(why), HasSubstr(shard_.string()))));
+  }
+
+  testing::TemporaryFolder folder_;
+  const std::filesystem::path shard_ = folder_ / "job-00000-of-00001.h5";
+};
+
+TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
+  write_marker_of("bytes");
+  EXPECT_TRUE(is_trusted());
+  write_marker_of("bytez");
+  expect_damaged([]() -> int { throw std::logic_error("was read"); }, "SHA-256");
+  write_marker_of("byte");
+  expect_damaged([]() -> int { throw std::logic_error("was read"); }, "size in bytes 4");
+}
+
+TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {
+  EXPECT_FALSE(is_trusted());
+  testing::write_file(folder_ / "job-00000-of-00001.json", "{");
+  EXPECT_FALSE(is_trusted());
+  EXPECT_EQ(read_guarded(shard_, []() -> int { throw InputError("gone"); }), 66);
+}
+
+TEST_F(ReadGuarded, ACrashIsDamage) {
+  expect_damaged([] { return ::raise(SIGSEGV); }, "Segmentation fault");
+  expect_damaged([] { return ::raise(SIGABRT); }, "Aborted");
+}
+
+TEST_F(ReadGuarded, ALoopWithoutEndIsDamage) {
+  expect_damaged(
+      [] {
+        const volatile bool for_ever = true;
+        while (for_ever) {
+        }
+        return 0;
+      },
+      "10 s");
+}
+
+TEST_F(ReadGuarded, MoreMemoryThanThereIsIsDamage) {
+  EXPECT_EQ(read_guarded(shard_,
+                         [] {
+                           const std::vector<char> most(std::size_t{1} << 46);
+                           return static_cast<int>(most.back());
+                         }),
+            1);
+}
+
+TEST_F(ReadGuarded, PartsOfManyShardsAreReadApartAlways) {
+  write_marker_of("bytes");
+  bool here = false;
+  EXPECT_EQ(read_apart(folder_.path(), [&] { return here = true, 7; }), 7);
+  EXPECT_FALSE(here);
+  EXPECT_THAT([&] { read_apart(folder_.path(), [] { return ::raise(SIGSEGV); }); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(folder_.path().string())));
+}
+
+TEST_F(ReadGuarded, OnlyARegularFileIsOpened) {
+  const std::filesystem::path pipe = folder_ / "pipe.h5";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT([&] { read_guarded(pipe, [] { return 0; }); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(pipe.string())));
+  bool here = false;  // what reads says that there is none
+  read_guarded(folder_ / "none.h5", [&] { return here = true, 0; });
+  EXPECT_TRUE(here);
+}
+
+TEST(ParseSlots, TakesNumbersAndRanges) {
+  EXPECT_THAT(parse_slots("0,3-5", 8), ElementsAre(0, 3, 4, 5));
+  EXPECT_THAT(parse_slots("5,1,4-5,1", 8), ElementsAre(1, 4, 5));
+  EXPECT_THAT(parse_slots("7", 8), ElementsAre(7));
+}
+
+TEST(ParseSlots, RefusesWhatIsNoSlot) {
+  for (const char* text :
+       {"", ",", "1,", "8", "-1", "5-3", "1-", "a", "1 2", "0x1", "99999999999"}) {
+    EXPECT_THROW(parse_slots(text, 8), UsageError) << text;
+  }
+  EXPECT_THROW(parse_slots("0", 0), UsageError);
+}
+
+TEST(Spread, EvenlyFromTheFirst) {
+  EXPECT_THAT(spread(3, 9), ElementsAre(0, 3, 6));
+  EXPECT_THAT(spread(8, 3), ElementsAre(0, 1, 2));
+  EXPECT_THAT(spread(8, 0), ElementsAre());
+}
+
+/// Six samples, 11 to 16, in two shards of four and two: pictures 10 to 16, of which 13 is as
+/// bright as 12, and 15 is 60 levels brighter than 14. So the emptiest sample is 13, and the
+/// fullest 15.
+class Preview : public ::testing::Test {
+ protected:
+  Preview() {
+    const JobManifest job = testing::make_small_job(folder_, 7);
+    constexpr int kGreys[] = {0, 20, 40, 40, 60, 120, 140};
+    for (int frame = 0; frame < 7; ++frame) {
+      testing::write_flat_picture(folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png"),
+                                  {20, 30}, kGreys[frame]);
+    }
+    ConversionOptions options;
+    options.output = folder_ / "out";
+    options.threads = 1;
+    convert(job, testing::FakeGenerator(), "weights", options);
+    options_.out = folder_ / "pictures";
+  }
+
+  /// Names of what it wrote.
+  std::vector<std::string> draw(const std::string& where) {
+    warnings_.clear();
+    std::vector<std::string> names;
+    for (const auto& picture : preview(folder_ / where, options_, warnings_)) {
+      EXPECT_GT(std::filesystem::file_size(picture), 100u);
+      names.push_back(picture.filename());
+    }
+    return names;
+  }
+
+  testing::TemporaryFolder folder_;
+  PreviewOptions options_;
+  std::vector<std::string> warnings_;
+  const std::string shard_ = "out/job-train-00000-of-00002.h5";
+};
+
+TEST_F(Preview, OfAShardDrawsTheSlots) {
+  options_.slots = "1,3";
+  EXPECT_THAT(draw(shard_), ElementsAre("job-train-00000-of-00002_0001.png",
+                                        "job-train-00000-of-00002_0003.png"));
+  EXPECT_THAT(warnings_, ::testing::IsEmpty());
+  options_.slots = "4";
+  EXPECT_THROW(draw(shard_), UsageError);
+  EXPECT_THROW(draw("out"), UsageError) << "slots are of a shard";
+}
+
+TEST_F(Preview, OfAFolderSpreadsOverAllShards) {
+  options_.count = 2;
+  const std::vector<std::string> expected{"job-train-00000-of-00002_0000.png",
+                                          "job-train-00000-of-00002_0003.png"};
+  EXPECT_EQ(draw("out"), expected);
+  EXPECT_EQ(draw("out/dataset.h5"), expected) << "which is a view of its folder's shards";
+  options_.count.reset();
+  EXPECT_EQ(draw("out").size(), 6u);
+}
+
+TEST_F(Preview, FindsSamplesByTheirId) {
+  options_.sample_ids = {"f_16", "f_12"};
+  EXPECT_THAT(draw("out"), ElementsAre("job-train-00000-of-00002_0001.png",
+                                       "job-train-00001-of-00002_0001.png"));
+  options_.sample_ids.push_back("f_99");
+  EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<UsageError>(HasSubstr("\"f_99\"")));
+}
+
+TEST_F(Preview, TheWorstAreTheEmptiestAndTheFullest) {
+  options_.worst = 1;
+  EXPECT_THAT(draw("out"), ElementsAre("job-train-00000-of-00002_0002.png",
+                                       "job-train-00001-of-00002_0000.png"));
+  options_.worst = 100;
+  EXPECT_EQ(draw("out").size(), 6u) << "each once";
+}
+
+TEST_F(Preview, RanksByKind) {
+  ShardOverview shard;
+  shard.header.volume = {9, {2, 5}};
+  shard.tables.events.sum_positive = {5, 1, 9};
+  shard.tables.events.sum_negative = {5, 1, 0};
+  shard.tables.events.flags = {kFlagExtrapolated, kFlagSaturated, kFlagExtrapolated};
+  shard.tables.pairs.gap_frames = {6, 3, 6};
+  shard.tables.valid = {1, 1, 0};
+  EXPECT_EQ(rank(Extreme::kFullest, shard, 0), 1.0);
+  EXPECT_EQ(rank(Extreme::kEmptiest, shard, 1), -0.2);
+  EXPECT_EQ(rank(Extreme::kExtrapolated, shard, 0), 6.0);
+  EXPECT_EQ(rank(Extreme::kExtrapolated, shard, 1), std::nullopt);
+  EXPECT_EQ(rank(Extreme::kFullest, shard, 2), std::nullopt) << "in quarantine";
+}
+
+TEST_F(Preview, AClassThatNoBoxHasIsRefused) {
+  options_.class_name = "Car";
+  EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<UsageError>(HasSubstr("without boxes")));
+}
+
+TEST_F(Preview, ASheetIsOnePicture) {
+  options_.sheet = true;
+  EXPECT_THAT(draw("out"), ElementsAre("sheet.png"));
+}
+
+TEST_F(Preview, AVideoHasTheSequence) {
+  options_.video = true;
+  EXPECT_THAT(draw("out"), ElementsAre("sequence.mp4"));
+  EXPECT_EQ(probe_image_size(folder_ / "pictures/sequence.mp4").index(), 0u);
+}
+
+TEST_F(Preview, WarnsOfFramesThatAreGone) {
+  std::filesystem::remove_all(folder_ / "clip");
+  options_.slots = "0";
+  EXPECT_EQ(draw(shard_).size(), 1u);
+  EXPECT_THAT(warnings_, ::testing::Each(HasSubstr("clip/f_1")));
+  EXPECT_EQ(warnings_.size(), 2u);
+}
+
+TEST_F(Preview, WithoutShardsThereIsNothingToDraw) {
+  EXPECT_THROW(draw("clip"), InputError);
+  for (const char* shard : {"out/job-train-00000-of-00002.h5", "out/job-train-00001-of-00002.h5"}) {
+    std::filesystem::remove(folder_ / shard);
+  }
+  EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<InputError>(HasSubstr("got none")));
+}
+
+}  // namespace
+}  // namespace eventgan
