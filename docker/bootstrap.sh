@@ -58,13 +58,12 @@ demo() {
   # The folder may be of an earlier build, which would have written other bytes.
   "$program" convert "$folder/manifest.json" --overwrite
   "$program" verify "$folder/events"
-  local shard
-  for shard in "$folder"/events/*.h5; do
-    "$program" preview "$shard" --out "$folder/pictures" --count 3 >/dev/null
-  done
+  "$program" preview "$folder/events" --out "$folder/pictures" --count 12 >/dev/null
+  "$program" report "$folder/events" >/dev/null
   say "done"
   echo "shards:    $folder/events/*.h5"
   echo "pictures:  $folder/pictures/*.png"
+  echo "report:    $folder/events/report.html, for a browser"
 }
 
 run_tests() {

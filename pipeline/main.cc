@@ -34,6 +34,7 @@ int main(int argc, char** argv) {
   eventgan::add_verify_command(app, exit_code);
   eventgan::add_inspect_command(app, exit_code);
   eventgan::add_preview_command(app, exit_code);
+  eventgan::add_report_command(app, exit_code);
   eventgan::add_export_command(app, exit_code);
   eventgan::add_make_demo_command(app, exit_code);
   eventgan::add_import_weights_command(app, exit_code);

@@ -179,7 +179,7 @@ void discard_output(const fs::path& folder) {
   }
   // What says that something is whole goes before what it says it of; the plan last, so that after
   // an interruption the next run finds the rest.
-  for (const char* name : {"dataset.json", "dataset.h5"}) fs::remove(folder / name);
+  for (const char* name : {"dataset.json", "dataset.h5", "report.html"}) fs::remove(folder / name);
   for (const ShardOutline& shard : shards) {
     fs::remove(folder / marker_name(shard.name));
     fs::remove(folder / shard.name);

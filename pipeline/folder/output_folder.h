@@ -34,8 +34,8 @@ FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan);
 FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
 FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
 
-/// Deletes plan.json, every shard and marker it names, and what was made from these (dataset.json,
-/// dataset.h5, amendments.json); other files are left alone. Nothing happens without plan.json.
+/// Deletes plan.json, every shard and marker it names, and what was made from these
+/// (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None without a plan.
 void discard_output(const std::filesystem::path& folder);
 
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a

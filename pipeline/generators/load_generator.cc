@@ -9,6 +9,7 @@
 #include "manifests/values/weights.h"
 #include "pipeline/generators/choose_engine.h"
 #include "pipeline/generators/simulated_generator.h"
+#include "pipeline/generators/weights_warning.h"
 #include "stages/base/files/sha256.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/shipped_weights.h"
@@ -20,22 +21,9 @@ namespace eventgan {
 namespace {
 
 /// Weights that untrained_weights made, and what was made of them (a calibration), say so.
-std::string untrained_warning(const Weights& weights, const std::string& name) {
+bool are_untrained(const Weights& weights) {
   const auto origin = weights.metadata.find("origin");
-  if (origin == weights.metadata.end() || !origin->second.starts_with("untrained")) return "";
-  return "the generator is UNTRAINED (" + name +
-         "): its volumes are random patterns, not events. Fit for trying the program, for nothing "
-         "else.";
-}
-
-/// The weights that come with the program say what they are for.
-std::string shipped_warning(const JobManifest& manifest) {
-  const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
-  if (!name || name->origin != WeightsOrigin::kShipped) return "";
-  return "the weights are those that come with the program (" +
-         shipped_weights_name(manifest.generator.weights) +
-         "), trained on some minutes of recordings: fit to try things with. For results import or "
-         "train weights (README, \"The generator's weights\").";
+  return origin != weights.metadata.end() && origin->second.starts_with("untrained");
 }
 
 LoadedWeights named_weights(const JobManifest& manifest) {
@@ -67,8 +55,8 @@ LoadedWeights load_weights(const JobManifest& manifest) {
     throw UsageError("$.volume.bins: expected " + std::to_string(loaded.weights.bins) +
                      " as the weights have, got " + std::to_string(manifest.volume.bins));
   }
-  loaded.warning =
-      untrained_warning(loaded.weights, manifest.generator.weights) + shipped_warning(manifest);
+  loaded.warning = are_untrained(loaded.weights) ? untrained_warning(manifest.generator.weights)
+                                                 : weights_warning(manifest);
   return loaded;
 }
 

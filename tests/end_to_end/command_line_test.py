@@ -41,7 +41,7 @@ class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
         for command in ["convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
-                        "import-weights", "calibrate", "simulate", "train", "realism", "tradeoff", "export"]:
+                        "import-weights", "calibrate", "simulate", "train", "realism", "tradeoff", "export", "report"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
@@ -201,7 +201,7 @@ class CommandLine(program.InFolder):
         for redirection in [">/dev/full", ">&-"]:
             for arguments in [["--help"], ["--version"], ["plan", "--help"], ["plan", path], ["plan", path, "--json"],
                               ["convert", path], ["retry", folder], ["status", folder], ["verify", folder],
-                              ["inspect", shard], ["finalize", folder], ["preview", shard, "--out", self.folder / "p"]]:
+                              ["inspect", shard], ["finalize", folder], ["report", folder], ["preview", shard, "--out", self.folder / "p"]]:
                 with self.subTest(redirection=redirection, arguments=arguments):
                     done = self.run_with_output_to(redirection, *arguments)
                     self.assertEqual(done.returncode, 1, done.stderr)

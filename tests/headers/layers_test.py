@@ -20,7 +20,7 @@ FLOORS = [
     ["pipeline/folder"],
     ["pipeline/conversion"],
     ["pipeline/generators", "pipeline/simulation", "pipeline/training", "pipeline/realism",
-     "pipeline/exports"],
+     "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],
     ["pipeline/commands"],
     ["pipeline/main.cc"],

@@ -1,0 +1,73 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/standard_streams.h"
+#include "pipeline/folder/output_folder.h"
+#include "pipeline/folder/preview.h"
+#include "pipeline/folder/shard_guard.h"
+#include "pipeline/generators/weights_warning.h"
+#include "pipeline/report/report_page.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/events/pictures/picture_output.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReportArguments {
+  fs::path folder;
+  std::optional<fs::path> out;
+  fs::path frames;
+};
+
+int run(const ReportArguments& arguments) {
+  constexpr int kPictureWidth = 640;
+  const fs::path& folder = arguments.folder;
+  const Survey survey = survey_folder(folder);
+  std::vector<std::string> warnings;
+  PreviewReader reader(!arguments.frames.empty()
+                           ? fs::absolute(arguments.frames)
+                           : recorded_manifest_folder(folder).value_or(folder),
+                       warnings);
+  PageContext context;
+  context.folder = folder;
+  context.file = arguments.out.value_or(folder / kReportName);
+  context.warning = weights_warning(survey.parts.manifest);
+  context.picture = [&](const PickedSample& sample) {
+    const PreviewContent content = reader.content(folder / sample.shard, sample.slot);
+    return jpeg_of(draw_tile(content, kPictureWidth), PageContext::kMostPictureBytes);
+  };
+  write_file_atomically(context.file, report_page(survey, context));
+  std::cout << context.file.string() << std::endl;
+  for (const std::string& warning : warnings) tell_warning(warning);
+  return kComplete;
+}
+
+}  // namespace
+
+void add_report_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "report",
+      "Writes one page about an output folder, for a browser: what was made of what, counts, "
+      "distributions, faults and pictures; it needs no network");
+  const auto arguments = std::make_shared<ReportArguments>();
+  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
+  command->add_option("--out", arguments->out, "The page; default: DIR/report.html")
+      ->option_text("FILE");
+  command
+      ->add_option(
+          "--frames", arguments->frames,
+          "The manifest's folder, where frame paths start; default: as convert recorded it")
+      ->option_text("DIR");
+  command->callback([arguments, &exit_code] {
+    exit_code = read_apart(arguments->folder, [&] { return run(*arguments); });
+  });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "pipeline/report/survey.h"
+
+namespace eventgan {
+
+/// The page's name beside the shards.
+inline constexpr char kReportName[] = "report.html";
+
+/// What a page shows besides the numbers.
+struct PageContext {
+  std::filesystem::path folder;  ///< of the shards
+  std::filesystem::path file;    ///< where the page will be: links to shards start there
+  std::string warning;           ///< of the weights, shown in red; empty: there is none
+  /// The bytes of a JPEG that shows a sample; at most kMostPictureBytes.
+  std::function<std::string(const PickedSample&)> picture;
+
+  static constexpr std::size_t kMostPictureBytes = 60'000;
+};
+
+/// The survey as one HTML page that needs nothing else: no network, no script. Below 5 MB for any
+/// survey: lists and texts are cut, pictures are few. Numbers stand in elements with `data-key`, as
+/// `data-value` without ornament. Text that comes from outside is escaped.
+std::string report_page(const Survey& survey, const PageContext& context);
+
+/// Text as HTML shows it: & < > " and ' as entities, bytes that are no UTF-8 and control characters
+/// as U+FFFD; beyond `most` bytes cut, with an ellipsis.
+std::string escaped(const std::string& text, std::size_t most = 300);
+
+}  // namespace eventgan

@@ -1,0 +1,95 @@
+#include "pipeline/report/report_page.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Escaped, LeavesNoMarkupAndNoBrokenText) {
+  EXPECT_EQ(escaped("<b a=\"1\" c='2'>&"), "&lt;b a=&quot;1&quot; c=&#39;2&#39;&gt;&amp;");
+  EXPECT_EQ(escaped("a\xFF\x01z\n"), "a\uFFFD\uFFFDz\n");
+  EXPECT_EQ(escaped("äöü", 2), "ä…") << "a letter of two bytes stays whole";
+  EXPECT_EQ(escaped("abc", 3), "abc");
+}
+
+/// Of a job as large as there are: every list longer than a page has room for, every text hostile.
+Survey huge_survey() {
+  constexpr char kHostile[] = "<script>alert('&')</script>";
+  Survey survey;
+  PlanOutline& plan = survey.parts.frozen.plan;
+  plan.name = "job";
+  plan.manifest_text = std::string(3'000'000, '<');
+  survey.header.volume = {9, {260, 346}};
+  for (int i = 0; i < 2000; ++i) {
+    const std::string name = kHostile + std::to_string(i);
+    SourceSpec source;
+    source.root = name;
+    survey.parts.manifest.sources.push_back(source);
+    SourceSummary& summary = plan.sources.emplace_back();
+    summary.notes = {name};
+    SourceSurvey& numbers = survey.sources.emplace_back();
+    numbers.counts.samples = 1000;
+    numbers.events_per_pixel.add(1e-9 * (i + 1));
+    if (i < Survey::kPicturedSources) numbers.picked.resize(5, {"random", name, 1, name});
+    survey.counts.classes[name] = i + 1;
+    survey.classes[name] = {10, 3};
+    survey.joints[name] = {10, 3};
+    survey.faults[name] = {2, {name, 1, name, name}};
+    survey.splits[name] = {};
+    plan.fingerprint[name] = std::string(1000, '&');
+  }
+  survey.quarantined.resize(Survey::kMostQuarantined,
+                            {kHostile, 1, kHostile, std::string(5000, '"')});
+  for (int i = 0; i < 20'000; ++i) {
+    ShardMarker marker;
+    marker.samples = marker.valid = 64;
+    survey.parts.done.push_back({{kHostile, 0, {}, 64}, ShardCondition::kDone, marker});
+    survey.parts.missing.push_back({{kHostile, 0, {}, 64}});
+  }
+  survey.counts.samples = survey.counts.valid = 1'280'000;
+  survey.counts.boxes = 3'000'000;
+  survey.box_sides.add(30);
+  survey.positive_bins.assign(9, 0.1);
+  survey.negative_bins.assign(9, 0.2);
+  survey.volumes = Survey::kMostVolumes;
+  return survey;
+}
+
+TEST(ReportPage, IsSmallAndWithoutForeignMarkupForAnyJob) {
+  PageContext context;
+  context.folder = "out";
+  context.file = "out/report.html";
+  context.warning = "<i>";
+  int pictures = 0;
+  context.picture = [&](const PickedSample&) {
+    ++pictures;
+    return std::string(PageContext::kMostPictureBytes, 'x');
+  };
+  const std::string page = report_page(huge_survey(), context);
+  EXPECT_EQ(pictures, 5 * Survey::kPicturedSources);
+  EXPECT_LT(page.size(), 5'000'000u);
+  EXPECT_THAT(page, Not(HasSubstr("<script")));
+  EXPECT_THAT(page, Not(HasSubstr("<i>")));
+  EXPECT_THAT(page, HasSubstr("data-key=\"samples\" data-value=\"1280000\""));
+  EXPECT_THAT(page, HasSubstr("… and 1\u202F940 more")) << "2000 sources, 60 in the table";
+}
+
+TEST(ReportPage, LinksLeadFromThePageToTheShards) {
+  Survey survey;
+  survey.header.volume = {9, {2, 2}};
+  survey.parts.done.push_back(
+      {{"a b-00000-of-00001.h5", 0, {}, 1}, ShardCondition::kDone, ShardMarker{}});
+  PageContext context;
+  context.folder = "/data/ö/out";
+  context.file = "/data/pages/report.html";
+  const std::string page = report_page(survey, context);
+  EXPECT_THAT(page, HasSubstr("href=\"../%C3%B6/out/a%20b-00000-of-00001.h5\""));
+  EXPECT_THAT(page, Not(HasSubstr("class=warning"))) << "the weights are somebody's own";
+}
+
+}  // namespace
+}  // namespace eventgan
