@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <stdexcept>
 
 #include "manifests/documents/job_manifest_internal.h"
 #include "manifests/documents/manifest_file_internal.h"
@@ -155,10 +156,46 @@ struct Preset {
   int blur;
 };
 
-/// DESIGN section 4: the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
-constexpr std::array kPresetWords{Word<Preset>{"kitti", {"kitti", GreyOrder::kBeforeResize, 3}},
-                                  Word<Preset>{"mpii", {"mpii", GreyOrder::kBeforeResize, 0}},
-                                  Word<Preset>{"demo", {"demo", GreyOrder::kAfterResize, 0}}};
+// DESIGN section 4: the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
+constexpr Preset kKitti{"kitti", GreyOrder::kBeforeResize, 3};
+constexpr Preset kMpii{"mpii", GreyOrder::kBeforeResize, 0};
+constexpr Preset kDemo{"demo", GreyOrder::kAfterResize, 0};
+constexpr std::array kPresetWords{Word<Preset>{kKitti.name, kKitti},
+                                  Word<Preset>{kMpii.name, kMpii}, Word<Preset>{kDemo.name, kDemo}};
+
+/// What the published scripts do to a dataset; to any other pictures, what their demo does.
+const Preset& preset_of(DatasetKind dataset) {
+  switch (dataset) {
+    case DatasetKind::kKittiObject:
+    case DatasetKind::kKittiTracking:
+    case DatasetKind::kKittiRaw:
+      return kKitti;
+    case DatasetKind::kMpii:
+    case DatasetKind::kMpiiList:
+    case DatasetKind::kHuman36m:
+      return kMpii;
+    case DatasetKind::kFrames:
+      return kDemo;
+  }
+  throw std::logic_error("preset_of: not a kind of dataset");
+}
+
+/// The preset of the sources' datasets. A job has one preprocessing: where they differ, that is a
+/// fault of `preset`, which had to say which.
+Preset default_preset(const std::vector<SourceSpec>& sources, StrictObject& image) {
+  if (sources.empty()) return kKitti;  // a fault already
+  const DatasetKind first = sources.front().dataset;
+  for (const SourceSpec& source : sources) {
+    if (preset_of(source.dataset).name == preset_of(first).name) continue;
+    const auto has = [](DatasetKind dataset) {
+      return std::string(to_string(dataset)) + " has \"" + std::string(preset_of(dataset).name) +
+             "\"";
+    };
+    image.at("preset").fault("a preset, since " + has(first) + " and " + has(source.dataset));
+    break;
+  }
+  return preset_of(first);
+}
 
 int read_blur(const StrictValue& value) {
   const int blur = value.integer(0, 31);
@@ -168,7 +205,7 @@ int read_blur(const StrictValue& value) {
 
 }  // namespace
 
-ImageSpec read_image(const StrictValue& value) {
+ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& sources) {
   ImageSpec spec;
   StrictObject object = value.object();
   if (object.find("width") || object.find("height")) {
@@ -180,15 +217,13 @@ ImageSpec read_image(const StrictValue& value) {
   const auto preset = object.find("preset");
   const auto grey = object.find("grey");
   const auto blur = object.find("blur");
-  if (preset) {
-    const Preset chosen = preset->choice(kPresetWords);
+  if (preset || (!grey && !blur)) {
+    const Preset chosen = preset ? preset->choice(kPresetWords) : default_preset(sources, object);
     spec.preset = chosen.name;
     spec.grey = chosen.grey;
     spec.blur = chosen.blur;
     if (grey) grey->fault("no such key beside a preset, which decides it");
     if (blur) blur->fault("no such key beside a preset, which decides it");
-  } else if (!grey && !blur) {
-    object.at("preset").fault("\"kitti\", \"mpii\" or \"demo\", or else the keys grey and blur");
   } else {
     spec.grey = object.at("grey").choice(kGreyWords);
     spec.blur = read_blur(object.at("blur"));
@@ -361,7 +396,7 @@ JobManifest read_document(const StrictValue& document) {
     manifest.sources.push_back(read_source(source));
   }
   const StrictValue image = object.at("image");
-  manifest.image = read_image(image);
+  manifest.image = read_image(image, manifest.sources);
   if (const auto generator = object.find("generator")) {
     manifest.generator = read_generator(*generator);
   }

@@ -101,7 +101,7 @@ enum class GreyOrder { kBeforeResize, kAfterResize };
 
 /// How a frame becomes the network's input. Presets (DESIGN section 4): kitti = grey before
 /// resizing and a 3x3 blur; mpii = grey before resizing, no blur; demo = grey after resizing, no
-/// blur. A manifest names a preset or gives both `grey` and `blur`, never a mixture.
+/// blur. A manifest names one, gives both `grey` and `blur`, or takes that of its datasets.
 struct ImageSpec {
   std::optional<ImageSize> size;  ///< sides 16..8192; none: every picture keeps its own size
   ImageFit fit = ImageFit::kStretch;

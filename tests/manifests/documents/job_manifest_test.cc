@@ -191,10 +191,12 @@ TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {
             "m.json: $.sed: expected the key \"seed\" or none, got an unknown key");
 }
 
-ImageSpec read(const char* text) {
+ImageSpec read(const char* text, DatasetKind dataset = DatasetKind::kFrames) {
   FaultList faults("m");
   const auto document = nlohmann::json::parse(text);
-  const ImageSpec spec = read_image(StrictValue(document, faults));
+  SourceSpec source;
+  source.dataset = dataset;
+  const ImageSpec spec = read_image(StrictValue(document, faults), {source});
   EXPECT_EQ(faults.text(), "");
   return spec;
 }
@@ -208,6 +210,20 @@ TEST(ImageSpec, PresetsAreThoseOfThePublishedScripts) {
             std::tuple("kitti", GreyOrder::kBeforeResize, 3));
   EXPECT_EQ(read_preset(R"({"preset": "mpii"})"), std::tuple("mpii", GreyOrder::kBeforeResize, 0));
   EXPECT_EQ(read_preset(R"({"preset": "demo"})"), std::tuple("demo", GreyOrder::kAfterResize, 0));
+}
+
+TEST(ImageSpec, EachDatasetHasAPresetOfItsOwn) {
+  using enum DatasetKind;
+  for (const DatasetKind dataset : {kKittiObject, kKittiTracking, kKittiRaw}) {
+    EXPECT_EQ(read("{}", dataset).preset, "kitti");
+    EXPECT_EQ(read("{}", dataset).blur, 3);
+  }
+  for (const DatasetKind dataset : {kMpii, kMpiiList, kHuman36m}) {
+    EXPECT_EQ(read("{}", dataset).preset, "mpii");
+  }
+  EXPECT_EQ(read("{}", kFrames).preset, "demo");
+  EXPECT_EQ(read("{}", kFrames).grey, GreyOrder::kAfterResize);
+  EXPECT_EQ(read(R"({"preset": "mpii"})", kKittiRaw).blur, 0);
 }
 
 TEST(ImageSpec, KeysGivenOneByOneNameNoPreset) {
