@@ -51,7 +51,7 @@ class PicturesDataset final : public Dataset {
       note(without_pictures, "folders without pictures");
     }
     if (labelled_.empty()) {
-      throw InputError("expected pictures or folders of pictures, got none, in " +
+      throw InputError("expected pictures, folders of pictures, or videos, got none, in " +
                        root_.on_disk("").string());
     }
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
@@ -184,115 +184,197 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 
 namespace {
 
-class VideoDataset final : public Dataset {
+constexpr std::array<std::string_view, 4> kVideoExtensions = {".mp4", ".avi", ".mov", ".mkv"};
+
+/// The place of the extension in kVideoExtensions; their number if it is none of them.
+std::size_t video_rank(const fs::path& file) {
+  return static_cast<std::size_t>(std::ranges::find(kVideoExtensions, lower_extension(file)) -
+                                  kVideoExtensions.begin());
+}
+
+/// A video and its labels.
+struct LabelledClip {
+  std::string path;  ///< as FrameRef::path is written
+  VideoClip video;
+  std::string sidecar;  ///< written as `path`; empty if there is none
+  VideoLabels labels;
+
+  FrameRef frame(std::int64_t number) const { return {path, number, number, video.time_s(number)}; }
+};
+
+class VideosDataset final : public Dataset {
  public:
-  VideoDataset(const SourceSpec& spec, const fs::path& base)
-      : path_(fs::path(spec.root).generic_string()), clip_(measure_video(base / spec.root)) {
-    if (spec.frames_per_second) {
-      clip_.frames_per_second = spec.frames_per_second;
-      clip_.uneven_times_s.clear();
+  VideosDataset(const SourceSpec& spec, const fs::path& base)
+      : frames_per_second_(spec.frames_per_second) {
+    const fs::path root(spec.root);
+    const bool is_folder = fs::is_directory(base / root);
+    const SourceRoot folder(is_folder ? spec.root : root.parent_path().generic_string(), base);
+    const FolderListing listing = list_folder(folder.on_disk(""));
+    std::map<std::string, std::vector<std::string>> labels;  // names of .json files by stem
+    for (const fs::path name : listing.files) {
+      if (lower_extension(name) == ".json") labels[name.stem().string()].push_back(name.string());
     }
-    read_sidecar(base);
-    const std::string stem = fs::path(spec.root).stem().string();
-    // At least six digits, and one width for all: so the samples' order is that of the frames.
-    const std::size_t width =
-        std::max<std::size_t>(6, std::to_string(clip_.frame_count - 1).size());
-    for (std::int64_t i = 0; i < clip_.frame_count; ++i) {
-      const std::string key = labels_.contains(i) ? std::to_string(i) : std::string();
-      labelled_.push_back({fmt::format("{}/{:0{}}", stem, i, width), stem, frame(i), key});
+    if (is_folder) {
+      for (const auto& [stem, name] : choose_videos(listing, folder)) {
+        if (auto video = measure(folder, name)) add_clip(folder, name, *video, labels[stem]);
+      }
+      if (clips_.empty()) throw InputError(unreadable_.front());
+      if (!unreadable_.empty()) notes_.push_back(counted(unreadable_, "videos left out"));
+    } else {
+      const std::string name = root.filename().string();
+      add_clip(folder, name, measure_video(folder.on_disk(name)), labels[root.stem().string()]);
     }
-    note_frames_that_do_not_decode();
-    if (!clip_.times_ascend && !spec.frames_per_second) {
-      notes_.push_back("the times of the frames do not ascend, their rate is taken instead, in " +
-                       path_);
-    }
-    const auto first_beyond = labels_.lower_bound(clip_.frame_count);
-    if (const auto count = std::distance(first_beyond, labels_.end()); count > 0) {
-      notes_.push_back(std::to_string(count) + " labels for frames beyond the video's " +
-                       std::to_string(clip_.frame_count) + " left out, in " + sidecar_);
-    }
+    std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
+    std::ranges::sort(annotation_files_);
   }
 
   const LabelSchema& label_schema() const override { return schema_; }
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
   std::vector<std::string> notes() const override { return notes_; }
-
-  std::vector<std::string> annotation_files() const override {
-    return sidecar_.empty() ? std::vector<std::string>() : std::vector{sidecar_};
-  }
+  std::vector<std::string> annotation_files() const override { return annotation_files_; }
 
   Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
+    const LabelledClip& clip = clips_.at(labelled.sequence);
     const std::int64_t number = labelled.frame.index + steps;
-    if (number < 0 || number >= clip_.frame_count) return {};
-    return {Neighbour::State::kPresent, frame(number)};
+    if (number < 0 || number >= clip.video.frame_count) return {};
+    return {Neighbour::State::kPresent, clip.frame(number)};
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
-    if (label_key.empty()) return Annotation{};
-    std::int64_t number = -1;
-    std::from_chars(label_key.data(), label_key.data() + label_key.size(), number);
-    const auto label = labels_.find(number);
-    if (label == labels_.end()) {
-      return SampleFault{"expected a label of frame " + label_key + ", got none, in " + sidecar_};
+    const auto [stem, number] = split_key(label_key);
+    if (number.empty()) return Annotation{};
+    std::int64_t frame = -1;
+    std::from_chars(number.data(), number.data() + number.size(), frame);
+    if (const auto clip = clips_.find(stem); clip != clips_.end()) {
+      const auto label = clip->second.labels.find(frame);
+      if (label != clip->second.labels.end()) return Annotation{label->second, {}, {}};
     }
-    return Annotation{label->second, {}, {}};
+    return SampleFault{"expected a label of frame " + number + ", got none, in " +
+                       label_place(label_key)};
   }
 
   std::string label_place(const std::string& label_key) const override {
-    return label_key.empty() ? path_ : sidecar_ + "#" + label_key;
+    const auto [stem, number] = split_key(label_key);
+    const auto clip = clips_.find(stem);
+    if (clip == clips_.end()) return stem;
+    return number.empty() ? clip->second.path : clip->second.sidecar + "#" + number;
   }
 
  private:
+  /// A label_key is "STEM/NUMBER", or "STEM/" of a frame without label.
+  static std::pair<std::string, std::string> split_key(const std::string& label_key) {
+    const std::size_t slash = std::min(label_key.find('/'), label_key.size());
+    return {label_key.substr(0, slash), label_key.substr(std::min(slash + 1, label_key.size()))};
+  }
+
+  /// The videos of a folder by their names without extension, which name the samples. All else but
+  /// their labels is noted.
+  std::map<std::string, std::string> choose_videos(const FolderListing& listing,
+                                                   const SourceRoot& folder) {
+    std::map<std::string, std::string> videos;
+    std::vector<std::string> left_out = listing.folders;
+    for (const fs::path name : listing.files) {
+      if (!is_video_name(name) || name.string().starts_with('.')) continue;
+      const auto [video, is_new] = videos.try_emplace(name.stem().string(), name.string());
+      if (is_new) continue;
+      std::string other = name.string();
+      if (video_rank(name) < video_rank(video->second)) video->second.swap(other);
+      left_out.push_back(std::move(other));
+    }
+    for (const fs::path name : listing.files) {
+      const bool is_label = lower_extension(name) == ".json" && videos.contains(name.stem());
+      if (!is_video_name(name) && !is_label) left_out.push_back(name.string());
+    }
+    std::erase_if(left_out, [](const std::string& name) { return name.starts_with('.'); });
+    std::ranges::sort(left_out);
+    if (!left_out.empty()) {
+      notes_.push_back(counted(left_out, "files and folders left out in " + folder.written("")));
+    }
+    return videos;
+  }
+
+  std::optional<VideoClip> measure(const SourceRoot& folder, const std::string& name) try {
+    return measure_video(folder.on_disk(name));
+  } catch (const InputError& error) {
+    unreadable_.push_back(error.what());
+    return std::nullopt;
+  }
+
+  void add_clip(const SourceRoot& folder, const std::string& name, VideoClip video,
+                const std::vector<std::string>& label_files) {
+    const std::string stem = fs::path(name).stem().string();
+    LabelledClip& clip = clips_[stem];
+    clip.path = folder.written(name);
+    clip.video = std::move(video);
+    if (frames_per_second_) {
+      clip.video.frames_per_second = frames_per_second_;
+      clip.video.uneven_times_s.clear();
+    }
+    read_labels(folder, label_files, clip);
+    // At least six digits, and one width for all: so the samples' order is that of the frames.
+    const std::int64_t count = clip.video.frame_count;
+    const std::size_t width = std::max<std::size_t>(6, std::to_string(count - 1).size());
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::string number = clip.labels.contains(i) ? std::to_string(i) : std::string();
+      labelled_.push_back(
+          {fmt::format("{}/{:0{}}", stem, i, width), stem, clip.frame(i), stem + "/" + number});
+    }
+    note_clip(clip);
+  }
+
   /// Of NAME.json and NAME.JSON beside the video, the first by name that is no manifest; the other
   /// is noted.
-  void read_sidecar(const fs::path& base) {
-    const fs::path video(path_);
-    const fs::path folder = base / video.parent_path();
-    for (const fs::path name : list_folder(folder.empty() ? "." : folder).files) {
-      if (name.stem() != video.stem() || lower_extension(name) != ".json") continue;
-      if (!sidecar_.empty()) {
-        notes_.push_back("1 labels left out, since " + sidecar_ + " counts: " + name.string());
+  void read_labels(const SourceRoot& folder, const std::vector<std::string>& files,
+                   LabelledClip& clip) {
+    for (const std::string& name : files) {
+      if (!clip.sidecar.empty()) {
+        notes_.push_back("1 labels left out, since " + clip.sidecar + " counts: " + name);
         continue;
       }
-      auto labels = read_video_labels(folder / name, path_);
+      auto labels = read_video_labels(folder.on_disk(name), clip.path);
       if (!labels) continue;
-      labels_ = std::move(*labels);
-      sidecar_ = (video.parent_path() / name).generic_string();
+      clip.labels = std::move(*labels);
+      clip.sidecar = folder.written(name);
+      annotation_files_.push_back(clip.sidecar);
     }
   }
 
-  /// A file cut short plays without complaint as far as it goes.
-  void note_frames_that_do_not_decode() {
-    const std::int64_t missing = clip_.announced_count - clip_.frame_count;
-    const std::int64_t tolerance = std::max<std::int64_t>(1, clip_.announced_count / 100);
-    if (missing <= tolerance) return;
-    notes_.push_back("only " + std::to_string(clip_.frame_count) + " of about " +
-                     std::to_string(clip_.announced_count) +
-                     " announced frames can be decoded: the file may be cut short, in " + path_);
+  void note_clip(const LabelledClip& clip) {
+    const VideoClip& video = clip.video;
+    // A file cut short plays without complaint as far as it goes.
+    const std::int64_t missing = video.announced_count - video.frame_count;
+    if (missing > std::max<std::int64_t>(1, video.announced_count / 100)) {
+      notes_.push_back("only " + std::to_string(video.frame_count) + " of about " +
+                       std::to_string(video.announced_count) +
+                       " announced frames can be decoded: the file may be cut short, in " +
+                       clip.path);
+    }
+    if (!video.times_ascend && !frames_per_second_) {
+      notes_.push_back("the times of the frames do not ascend, their rate is taken instead, in " +
+                       clip.path);
+    }
+    const auto first_beyond = clip.labels.lower_bound(video.frame_count);
+    if (const auto count = std::distance(first_beyond, clip.labels.end()); count > 0) {
+      notes_.push_back(std::to_string(count) + " labels for frames beyond the video's " +
+                       std::to_string(video.frame_count) + " left out, in " + clip.sidecar);
+    }
   }
 
-  FrameRef frame(std::int64_t number) const {
-    return {path_, number, number, clip_.time_s(number)};
-  }
-
-  std::string path_;
-  VideoClip clip_;
+  std::optional<double> frames_per_second_;
   LabelSchema schema_;
-  std::string sidecar_;                         ///< empty if there is none
-  std::map<std::int64_t, std::string> labels_;  ///< by frame
+  std::map<std::string, LabelledClip> clips_;  ///< by the file's name without extension
+  std::vector<std::string> unreadable_;        ///< why, of the videos that are left out
   std::vector<LabelledFrame> labelled_;
+  std::vector<std::string> annotation_files_;
   std::vector<std::string> notes_;
 };
 
 }  // namespace
 
-bool is_video_name(const fs::path& file) {
-  constexpr std::array<std::string_view, 4> kVideos = {".mp4", ".avi", ".mov", ".mkv"};
-  return std::ranges::find(kVideos, lower_extension(file)) != kVideos.end();
-}
+bool is_video_name(const fs::path& file) { return video_rank(file) < kVideoExtensions.size(); }
 
-std::unique_ptr<Dataset> open_video_dataset(const SourceSpec& spec, const fs::path& base) {
-  return std::make_unique<VideoDataset>(spec, base);
+std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec, const fs::path& base) {
+  return std::make_unique<VideosDataset>(spec, base);
 }
 
 std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
@@ -300,13 +382,18 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
   const std::filesystem::path root = base / spec.root;
   std::error_code error;
   const auto status = std::filesystem::status(root, error);
-  if (std::filesystem::is_directory(status)) return open_pictures_dataset(spec, base);
+  if (std::filesystem::is_directory(status)) {
+    const PictureFolder top = list_picture_folder(root);
+    const bool has_videos = std::ranges::any_of(top.left_out, is_video_name);
+    return top.frames.empty() && has_videos ? open_videos_dataset(spec, base)
+                                            : open_pictures_dataset(spec, base);
+  }
   if (std::filesystem::is_regular_file(status) && is_video_name(root)) {
-    return open_video_dataset(spec, base);
+    return open_videos_dataset(spec, base);
   }
   throw InputError(
-      "expected a folder of pictures, a folder of such folders, or a video (mp4, avi, mov, mkv), "
-      "got " +
+      "expected a video (mp4, avi, mov, mkv), a folder of pictures, of such folders, or of "
+      "videos, got " +
       std::string(std::filesystem::exists(status) ? "something else" : "nothing") + ", in " +
       root.string());
 }

@@ -16,7 +16,8 @@ namespace eventgan {
 ///   a folder of pictures: one sequence, named ""; sample_id is the file name without extension;
 ///   a folder of such folders: each a sequence; sample_id is "FOLDER/NAME";
 ///   a video (mp4, avi, mov, mkv): one sequence named as the file without extension; sample_id is
-///     "NAME/000012", counted from 0.
+///     "NAME/000012", counted from 0;
+///   a folder of videos: each a sequence. One that cannot be read is left out, with a note.
 /// How pictures are numbered, PictureFolder says. time_s is the frame's number through
 /// `frames_per_second`, else the video's own (VideoClip::time_s), else NaN.
 ///
@@ -26,13 +27,14 @@ namespace eventgan {
 /// through as Annotation::original, which is empty for a frame without label; there are no boxes
 /// and no persons.
 ///
-/// A video is decoded once at opening, to count and time its frames. Relative paths start at
-/// `base`. Throws InputError if ROOT is none of these or a video's labels are malformed.
+/// Where several of these lie in one folder, pictures count before videos, and videos before
+/// folders; what is left out, the notes name. A video is decoded once at opening, to count and time
+/// its frames. Relative paths start at `base`. Throws InputError if ROOT is none of these or a
+/// video's labels are malformed.
 std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 
-/// open_frames_dataset for folders. Where pictures and folders lie side by side, the pictures count
-/// and the folders are named in the notes. The label_key is the sidecar's path below ROOT; the
+/// open_frames_dataset for folders of pictures. The label_key is the sidecar's path below ROOT; the
 /// picture's if there is none.
 std::unique_ptr<Dataset> open_pictures_dataset(const SourceSpec& spec,
                                                const std::filesystem::path& base);
@@ -51,8 +53,9 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 /// True for mp4, avi, mov and mkv, in small or capital letters.
 bool is_video_name(const std::filesystem::path& file);
 
-/// open_frames_dataset for a video. The label_key is the frame's number; empty if it has no label.
-std::unique_ptr<Dataset> open_video_dataset(const SourceSpec& spec,
-                                            const std::filesystem::path& base);
+/// open_frames_dataset for a video or a folder of them. The label_key is "NAME/12"; "NAME/" if
+/// frame 12 has no label.
+std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec,
+                                             const std::filesystem::path& base);
 
 }  // namespace eventgan

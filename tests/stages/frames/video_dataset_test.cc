@@ -215,7 +215,7 @@ class VideoDatasetTest : public ::testing::Test {
                            cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 20, cv::Size(32, 16));
     for (int i = 0; i < 7; ++i) writer.write(cv::Mat(16, 32, CV_8UC3, cv::Scalar::all(30 * i)));
   }
-  std::unique_ptr<Dataset> open() const { return open_video_dataset(spec_, folder_.path()); }
+  std::unique_ptr<Dataset> open() const { return open_frames_dataset(spec_, folder_.path()); }
 
   testing::TemporaryFolder folder_;
   SourceSpec spec_;
@@ -281,7 +281,7 @@ TEST_F(VideoDatasetTest, PassesLabelsThrough) {
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[2].label_key)).original,
             R"({"k":[1,2]})");
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[3].label_key)).original, "");
-  EXPECT_TRUE(is_fault(dataset->annotation("4")));
+  EXPECT_TRUE(is_fault(dataset->annotation("clip/4")));
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("v/clip.json"));
   EXPECT_EQ(dataset->label_place(frames[2].label_key), "v/clip.json#2");
   EXPECT_EQ(dataset->label_place(frames[3].label_key), "v/clip.avi");
@@ -292,7 +292,7 @@ TEST_F(VideoDatasetTest, PassesLabelsThrough) {
 TEST_F(VideoDatasetTest, ALabelFilesExtensionMayBeInCapitals) {
   testing::write_file(folder_ / "v/clip.JSON", R"({"2": "two"})");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
-  EXPECT_EQ(std::get<Annotation>(open()->annotation("2")).original, "\"two\"");
+  EXPECT_EQ(std::get<Annotation>(open()->annotation("clip/2")).original, "\"two\"");
   testing::write_file(folder_ / "v/clip.json", "{}");
   EXPECT_THAT(open()->annotation_files(), ElementsAre("v/clip.JSON"));
   EXPECT_THAT(open()->notes(),
@@ -313,6 +313,64 @@ TEST_F(VideoDatasetTest, RefusesWhatIsNoVideo) {
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("v/clip.avi")));
 }
 
+class VideoFolderTest : public VideoDatasetTest {
+ protected:
+  VideoFolderTest() { spec_.root = "v"; }
+};
+
+TEST_F(VideoFolderTest, EachVideoIsASequence) {
+  testing::write_counting_video(folder_ / "v/b.AVI", 3);
+  testing::write_file(folder_ / "v/b.json", R"({"1": "one"})");
+  testing::write_file(folder_ / "v/clip.json", R"({"1": "another"})");
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u + 7u);
+  EXPECT_EQ(frames[1].sample_id, "b/000001");
+  EXPECT_EQ(frames[1].frame, (FrameRef{"v/b.AVI", 1, 1}));
+  EXPECT_EQ(frames[4].sample_id, "clip/000001");
+  EXPECT_EQ(frames[4].sequence, "clip");
+  // The end of one video is not the beginning of the next.
+  EXPECT_EQ(dataset->neighbour(frames[2], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(frames[3], -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->neighbour(frames[3], 6).frame, (FrameRef{"v/clip.avi", 6, 6}));
+  EXPECT_DOUBLE_EQ(frames[4].frame.time_s, 1.0 / 20);  // each at its own rate
+  EXPECT_DOUBLE_EQ(frames[1].frame.time_s, 1.0 / 25);
+  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[1].label_key)).original, "\"one\"");
+  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[4].label_key)).original, "\"another\"");
+  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[0].label_key)).original, "");
+  EXPECT_EQ(dataset->label_place(frames[4].label_key), "v/clip.json#1");
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("v/b.json", "v/clip.json"));
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+}
+
+TEST_F(VideoFolderTest, NotesWhatItLeavesOut) {
+  for (const char* name : {"v/.hidden.avi", "v/clip.mkv", "v/other.json", "v/readme.txt"}) {
+    testing::write_file(folder_ / name, "");
+  }
+  std::filesystem::create_directory(folder_ / "v/more");
+  EXPECT_THAT(open()->notes(), ElementsAre("4 files and folders left out in v: clip.mkv, more, "
+                                           "other.json, readme.txt"));
+}
+
+TEST_F(VideoFolderTest, AVideoThatCannotBeReadIsLeftOutWithItsReason) {
+  testing::write_file(folder_ / "v/a.mp4", "no video");
+  EXPECT_EQ(open()->labelled_frames().size(), 7u);
+  EXPECT_THAT(open()->notes(), ElementsAre(AllOf(HasSubstr("1 videos left out: "),
+                                                 HasSubstr("expected a video, got no frames"),
+                                                 HasSubstr("v/a.mp4"))));
+  std::filesystem::remove(folder_ / "v/clip.avi");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("v/a.mp4")));
+}
+
+TEST_F(VideoFolderTest, PicturesCountBeforeVideosAndVideosBeforeFolders) {
+  std::filesystem::create_directory(folder_ / "v/pictures");
+  testing::write_file(folder_ / "v/pictures/1.png", "");
+  EXPECT_EQ(open()->labelled_frames().front().sample_id, "clip/000000");
+  testing::write_file(folder_ / "v/1.png", "");
+  EXPECT_EQ(open()->labelled_frames().front().sample_id, "1");
+  EXPECT_THAT(open()->notes(), ::testing::Contains(HasSubstr("clip.avi")));
+}
+
 TEST(IsVideoName, GoesByTheExtension) {
   for (const char* name : {"a.mp4", "a.b.AVI", "x/a.mov", "a.Mkv"})
     EXPECT_TRUE(is_video_name(name));
@@ -323,7 +381,7 @@ TEST(VideoDatasetOnSharedData, CountsTheFramesOfAClip) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   SourceSpec spec;
   spec.root = "clips/01_dog.mp4";
-  const auto dataset = open_video_dataset(spec, data);
+  const auto dataset = open_frames_dataset(spec, data);
   ASSERT_EQ(dataset->labelled_frames().size(), 289u);
   EXPECT_EQ(dataset->labelled_frames().back().sample_id, "01_dog/000288");
   EXPECT_NEAR(dataset->labelled_frames()[30].frame.time_s, 30 * 1001.0 / 30000, 1e-9);  // 29.97 Hz
