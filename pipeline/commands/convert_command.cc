@@ -1,8 +1,11 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <cstdint>
 #include <cstdlib>
+#include <filesystem>
 #include <iostream>
+#include <limits>
 #include <memory>
 
 #include "manifests/documents/job_manifest.h"
@@ -22,6 +25,7 @@ namespace {
 struct ConvertArguments {
   JobOptions job;
   std::optional<std::string> shards;
+  std::optional<std::int64_t> limit;
   double grace_s = ConversionOptions().grace_s;
   std::optional<std::string> profile;
 };
@@ -36,6 +40,14 @@ int judge(const ConversionReport& report, const ErrorSpec& errors) {
   return report.stopped ? kStopped : kFailed;
 }
 
+namespace fs = std::filesystem;
+
+/// What a trial leaves to do, for a person.
+std::string trial_text(const JobOptions& job, const ConversionReport& report) {
+  return fmt::format("a trial: {} pairs of the job. The whole:  eventgan convert {}\n",
+                     report.plan_pairs, job.manifest);
+}
+
 int convert_and_report(const JobOptions& job, const JobManifest& manifest,
                        const ConversionOptions& options) {
   const LoadedGenerator loaded = [&] {
@@ -45,8 +57,16 @@ int convert_and_report(const JobOptions& job, const JobManifest& manifest,
   tell_generator(loaded);
   const ConversionReport report =
       convert(manifest, *loaded.generator, loaded.weights_hash, options);
-  std::cout << (job.as_json() ? to_json(report) : to_text(report)) << std::flush;
+  std::cout << (job.as_json() ? to_json(report) : to_text(report));
+  if (options.limit && !job.as_json()) std::cout << trial_text(job, report);
+  std::cout << std::flush;
   return judge(report, manifest.errors);
+}
+
+/// OUT-trial-20 beside OUT.
+fs::path trial_folder(fs::path output, std::int64_t limit) {
+  if (!output.has_filename()) output = output.parent_path();  // "out/"
+  return output += fmt::format("-trial-{}", limit);
 }
 
 int run(const ConvertArguments& arguments) {
@@ -57,14 +77,15 @@ int run(const ConvertArguments& arguments) {
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };
-  options.output = job.output_folder();
+  options.limit = arguments.limit;
+  fs::path folder = job.output_folder().value_or(resolve(manifest, manifest.output.directory));
+  if (options.limit && !job.output) folder = trial_folder(folder, *options.limit);
+  options.output = folder;
   options.threads = job.threads;
   options.overwrite = job.overwrite;
   options.make_progress = [&](std::int64_t total) { return show_progress(job.progress, total); };
   options.warn = tell_warning;
   options.note = [](const std::string& text) { tell(text); };
-  const std::filesystem::path folder =
-      options.output.value_or(resolve(manifest, manifest.output.directory));
   return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {
     options.trace = trace;
     return convert_and_report(job, manifest, options);
@@ -87,6 +108,11 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "This worker's part of the plan: I/N (0 <= I < N) or all; default: what "
                    "SHARD_INDEX, Slurm, Kubernetes or Open MPI says in the environment, else all")
       ->option_text("I/N");
+  command
+      ->add_option("--limit", arguments->limit,
+                   "A trial: N pairs alone, the first of each source, in the folder OUTPUT-trial-N")
+      ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
+      ->option_text("N");
   command
       ->add_option("--grace", arguments->grace_s,
                    "Seconds after a signal to finish the shard under way; default: 20")

@@ -64,8 +64,7 @@ int run(const PlanArguments& arguments) {
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);
-  std::cout << (arguments.json ? plan_summary_json : plan_text)(manifest, job.plan, estimate,
-                                                                threads)
+  std::cout << (arguments.json ? plan_summary_json : plan_text)(manifest, job, estimate, threads)
             << std::flush;
   return kComplete;
 }

@@ -153,9 +153,9 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
-  PlannedJob planned = make_plan(
-      manifest, weights_hash, generator.description(), [&] { return options.stop_requested(); },
-      options.trace);
+  PlannedJob planned =
+      make_plan(manifest, weights_hash, generator.description(),
+                {[&] { return options.stop_requested(); }, options.trace, options.limit});
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);

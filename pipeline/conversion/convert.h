@@ -17,6 +17,7 @@ struct ConversionOptions : RunOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
   bool overwrite = false;                       ///< discard what an earlier run left in the folder
   WorkerPart part;                              ///< this worker's shards
+  std::optional<std::int64_t> limit;            ///< a trial of so many pairs (PlanningOptions)
   /// Told what goes on: which part this is, that checking takes long. None: silent.
   std::function<void(const std::string&)> note;
 };

@@ -1,6 +1,7 @@
 #include "pipeline/conversion/plan_summary.h"
 
 #include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <map>
@@ -93,7 +94,7 @@ TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
 
 namespace {
 
-constexpr std::size_t kListedIds = 5;
+constexpr std::ptrdiff_t kListedIds = 5;
 
 std::int64_t shards_of(const Plan& plan, int source) {
   return std::count_if(plan.shards.begin(), plan.shards.end(),
@@ -106,27 +107,40 @@ std::int64_t pairs_of(const SourceSummary& summary) {
   return pairs;
 }
 
-std::string source_text(const SourceSpec& spec, const SourceSummary& summary, std::int64_t shards) {
+/// "  (gap 1: 7, gap 2: 5)"; nothing where there is none.
+std::string by_gap_text(const std::map<int, std::int64_t>& counts) {
+  std::string text;
+  for (const auto& [gap, count] : counts) {
+    text += fmt::format("{}gap {}: {}", text.empty() ? "  (" : ", ", gap, count);
+  }
+  return text.empty() ? text : text + ")";
+}
+
+std::string without_partner_text(const SourceSpec& spec, const SourceSummary& summary,
+                                 const std::map<int, std::int64_t>& by_gap) {
+  std::int64_t places = 0;
+  for (const auto& [gap, count] : by_gap) places += count;
+  std::string text =
+      fmt::format("  without partner  {} of {} labelled frames x gaps{}\n", places,
+                  summary.labelled_frames * std::ssize(spec.pairs.gaps), by_gap_text(by_gap));
+  const std::vector<std::string>& ids = summary.without_partner_ids;
+  if (ids.empty()) return text;
+  const bool draws = spec.pairs.choose == PairChoice::kOne;
+  text += fmt::format(
+      "  {:<15}  {} of {} labelled frames  ({}", draws ? "no pair at all" : "lacking a gap",
+      ids.size(), summary.labelled_frames,
+      fmt::join(ids.begin(), ids.begin() + std::min<std::ptrdiff_t>(kListedIds, std::ssize(ids)),
+                ", "));
+  return text + (std::ssize(ids) > kListedIds ? ", ...)\n" : ")\n");
+}
+
+std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
+                        const std::map<int, std::int64_t>& without_partner, std::int64_t shards) {
   std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset), spec.root, spec.split);
   text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
-  text += fmt::format("  pairs            {}", pairs_of(summary));
-  const char* separator = "  (gap ";
-  for (const auto& [gap, count] : summary.pairs_by_gap) {
-    text += fmt::format("{}{}: {}", separator, gap, count);
-    separator = ", ";
-  }
-  text += summary.pairs_by_gap.empty() ? "\n" : ")\n";
-  text += fmt::format("  without partner  {}", summary.without_partner);
-  // With choose = all a frame may lack the partner of several gaps, and have that of others.
-  if (const auto frames = static_cast<std::int64_t>(summary.without_partner_ids.size());
-      frames != summary.without_partner) {
-    text += fmt::format(" pairs of {} labelled frames", frames);
-  }
-  for (std::size_t i = 0; i < std::min(kListedIds, summary.without_partner_ids.size()); ++i) {
-    text += (i == 0 ? "  (" : ", ") + summary.without_partner_ids[i];
-  }
-  if (summary.without_partner_ids.size() > kListedIds) text += ", ...";
-  text += summary.without_partner_ids.empty() ? "\n" : ")\n";
+  text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
+                      by_gap_text(summary.pairs_by_gap));
+  text += without_partner_text(spec, summary, without_partner);
   if (summary.faults > 0) {
     text += fmt::format(
         "  to quarantine    {}  (a frame is missing inside the sequence, or a note says why)\n",
@@ -134,6 +148,12 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary, st
   }
   for (const std::string& note : summary.notes) text += "  note: " + note + "\n";
   return text + fmt::format("  shards           {}\n", shards);
+}
+
+nlohmann::json by_gap_json(const std::map<int, std::int64_t>& counts) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const auto& [gap, count] : counts) json[std::to_string(gap)] = count;
+  return json;
 }
 
 std::string estimate_text(const TrialEstimate& estimate, int threads) {
@@ -148,31 +168,33 @@ std::string estimate_text(const TrialEstimate& estimate, int threads) {
 
 }  // namespace
 
-std::string plan_text(const JobManifest& manifest, const Plan& plan, const TrialEstimate& estimate,
-                      int threads) {
+std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
+                      const TrialEstimate& estimate, int threads) {
+  const Plan& plan = job.plan;
   std::string text;
   for (std::size_t i = 0; i < plan.sources.size(); ++i) {
-    text += source_text(manifest.sources[i], plan.sources[i], shards_of(plan, static_cast<int>(i)));
+    text += source_text(manifest.sources[i], plan.sources[i], job.without_partner_by_gap[i],
+                        shards_of(plan, static_cast<int>(i)));
   }
   return text +
          fmt::format("in all {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
          estimate_text(estimate, threads);
 }
 
-std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
+std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job,
                               const TrialEstimate& estimate, int threads) {
+  const Plan& plan = job.plan;
   nlohmann::json sources = nlohmann::json::array();
   for (std::size_t i = 0; i < plan.sources.size(); ++i) {
     const SourceSummary& summary = plan.sources[i];
-    nlohmann::json gaps = nlohmann::json::object();
-    for (const auto& [gap, count] : summary.pairs_by_gap) gaps[std::to_string(gap)] = count;
     sources.push_back({{"dataset", to_string(manifest.sources[i].dataset)},
                        {"root", manifest.sources[i].root},
                        {"split", manifest.sources[i].split},
                        {"labelled_frames", summary.labelled_frames},
                        {"pairs", pairs_of(summary)},
-                       {"pairs_by_gap", gaps},
+                       {"pairs_by_gap", by_gap_json(summary.pairs_by_gap)},
                        {"without_partner", summary.without_partner},
+                       {"without_partner_by_gap", by_gap_json(job.without_partner_by_gap[i])},
                        {"frames_without_partner", summary.without_partner_ids.size()},
                        {"without_partner_ids", summary.without_partner_ids},
                        {"missing_frames", summary.faults},

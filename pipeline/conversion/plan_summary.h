@@ -25,11 +25,11 @@ TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
 
 /// What `eventgan plan` prints: for each source its labelled frames, pairs by gap, what is missing,
 /// its shards; then the estimate for the whole.
-std::string plan_text(const JobManifest& manifest, const Plan& plan, const TrialEstimate& estimate,
-                      int threads);
+std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
+                      const TrialEstimate& estimate, int threads);
 
 /// The same as JSON.
-std::string plan_summary_json(const JobManifest& manifest, const Plan& plan,
+std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job,
                               const TrialEstimate& estimate, int threads);
 
 }  // namespace eventgan

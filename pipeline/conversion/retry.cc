@@ -104,9 +104,10 @@ void accept_inputs(const fs::path& folder, const std::string& plan_hash, const F
 }
 
 PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_hash,
-                      const std::string& engine, const RunOptions& options) {
-  return make_plan(
-      manifest, weights_hash, engine, [&] { return options.stop_requested(); }, options.trace);
+                      const std::string& engine, const Fingerprint& frozen,
+                      const RunOptions& options) {
+  return make_plan(manifest, weights_hash, engine,
+                   {[&] { return options.stop_requested(); }, options.trace, limit_of(frozen)});
 }
 
 /// The shards with quarantined samples that prove whole; the others are reported. After a request
@@ -194,7 +195,7 @@ std::optional<RetryReport> nothing_to_retry(const fs::path& folder, const Frozen
   if (found.count > 0) return std::nullopt;
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
   const Fingerprint& before = frozen.plan.fingerprint;
-  Fingerprint now = plan_again(manifest, "", "", options).plan.fingerprint;
+  Fingerprint now = plan_again(manifest, "", "", before, options).plan.fingerprint;
   for (auto& [field, value] : now) {
     const auto known = before.find(field);
     if (known == before.end() || is_amendable(field) || field.starts_with("manifest ")) continue;
@@ -213,7 +214,8 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   const QuarantinedSamples found = find_quarantined(folder, outline);
   RetryReport report = new_report(folder, found, frozen.plan.sample_count());
 
-  PlannedJob job = plan_again(manifest, weights_hash, generator.description(), options);
+  PlannedJob job =
+      plan_again(manifest, weights_hash, generator.description(), frozen.plan.fingerprint, options);
   accept_inputs(folder, frozen.hash, frozen.plan.fingerprint, job.plan.fingerprint, manifest,
                 found.ids, report);
   job.plan = {};  // the frozen one counts, and it can be huge

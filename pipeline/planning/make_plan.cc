@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <charconv>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string_view>
@@ -82,18 +84,21 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
 
 PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
                             const SourceSpec& source, std::uint64_t seed) {
+  PairChoiceResult result;
   std::vector<PlannedSample> present;
   std::vector<PlannedSample> damaged;
   for (const int gap : source.pairs.gaps) {
     Candidate found = candidate(dataset, frame, source.pairs, gap);
     if (found.state == Neighbour::State::kPresent) present.push_back(std::move(found.sample));
     if (found.state == Neighbour::State::kHole) damaged.push_back(std::move(found.sample));
+    if (found.state == Neighbour::State::kBeyond) result.without_partner.push_back(gap);
   }
   auto& choices = present.empty() ? damaged : present;
-  if (choices.empty()) return {{}, source.pairs.gaps};
+  if (choices.empty()) return result;
   const CounterRandom random =
       CounterRandom(seed).keyed(to_string(source.dataset)).keyed(frame.sample_id);
-  return {{std::move(choices[random.below(0, choices.size())])}, {}};
+  result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
+  return result;
 }
 
 PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
@@ -229,31 +234,42 @@ class SizeProbe {
   std::unordered_map<std::string, ImageSize> sizes_;
 };
 
-SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset& dataset,
-                          SizeProbe& probe, ShardLayout& layout,
-                          const std::function<void()>& before_frame) {
-  const SourceSpec& spec = manifest.sources[index];
+struct PlannedSource {
   SourceSummary summary;
   std::int64_t pairs = 0;
+  std::map<int, std::int64_t> without_partner_by_gap;
+};
+
+/// Plans `most` pairs at most; then the source ends for it.
+PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset& dataset,
+                          std::int64_t most, SizeProbe& probe, ShardLayout& layout,
+                          const std::function<void()>& before_frame) {
+  const SourceSpec& spec = manifest.sources[index];
+  PlannedSource planned;
+  SourceSummary& summary = planned.summary;
   layout.begin_source(index, spec.split);
   const auto [frames, selection_notes] =
       select_frames(dataset.labelled_frames(), spec, manifest.directory, manifest.seed);
   for (const LabelledFrame& frame : frames) {
+    if (planned.pairs == most) break;
     before_frame();
+    ++summary.labelled_frames;
     PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
-    summary.without_partner += chosen.samples.empty() && spec.pairs.choose == PairChoice::kOne
-                                   ? 1
-                                   : static_cast<std::int64_t>(chosen.without_partner.size());
-    if (!chosen.without_partner.empty()) summary.without_partner_ids.push_back(frame.sample_id);
+    for (const int gap : chosen.without_partner) ++planned.without_partner_by_gap[gap];
+    const std::int64_t lost = spec.pairs.choose == PairChoice::kOne
+                                  ? std::int64_t{chosen.samples.empty()}
+                                  : std::ssize(chosen.without_partner);
+    summary.without_partner += lost;
+    if (lost > 0) summary.without_partner_ids.push_back(frame.sample_id);
     for (PlannedSample& sample : chosen.samples) {
-      ++pairs;
+      if (planned.pairs == most) break;
+      ++planned.pairs;
       ++summary.pairs_by_gap[sample.pair.gap_frames];
       summary.faults += !sample.fault.empty();
       const ImageSize size = probe.volume_size(sample);
       layout.add(std::move(sample), size);
     }
   }
-  summary.labelled_frames = static_cast<std::int64_t>(frames.size());
   summary.notes = dataset.notes();
   if (const auto left_out = dataset.labelled_frames().size() - frames.size(); left_out > 0) {
     summary.notes.push_back(std::to_string(left_out) + " of " +
@@ -261,13 +277,13 @@ SourceSummary plan_source(const JobManifest& manifest, int index, const Dataset&
                             " labelled frames left out, as the manifest selects");
   }
   summary.notes.insert(summary.notes.end(), selection_notes.begin(), selection_notes.end());
-  if (pairs < spec.pairs.min_pairs) {
+  if (planned.pairs < std::min(spec.pairs.min_pairs, most)) {
     throw InputError("expected at least " + std::to_string(spec.pairs.min_pairs) +
-                     " pairs (pairs.min_pairs), got " + std::to_string(pairs) + " of " +
+                     " pairs (pairs.min_pairs), got " + std::to_string(planned.pairs) + " of " +
                      std::to_string(summary.labelled_frames) + " labelled frames, in " + spec.root +
                      " ($.sources[" + std::to_string(index) + "])");
   }
-  return summary;
+  return planned;
 }
 
 /// Says of each source which samples' size is unknown: what becomes of them is worth a look before
@@ -337,15 +353,19 @@ void settle_sizes(const JobManifest& manifest, Plan& plan) {
   }
 }
 
+constexpr char kLimitField[] = "limit";  // of a trial's fingerprint
+
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine, const std::function<bool()>& stop,
-                     TraceRecorder* trace) {
-  TraceSpan whole(trace, "make plan", "job");
+                     const std::string& engine, const PlanningOptions& options) {
+  TraceSpan whole(options.trace, "make plan", "job");
   const auto stop_if_asked = [&] {
-    if (stop && stop()) throw Stopped("stopped while planning; nothing was written: run again");
+    if (options.stop && options.stop()) {
+      throw Stopped("stopped while planning; nothing was written: run again");
+    }
   };
+  std::int64_t left = options.limit.value_or(std::numeric_limits<std::int64_t>::max());
   PlannedJob job;
   job.plan.name = manifest.name;
   job.plan.manifest_text = manifest.text;
@@ -353,12 +373,17 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
   std::vector<std::string> annotation_files;
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
-    TraceSpan span(trace, "plan source", "job");
+    TraceSpan span(options.trace, "plan source", "job");
     span.note("root", manifest.sources[i].root);
     const auto& dataset =
         job.datasets.emplace_back(open_dataset(manifest.sources[i], manifest.directory));
-    job.plan.sources.push_back(
-        plan_source(manifest, static_cast<int>(i), *dataset, probe, layout, stop_if_asked));
+    const auto sources_left = static_cast<std::int64_t>(manifest.sources.size() - i);
+    const std::int64_t share = options.limit ? (left + sources_left - 1) / sources_left : left;
+    PlannedSource planned =
+        plan_source(manifest, static_cast<int>(i), *dataset, share, probe, layout, stop_if_asked);
+    left -= planned.pairs;
+    job.plan.sources.push_back(std::move(planned.summary));
+    job.without_partner_by_gap.push_back(std::move(planned.without_partner_by_gap));
     const auto files = dataset->annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
     if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);
@@ -366,10 +391,19 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   job.plan.shards = layout.finish();
   note_unknown_sizes(job.plan);
   whole.note("pairs", job.plan.sample_count());
-  const TraceSpan span(trace, "fingerprint", "job");
+  const TraceSpan span(options.trace, "fingerprint", "job");
   job.plan.fingerprint =
       make_fingerprint(manifest, job.plan, annotation_files, weights_hash, engine, stop_if_asked);
+  if (options.limit) job.plan.fingerprint[kLimitField] = std::to_string(*options.limit);
   return job;
+}
+
+std::optional<std::int64_t> limit_of(const std::map<std::string, std::string>& fingerprint) {
+  const auto field = fingerprint.find(kLimitField);
+  if (field == fingerprint.end()) return std::nullopt;
+  std::int64_t limit = 0;
+  std::from_chars(field->second.data(), field->second.data() + field->second.size(), limit);
+  return limit;
 }
 
 void renew_samples(const JobManifest& manifest,

@@ -1,9 +1,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,8 +21,7 @@ namespace eventgan {
 /// What becomes of one labelled frame.
 struct PairChoiceResult {
   std::vector<PlannedSample> samples;
-  /// Gaps whose partner lies beyond the sequence's ends or pairs.max_gap_s (with choose = one: all
-  /// of them, or none).
+  /// Gaps whose partner lies beyond the sequence's ends or pairs.max_gap_s.
   std::vector<int> without_partner;
 };
 
@@ -90,19 +91,29 @@ class ShardLayout {
 /// A plan, and the opened datasets it was made from (their annotations are read while converting).
 struct PlannedJob {
   Plan plan;
+  /// Of each source, how many labelled frames have no partner at a gap.
+  std::vector<std::map<int, std::int64_t>> without_partner_by_gap;
   std::vector<std::unique_ptr<Dataset>> datasets;  ///< one for each source of the manifest
+};
+
+struct PlanningOptions {
+  /// A million frames on a network file system take minutes to look at: this is asked for each, and
+  /// if it says yes, Stopped is thrown. None: nobody asks.
+  std::function<bool()> stop = {};
+  TraceRecorder* trace = nullptr;  ///< gets what takes time; null: nobody asks
+  /// For a trial: no more pairs than this, >= 1, the first of each source, which share it evenly.
+  /// Frames behind them are not looked at.
+  std::optional<std::int64_t> limit = std::nullopt;
 };
 
 /// Opens every source and decides everything that is random or depends on what is on disk. Freezes
 /// and writes nothing. Throws InputError if a source is missing or yields fewer pairs than its
-/// min_pairs.
-///
-/// A million frames on a network file system take minutes to look at: `stop` is asked for each, and
-/// if it says yes, Stopped is thrown. None: nobody asks. `trace` gets what takes time; null: nobody
-/// asks.
+/// min_pairs (and than its share of the limit).
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
-                     const std::string& engine, const std::function<bool()>& stop = {},
-                     TraceRecorder* trace = nullptr);
+                     const std::string& engine, const PlanningOptions& options = {});
+
+/// The limit of the plan that has this fingerprint; none: the whole job.
+std::optional<std::int64_t> limit_of(const std::map<std::string, std::string>& fingerprint);
 
 /// Gives every sample of a frozen plan what its labelled frame says today (renew_sample): times and
 /// faults may have been mended, and the key of a label may be its row in an annotation file, where

@@ -167,7 +167,7 @@ class Comparison {
       : manifest_(manifest),
         options_(options),
         threads_(thread_count(options.threads)),
-        job_(make_plan(manifest, "", "trade-off", options.stop_requested)),
+        job_(make_plan(manifest, "", "trade-off", {options.stop_requested})),
         whole_(only_size(job_.plan)),
         samples_(choose_calibration_samples(job_.plan, options.pairs, 0)),
         reading_(reading_generator(manifest)) {}

@@ -18,6 +18,8 @@ class PlanSummary : public ::testing::Test {
     manifest_.sources.resize(1);
     manifest_.sources[0].root = "kitti/training";
     manifest_.sources[0].dataset = DatasetKind::kKittiObject;
+    manifest_.sources[0].pairs = {{1, 3}, PairSide::kBefore, PairChoice::kAll};
+    job_.without_partner_by_gap = {{{1, 3}, {3, 6}}};
     SourceSummary source;
     source.labelled_frames = 12;
     source.pairs_by_gap = {{1, 2}, {3, 1}};
@@ -25,23 +27,24 @@ class PlanSummary : public ::testing::Test {
     source.without_partner_ids = {"a", "b", "c", "d", "e", "f"};
     source.faults = 1;
     source.notes = {"2 pictures without labels"};
-    plan_.sources = {source};
-    plan_.shards.resize(1);
-    plan_.shards[0].samples.resize(3);
+    job_.plan.sources = {source};
+    job_.plan.shards.resize(1);
+    job_.plan.shards[0].samples.resize(3);
   }
 
   JobManifest manifest_;
-  Plan plan_;
+  PlannedJob job_;
   const TrialEstimate estimate_{2, 0.5, 90, 4e6};
 };
 
 TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
   EXPECT_EQ(
-      plan_text(manifest_, plan_, estimate_, 2),
+      plan_text(manifest_, job_, estimate_, 2),
       "kitti_object kitti/training (train)\n"
       "  labelled frames  12\n"
-      "  pairs            3  (gap 1: 2, 3: 1)\n"
-      "  without partner  9 pairs of 6 labelled frames  (a, b, c, d, e, ...)\n"
+      "  pairs            3  (gap 1: 2, gap 3: 1)\n"
+      "  without partner  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
+      "  lacking a gap    6 of 12 labelled frames  (a, b, c, d, e, ...)\n"
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 pictures without labels\n"
       "  shards           1\n"
@@ -50,23 +53,35 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
 }
 
 TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
-  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
+  EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
 }
 
 TEST_F(PlanSummary, JsonHasTheSameNumbers) {
-  const auto json = nlohmann::json::parse(plan_summary_json(manifest_, plan_, estimate_, 2));
+  const auto json = nlohmann::json::parse(plan_summary_json(manifest_, job_, estimate_, 2));
   EXPECT_EQ(json["pairs"], 3);
   EXPECT_EQ(json["estimated_bytes"], 4e6);
   EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
   EXPECT_EQ(json["sources"][0]["without_partner"], 9);
+  EXPECT_EQ(json["sources"][0]["without_partner_by_gap"]["3"], 6);
   EXPECT_EQ(json["sources"][0]["frames_without_partner"], 6);
   EXPECT_EQ(json["sources"][0]["without_partner_ids"].size(), 6u);
 }
 
-TEST_F(PlanSummary, WhereEachFrameLacksOnePairOneNumberSaysIt) {
-  plan_.sources[0].without_partner = 6;
-  EXPECT_THAT(plan_text(manifest_, plan_, {}, 1),
-              ::testing::HasSubstr("  without partner  6  (a, b, c, d, e, ...)\n"));
+TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {
+  manifest_.sources[0].pairs.choose = PairChoice::kOne;
+  job_.plan.sources[0].without_partner = 2;
+  job_.plan.sources[0].without_partner_ids = {"a", "b"};
+  EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
+              ::testing::HasSubstr(
+                  "  without partner  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
+                  "  no pair at all   2 of 12 labelled frames  (a, b)\n"));
+}
+
+TEST_F(PlanSummary, SaysThatNothingIsMissing) {
+  job_.plan.sources[0].without_partner_ids = {};
+  job_.without_partner_by_gap = {{}};
+  EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
+              ::testing::HasSubstr("  without partner  0 of 24 labelled frames x gaps\n  to "));
 }
 
 TEST(MeasureTrial, ScalesAFewPairsToTheWholePlan) {

@@ -155,7 +155,7 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   for (const char* name : {"f_02.png", "f_03.png"}) {
     testing::write_file(folder_ / "clip" / name, "not a picture");
   }
-  auto [plan, datasets] = make_plan(manifest_, "w", "e");
+  auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
   ASSERT_EQ(plan.shards.size(), 2u);  // of the pairs 0-1 and 1-2, and of 2-3
   EXPECT_TRUE(plan.shards[1].size_unknown);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6}));
@@ -179,7 +179,7 @@ TEST_F(MakePlan, AHoleThatWasFilledBecomesWhatItWouldBePlannedAsToday) {
     const PlannedSample& meant = whole.shards[0].samples.at(1);  // of f_01 and f_02
     const std::string picture = testing::read_file(folder_ / "clip" / "f_01.png");
     std::filesystem::remove(folder_ / "clip" / "f_01.png");
-    auto [plan, datasets] = make_plan(manifest_, "w", "e");
+    auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
     const PlannedSample& hole = plan.shards.at(0).samples.at(0);
     ASSERT_EQ(hole.sample_id, meant.sample_id);
     const std::string before = to_json(plan);
@@ -200,7 +200,7 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
   for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
     manifest_.sources[0].pairs.choose = choice;
     testing::write_file(folder_ / "clip" / "f_01.json", "{}");
-    auto [plan, datasets] = make_plan(manifest_, "w", "e");
+    auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
     const std::string whole = to_json(plan);
     PlannedSample& sample = plan.shards.at(0).samples.at(0);
     ASSERT_NE(sample.label_key, "");
@@ -219,16 +219,62 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
   }
 }
 
+TEST_F(MakePlan, CountsForEachGapWhatHasNoPartner) {
+  manifest_.sources[0].pairs.gaps = {1, 3, 6};
+  const PlannedJob job = make_plan(manifest_, "w", "e");  // 4 frames
+  EXPECT_THAT(job.without_partner_by_gap,
+              ::testing::ElementsAre(std::map<int, std::int64_t>{{1, 1}, {3, 3}, {6, 4}}));
+  EXPECT_EQ(job.plan.sources[0].without_partner, 1) << "the others draw gap 1";
+}
+
+TEST_F(MakePlan, ALimitIsSharedByTheSources) {
+  const auto planned = [&](std::int64_t limit) {
+    const Plan plan = make_plan(manifest_, "w", "e", {.limit = limit}).plan;
+    EXPECT_EQ(limit_of(plan.fingerprint), limit);
+    std::vector<std::int64_t> pairs;
+    for (const SourceSummary& source : plan.sources) {
+      pairs.push_back(source.pairs_by_gap.empty() ? 0 : source.pairs_by_gap.at(1));
+    }
+    return pairs;
+  };
+  EXPECT_EQ(limit_of(make_plan(manifest_, "w", "e").plan.fingerprint), std::nullopt);
+  manifest_.sources.push_back(manifest_.sources[0]);  // three pairs each
+  manifest_.sources[0].pairs.min_pairs = 3;           // of the whole job, not of a trial
+  EXPECT_THAT(planned(1), ::testing::ElementsAre(1, 0));
+  EXPECT_THAT(planned(3), ::testing::ElementsAre(2, 1));
+  EXPECT_THAT(planned(5), ::testing::ElementsAre(3, 2));
+  EXPECT_THAT(planned(100), ::testing::ElementsAre(3, 3));
+  manifest_.sources[0].pairs = {{1, 2}, PairSide::kBefore, PairChoice::kAll};
+  EXPECT_THAT(planned(6), ::testing::ElementsAre(2, 3)) << "a frame's second pair is one more";
+  manifest_.sources[0].pairs.min_pairs = 6;
+  EXPECT_THROW(planned(100), InputError);
+}
+
+TEST_F(MakePlan, ATrialTakesTheFirstPairsAsTheWholeJobHasThem) {
+  manifest_.sources[0].pairs.gaps = {1, 2};
+  const Plan whole = make_plan(manifest_, "w", "e").plan;
+  const Plan trial = make_plan(manifest_, "w", "e", {.limit = 2}).plan;
+  ASSERT_EQ(trial.shards.size(), 1u);
+  EXPECT_EQ(ids(trial.shards[0]), ids(whole.shards[0]));
+  for (std::size_t slot = 0; slot < 2; ++slot) {
+    EXPECT_EQ(trial.shards[0].samples[slot].pair.gap_frames,
+              whole.shards[0].samples[slot].pair.gap_frames);
+  }
+  EXPECT_EQ(trial.sources[0].labelled_frames, 3) << "one has no partner, the last is not asked";
+  EXPECT_THAT(fingerprint_differences(whole.fingerprint, trial.fingerprint),
+              ::testing::Contains("limit: expected nothing, got 2"));
+}
+
 TEST_F(MakePlan, StopsAtAnyFrameOrFile) {
   int asked = 0;
-  make_plan(manifest_, "w", "e", [&] {
-    ++asked;
-    return false;
-  });
+  make_plan(manifest_, "w", "e", {[&] {
+              ++asked;
+              return false;
+            }});
   EXPECT_EQ(asked, 4 + 4);
   for (int last = 1; last <= 8; ++last) {
     asked = 0;
-    EXPECT_THROW(make_plan(manifest_, "w", "e", [&] { return ++asked == last; }), Stopped);
+    EXPECT_THROW(make_plan(manifest_, "w", "e", {[&] { return ++asked == last; }}), Stopped);
     EXPECT_EQ(asked, last);
   }
 }

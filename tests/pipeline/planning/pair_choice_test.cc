@@ -95,6 +95,13 @@ TEST(ChoosePairs, BeyondTheSequenceThereIsNoPartnerAndNoSample) {
   EXPECT_THAT(result.without_partner, ::testing::ElementsAre(1, 2));
 }
 
+TEST(ChoosePairs, OneTellsWhichGapsCouldNotBeDrawn) {
+  const FakeDataset dataset("root", 3);
+  const auto result = choose(dataset, 1, source({1, 2, 4}, PairSide::kBefore, PairChoice::kOne));
+  EXPECT_EQ(result.samples.size(), 1u);
+  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(2, 4));
+}
+
 TEST(ChoosePairs, FramesFartherApartThanAskedAreNoPartners) {
   FakeDataset dataset("root", 20);  // a frame each 0.1 s
   auto spec = source({1, 2, 3, 4}, PairSide::kBefore, PairChoice::kAll);
