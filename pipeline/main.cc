@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
       "input missing; 75 stopped, run again.");
 
   int exit_code = eventgan::kFailed;
+  eventgan::add_init_command(app, exit_code);
   eventgan::add_convert_command(app, exit_code);
   eventgan::add_plan_command(app, exit_code);
   eventgan::add_status_command(app, exit_code);

@@ -14,6 +14,7 @@ void add_status_command(CLI::App& app, int& exit_code);
 void add_retry_command(CLI::App& app, int& exit_code);
 void add_finalize_command(CLI::App& app, int& exit_code);
 void add_verify_command(CLI::App& app, int& exit_code);
+void add_init_command(CLI::App& app, int& exit_code);
 void add_inspect_command(CLI::App& app, int& exit_code);
 void add_preview_command(CLI::App& app, int& exit_code);
 void add_report_command(CLI::App& app, int& exit_code);

@@ -15,12 +15,6 @@ namespace eventgan {
 namespace {
 
 constexpr char kTrackletFile[] = "/tracklet_labels.xml";
-constexpr std::size_t kDateLength = std::string_view("2011_09_26").size();
-
-bool is_date(const std::string& name) {
-  return name.size() == kDateLength && name[4] == '_' && name[7] == '_' &&
-         name.find_first_not_of("0123456789_") == std::string::npos;
-}
 
 bool is_drive_of(const std::string& name, const std::string& date) {
   return name.starts_with(date + "_drive_") && name.ends_with("_sync");
@@ -40,7 +34,7 @@ class KittiRawDataset : public Dataset {
     root_.require_folder("");
     std::vector<std::string> others;
     for (const std::string& date : root_.folders_in("")) {
-      if (is_date(date)) {
+      if (is_kitti_date(date)) {
         add_date(date);
       } else if (!date.starts_with('.')) {
         others.push_back(date);

@@ -62,6 +62,12 @@ std::string_view without_end(std::string_view line) {
 
 }  // namespace
 
+bool is_kitti_date(const std::string& folder) {
+  constexpr std::size_t kLength = std::string_view("2011_09_26").size();
+  return folder.size() == kLength && folder[4] == '_' && folder[7] == '_' &&
+         folder.find_first_not_of("0123456789_") == std::string::npos;
+}
+
 Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::string& path) {
   std::vector<double> seconds;
   std::optional<nanoseconds> first, latest;

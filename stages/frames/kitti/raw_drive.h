@@ -22,6 +22,9 @@ inline constexpr double kKittiFrameSeconds = 0.1;
 /// and for a last line that is cut short: without a line end, and shorter than the first.
 Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::string& path);
 
+/// Whether a folder of KITTI raw is named as those that hold the drives of a day: "2011_09_26".
+bool is_kitti_date(const std::string& folder);
+
 /// The left colour camera's frames of one drive of KITTI raw:
 /// DATE/DRIVE/image_02/data/NNNNNNNNNN.png, and image_02/timestamps.txt if it is there. Thread-safe
 /// once built.

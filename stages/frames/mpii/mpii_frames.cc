@@ -31,6 +31,10 @@ std::string find_file(const std::vector<std::string>& folders, const char* name,
   return {};
 }
 
+std::vector<std::string> annotation_folders(const SourceRoot& root) {
+  return {root.written(""), root.written("mpii_human_pose_v1_u12_2")};
+}
+
 [[noreturn]] void refuse_missing(const char* name, const std::vector<std::string>& folders,
                                  const fs::path& base) {
   std::string places;
@@ -41,6 +45,10 @@ std::string find_file(const std::vector<std::string>& folders, const char* name,
 }
 
 }  // namespace
+
+fs::path find_mpii_annotations(const fs::path& root) {
+  return find_file(annotation_folders(SourceRoot(root.string(), "")), kAnnotations, "");
+}
 
 std::string find_mpii_keyframes(const std::vector<std::string>& folders, const fs::path& base) {
   return find_file(folders, kKeyframes, base);
@@ -56,8 +64,7 @@ MpiiPlaces find_mpii_places(const SourceSpec& spec, const fs::path& base) {
   if (annotations.has_file("")) {
     places.annotations = annotations.written("");
   } else {
-    const std::vector<std::string> folders = {annotations.written(""),
-                                              annotations.written("mpii_human_pose_v1_u12_2")};
+    const std::vector<std::string> folders = annotation_folders(annotations);
     places.annotations = find_file(folders, kAnnotations, base);
     if (places.annotations.empty()) refuse_missing(kAnnotations, folders, base);
   }

@@ -27,6 +27,10 @@ struct MpiiPlaces {
 /// if a .mat file, the root, or a folder that the manifest names is missing.
 MpiiPlaces find_mpii_places(const SourceSpec& spec, const std::filesystem::path& base);
 
+/// mpii_human_pose_v1_u12_1.mat in a root, or in its mpii_human_pose_v1_u12_2; empty if it is in
+/// neither.
+std::filesystem::path find_mpii_annotations(const std::filesystem::path& root);
+
 /// The keyframes' file in the first of `folders` that has it; empty if none has.
 std::string find_mpii_keyframes(const std::vector<std::string>& folders,
                                 const std::filesystem::path& base);

@@ -1,11 +1,15 @@
 #include "stages/frames/mpii/mpii_list_dataset.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <system_error>
 #include <unordered_map>
 #include <utility>
 #include <vector>
@@ -304,6 +308,29 @@ std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec, const fs
   SourceRoot(spec.root, base).require_folder("");
   if (spec.sequences) SourceRoot(*spec.sequences, base).require_folder("");
   return std::make_unique<MpiiListDataset>(spec, base);
+}
+
+std::vector<fs::path> find_mpii_lists(const fs::path& root) {
+  // Somebody's folder of labels, shards or recordings is not to be read for a look at it.
+  constexpr std::size_t kMostFiles = 20;
+  constexpr std::uintmax_t kLargestBytes = std::uintmax_t{64} << 20;
+  std::vector<fs::path> lists;
+  for (const fs::path& folder : {root, root / "annot"}) {
+    std::vector<std::string> files = list_folder(folder).files;
+    std::erase_if(files, [&](const fs::path name) {
+      std::error_code unknown;
+      return (name.extension() != ".json" && name.extension() != ".h5") ||
+             fs::file_size(folder / name, unknown) > kLargestBytes;
+    });
+    if (files.size() > kMostFiles) continue;
+    for (const std::string& name : files) {
+      try {
+        if (!read_mpii_list(folder / name).rows.empty()) lists.push_back(folder / name);
+      } catch (const InputError&) {  // another file
+      }
+    }
+  }
+  return lists;
 }
 
 }  // namespace eventgan

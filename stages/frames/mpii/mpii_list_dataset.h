@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <vector>
 
 #include "manifests/values/job.h"
 #include "stages/frames/dataset.h"
@@ -29,5 +30,9 @@ namespace eventgan {
 /// `annotations`; InputError if a file or folder is missing or damaged.
 std::unique_ptr<Dataset> open_mpii_list_dataset(const SourceSpec& spec,
                                                 const std::filesystem::path& base);
+
+/// The JSON lists and tables of people in ROOT and ROOT/annot, by name. Reads the .json and .h5
+/// files there to find out, unless they are more than twenty or above 64 MiB.
+std::vector<std::filesystem::path> find_mpii_lists(const std::filesystem::path& root);
 
 }  // namespace eventgan

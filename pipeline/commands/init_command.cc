@@ -1,0 +1,86 @@
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <array>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "manifests/values/words.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/planning/draft_manifest.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/frames/find_source.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct InitArguments {
+  std::vector<std::string> where;  ///< PATH, or DATASET PATH
+  std::string out = "manifest.json";
+};
+
+DatasetKind read_dataset(const std::string& word) {
+  std::string words;
+  for (const Word<DatasetKind>& known : kDatasetWords) {
+    if (known.word == word) return known.value;
+    words.append(words.empty() ? "" : ", ").append(known.word);
+  }
+  throw UsageError("DATASET: expected one of " + words + ", got " + word);
+}
+
+void refuse_to_overwrite(const fs::path& file) {
+  throw UsageError("--out: expected the name of a new file, got one that is there, in " +
+                   file.string());
+}
+
+int run(const InitArguments& arguments) {
+  const fs::path path = arguments.where.back();
+  const fs::path out = arguments.out;
+  if (path.empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
+  if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
+  if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(out);
+  const auto dataset = arguments.where.size() == 2
+                           ? std::optional(read_dataset(arguments.where.front()))
+                           : std::nullopt;
+  const FoundSource found = find_source(path, dataset);
+  const fs::path folder = fs::absolute(out).lexically_normal().parent_path();
+  const ManifestDraft draft = draft_manifest(found, folder, path.is_relative());
+  const bool is_new = create_file_atomically(out, [&](const TextSink& sink) { sink(draft.text); });
+  if (!is_new) refuse_to_overwrite(out);
+
+  for (const std::string& line : draft.findings) std::cout << line << "\n";
+  for (const std::string& note : draft.notes) std::cout << "note: " << note << "\n";
+  std::cout << "the manifest is in " << out.string() << "\n"
+            << (draft.has_pairs ? "next:  "
+                                : "no pairs can be made of this; once that is mended:  ")
+            << "eventgan plan " << out.string() << std::endl;
+  return kComplete;
+}
+
+}  // namespace
+
+void add_init_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "init", "Finds out which dataset lies in a folder, and writes a manifest for it");
+  const auto arguments = std::make_shared<InitArguments>();
+  command
+      ->add_option("WHERE", arguments->where,
+                   "The folder or video, and in front of it, where that is to be checked, which "
+                   "dataset it is: kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, "
+                   "human36m or frames")
+      ->required()
+      ->expected(1, 2)
+      ->option_text("[DATASET] PATH");
+  command->add_option("--out", arguments->out, "The manifest, a new file; default: manifest.json")
+      ->option_text("FILE");
+  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "stages/frames/find_source.h"
+
+namespace eventgan {
+
+/// A manifest for a dataset that was found, and what a person should know of the two.
+struct ManifestDraft {
+  std::string text;                   ///< the manifest, with comments
+  std::vector<std::string> findings;  ///< what there is and what is missing, a line each
+  std::vector<std::string> notes;     ///< Dataset::notes()
+  bool has_pairs = false;             ///< false: no labelled frame has a partner at any gap
+};
+
+/// Opens the dataset, counts its labelled frames and their partners, and writes a manifest for it:
+/// name, gaps, size and preset as manifests/examples have them, gaps without any partner left out.
+/// The manifest will lie in `folder`; its paths start there if `relative`, else they are absolute.
+/// What it reads is what `convert` would read from it. Throws as open_dataset does, and UsageError
+/// for a path that is not UTF-8, which no manifest can name.
+ManifestDraft draft_manifest(const FoundSource& found, const std::filesystem::path& folder,
+                             bool relative);
+
+}  // namespace eventgan

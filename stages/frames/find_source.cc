@@ -1,0 +1,265 @@
+#include "stages/frames/find_source.h"
+
+#include <algorithm>
+#include <array>
+#include <system_error>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/kitti/raw_drive.h"
+#include "stages/frames/mpii/mpii_frames.h"
+#include "stages/frames/mpii/mpii_list_dataset.h"
+#include "stages/frames/sequences/frames_dataset.h"
+#include "stages/frames/sequences/picture_folder.h"
+#include "stages/frames/source_folders.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool has_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+bool has_file(const fs::path& path) {
+  std::error_code error;
+  return fs::is_regular_file(path, error);
+}
+
+/// What is in a folder; nothing if it cannot be listed, since it is somebody else's then.
+FolderListing look_into(const fs::path& folder) {
+  try {
+    return has_folder(folder) ? list_folder(folder) : FolderListing();
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
+template <class Fits>
+bool any_folder(const fs::path& folder, Fits fits) {
+  return std::ranges::any_of(look_into(folder).folders, fits);
+}
+
+bool is_kitti_object(const fs::path& root) { return has_folder(root / "label_2"); }
+
+bool is_kitti_tracking(const fs::path& root) { return has_folder(root / "label_02"); }
+
+bool is_kitti_raw(const fs::path& root) { return any_folder(root, is_kitti_date); }
+
+bool is_devkit(const fs::path& folder) { return has_file(folder / "mapping/train_mapping.txt"); }
+
+bool is_mpii(const fs::path& root) { return !find_mpii_annotations(root).empty(); }
+
+bool is_mpii_list(const fs::path& root) try {
+  return has_folder(root) && !find_mpii_lists(root).empty();
+} catch (const InputError&) {  // cannot be listed
+  return false;
+}
+
+/// Whether a folder S1, S5, ... of the root holds a folder that fits.
+template <class Fits>
+bool any_of_a_subject(const fs::path& root, Fits fits) {
+  return any_folder(root, [&](const std::string& subject) {
+    return subject.size() > 1 && subject[0] == 'S' && is_digit(subject[1]) &&
+           any_folder(root / subject,
+                      [&](const std::string& name) { return fits(root / subject / name); });
+  });
+}
+
+bool is_human36m_fetch(const fs::path& root) {
+  return any_of_a_subject(root, [](const fs::path& action) {
+    return has_file(action / "annot.h5") || has_folder(action / "imageSequence");
+  });
+}
+
+bool is_human36m_extracted(const fs::path& root) {
+  return any_of_a_subject(root, [](const fs::path& sequence) {  // S1_Directions_1.54138969
+    const std::string camera = sequence.extension();
+    return camera.size() > 1 && std::all_of(camera.begin() + 1, camera.end(), is_digit) &&
+           sequence.stem().string().starts_with(sequence.parent_path().filename().string() + "_");
+  });
+}
+
+bool is_human36m_official(const fs::path& root) {
+  return any_of_a_subject(
+      root, [](const fs::path& folder) { return folder.filename() == "MyPoseFeatures"; });
+}
+
+bool is_frames(const fs::path& root) {
+  if (has_file(root)) return is_video_name(root);
+  if (has_folder(root / "image_2")) return false;  // KITTI's test pictures: no sequence at all
+  const PictureFolder top = has_folder(root) ? list_picture_folder(root) : PictureFolder();
+  return !top.frames.empty() || std::ranges::any_of(top.left_out, is_video_name) ||
+         std::ranges::any_of(top.folders, [&](const std::string& name) {
+           return !look_into(root / name).files.empty() &&
+                  !list_picture_folder(root / name).frames.empty();
+         });
+}
+
+/// The first that fits of the two folders above `root`, and of the folders in these.
+template <class Fits>
+std::optional<fs::path> find_beside(const fs::path& root, Fits fits) {
+  for (const fs::path& above : {root.parent_path(), root.parent_path().parent_path()}) {
+    if (fits(above)) return above;
+    for (const std::string& name : look_into(above).folders) {
+      if (fits(above / name)) return above / name;
+    }
+  }
+  return std::nullopt;
+}
+
+void complete_kitti_object(FoundSource& found) {
+  found.devkit = find_beside(found.root, is_devkit);
+  if (found.devkit) found.raw_root = find_beside(found.root, is_kitti_raw);
+  if (!has_folder(found.root / "prev_2")) {
+    found.remarks.push_back("no prev_2: no previous frames from KITTI object itself");
+  }
+  if (!found.devkit) {
+    found.remarks.push_back(
+        "no devkit (a folder with mapping/train_mapping.txt): no gaps 4-6 through KITTI raw, no "
+        "names of drives");
+  } else if (!found.raw_root) {
+    found.remarks.push_back("no raw_root (KITTI raw, DATE/DATE_drive_NNNN_sync): no gaps 4-6");
+  }
+  if (!has_folder(found.root / "calib")) found.remarks.push_back("no calib: no projections");
+}
+
+void complete_kitti_tracking(FoundSource& found) {
+  if (!has_folder(found.root / "calib")) found.remarks.push_back("no calib: no projections");
+}
+
+void complete_kitti_raw(FoundSource& found) {
+  const bool has_tracklets = any_folder(found.root, [&](const std::string& date) {
+    return any_folder(found.root / date, [&](const std::string& drive) {
+      return has_file(found.root / date / drive / "tracklet_labels.xml");
+    });
+  });
+  if (!has_tracklets) found.remarks.push_back("no tracklet_labels.xml: no labels");
+}
+
+void complete_mpii(FoundSource& found) {
+  const bool has_sequences = any_folder(found.root, [](const std::string& name) {
+    return name == "sequences" || name.starts_with(kMpiiBatchPrefix);
+  });
+  if (!has_sequences) found.remarks.push_back("no sequences (video frames): no pairs");
+}
+
+void complete_mpii_list(FoundSource& found) {
+  std::vector<fs::path> lists = find_mpii_lists(found.root);
+  const auto train = std::ranges::find(lists, "train", [](const fs::path& l) { return l.stem(); });
+  const auto chosen = train == lists.end() ? lists.begin() : train;
+  found.annotations = *chosen;
+  lists.erase(chosen);
+  for (const fs::path& other : lists) {
+    found.remarks.push_back("another list of people, left out: " +
+                            other.lexically_relative(found.root).string());
+  }
+  for (const fs::path& above : {found.root, found.root.parent_path()}) {
+    if (!found.sequences && has_folder(above / "sequences")) found.sequences = above / "sequences";
+  }
+  if (!found.sequences) {
+    found.remarks.push_back(
+        "no sequences (MPII's video frames; \"sequences\" says where): no pairs");
+  }
+}
+
+void complete_frames(FoundSource& found) {
+  if (has_file(found.root)) return;
+  const PictureFolder top = list_picture_folder(found.root);
+  if (top.frames.empty() && std::ranges::any_of(top.left_out, is_video_name)) return;
+  found.remarks.push_back("no times, since pictures tell none (\"frames_per_second\" gives them)");
+}
+
+/// A dataset in one of the ways in which it lies on disk.
+struct DatasetLayout {
+  DatasetKind dataset;
+  std::string_view layout;
+  std::string_view title;
+  bool (*fits)(const fs::path& root);
+  void (*complete)(FoundSource& found) = [](FoundSource&) {};
+};
+
+/// Of several that one folder fits, the first counts.
+constexpr std::array kLayouts{
+    DatasetLayout{DatasetKind::kKittiObject, "", "KITTI object", is_kitti_object,
+                  complete_kitti_object},
+    DatasetLayout{DatasetKind::kKittiTracking, "", "KITTI tracking", is_kitti_tracking,
+                  complete_kitti_tracking},
+    DatasetLayout{DatasetKind::kKittiRaw, "", "KITTI raw", is_kitti_raw, complete_kitti_raw},
+    DatasetLayout{DatasetKind::kMpii, "", "MPII Human Pose", is_mpii, complete_mpii},
+    DatasetLayout{DatasetKind::kHuman36m, "fetch", "Human3.6M as h36m-fetch unpacks it",
+                  is_human36m_fetch},
+    DatasetLayout{DatasetKind::kHuman36m, "official", "Human3.6M as it is downloaded",
+                  is_human36m_official},
+    DatasetLayout{DatasetKind::kHuman36m, "extracted", "Human3.6M as extracted pictures",
+                  is_human36m_extracted},
+    DatasetLayout{DatasetKind::kMpiiList, "", "MPII as a list of people", is_mpii_list,
+                  complete_mpii_list},
+    DatasetLayout{DatasetKind::kFrames, "", "pictures or videos", is_frames, complete_frames}};
+
+struct Place {
+  const DatasetLayout* layout;
+  fs::path root;
+};
+
+std::optional<Place> look_at(const fs::path& root, std::optional<DatasetKind> dataset,
+                             bool frames_too) {
+  for (const DatasetLayout& layout : kLayouts) {
+    if (dataset && layout.dataset != *dataset) continue;
+    if (layout.dataset == DatasetKind::kFrames && !frames_too) continue;
+    if (layout.fits(root)) return Place{&layout, root};
+  }
+  return std::nullopt;
+}
+
+std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind> dataset) {
+  if (auto found = look_at(path, dataset, /*frames_too=*/false)) return found;
+  std::vector<Place> below;
+  for (const std::string& name : look_into(path).folders) {
+    const auto found = look_at(path / name, dataset, /*frames_too=*/false);
+    if (found) below.push_back(*found);
+  }
+  if (below.empty()) return look_at(path, dataset, /*frames_too=*/true);
+  if (below.size() == 1) return below.front();
+  std::string names;
+  for (const Place& found : below) {
+    names += (names.empty() ? "" : ", ") + found.root.filename().string() + " (" +
+             std::string(to_string(found.layout->dataset)) + ")";
+  }
+  throw InputError("expected one dataset, got " + std::to_string(below.size()) + ": " + names +
+                   ", in " + path.string());
+}
+
+}  // namespace
+
+FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset) {
+  fs::path root = fs::absolute(path).lexically_normal();
+  if (!root.has_filename()) root = root.parent_path();  // "kitti/"
+  std::error_code error;
+  const auto status = fs::status(root, error);
+  if (!fs::exists(status)) {
+    throw InputError("expected a folder or a video, got '" + (error ? error.message() : "nothing") +
+                     "', in " + path.string());
+  }
+  const std::optional<Place> place = look_around(root, dataset);
+  if (!place) {
+    const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
+    const std::string expected =
+        dataset ? std::string(to_string(*dataset))
+                : "KITTI object, tracking or raw, MPII, Human3.6M, pictures or videos";
+    throw InputError("expected " + expected + ", got " +
+                     (other ? std::string(to_string(other->layout->dataset)) : "none of these") +
+                     ", in " + path.string());
+  }
+  FoundSource found;
+  found.dataset = place->layout->dataset;
+  found.layout = place->layout->layout;
+  found.title = place->layout->title;
+  found.root = place->root;
+  place->layout->complete(found);
+  return found;
+}
+
+}  // namespace eventgan

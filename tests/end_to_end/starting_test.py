@@ -1,0 +1,320 @@
+"""The first minutes: a manifest for what lies in a folder, the manifests to copy, a trial of a job."""
+
+import json
+import os
+import pathlib
+import re
+import shutil
+import tempfile
+import unittest
+
+import cv2
+import h5py
+import numpy as np
+
+import program
+from moving_picture import texture
+from program import SHARED, SOURCE, run, shard_bytes, text
+from small_job import save_picture, small_job, write_cars, write_people
+
+EXAMPLES = SOURCE / "manifests" / "examples"
+
+
+def write_video(path, frames, height=48, width=64):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 25, (width, height))
+    picture = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
+    for shift in range(frames):
+        video.write(picture[:, shift:shift + width])
+    video.release()
+
+
+def read_commented(path):
+    """A manifest, whose comments stand on lines of their own or after two spaces."""
+    return json.loads(re.sub(r"(?m)(^|  )\s*//.*$", "", path.read_text()))
+
+
+class Init(program.InFolder):
+    def init(self, *where, expect=0, **options):
+        out = self.folder / "job" / "manifest.json"
+        shutil.rmtree(out.parent, ignore_errors=True)
+        out.parent.mkdir()
+        told, errors = run("init", *where, "--out", out, expect=expect, **options)
+        if expect:
+            self.assertEqual(errors.count("\n"), 1, errors)
+            self.assertFalse(out.exists())
+            return errors
+        self.assertIn(f"eventgan plan {out}", told)
+        return told, out
+
+    def trial(self, manifest, pairs, limit=2):
+        """Converts a few pairs by the manifest."""
+        run("convert", manifest, "--limit", limit, "--progress", "none")
+        trial, = (manifest.parent / "out").iterdir()
+        run("verify", trial)
+        counted = 0
+        for shard in trial.glob("*.h5"):
+            with h5py.File(shard) as opened:
+                counted += int(opened["valid"][:].sum())
+        self.assertEqual(counted, min(limit, pairs))
+
+    def test_kitti_object(self):
+        write_cars(self.folder / "kitti" / "training", 5, np.random.default_rng(7))
+        for path in ["kitti", "kitti/training", "kitti/training/"]:
+            with self.subTest(path):
+                told, manifest = self.init("kitti_object", self.folder / path)
+                self.assertIn("KITTI object: 5 labelled frames, 5 annotation files\n", told)
+                self.assertIn("by gap: gap 1: 5, gap 2: 5, gap 3: 5, gap 4: 0, gap 5: 0, gap 6: 0\n", told)
+                self.assertIn("no devkit", told)
+                self.assertIn("no calib", told)
+                self.assertNotIn("prev_2", told)
+                for line in told.splitlines()[:3]:
+                    self.assertIn(f"// {line}\n", manifest.read_text())
+                source, = read_commented(manifest)["sources"]
+                self.assertEqual(source["root"], str(self.folder / "kitti" / "training"))
+                self.assertEqual(source["pairs"]["gaps"], [1, 2])
+        self.trial(manifest, 5)
+
+    def test_kitti_object_without_previous_frames(self):
+        write_cars(self.folder / "training", 2, np.random.default_rng(7))
+        shutil.rmtree(self.folder / "training" / "prev_2")
+        told, manifest = self.init(self.folder)
+        self.assertIn("no prev_2", told)
+        self.assertIn("no pairs can be made of this", told)
+        self.assertIn("expected at least 1 pairs", run("plan", manifest, expect=66)[1])
+
+    def test_gaps_without_partner_are_left_out(self):
+        write_cars(self.folder / "training", 2, np.random.default_rng(7))
+        for picture in (self.folder / "training" / "prev_2").glob("*_02.png"):
+            picture.unlink()
+        for picture in (self.folder / "training" / "prev_2").glob("*_03.png"):
+            picture.unlink()
+        _, manifest = self.init(self.folder)
+        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"]["gaps"], [1])
+
+    def test_kitti_tracking(self):
+        random = np.random.default_rng(7)
+        for k in range(4):
+            save_picture(self.folder / "t" / "image_02" / "0000" / f"{k:06d}.png", random)
+        (self.folder / "t" / "label_02").mkdir()
+        (self.folder / "t" / "label_02" / "0000.txt").write_text("")
+        told, manifest = self.init("kitti_tracking", self.folder / "t")
+        self.assertIn("KITTI tracking: 4 labelled frames of 1 sequences", told)
+        self.assertIn("gap 1: 3, gap 2: 2, gap 3: 1, gap 4: 0", told)
+        self.trial(manifest, 3)
+
+    def test_people_lists(self):
+        root = self.folder / "people"
+        write_people(root, 3, np.random.default_rng(7))
+        told, manifest = self.init(root)
+        self.assertIn("MPII as a list of people: 3 labelled frames", told)
+        source, = read_commented(manifest)["sources"]
+        self.assertEqual(source["annotations"], str(root / "people.json"))
+        self.assertEqual(source["sequences"], str(root / "sequences"))
+        self.trial(manifest, 3)
+        shutil.copy(root / "people.json", root / "train.json")
+        (root / "other.json").write_text('{"format": "coco"}')
+        told, manifest = self.init(root)
+        self.assertEqual(read_commented(manifest)["sources"][0]["annotations"], str(root / "train.json"))
+        self.assertIn("another list of people, left out: people.json", told)
+        self.assertNotIn("other.json", told)
+        shutil.rmtree(root / "sequences")
+        self.assertIn("no sequences", self.init(root)[0])
+
+    def test_pictures_and_videos(self):
+        random = np.random.default_rng(7)
+        for clip in ["a", "b"]:
+            for k in range(4):
+                save_picture(self.folder / "clips" / clip / f"f_{k}.png", random)
+        write_video(self.folder / "videos" / "one.mp4", 5)
+        write_video(self.folder / "videos" / "two.mp4", 4)
+        for path, frames, gap_1 in [("clips/a", 4, 3), ("clips", 8, 6), ("videos", 9, 7), ("videos/one.mp4", 5, 4)]:
+            for dataset in [[], ["frames"]]:
+                with self.subTest(path=path, dataset=dataset):
+                    told, manifest = self.init(*dataset, self.folder / path)
+                    self.assertIn(f"pictures or videos: {frames} labelled frames", told)
+                    self.assertIn(f"gap 1: {gap_1}, ", told)
+                    self.assertEqual("frames_per_second" in told, path.startswith("clips"))
+            self.trial(manifest, gap_1, limit=100)
+
+    def test_paths_start_at_the_manifest_where_they_are_given_so(self):
+        write_video(self.folder / "videos" / "one.mp4", 3)
+        here = os.getcwd()
+        os.chdir(self.folder)
+        self.addCleanup(os.chdir, here)
+        pathlib.Path("jobs").mkdir()
+        run("init", "videos/one.mp4", "--out", "jobs/one.json")
+        self.assertEqual(read_commented(pathlib.Path("jobs/one.json"))["sources"][0]["root"], "../videos/one.mp4")
+        run("plan", "jobs/one.json")
+        os.chdir("videos")
+        run("init", ".")
+        self.assertEqual(read_commented(pathlib.Path("manifest.json"))["sources"][0]["root"], ".")
+        run("plan", "manifest.json")
+
+    def test_no_manifest_is_overwritten(self):
+        write_video(self.folder / "one.mp4", 3)
+        manifest = self.folder / "manifest.json"
+        manifest.write_text("mine")
+        _, errors = run("init", self.folder / "one.mp4", "--out", manifest, expect=64)
+        self.assertIn(f"expected the name of a new file, got one that is there, in {manifest}", errors)
+        self.assertEqual(manifest.read_text(), "mine")
+
+    def test_what_is_no_dataset_is_said_in_one_line(self):
+        empty = self.folder / "empty"
+        empty.mkdir()
+        (self.folder / "notes.txt").write_text("notes")
+        for path in [empty, self.folder / "notes.txt", pathlib.Path("/proc/self/fd")]:
+            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, pictures or videos, got none of these, "
+                          f"in {path}", self.init(path, expect=66))
+        self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
+        self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
+        self.assertIn("DATASET: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
+        write_cars(self.folder / "k", 1, np.random.default_rng(7))
+        self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
+        shutil.rmtree(self.folder / "k" / "image_2")
+        self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))
+        (self.folder / "v").mkdir()
+        (self.folder / "v" / "broken.mp4").write_text("no video")
+        self.assertIn("expected a video, got no frames, in ", self.init(self.folder / "v", expect=66))
+
+    def test_of_several_datasets_one_must_be_named(self):
+        for name in "ab":
+            write_cars(self.folder / "data" / name, 1, np.random.default_rng(7))
+        self.assertIn("expected one dataset, got 2: a (kitti_object), b (kitti_object), in ",
+                      self.init(self.folder / "data", expect=66))
+
+    @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
+    def test_real_datasets(self):
+        # By folder: dataset, labelled frames, those with a partner at the first gap that its side has.
+        expected = {"kitti_object": ("kitti_object", 4, 1), "kitti_raw": ("kitti_raw", 21, 20), "mpii": ("mpii", 2, 1),
+                    "human36m_fetch": ("human36m", 18, 16), "davis/slider_depth": ("frames", 3, 2),
+                    "clips/01_dog.mp4": ("frames", 289, 288)}
+        for path, (dataset, frames, partners) in expected.items():
+            with self.subTest(path):
+                told, manifest = self.init(SHARED / path)
+                self.assertEqual(read_commented(manifest)["sources"][0]["dataset"], dataset)
+                self.assertIn(f": {frames} labelled frames", told)
+                self.assertRegex(told, rf"by gap: gap \d: {partners},")
+                self.trial(manifest, partners)
+        self.assertIn("gap 1: 1, gap 2: 1, gap 3: 1, gap 4: 1, gap 5: 1, gap 6: 1", self.init(SHARED / "kitti_object")[0])
+        self.assertIn("expected one dataset, got ", self.init(SHARED, expect=66))
+
+
+class Trial(program.InFolder):
+    def setUp(self):
+        super().setUp()
+        self.manifest = small_job(self.folder)
+
+    def convert(self, *more, expect=0):
+        return run("convert", self.manifest, "--progress", "none", *more, expect=expect)
+
+    def ids(self, name):
+        ids = []
+        for path in sorted((self.folder / name).glob("*.h5")):
+            with h5py.File(path) as shard:
+                ids += map(text, shard["pairs/sample_id"][:])
+        return ids
+
+    def test_lies_in_a_folder_of_its_own(self):
+        out, _ = self.convert("--limit", 4)
+        self.assertEqual([path.name for path in self.folder.glob("out*")], ["out-trial-4"])
+        self.assertIn("4 of 4 pairs written", out)
+        self.assertTrue(out.endswith(f"a trial: 4 pairs of the job. The whole:  eventgan convert {self.manifest}\n"), out)
+        self.assertEqual(self.ids("out-trial-4"), ["000000", "000001", "000000000", "000000001"])  # two of each source
+        trial = shard_bytes(self.folder / "out-trial-4")
+        self.assertIn("in 2 of 2 shards (2 done before)", self.convert("--limit", 4)[0])
+        self.assertEqual(shard_bytes(self.folder / "out-trial-4"), trial)
+        self.assertNotIn("a trial", self.convert()[0])
+        self.assertEqual(len(self.ids("out")), 9)
+        self.assertEqual(shard_bytes(self.folder / "out-trial-4"), trial)
+        for command in ["status", "verify", "finalize", "retry"]:
+            run(command, self.folder / "out-trial-4")
+
+    def test_is_no_beginning_of_the_whole(self):
+        self.convert("--limit", 4, "--output", self.folder / "mine")
+        self.assertEqual(len(self.ids("mine")), 4)
+        _, errors = self.convert("--output", self.folder / "mine", expect=64)
+        self.assertIn("limit: expected 4, got nothing", errors)
+        self.convert()
+        self.assertIn("limit: expected nothing, got 4", self.convert("--limit", 4, "--output", self.folder / "out", expect=64)[1])
+
+    def test_a_mended_sample_of_a_trial_is_retried(self):
+        manifest = json.loads(self.manifest.read_text())
+        manifest["errors"] = {"max_count": 9, "max_fraction": 1}
+        self.manifest.write_text(json.dumps(manifest))
+        picture = self.folder / "cars" / "image_2" / "000001.png"
+        whole = picture.read_bytes()
+        picture.write_bytes(whole[:-20])
+        self.assertIn("1 quarantined", self.convert("--limit", 4)[0])
+        picture.write_bytes(whole)
+        out, _ = run("retry", self.folder / "out-trial-4")
+        self.assertIn("1 of 1 quarantined sample mended", out)
+        self.assertIn("4 of 4 pairs written, 0 quarantined", self.convert("--limit", 4)[0])
+
+    def test_a_limit_beyond_the_job_is_the_job(self):
+        self.convert("--limit", 1000)
+        self.convert()
+        self.assertEqual(self.ids("out-trial-1000"), self.ids("out"))
+
+    def test_no_pairs_are_no_trial(self):
+        for limit in ["0", "-1", "many"]:
+            self.assertIn("--limit", self.convert("--limit", limit, expect=64)[1])
+
+
+class Examples(program.InFolder):
+    """manifests/examples, copied beside the files that they say they need, and nothing else."""
+
+    @classmethod
+    def setUpClass(cls):
+        cls.tree = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-examples-"))
+        cls.addClassCleanup(shutil.rmtree, cls.tree)
+        run("make-demo", cls.tree / "demo")
+        for name in ["kitti", "mpii", "h36m"]:
+            (cls.tree / "demo" / name).rename(cls.tree / name)
+        write_video(cls.tree / "clip.mp4", 91)
+        random = np.random.default_rng(7)
+        for k in range(202):
+            save_picture(cls.tree / "drive" / "image_02" / "data" / f"{k:010d}.png", random)
+        cls.write_raw()
+        for example in EXAMPLES.glob("*.json"):
+            shutil.copy(example, cls.tree)
+
+    @classmethod
+    def write_raw(cls):
+        """The demo's street as a drive of KITTI raw: picture n is its frame n + 3, as the pictures before it need."""
+        training = cls.tree / "kitti" / "training"
+        drive = cls.tree / "kitti" / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync" / "image_02" / "data"
+        drive.mkdir(parents=True)
+        numbers = sorted(int(path.stem) for path in (training / "label_2").iterdir())
+        mapping = cls.tree / "kitti" / "devkit" / "mapping"
+        mapping.mkdir(parents=True)
+        (mapping / "train_rand.txt").write_text(",".join(str(n + 1) for n in range(max(numbers) + 1)) + "\n")
+        lines = []
+        for n in range(max(numbers) + 1):
+            lines.append(f"2011_09_26 2011_09_26_drive_0001_sync {10 * n + 6:010d}\n")
+            if n in numbers:
+                shutil.copy(training / "image_2" / f"{n:06d}.png", drive / f"{10 * n + 6:010d}.png")
+        (mapping / "train_mapping.txt").write_text("".join(lines))
+
+    def test_every_job_can_be_planned(self):
+        jobs = [path for path in sorted(EXAMPLES.glob("*.json")) if read_commented(path)["format"] == "eventgan-manifest"]
+        self.assertGreaterEqual(len(jobs), 6)
+        for job in jobs:
+            with self.subTest(job.name):
+                planned = json.loads(run("plan", self.tree / job.name, "--json")[0])
+                self.assertGreater(planned["pairs"], 0)
+                self.assertGreater(planned["pairs_measured"], 0)
+
+    def test_the_simulation_finds_its_frames(self):
+        recordings = set()
+        for source in read_commented(EXAMPLES / "simulate.json")["sources"]:
+            self.assertTrue((self.tree / source["path"]).exists(), source)
+            name = source.get("name", pathlib.Path(source["path"]).stem)
+            recordings.add(f"recordings/{name}-000.hdf5" if source.get("method") == "affine" else f"recordings/{name}.hdf5")
+        train = read_commented(EXAMPLES / "train.json")
+        named = {recording["path"] for recording in train["recordings"] + train["validation"]}
+        self.assertEqual(named, recordings)
+
+
+if __name__ == "__main__":
+    program.main()
