@@ -3,6 +3,7 @@
 #   docker/bootstrap.sh demo [DIR]   a small demo dataset in DIR (default: ./demo), converted, checked and drawn
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
+#   docker/bootstrap.sh package      a Debian package of it, build/release/eventgan_VERSION_amd64.deb
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail
@@ -47,6 +48,13 @@ build_program() {
   build release eventgan
 }
 
+package() {
+  build_program
+  install_packages docker/packages/package.txt
+  say "packing"
+  (cd build/release && cpack)
+}
+
 demo() {
   local folder=${1:-demo} program=build/release/eventgan
   build_program
@@ -88,6 +96,7 @@ case "${1:-}" in
   demo) demo "${@:2}" ;;
   test) run_tests ;;
   build) build_program ;;
+  package) package ;;
   packages) packages "${@:2}" ;;
-  *) sed -n '2,8s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
+  *) sed -n '2,9s/^# \{0,1\}//p' "$0" >&2; exit 64 ;;
 esac

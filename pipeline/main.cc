@@ -1,10 +1,10 @@
 #include <CLI/CLI.hpp>
-#include <iostream>
 #include <opencv2/core/utility.hpp>
-#include <sstream>
+#include <string_view>
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/standard_streams.h"
+#include "pipeline/commands/usage_internal.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Turns labelled frame datasets (KITTI, MPII, Human3.6M) into event-camera training data");
   app.name("eventgan");
-  app.set_version_flag("--version", eventgan::program_version());
+  app.set_version_flag("--version", eventgan::version_text);
   app.require_subcommand(1);
   app.footer(
       "Exit codes: 0 complete; 1 failed; 64 usage or bad manifest; 65 too many bad samples; 66 "
@@ -44,17 +44,23 @@ int main(int argc, char** argv) {
   eventgan::add_simulate_command(app, exit_code);
   eventgan::add_train_command(app, exit_code);
   eventgan::add_tradeoff_command(app, exit_code);
+  eventgan::add_help_command(app, exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    std::ostringstream message;
-    const bool asked_for = app.exit(error, std::cout, message) == 0;  // --help, --version
+    const bool asked_for = error.get_exit_code() == 0;  // --help, --version
     exit_code = asked_for ? eventgan::kComplete : eventgan::kUsage;
-    if (!asked_for)
-      eventgan::tell_error(message.str().substr(0, message.str().find_last_not_of('\n') + 1));
+    if (asked_for) {
+      app.exit(error);
+    } else {
+      eventgan::tell_error(eventgan::usage_text(app, error));
+    }
   } catch (const std::exception& error) {
     exit_code = eventgan::exit_code_of(error);
-    eventgan::tell_error(eventgan::error_text(error));
+    // One fault is told in one line, however many layers have something to say of it; a list of
+    // faults in a line each.
+    const bool is_list = std::string_view(error.what()).find('\n') != std::string_view::npos;
+    eventgan::tell_error(is_list ? eventgan::error_text(error) : eventgan::error_line(error));
   }
   return streams.finish(exit_code);
 }

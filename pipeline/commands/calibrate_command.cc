@@ -52,7 +52,9 @@ CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobM
     return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
   };
   // The plan is used here and then dropped, so its fingerprint needs no engine.
-  const PlannedJob job = make_plan(manifest, loaded.hash, "none", {options.stop_requested});
+  const PlannedJob job =
+      make_plan(manifest, loaded.hash, "none",
+                {.stop = options.stop_requested, .show_phase = show_phases(arguments.progress)});
   return calibrate(manifest, job, loaded.weights, options);
 }
 

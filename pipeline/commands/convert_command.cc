@@ -84,6 +84,7 @@ int run(const ConvertArguments& arguments) {
   options.threads = job.threads;
   options.overwrite = job.overwrite;
   options.make_progress = [&](std::int64_t total) { return show_progress(job.progress, total); };
+  options.show_phase = show_phases(job.progress);
   options.warn = tell_warning;
   options.note = [](const std::string& text) { tell(text); };
   return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {

@@ -11,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
+#include "pipeline/commands/usage_internal.h"
 #include "pipeline/exports/export_job.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
@@ -79,13 +80,6 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   return kComplete;
 }
 
-template <class Value>
-CLI::CheckedTransformer one_of(const std::map<std::string, Value>& words) {
-  CLI::CheckedTransformer transformer(words);
-  transformer.description("");
-  return transformer;
-}
-
 }  // namespace
 
 void add_export_command(CLI::App& app, int& exit_code) {
@@ -96,12 +90,9 @@ void add_export_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<ExportArguments>();
   ExportOptions& options = arguments->options;
   command->add_option("DIR", arguments->folder, "A folder that finalize has completed")->required();
-  command
-      ->add_option("--to", options.to,
-                   "yolo, coco, mpii, davis, webdataset or events (manifests/guides/exports.md)")
-      ->required()
-      ->transform(one_of(kFormats))
-      ->option_text("FORMAT");
+  take_one_of(command->add_option("--to", options.to, "Format (manifests/guides/exports.md)"),
+              kFormats)
+      ->required();
   command->add_option("--out", arguments->out, "Folder to write to")
       ->required()
       ->option_text("FOLDER");
@@ -112,28 +103,25 @@ void add_export_command(CLI::App& app, int& exit_code) {
       ->add_option("--classes", arguments->classes,
                    "yolo, coco: JSON of class names and their numbers, null to leave one out")
       ->option_text("FILE");
-  command
-      ->add_option("--ignored", arguments->keep_ignored,
-                   "keep or drop boxes to ignore (DontCare), yolo: as a class of their own, "
-                   "default drop; coco: as crowds, default keep")
-      ->transform(one_of(kIgnored))
-      ->option_text("WHAT");
+  take_one_of(
+      command->add_option("--ignored", arguments->keep_ignored,
+                          "keep or drop boxes to ignore (DontCare), yolo: as a class of their own, "
+                          "default drop; coco: as crowds, default keep"),
+      kIgnored);
   command
       ->add_option("--full-scale", options.full_scale,
                    "yolo, mpii: the value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))
       ->option_text("VALUE");
-  command->add_option("--dtype", arguments->is_float32, "davis: float16 (default) or float32")
-      ->transform(one_of(kIsFloat32))
-      ->option_text("TYPE");
-  command->add_option("--counts", options.counts, "events: poisson (default) or rounded")
-      ->transform(one_of(kCounts))
-      ->option_text("RULE");
-  command
-      ->add_option("--layout", options.event_file,
-                   "events: text, lines t x y p (default), or mvsec, HDF5")
-      ->transform(one_of(kEventFiles))
-      ->option_text("LAYOUT");
+  take_one_of(
+      command->add_option("--dtype", arguments->is_float32, "davis: float16 (default) or float32"),
+      kIsFloat32);
+  take_one_of(
+      command->add_option("--counts", options.counts, "events: poisson (default) or rounded"),
+      kCounts);
+  take_one_of(command->add_option("--layout", options.event_file,
+                                  "events: text, lines t x y p (default), or mvsec, HDF5"),
+              kEventFiles);
   command->add_option("--seed", options.seed, "events: of all draws; default: 0")
       ->option_text("NUMBER");
   command->add_option("--threads", options.threads, "Threads to use; default: all cores")

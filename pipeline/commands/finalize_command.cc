@@ -6,6 +6,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/folder/finalize.h"
 #include "pipeline/runtime/errors.h"
@@ -18,14 +19,17 @@ struct FinalizeArguments {
   std::string manifest;  ///< empty: the one in the plan
   bool partial = false;
   bool json = false;
+  ProgressStyle progress = ProgressStyle::kAuto;
 };
 
 int run(const FinalizeArguments& arguments) {
   FinalizationOptions options;
   options.partial = arguments.partial;
+  options.show_phase = show_phases(arguments.progress);
   if (!arguments.manifest.empty()) options.errors = read_job_manifest(arguments.manifest).errors;
   const FinalizationReport report = finalize(arguments.folder, options);
-  std::cout << (arguments.json ? to_json(report) : to_text(report)) << std::flush;
+  const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
+  std::cout << (as_json ? to_json(report) : to_text(report)) << std::flush;
   if (report.too_many_faults) {
     tell_error(
         fmt::format("expected no more quarantined samples than the manifest's errors allow, got {} "
@@ -55,6 +59,7 @@ void add_finalize_command(CLI::App& app, int& exit_code) {
                    "that the plan was frozen with")
       ->option_text("FILE");
   command->add_flag("--json", arguments->json, "Print JSON");
+  add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -1,7 +1,5 @@
 #include "pipeline/commands/options.h"
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <exception>
@@ -12,6 +10,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/commands/standard_streams.h"
+#include "pipeline/commands/usage_internal.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace_watch.h"
 
@@ -27,17 +26,25 @@ const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressS
 }  // namespace
 
 void add_progress_option(CLI::App& command, ProgressStyle& style) {
-  command
-      .add_option("--progress", style,
-                  "auto, bar, lines, none; json prints machine-readable lines and report")
-      ->transform(CLI::CheckedTransformer(kProgressStyles).description(""))
-      ->option_text("STYLE");
+  take_one_of(
+      command.add_option("--progress", style,
+                         "auto (default): a bar on a terminal, lines elsewhere; json prints "
+                         "machine-readable lines and report"),
+      kProgressStyles);
 }
 
 std::unique_ptr<Progress> show_progress(ProgressStyle style, std::int64_t total,
                                         const ProgressUnit& unit) {
-  return std::make_unique<Progress>(std::cerr, style, isatty(STDERR_FILENO) != 0, total,
-                                    std::chrono::steady_clock::now, unit);
+  auto progress = std::make_unique<Progress>(std::cerr, style, terminal_columns(), total,
+                                             std::chrono::steady_clock::now, unit);
+  progress->keep_up();
+  return progress;
+}
+
+ShowPhase show_phases(ProgressStyle style) {
+  return [style](const ProgressUnit& unit, std::int64_t total) {
+    return show_progress(style, total, unit);
+  };
 }
 
 std::optional<std::filesystem::path> JobOptions::output_folder() const {

@@ -24,6 +24,9 @@ void add_progress_option(CLI::App& command, ProgressStyle& style);
 std::unique_ptr<Progress> show_progress(ProgressStyle style, std::int64_t total,
                                         const ProgressUnit& unit = {});
 
+/// The same for the phases beside what a command counts.
+ShowPhase show_phases(ProgressStyle style);
+
 /// What every command takes that makes a folder of files by a manifest.
 struct JobOptions {
   std::string manifest;

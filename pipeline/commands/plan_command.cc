@@ -26,6 +26,7 @@ struct PlanArguments {
   bool json = false;
   bool freeze = false;
   std::optional<std::string> output;
+  ProgressStyle progress = ProgressStyle::kAuto;
 };
 
 /// What a script needs to know before it submits a job for each shard.
@@ -50,7 +51,7 @@ int freeze(const PlanArguments& arguments, const JobManifest& manifest, Plan pla
                                            ? std::filesystem::path(*arguments.output)
                                            : resolve(manifest, manifest.output.directory);
   std::filesystem::create_directories(folder);
-  const FrozenPlan frozen = freeze_plan(folder, std::move(plan));
+  const FrozenPlan frozen = freeze_plan(folder, std::move(plan), show_phases(arguments.progress));
   record_manifest_folder(folder, manifest);
   print_frozen(folder, frozen, arguments.json);
   return kComplete;
@@ -60,11 +61,13 @@ int run(const PlanArguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
   tell_generator(loaded);
-  PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description());
+  PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
+                             /*stop=*/{}, /*trace=*/nullptr, show_phases(arguments.progress));
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
+  const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);
-  std::cout << (arguments.json ? plan_summary_json : plan_text)(manifest, job, estimate, threads)
+  std::cout << (as_json ? plan_summary_json : plan_text)(manifest, job, estimate, threads)
             << std::flush;
   return kComplete;
 }
@@ -91,6 +94,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
       ->add_option("--output", arguments->output,
                    "Folder to freeze the plan in, instead of the manifest's")
       ->needs(freeze_flag);
+  add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

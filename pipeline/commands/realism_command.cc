@@ -14,6 +14,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
+#include "pipeline/commands/usage_internal.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/recordings/recording.h"
@@ -150,9 +151,10 @@ void add_choices(CLI::App& command, RealismArguments& arguments) {
 
 void add_methods(CLI::App& command, RealismArguments& arguments) {
   RealismOptions& options = arguments.options;
-  command.add_option("--with", options.methods, "Of network,difference,esim; default: all")
-      ->delimiter(',')
-      ->transform(CLI::CheckedTransformer(kMethods).description(""))
+  take_one_of(
+      command.add_option("--with", options.methods, "Of network,difference,esim; default: all")
+          ->delimiter(','),
+      kMethods)
       ->option_text("METHOD,...");
   command.add_option("--weights", options.weights,
                      "The network's: FILE.safetensors, shipped or shipped:WIDTH; default: shipped");

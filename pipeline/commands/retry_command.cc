@@ -48,6 +48,7 @@ int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder
   RunOptions options;
   options.threads = arguments.threads;
   options.grace_s = arguments.grace_s;
+  options.show_phase = show_phases(arguments.progress);
   options.warn = tell_warning;
   options.trace = trace;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };

@@ -1,9 +1,11 @@
 #include "pipeline/commands/standard_streams.h"
 
 #include <fcntl.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <streambuf>
@@ -45,8 +47,33 @@ std::string json_line(const std::string& line) {
 /// Whether the standard error stream is for machines; set before there are other threads.
 bool is_json = false;
 
+/// Whether it is a terminal that knows control sequences, and whether these may be colours.
+bool can_redraw = false;
+bool has_colours = false;
+
+std::string variable(const char* name) {
+  const char* value = std::getenv(name);
+  return value ? value : "";
+}
+
+void look_at_terminal() {
+  const std::string term = variable("TERM");
+  can_redraw = isatty(STDERR_FILENO) != 0 && !term.empty() && term != "dumb";
+  has_colours = can_redraw && variable("NO_COLOR").empty();
+}
+
+/// In one piece: a bar may be drawn by another thread meanwhile.
+void write_line(const std::string& line) {
+  std::cerr << (can_redraw && !is_json ? kWipeRow : "") + line + "\n" << std::flush;
+}
+
 void tell(const std::string& event, const std::string& start, const std::string& text) {
-  std::cerr << (is_json ? message_json(event, text) : start + text) << std::endl;
+  write_line(is_json ? message_json(event, text) : start + text);
+}
+
+/// `start` in a colour of ECMA-48's SGR sequences: "31" red, "33" yellow; "1;" bold.
+std::string coloured(const std::string& start, const std::string& colour) {
+  return has_colours ? "\x1b[" + colour + "m" + start + "\x1b[0m" : start;
 }
 
 }  // namespace
@@ -87,6 +114,7 @@ thread_local std::string StandardStreams::JsonLines::line_;
 StandardStreams::StandardStreams(int argc, const char* const* argv) {
   open_closed_streams();
   is_json = asks_for_json(argc, argv);
+  look_at_terminal();
   if (is_json) json_lines_ = std::make_unique<JsonLines>();
 }
 
@@ -101,12 +129,21 @@ int StandardStreams::finish(int exit_code) const {
   return exit_code == kComplete ? static_cast<int>(kFailed) : exit_code;
 }
 
-void tell_error(const std::string& text) { tell("error", "error: ", text); }
+void tell_error(const std::string& text) { tell("error", coloured("error: ", "1;31"), text); }
 
-void tell_warning(const std::string& text) { tell("warning", "warning: ", text); }
+void tell_warning(const std::string& text) { tell("warning", coloured("warning: ", "1;33"), text); }
 
 void tell_note(const std::string& text) { tell("note", "note: ", text); }
 
 void tell(const std::string& text) { tell("note", "", text); }
+
+ProgressDisplay::Columns terminal_columns() {
+  if (!can_redraw) return {};
+  return [] {
+    constexpr int kUnknown = 80;
+    winsize size{};
+    return ioctl(STDERR_FILENO, TIOCGWINSZ, &size) == 0 && size.ws_col > 0 ? size.ws_col : kUnknown;
+  };
+}
 
 }  // namespace eventgan

@@ -3,6 +3,8 @@
 #include <memory>
 #include <string>
 
+#include "pipeline/runtime/progress.h"
+
 namespace eventgan {
 
 /// What the program's three standard streams keep to, from the first line of main to its last:
@@ -10,7 +12,8 @@ namespace eventgan {
 /// 1. None is closed: else the next file that is opened, such as a shard, would take its place.
 /// 2. With `--progress json` every line on the standard error stream is a JSON object; what is not
 ///    written as one, by us or a library, becomes {"event": "error", "warning" or "note", "text":
-///    ...}.
+///    ...}. On a terminal a message stands in a row of its own, above the bar if there is one, and
+///    its first word is coloured if it is "error" or "warning", unless NO_COLOR is set.
 /// 3. What could not be written to the standard output is not passed over (finish()).
 ///
 /// For one object in the program, made before there are other threads.
@@ -38,5 +41,9 @@ void tell_error(const std::string& text);
 void tell_warning(const std::string& text);
 void tell_note(const std::string& text);
 void tell(const std::string& text);
+
+/// How wide the terminal on the standard error stream is, asked anew at each call; none where that
+/// stream is no terminal, or one that cannot redraw a line (TERM unset or "dumb").
+ProgressDisplay::Columns terminal_columns();
 
 }  // namespace eventgan

@@ -1,5 +1,3 @@
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <memory>
@@ -32,8 +30,10 @@ int run(const TrainArguments& arguments) {
   options.warn = tell_warning;
   options.note = tell_note;
   options.make_progress = [&] {
-    return std::make_unique<TrainingProgress>(std::cerr, arguments.job.progress,
-                                              isatty(STDERR_FILENO) != 0);
+    auto progress =
+        std::make_unique<TrainingProgress>(std::cerr, arguments.job.progress, terminal_columns());
+    progress->keep_up();
+    return progress;
   };
   const TrainingReport report = run_training(manifest, options);
   std::cout << (arguments.job.as_json() ? to_json(report) : to_text(report)) << std::flush;

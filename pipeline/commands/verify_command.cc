@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/folder/verify_folder.h"
 #include "pipeline/runtime/errors.h"
 
@@ -15,31 +16,28 @@ struct VerifyArguments {
   std::string folder;
   bool deep = false;
   std::optional<std::string> manifest;
+  bool json = false;
+  ProgressStyle progress = ProgressStyle::kAuto;
 };
 
 int run(const VerifyArguments& arguments) {
-  const FolderCheck check = verify_folder(arguments.folder, {arguments.deep, arguments.manifest});
-  for (const std::string& note : check.notes) std::cout << "note: " << note << "\n";
-  for (const std::string& fault : check.faults) std::cout << fault << "\n";
-  if (arguments.deep) {
-    std::cout << "labels of " << check.compared << " samples compared with their sources\n";
-  }
-  if (!check.faults.empty()) {
-    std::cout << check.faults.size() << " faults in " << check.shards << " shards" << std::endl;
-    return kFailed;
-  }
-  std::cout << "sound: " << check.shards << " shards, " << check.samples << " samples, "
-            << check.samples - check.valid << " of them quarantined" << std::endl;
-  return kComplete;
+  const FolderCheck check =
+      verify_folder(arguments.folder, {.deep = arguments.deep,
+                                       .manifest = arguments.manifest,
+                                       .show_phase = show_phases(arguments.progress)});
+  const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
+  std::cout << (as_json ? to_json(check, arguments.folder) : to_text(check, arguments.deep))
+            << std::flush;
+  return check.sound() ? kComplete : kFailed;
 }
 
 }  // namespace
 
 void add_verify_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("verify",
-                         "Checks every file of a folder: hashes, structure, counts, checksums, "
-                         "values; exit code 1 and a line for each fault");
+  auto* command = app.add_subcommand(
+      "verify",
+      "Checks every file of a folder: hashes, structure, counts, checksums, values; a line for "
+      "each shard, exit code 1 and a line for each fault");
   const auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
   command->add_flag("--deep", arguments->deep,
@@ -49,6 +47,8 @@ void add_verify_command(CLI::App& app, int& exit_code) {
                    "With --deep: the job, where its folder has moved; default: as recorded in DIR")
       ->option_text("FILE")
       ->needs("--deep");
+  command->add_flag("--json", arguments->json, "Print JSON");
+  add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -73,7 +73,11 @@ std::string to_text(const ConversionReport& report) {
                         report.quarantined.size() - listed);
   }
   if (report.stopped) text += "\nstopped on request; the same command goes on from here";
-  return text + "\n" + notes_text(report.notes) + report.folder + "\n";
+  text += "\n" + notes_text(report.notes) + report.folder + "\n";
+  if (!report.quarantined.empty()) {
+    text += "next, once the inputs are mended:  eventgan retry " + report.folder + "\n";
+  }
+  return text;
 }
 
 std::string to_json(const ConversionReport& report) {

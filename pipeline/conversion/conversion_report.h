@@ -49,7 +49,8 @@ struct ConversionReport {
 /// the size of its volumes uncompressed.
 void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionReport& report);
 
-/// A few lines for a person; quarantined samples are listed up to a number, then counted.
+/// A few lines for a person; quarantined samples are listed up to a number, then counted, and the
+/// last line says what to do about them.
 std::string to_text(const ConversionReport& report);
 
 /// One line of JSON.

@@ -31,6 +31,7 @@ struct RunOptions {
   std::function<std::optional<double>()> since_stop_request;
   /// Called with the number of pairs to do; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
+  ShowPhase show_phase = {};  ///< of what comes before the first pair
   /// Told what a person should know: shards that are made again, volumes not to be trusted. None:
   /// silent.
   std::function<void(const std::string&)> warn = {};

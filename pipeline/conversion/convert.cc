@@ -58,7 +58,7 @@ FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, P
     throw std::runtime_error("cannot create " + folder.string() + ": " + error.message());
   }
   if (options.overwrite) discard_output(folder);
-  FrozenPlan frozen = freeze_plan(folder, std::move(plan));
+  FrozenPlan frozen = freeze_plan(folder, std::move(plan), options.show_phase);
   restore_shards(folder, {outline_of(frozen.plan), frozen.hash});
   record_place(folder, manifest, options);
   return frozen;
@@ -98,8 +98,8 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
                         ConversionReport& report) {
   const TraceSpan span(options.trace, "check earlier shards", "job");
   const ScanOptions scan{thread_count(options.threads), [&] { return options.stop_requested(); },
-                         options.trace};
-  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, scan, options.note);
+                         options.trace, options.show_phase};
+  EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, scan);
   for (const std::string& fault : earlier.faults) {
     tell(options.warn, fault + "; it is made again");
   }
@@ -138,7 +138,7 @@ void look_again(const ConversionJob& job, const ConversionOptions& options,
   const TraceSpan span(options.trace, "look again at all shards", "job");
   for (const ShardState& shard :
        scan_shards(job.folder, outlines_of(own), job.frozen.hash, ScanDepth::kMarker,
-                   {.threads = thread_count(options.threads)})) {
+                   {.threads = thread_count(options.threads), .show_phase = options.show_phase})) {
     if (shard.done()) continue;
     report.lost.push_back((job.folder / shard.outline.name).string() +
                           ": expected the shard that was committed, got it " +
@@ -153,9 +153,11 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                          const std::string& weights_hash, const ConversionOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   const fs::path folder = options.output.value_or(resolve(manifest, manifest.output.directory));
-  PlannedJob planned =
-      make_plan(manifest, weights_hash, generator.description(),
-                {[&] { return options.stop_requested(); }, options.trace, options.limit});
+  PlannedJob planned = make_plan(manifest, weights_hash, generator.description(),
+                                 {.stop = [&] { return options.stop_requested(); },
+                                  .trace = options.trace,
+                                  .show_phase = options.show_phase,
+                                  .limit = options.limit});
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);

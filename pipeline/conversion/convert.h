@@ -18,7 +18,7 @@ struct ConversionOptions : RunOptions {
   bool overwrite = false;                       ///< discard what an earlier run left in the folder
   WorkerPart part;                              ///< this worker's shards
   std::optional<std::int64_t> limit;            ///< a trial of so many pairs (PlanningOptions)
-  /// Told what goes on: which part this is, that checking takes long. None: silent.
+  /// Told what goes on: which part this is, where the manifest is now. None: silent.
   std::function<void(const std::string&)> note;
 };
 

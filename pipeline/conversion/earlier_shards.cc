@@ -1,7 +1,5 @@
 #include "pipeline/conversion/earlier_shards.h"
 
-#include <fmt/core.h>
-
 #include <cstddef>
 #include <stdexcept>
 #include <utility>
@@ -12,23 +10,6 @@
 
 namespace eventgan {
 namespace {
-
-/// Some ten seconds of hashing.
-constexpr std::int64_t kNotedBytes = 4'000'000'000;
-
-void tell_if_long(const std::vector<ShardState>& states,
-                  const std::function<void(const std::string&)>& note) {
-  int done = 0;
-  std::int64_t bytes = 0;
-  for (const ShardState& state : states) {
-    if (!state.done()) continue;
-    ++done;
-    bytes += state.marker->size_bytes;
-  }
-  if (!note || bytes < kNotedBytes) return;
-  note(fmt::format("checking {} committed shards ({:.1f} GB)", done,
-                   1e-9 * static_cast<double>(bytes)));
-}
 
 /// Empty if somebody has taken it away meanwhile.
 std::string marker_text(const std::filesystem::path& folder, const std::string& shard) {
@@ -43,11 +24,9 @@ std::string marker_text(const std::filesystem::path& folder, const std::string& 
 
 EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                    const std::vector<const PlannedShard*>& shards,
-                                   const ScanOptions& options,
-                                   const std::function<void(const std::string&)>& note) {
+                                   const ScanOptions& options) {
   std::vector<ShardState> states =
       scan_shards(folder, outlines_of(shards), frozen.hash, ScanDepth::kMarker, options);
-  tell_if_long(states, note);
   scan_again(folder, frozen.hash, /*done=*/true, states, ScanDepth::kRows, options);
 
   EarlierShards earlier;

@@ -30,12 +30,10 @@ struct EarlierShards {
 };
 
 /// Looks at what the folder holds of `shards` of the plan. Those that are committed are hashed, and
-/// their markers compared with them, before they are trusted (ScanDepth::kRows). `note` is told
-/// before that takes long; none: nobody asks.
+/// their markers compared with them, before they are trusted (ScanDepth::kRows).
 EarlierShards check_earlier_shards(const std::filesystem::path& folder, const FrozenPlan& frozen,
                                    const std::vector<const PlannedShard*>& shards,
-                                   const ScanOptions& options,
-                                   const std::function<void(const std::string&)>& note = {});
+                                   const ScanOptions& options);
 
 /// Quarantined samples of those `shards` that are done, by their markers alone.
 std::int64_t count_quarantined(const std::filesystem::path& folder, const FrozenPlan& frozen,

@@ -107,7 +107,10 @@ PlannedJob plan_again(const JobManifest& manifest, const std::string& weights_ha
                       const std::string& engine, const Fingerprint& frozen,
                       const RunOptions& options) {
   return make_plan(manifest, weights_hash, engine,
-                   {[&] { return options.stop_requested(); }, options.trace, limit_of(frozen)});
+                   {.stop = [&] { return options.stop_requested(); },
+                    .trace = options.trace,
+                    .show_phase = options.show_phase,
+                    .limit = limit_of(frozen)});
 }
 
 /// The shards with quarantined samples that prove whole; the others are reported. After a request
@@ -117,9 +120,10 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
                                            const RunOptions& options, RetryReport& report) {
   std::vector<const PlannedShard*> shards;
   for (const std::size_t shard : found.shards) shards.push_back(&frozen.plan.shards[shard]);
-  EarlierShards earlier = check_earlier_shards(
-      folder, frozen, shards,
-      {thread_count(options.threads), [&] { return options.stop_requested(); }, options.trace});
+  EarlierShards earlier =
+      check_earlier_shards(folder, frozen, shards,
+                           {thread_count(options.threads), [&] { return options.stop_requested(); },
+                            options.trace, options.show_phase});
   for (const std::string& fault : earlier.faults) report.damaged_shards.push_back(fault);
   if (!options.stop_requested()) {
     report.quarantined = 0;  // what a damaged shard held does not count

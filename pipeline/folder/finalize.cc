@@ -19,7 +19,8 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   FrozenOutline frozen = read_frozen_outline(folder);
   restore_shards(folder, frozen);  // and what a finalize that was killed has left goes
   std::vector<ShardState> shards =
-      scan_shards(folder, frozen.plan.shards, frozen.hash, ScanDepth::kRows);
+      scan_shards(folder, frozen.plan.shards, frozen.hash, ScanDepth::kRows,
+                  {.show_phase = options.show_phase});
   const DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
   FinalizationReport report;
   report.folder = folder.string();

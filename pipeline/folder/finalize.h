@@ -7,6 +7,7 @@
 
 #include "manifests/values/job.h"
 #include "pipeline/folder/dataset_description.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
 
@@ -34,6 +35,7 @@ std::string to_json(const FinalizationReport& report);
 struct FinalizationOptions {
   bool partial = false;             ///< write what there is even if shards are missing
   std::optional<ErrorSpec> errors;  ///< limits instead of those of the manifest in the plan
+  ShowPhase show_phase{};           ///< of the shards that are read
 };
 
 /// Completes the dataset in an output folder: puts back what a retry that was killed has left (see

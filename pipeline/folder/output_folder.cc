@@ -1,9 +1,13 @@
 #include "pipeline/folder/output_folder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <fstream>
 #include <istream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <streambuf>
@@ -15,6 +19,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/marker.h"
+#include "manifests/documents/plan_lines_internal.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
 #include "stages/base/files/atomic_file.h"
@@ -68,6 +73,21 @@ class HashedFile : public std::streambuf {
   Sha256 hash_;
 };
 
+/// The version that the last line of a plan states, `"version":1}`; none if that line is another.
+std::optional<int> stated_version(const fs::path& file) {
+  constexpr std::streamoff kLastLine = 24;  // of a version with so many digits as an int has
+  constexpr std::string_view kStart = "\"version\":";
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  stream.seekg(-std::min<std::streamoff>(kLastLine, stream.tellg()), std::ios::end);
+  const std::string end(std::istreambuf_iterator<char>(stream), {});
+  const std::size_t start = end.rfind(kStart);
+  int version = 0;
+  if (start == end.npos || std::sscanf(end.c_str() + start + kStart.size(), "%d}", &version) != 1) {
+    return std::nullopt;
+  }
+  return version;
+}
+
 /// Reads FOLDER/plan.json with `read` (a stream and a name to a plan, or a part of one).
 template <class Frozen, class Read>
 Frozen read_plan_file(const fs::path& folder, const Read& read) {
@@ -85,14 +105,39 @@ Frozen read_plan_file(const fs::path& folder, const Read& read) {
   } catch (const std::system_error&) {
     throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
   } catch (const std::runtime_error&) {
+    if (const auto version = stated_version(file); version && *version > kPlanVersion) {
+      throw std::runtime_error(fmt::format(
+          "expected a plan of version {} (the one that this program reads), got version {}, in {}: "
+          "a newer eventgan has written it",
+          kPlanVersion, *version, file.string()));
+    }
     std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
                                               file.string() + " (--overwrite starts again)"));
   }
 }
 
-std::string hash_of(const Plan& plan) {
+/// plan.json has a line for each pair, two for each shard, and few others.
+class PlanLines {
+ public:
+  PlanLines(const ShowPhase& show_phase, const std::string& name, const Plan& plan)
+      : phase_(show_phase, {"lines", /*has_bytes=*/false, name},
+               2 * std::ssize(plan.shards) + plan.sample_count()) {}
+
+  void count(std::string_view piece) {
+    for (auto lines = std::ranges::count(piece, '\n'); lines > 0; --lines) phase_.advance();
+  }
+
+ private:
+  Phase phase_;
+};
+
+std::string hash_of(const Plan& plan, const ShowPhase& show_phase) {
   Sha256 hash;
-  write_plan(plan, [&](std::string_view piece) { hash.update(piece); });
+  PlanLines lines(show_phase, "comparing the plan:", plan);
+  write_plan(plan, [&](std::string_view piece) {
+    hash.update(piece);
+    lines.count(piece);
+  });
   return hash.hex();
 }
 
@@ -131,19 +176,21 @@ FrozenOutline read_frozen_outline(const fs::path& folder) {
   return read_plan_file<FrozenOutline>(folder, &read_plan_outline);
 }
 
-FrozenPlan freeze_plan(const fs::path& folder, Plan plan) {
+FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_phase) {
   const fs::path file = folder / kPlanName;
   std::string hash;
   const bool is_first = create_file_atomically(file, [&](const TextSink& sink) {
     Sha256 hashed;
+    PlanLines lines(show_phase, "freezing the plan:", plan);
     write_plan(plan, [&](std::string_view piece) {
       hashed.update(piece);
       sink(piece);
+      lines.count(piece);
     });
     hash = hashed.hex();
   });
   if (is_first) return {std::move(plan), hash};
-  if (hash.empty()) hash = hash_of(plan);  // there was a plan from the start
+  if (hash.empty()) hash = hash_of(plan, show_phase);  // there was a plan from the start
 
   const std::string frozen_hash = sha256_of_file(file);
   const std::vector<Amendment> amendments = read_amendments(folder, frozen_hash);
@@ -163,7 +210,7 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan) {
   for (std::size_t i = 0; i < std::min(plan.sources.size(), frozen.plan.sources.size()); ++i) {
     plan.sources[i].notes = std::move(frozen.plan.sources[i].notes);
   }
-  if (hash_of(plan) == frozen.hash) return {std::move(plan), frozen.hash};
+  if (hash_of(plan, show_phase) == frozen.hash) return {std::move(plan), frozen.hash};
   throw UsageError(
       "expected the plan that this manifest and these inputs give, got an altered one, in " +
       file.string() + " (--overwrite starts again)");

@@ -6,6 +6,7 @@
 
 #include "manifests/documents/plan.h"
 #include "manifests/values/job.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
 
@@ -27,7 +28,8 @@ struct FrozenOutline {
 /// the same. Throws UsageError listing the fields that differ otherwise, or if the same fingerprint
 /// has another plan; std::runtime_error if the one that is there is damaged, or on an error of
 /// writing, after which there is no plan.json. Safe in several processes and threads at once.
-FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan);
+FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan,
+                       const ShowPhase& show_phase = {});
 
 /// The plan of an output folder. Throws InputError if there is none, std::runtime_error if it is
 /// damaged.

@@ -110,7 +110,7 @@ void set_time_limit(int seconds) {
   } catch (const std::length_error&) {
     tell_of_memory(shard);
   } catch (const std::exception& error) {
-    std::cerr << "error: " << error_text(error) << std::endl;
+    std::cerr << "error: " << error_line(error) << std::endl;
     code = exit_code_of(error);
   }
   ::_exit(code);  // what the parent has to do at its end is the parent's

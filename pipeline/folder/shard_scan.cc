@@ -1,5 +1,6 @@
 #include "pipeline/folder/shard_scan.h"
 
+#include <algorithm>
 #include <cstdint>
 #include <stdexcept>
 #include <system_error>
@@ -7,7 +8,6 @@
 
 #include "manifests/documents/marker.h"
 #include "pipeline/runtime/threads.h"
-#include "pipeline/runtime/trace.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/shards/shard_check.h"
@@ -131,6 +131,19 @@ class Look {
   ShardState state_;
 };
 
+ProgressUnit phase_of(ScanDepth depth) {
+  switch (depth) {
+    case ScanDepth::kMarker:
+      return {"shards", /*has_bytes=*/false, "looking at"};
+    case ScanDepth::kBytes:
+    case ScanDepth::kRows:
+      return {"shards", /*has_bytes=*/true, "hashing"};
+    case ScanDepth::kContents:
+      return {"shards", /*has_bytes=*/true, "verifying"};
+  }
+  return {};
+}
+
 /// Looks at those of `states` for which `which` is true.
 template <class Which>
 void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth depth,
@@ -139,6 +152,7 @@ void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth dep
   const bool is_read = depth != ScanDepth::kMarker;
   const int threads =
       options.threads == 0 && !is_read ? kLooksAtOnce : thread_count(options.threads);
+  Phase phase(options.show_phase, phase_of(depth), std::ranges::count_if(states, which));
   for_each_index(states.size(), threads, [&](std::size_t i) {
     ShardState& state = states[i];
     if (!which(state)) return;
@@ -148,6 +162,7 @@ void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth dep
     const ShardOutline outline = std::move(state.outline);
     state = options.stop && options.stop() ? ShardState{.outline = outline}
                                            : shard_state(folder, outline, plan_hash, depth);
+    phase.advance(state.marker ? state.marker->size_bytes : 0);
   });
 }
 

@@ -8,10 +8,10 @@
 
 #include "manifests/documents/plan.h"
 #include "manifests/values/shard.h"
+#include "pipeline/runtime/progress.h"
+#include "pipeline/runtime/trace.h"
 
 namespace eventgan {
-
-class TraceRecorder;
 
 /// What an output folder holds of a planned shard.
 enum class ShardCondition {
@@ -67,6 +67,7 @@ struct ScanOptions {
   /// Asked before each shard, from several threads: true leaves it out, as if it were missing.
   std::function<bool()> stop{};
   TraceRecorder* trace = nullptr;  ///< of shards that are read; null: nobody asks
+  ShowPhase show_phase{};
 };
 
 /// What the folder holds of each of `shards`, in their order.

@@ -1,5 +1,7 @@
 #include "pipeline/folder/verify_folder.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <exception>
@@ -156,13 +158,14 @@ class Verification {
     const FrozenOutline frozen = read_frozen_outline(folder_);
     if (options_.deep) open_sources(frozen.plan);
     std::vector<ShardState> shards =
-        scan_shards(folder_, frozen.plan.shards, frozen.hash, ScanDepth::kContents);
+        scan_shards(folder_, frozen.plan.shards, frozen.hash, ScanDepth::kContents,
+                    {.show_phase = options_.show_phase});
     if (const auto other = other_plan(shards, frozen.hash)) {
       fault(folder_ / "plan.json", "expected the plan with SHA-256 " + *other +
                                        " that all markers name, got " + frozen.hash +
                                        " (altered, or of another manifest)");
     }
-    for (std::size_t i = 0; i < shards.size(); ++i) tell_shard(i, shards[i]);
+    take_shards(shards);
     append(stray_files(folder_, frozen.plan));
     append(dataset_faults(folder_, frozen, std::move(shards)));
     check_amendments(frozen.hash);
@@ -204,21 +207,37 @@ class Verification {
     check_.notes.insert(check_.notes.end(), notes.begin(), notes.end());
   }
 
-  void tell_shard(std::size_t index, const ShardState& shard) {
-    ++check_.shards;
-    if (shard.condition == ShardCondition::kMissing) {
-      return fault(folder_ / marker_name(shard.outline.name),
-                   "expected the shard and its marker, got neither (not made yet)");
+  void take_shards(const std::vector<ShardState>& shards) {
+    Phase phase(sources_ ? options_.show_phase : ShowPhase(),
+                {"shards", /*has_bytes=*/false, "comparing"}, std::ssize(shards));
+    for (std::size_t i = 0; i < shards.size(); ++i) {
+      check_.by_shard.push_back(look_at(i, shards[i]));
+      append(check_.by_shard.back().faults);
+      phase.advance();
     }
-    append(shard.faults);
-    if (!shard.done()) return;
+  }
+
+  ShardCheck look_at(std::size_t index, const ShardState& shard) {
+    ShardCheck check{
+        .name = shard.outline.name, .condition = shard.condition, .faults = shard.faults};
+    if (shard.condition == ShardCondition::kMissing) {
+      check.faults.push_back((folder_ / marker_name(check.name)).string() +
+                             ": expected the shard and its marker, got neither (not made yet)");
+    }
+    if (!shard.done()) return check;
+    check.size_bytes = shard.marker->size_bytes;
+    check.samples = shard.marker->samples;
+    check.quarantined = shard.marker->samples - shard.marker->valid;
     check_.samples += shard.marker->samples;
     check_.valid += shard.marker->valid;
-    if (!sources_ || !shard.sound()) return;
-    const fs::path file = folder_ / shard.outline.name;
+    if (!sources_ || !shard.sound()) return check;
+    const long long compared_before = sources_->compared();
+    const fs::path file = folder_ / check.name;
     for (const std::string& what : sources_->faults(plan_.shards.at(index), ShardReader(file))) {
-      fault(file, what);
+      check.faults.push_back(file.string() + ": " + what);
     }
+    check.compared = sources_->compared() - compared_before;
+    return check;
   }
 
   void check_amendments(const std::string& plan_hash) {
@@ -248,6 +267,55 @@ class Verification {
 
 FolderCheck verify_folder(const fs::path& folder, const VerifyOptions& options) {
   return Verification(folder, options).run();
+}
+
+namespace {
+
+/// What was done with a shard, and what came of it.
+std::string line_of(const ShardCheck& shard, bool deep) {
+  if (shard.condition != ShardCondition::kDone) {
+    return shard.name + ": " + to_string(shard.condition);
+  }
+  std::string text =
+      fmt::format("{}: {}, {:.1f} MB hashed, {} samples read, {} quarantined", shard.name,
+                  shard.faults.empty() ? "sound" : fmt::format("{} faults", shard.faults.size()),
+                  static_cast<double>(shard.size_bytes) / 1e6, shard.samples, shard.quarantined);
+  if (deep) text += fmt::format(", labels of {} compared", shard.compared);
+  return text;
+}
+
+}  // namespace
+
+std::string to_text(const FolderCheck& check, bool deep) {
+  std::string text;
+  for (const std::string& note : check.notes) text += "note: " + note + "\n";
+  for (const ShardCheck& shard : check.by_shard) text += line_of(shard, deep) + "\n";
+  for (const std::string& fault : check.faults) text += fault + "\n";
+  if (!check.sound()) {
+    return text + fmt::format("{} faults in {} shards\n", check.faults.size(), check.shards());
+  }
+  return text + fmt::format("sound: {} shards, {} samples, {} of them quarantined\n",
+                            check.shards(), check.samples, check.samples - check.valid);
+}
+
+std::string to_json(const FolderCheck& check, const fs::path& folder) {
+  nlohmann::json shards = nlohmann::json::array();
+  for (const ShardCheck& shard : check.by_shard) {
+    shards.push_back({{"shard", shard.name},
+                      {"condition", to_string(shard.condition)},
+                      {"size_bytes", shard.size_bytes},
+                      {"samples", shard.samples},
+                      {"quarantined", shard.quarantined},
+                      {"compared", shard.compared},
+                      {"faults", shard.faults}});
+  }
+  const nlohmann::json json = {
+      {"folder", folder.string()},  {"sound", check.sound()},
+      {"shards", shards},           {"samples", check.samples},
+      {"valid", check.valid},       {"quarantined", check.samples - check.valid},
+      {"compared", check.compared}, {"faults", check.faults},
+      {"notes", check.notes}};
+  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -8,6 +9,7 @@
 #include "manifests/documents/plan.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
 
@@ -15,17 +17,39 @@ struct VerifyOptions {
   bool deep = false;  ///< compare labels with the sources, too
   /// deep: the job's manifest, if its folder is not the recorded one.
   std::optional<std::filesystem::path> manifest;
+  ShowPhase show_phase{};  ///< of the shards that are read and compared
+};
+
+/// What was done with one shard of the plan.
+struct ShardCheck {
+  std::string name;
+  ShardCondition condition = ShardCondition::kMissing;
+  std::int64_t size_bytes = 0;      ///< of a file that was hashed and read
+  int samples = 0;                  ///< by its marker
+  int quarantined = 0;              ///< of these
+  long long compared = 0;           ///< deep: valid samples compared with their source
+  std::vector<std::string> faults;  ///< among those of the folder
 };
 
 /// What `eventgan verify` found.
 struct FolderCheck {
-  std::vector<std::string> faults;  ///< one line each, "PATH: expected X, got Y"
-  std::vector<std::string> notes;   ///< what is no fault, but a person should know
-  int shards = 0;                   ///< shards of the plan that were looked at
+  std::vector<std::string> faults;   ///< one line each, "PATH: expected X, got Y"
+  std::vector<std::string> notes;    ///< what is no fault, but a person should know
+  std::vector<ShardCheck> by_shard;  ///< in plan order
   long long samples = 0;
   long long valid = 0;
   long long compared = 0;  ///< deep: valid samples whose labels were compared with their source
+
+  int shards() const { return static_cast<int>(by_shard.size()); }
+  bool sound() const { return faults.empty(); }
 };
+
+/// What `eventgan verify` prints: a line for each note, for each shard what was done with it and
+/// its faults, the other faults, and the sum. `deep` as in VerifyOptions.
+std::string to_text(const FolderCheck& check, bool deep);
+
+/// The same as JSON; `folder` is the one that was checked.
+std::string to_json(const FolderCheck& check, const std::filesystem::path& folder);
 
 /// Checks a whole output folder: the plan, a marker for every shard of it, each shard's bytes,
 /// structure, counts, checksums and values, on all cores; that nothing else looks like a part of

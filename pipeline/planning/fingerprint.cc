@@ -21,11 +21,13 @@ namespace {
 /// SHA-256 of a listing "PATH\tSTATE\n", sorted, each path once. A million pairs name two million
 /// frames: neither copies of their paths nor the listing stand in memory.
 template <class State>
-std::string listing_hash(std::vector<std::string_view> paths, const State& state) {
+std::string listing_hash(std::vector<std::string_view> paths,
+                         const std::function<void()>& before_file, const State& state) {
   std::ranges::sort(paths);
   Sha256 hash;
   std::string line;
   for (std::size_t i = 0; i < paths.size(); ++i) {
+    before_file();
     if (i > 0 && paths[i] == paths[i - 1]) continue;
     line.assign(paths[i]).append("\t").append(state(std::string(paths[i]))).append("\n");
     hash.update(line);
@@ -35,8 +37,7 @@ std::string listing_hash(std::vector<std::string_view> paths, const State& state
 
 std::string annotations_hash(const JobManifest& manifest, const std::vector<std::string>& files,
                              const std::function<void()>& before_file) {
-  return listing_hash({files.begin(), files.end()}, [&](const std::string& path) {
-    before_file();
+  return listing_hash({files.begin(), files.end()}, before_file, [&](const std::string& path) {
     const auto file = resolve(manifest, path);
     std::error_code unknown;
     if (!std::filesystem::exists(file, unknown) && !unknown) return std::string("absent");
@@ -86,12 +87,12 @@ std::string frames_hash(const JobManifest& manifest, const Plan& plan,
       paths.push_back(sample.pair.next.path);
     }
   }
-  const std::string hash = listing_hash(std::move(paths), [&](const std::string& path) {
-    before_file();
-    std::error_code absent;
-    const auto size = std::filesystem::file_size(resolve(manifest, path), absent);
-    return absent ? "absent" : std::to_string(size);
-  });
+  const std::string hash =
+      listing_hash(std::move(paths), before_file, [&](const std::string& path) {
+        std::error_code absent;
+        const auto size = std::filesystem::file_size(resolve(manifest, path), absent);
+        return absent ? "absent" : std::to_string(size);
+      });
   return sha256_hex(hash + "\n" + decisions_hash(manifest, plan));
 }
 
@@ -103,11 +104,9 @@ bool any_video(const std::vector<PlannedShard>& shards) {
   });
 }
 
-/// "libjpeg.so.62 0123456789abcdef": a library that cannot be asked for its version, as it is
-/// loaded in this process: the file's name and the first digits of its SHA-256, which are the same
-/// wherever the same package is installed. `name` alone if it is not loaded: then it is a part of
-/// the program.
-std::string loaded_library(const std::string& name) {
+/// The file of a library that is loaded in this process; empty: it is none, or a part of the
+/// program.
+std::filesystem::path library_file(const std::string& name) {
   struct Search {
     std::string start;
     std::filesystem::path found;
@@ -121,8 +120,16 @@ std::string loaded_library(const std::string& name) {
         return 1;
       },
       &search);
-  if (search.found.empty()) return name;
-  return search.found.filename().string() + " " + sha256_of_file(search.found).substr(0, 16);
+  return search.found;
+}
+
+/// "libjpeg.so.62 0123456789abcdef": a library that cannot be asked for its version: the file's
+/// name and the first digits of its SHA-256, which are the same wherever the same package is
+/// installed. `name` alone if it has no file.
+std::string loaded_library(const std::string& name) {
+  const std::filesystem::path file = library_file(name);
+  if (file.empty()) return name;
+  return file.filename().string() + " " + sha256_of_file(file).substr(0, 16);
 }
 
 /// Of all that makes or reads bytes, as it runs, which need not be what was compiled against.
@@ -165,6 +172,19 @@ std::string instruction_sets() {
 }
 
 std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSION; }
+
+std::string version_text() {
+  std::string engines;
+  for (const char* name : {"libtorch_cpu", "libdnnl", "libtbb"}) {
+    std::filesystem::path file = library_file(name);
+    if (file.empty()) continue;
+    std::error_code unknown;  // the name that has the whole version is behind a link
+    if (const auto whole = std::filesystem::canonical(file, unknown); !unknown) file = whole;
+    engines += (engines.empty() ? "" : ", ") + file.filename().string();
+  }
+  return program_version() + "\nlibraries: " + libraries(/*with_videos=*/true) +
+         "\nengines: " + engines + "\nprocessor: " + instruction_sets();
+}
 
 std::map<std::string, std::string> make_fingerprint(
     const JobManifest& manifest, const Plan& plan, const std::vector<std::string>& annotation_files,

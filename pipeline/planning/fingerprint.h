@@ -17,7 +17,8 @@ namespace eventgan {
 /// and size only, since their content would mean reading everything twice, and by what the plan
 /// takes from the inputs: samples, times, sizes, faults, counts. Libraries are those that are
 /// loaded (FFmpeg where frames come from videos), not those compiled against. `before_file` is
-/// called before each of these files is looked at; what it throws is passed on.
+/// called for each mention of a file, of which the first has it looked at: `annotation_files`, and
+/// two frames a pair; what it throws is passed on.
 std::map<std::string, std::string> make_fingerprint(
     const JobManifest& manifest, const Plan& plan, const std::vector<std::string>& annotation_files,
     const std::string& weights_hash, const std::string& engine,
@@ -32,5 +33,9 @@ std::string instruction_sets();
 
 /// Name and version of this program: "eventgan 0.1.0".
 std::string program_version();
+
+/// That and what else decides over a shard's bytes: the libraries that are loaded, the engines, the
+/// processor; a line each, without the last line's end.
+std::string version_text();
 
 }  // namespace eventgan

@@ -243,17 +243,19 @@ struct PlannedSource {
 /// Plans `most` pairs at most; then the source ends for it.
 PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset& dataset,
                           std::int64_t most, SizeProbe& probe, ShardLayout& layout,
-                          const std::function<void()>& before_frame) {
+                          const std::function<void()>& before_frame, const ShowPhase& show_phase) {
   const SourceSpec& spec = manifest.sources[index];
   PlannedSource planned;
   SourceSummary& summary = planned.summary;
   layout.begin_source(index, spec.split);
   const auto [frames, selection_notes] =
       select_frames(dataset.labelled_frames(), spec, manifest.directory, manifest.seed);
+  Phase phase(show_phase, {"frames", /*has_bytes=*/false, "planning"}, std::ssize(frames));
   for (const LabelledFrame& frame : frames) {
     if (planned.pairs == most) break;
     before_frame();
     ++summary.labelled_frames;
+    phase.advance();
     PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
     for (const int gap : chosen.without_partner) ++planned.without_partner_by_gap[gap];
     const std::int64_t lost = spec.pairs.choose == PairChoice::kOne
@@ -355,6 +357,18 @@ void settle_sizes(const JobManifest& manifest, Plan& plan) {
 
 constexpr char kLimitField[] = "limit";  // of a trial's fingerprint
 
+void open_datasets(const JobManifest& manifest, const PlanningOptions& options,
+                   std::vector<std::unique_ptr<Dataset>>& datasets) {
+  Phase phase(options.show_phase, {"sources", /*has_bytes=*/false, "opening"},
+              std::ssize(manifest.sources));
+  for (const SourceSpec& source : manifest.sources) {
+    TraceSpan span(options.trace, "open source", "job");
+    span.note("root", source.root);
+    datasets.push_back(open_dataset(source, manifest.directory));
+    phase.advance();
+  }
+}
+
 }  // namespace
 
 PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_hash,
@@ -372,19 +386,19 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   SizeProbe probe(manifest);
   ShardLayout layout(manifest.name, manifest.output.samples_per_shard);
   std::vector<std::string> annotation_files;
+  open_datasets(manifest, options, job.datasets);
   for (std::size_t i = 0; i < manifest.sources.size(); ++i) {
     TraceSpan span(options.trace, "plan source", "job");
     span.note("root", manifest.sources[i].root);
-    const auto& dataset =
-        job.datasets.emplace_back(open_dataset(manifest.sources[i], manifest.directory));
+    const Dataset& dataset = *job.datasets[i];
     const auto sources_left = static_cast<std::int64_t>(manifest.sources.size() - i);
     const std::int64_t share = options.limit ? (left + sources_left - 1) / sources_left : left;
-    PlannedSource planned =
-        plan_source(manifest, static_cast<int>(i), *dataset, share, probe, layout, stop_if_asked);
+    PlannedSource planned = plan_source(manifest, static_cast<int>(i), dataset, share, probe,
+                                        layout, stop_if_asked, options.show_phase);
     left -= planned.pairs;
     job.plan.sources.push_back(std::move(planned.summary));
     job.without_partner_by_gap.push_back(std::move(planned.without_partner_by_gap));
-    const auto files = dataset->annotation_files();
+    const auto files = dataset.annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
     if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);
   }
@@ -392,8 +406,13 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   note_unknown_sizes(job.plan);
   whole.note("pairs", job.plan.sample_count());
   const TraceSpan span(options.trace, "fingerprint", "job");
+  Phase phase(options.show_phase, {"files", /*has_bytes=*/false, "looking at"},
+              std::ssize(annotation_files) + 2 * job.plan.sample_count());
   job.plan.fingerprint =
-      make_fingerprint(manifest, job.plan, annotation_files, weights_hash, engine, stop_if_asked);
+      make_fingerprint(manifest, job.plan, annotation_files, weights_hash, engine, [&] {
+        stop_if_asked();
+        phase.advance();
+      });
   if (options.limit) job.plan.fingerprint[kLimitField] = std::to_string(*options.limit);
   return job;
 }

@@ -13,6 +13,7 @@
 #include "manifests/documents/plan.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "pipeline/runtime/progress.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/dataset.h"
 
@@ -101,6 +102,7 @@ struct PlanningOptions {
   /// if it says yes, Stopped is thrown. None: nobody asks.
   std::function<bool()> stop = {};
   TraceRecorder* trace = nullptr;  ///< gets what takes time; null: nobody asks
+  ShowPhase show_phase = {};       ///< told of the sources, frames and files that are looked at
   /// For a trial: no more pairs than this, >= 1, the first of each source, which share it evenly.
   /// Frames behind them are not looked at.
   std::optional<std::int64_t> limit = std::nullopt;

@@ -1,11 +1,16 @@
 #pragma once
 
+#include <atomic>
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <iosfwd>
+#include <memory>
+#include <mutex>
 #include <string>
 #include <string_view>
+#include <thread>
 
 namespace eventgan {
 
@@ -21,45 +26,83 @@ std::string duration_text(double seconds, std::string_view leading, int count = 
 /// is "error", of a warning "warning", of anything else "note".
 std::string message_json(std::string_view event, std::string_view text);
 
+/// Takes the cursor to the start of its row and wipes everything from there on.
+inline constexpr char kWipeRow[] = "\r\x1b[J";
+
+/// What a run has to show, in words and as JSON, both without line ends.
+struct ProgressText {
+  std::int64_t done = 0;
+  std::int64_t total = 0;
+  std::string line;  ///< parts with ", " between them, what matters most first
+  std::string json;
+};
+
 /// Shows on a stream how a run goes on: a bar redrawn ten times a second, a plain line every 10 s,
-/// or a JSON line a second. Thread safety: one thread at a time.
+/// or a JSON line a second.
+///
+/// The bar keeps to one row of the terminal however that is resized: the cursor rests at the row's
+/// start, which is where a terminal that wraps the row anew leaves it, and everything from there on
+/// is wiped before the bar is drawn again. Thread safe.
 class ProgressDisplay {
  public:
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
+  /// Columns of the terminal, asked before each bar. None: no terminal that can redraw a line.
+  using Columns = std::function<int()>;
+  /// What there is to show at a time; called by one thread at a time, also by that of keep_up().
+  using Describe = std::function<ProgressText(std::chrono::steady_clock::time_point now)>;
 
-  /// kAuto asks whether the stream's terminal is there: `is_terminal`. `clock` is for tests.
-  ProgressDisplay(std::ostream& stream, ProgressStyle style, bool is_terminal, int bar_width,
-                  Clock clock);
+  /// kAuto is a bar if there are `columns`. `clock` is for tests. What `describe` refers to is
+  /// changed in update() alone, and must outlive the display.
+  ProgressDisplay(std::ostream& stream, ProgressStyle style, Columns columns, Clock clock,
+                  Describe describe);
 
   /// Ends the bar's line.
-  ~ProgressDisplay() { end_line(); }
+  ~ProgressDisplay();
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
+  /// From now on it shows by itself what there is, also while nothing changes for long, and draws
+  /// the bar anew when the terminal is resized.
+  void keep_up();
+
   /// When this was made.
   std::chrono::steady_clock::time_point start() const { return start_; }
-  std::chrono::steady_clock::time_point now() const { return clock_(); }
 
-  /// Whether enough time has passed since something was shown, or since the start.
-  bool is_due() const;
+  /// Lets `change` change what is described, at the time it is given, and shows it: `at_once`, or
+  /// if enough time has passed since something was shown, or since the start.
+  void update(const std::function<void(std::chrono::steady_clock::time_point now)>& change,
+              bool at_once = false);
 
-  /// `line` and `json` tell the same of the time `now`, without line ends: `done` of `total`, and
-  /// more.
-  void show(std::chrono::steady_clock::time_point now, std::int64_t done, std::int64_t total,
-            const std::string& line, const std::string& json);
+  /// What keep_up() does ten times a second: shows what there is if it is time for that, or if the
+  /// bar has not the terminal's width any more.
+  void refresh();
 
-  /// Ends the bar's line, if there is one: something else is written next.
-  void end_line();
+  /// Shows what there is at the end, and ends the bar's line. `passing`: only where something was
+  /// shown before, and the bar goes.
+  void finish(bool passing);
 
  private:
+  void show(std::chrono::steady_clock::time_point now);
+  int columns() const;
+  void end_line();
+
+  std::mutex mutex_;
   std::ostream& stream_;
   ProgressStyle style_;
-  int bar_width_;
+  Columns columns_;
   Clock clock_;
+  Describe describe_;
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point shown_;
-  std::size_t widest_ = 0;  // of the bar's line; 0: there is none
+  bool anything_shown_ = false;
+  int bar_columns_ = 0;  // the terminal's when the bar was drawn that stands there; 0: none does
+  std::condition_variable_any wake_;
+  std::jthread keeper_;
 };
+
+/// The bar and the line on one row of a terminal of so many columns, the last of which stays free:
+/// the line's last parts make room for the bar, the bar for its first two, where all do not fit.
+std::string fitted_line(const ProgressText& text, int columns);
 
 /// "[###.......]": `done` of `total` on `width` columns.
 std::string progress_bar(std::int64_t done, std::int64_t total, int width);
@@ -68,6 +111,9 @@ std::string progress_bar(std::int64_t done, std::int64_t total, int width);
 struct ProgressUnit {
   std::string name = "pairs";
   bool has_bytes = true;  ///< whether the bytes so far are told
+  /// "planning", "checking": one of several in a run, told only while it takes time. Empty: what
+  /// the run is there for.
+  std::string phase = {};
 };
 
 /// Where a run stands.
@@ -93,28 +139,56 @@ std::string progress_line(const ProgressState& state);
 /// The same as JSON: {"event": "progress", "done": ..., ...}.
 std::string progress_json(const ProgressState& state);
 
-/// Progress of a run that counts things of one kind; see ProgressDisplay.
+/// Progress of a run that counts things of one kind; see ProgressDisplay. Thread safe.
 class Progress {
  public:
   using Clock = ProgressDisplay::Clock;
 
-  Progress(std::ostream& stream, ProgressStyle style, bool is_terminal, std::int64_t total,
-           Clock clock = std::chrono::steady_clock::now, ProgressUnit unit = {});
+  Progress(std::ostream& stream, ProgressStyle style, ProgressDisplay::Columns columns,
+           std::int64_t total, Clock clock = std::chrono::steady_clock::now,
+           ProgressUnit unit = {});
+
+  /// See ProgressDisplay::keep_up().
+  void keep_up() { display_.keep_up(); }
 
   /// One more is done.
   void advance(bool quarantined, std::int64_t bytes);
 
   /// There is more or less to do than was thought.
-  void set_total(std::int64_t total) { state_.total = total; }
+  void set_total(std::int64_t total) { total_ = total; }
 
-  /// Shows the last state and ends the line.
+  /// Shows the last state and ends the line; a phase's bar goes.
   void finish();
 
  private:
-  void show();
-
-  ProgressDisplay display_;
+  std::atomic<std::int64_t> total_;
   ProgressState state_;
+  ProgressDisplay display_;
+};
+
+/// Shows a phase of a run beside what it is there for, such as the planning of 10^6 pairs: what it
+/// counts, and how many there are. A function of this type may be empty: then nobody looks.
+using ShowPhase = std::function<std::unique_ptr<Progress>(const ProgressUnit&, std::int64_t total)>;
+
+/// A phase from its beginning to the end of the scope; shows nothing without `show` or things to
+/// count. Thread safe.
+class Phase {
+ public:
+  Phase(const ShowPhase& show, const ProgressUnit& unit, std::int64_t total)
+      : progress_(show && total > 0 ? show(unit, total) : nullptr) {}
+  ~Phase() {
+    if (progress_) progress_->finish();
+  }
+  Phase(const Phase&) = delete;
+  Phase& operator=(const Phase&) = delete;
+
+  /// One more is done, of so many bytes.
+  void advance(std::int64_t bytes = 0) {
+    if (progress_) progress_->advance(/*quarantined=*/false, bytes);
+  }
+
+ private:
+  std::unique_ptr<Progress> progress_;
 };
 
 }  // namespace eventgan

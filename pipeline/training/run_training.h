@@ -27,23 +27,27 @@ class TrainingProgress {
  public:
   using Clock = ProgressDisplay::Clock;
 
-  TrainingProgress(std::ostream& stream, ProgressStyle style, bool is_terminal,
+  TrainingProgress(std::ostream& stream, ProgressStyle style, ProgressDisplay::Columns columns,
                    Clock clock = std::chrono::steady_clock::now);
+
+  /// See ProgressDisplay::keep_up(); from the first step on.
+  void keep_up() { keeps_up_ = true; }
 
   /// `done` of the phase's `total` steps are done, the last with these losses.
   void advance(TrainingPhase phase, std::int64_t done, std::int64_t total,
                const std::map<std::string, double>& losses);
 
  private:
-  void show();
+  ProgressText describe(std::chrono::steady_clock::time_point now) const;
 
-  ProgressDisplay display_;
   std::chrono::steady_clock::time_point start_;  // of this run's part of the phase
   TrainingPhase phase_ = TrainingPhase::kFlow;
   std::int64_t first_ = -1;  // steps done when it began; -1: not begun
   std::int64_t done_ = 0;
   std::int64_t total_ = 0;
   std::map<std::string, double> losses_;
+  bool keeps_up_ = false;
+  ProgressDisplay display_;
 };
 
 struct TrainingOptions {

@@ -45,8 +45,72 @@ class CommandLine(program.InFolder):
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 
-    def test_version(self):
-        self.assertRegex(run("--version")[0], r"eventgan \d+\.\d+\.\d+")
+    def test_help_of_a_command_is_its_own(self):
+        self.assertEqual(run("help", "verify"), run("verify", "--help"))
+        self.assertEqual(run("help"), run("--help"))
+
+    def test_version_names_the_libraries(self):
+        version, libraries, engines, processor = run("--version")[0].splitlines()
+        self.assertRegex(version, r"^eventgan \d+\.\d+\.\d+$")
+        for name in ["HDF5", "OpenCV", "libavcodec"]:
+            self.assertRegex(libraries, rf"\b{name}\S* \S+")
+        self.assertRegex(engines, r"libtorch_cpu\.so\.\d+\.\d+.*libtbb\.so\.\d+\.\d+")
+        self.assertIn("processor: ", processor)
+
+    def test_mistyped_words_get_the_nearest(self):
+        for arguments, got, meant in [
+                (["conver"], "conver", "convert"), (["stauts"], "stauts", "status"), (["help", "inspct"], "inspct", "inspect"),
+                (["convert", "a.json", "--thread", "3"], "--thread", "--threads"),
+                (["convert", "a.json", "--thraeds=3"], "--thraeds", "--threads"),
+                (["export", "out", "--too", "coco", "--out", "x"], "--too", "--to"),
+                (["convert", "a.json", "--progress", "jsn"], "jsn", "json"),
+                (["export", "out", "--to", "coc", "--out", "x"], "coc", "coco")]:
+            with self.subTest(arguments=arguments):
+                _, err = run(*arguments, expect=64)
+                self.assertRegex(err, rf"^error: .*got {got}; did you mean {meant}\? \(eventgan[a-z ]* --help\)\n$")
+        for arguments in [["frobnicate"], ["convert", "a.json", "--frobnicate"], ["convert", "a.json", "--progress", "frobnicate"]]:
+            _, err = run(*arguments, expect=64)
+            self.assertIn("frobnicate", err)
+            self.assertNotIn("did you mean", err)
+
+    def test_words_are_listed_and_numbers_are_none(self):
+        for arguments in [["convert", "a.json", "--progress", "3"], ["realism", "a.h5", "--with", "1"],
+                          ["export", "out", "--to", "0", "--out", "x"]]:
+            _, err = run(*arguments, expect=64)
+            self.assertRegex(err, r"expected one of [a-z]+(, [a-z]+)+, got \d")
+            self.assertNotRegex(err, r"->|\{")
+
+    def test_after_quarantine_the_last_line_says_what_to_run(self):
+        path = small_job(self.folder / "small", errors=LENIENT)
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        out = run("convert", path)[0]
+        last = out.splitlines()[-1]
+        self.assertEqual(last, f"next, once the inputs are mended:  eventgan retry {path.parent / 'out'}")
+        run(*last.split("eventgan ")[1].split())  # which runs
+
+    def test_verify_tells_of_each_shard(self):
+        path = small_job(self.folder / "small", errors=LENIENT)
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        run("convert", path)
+        folder = path.parent / "out"
+        shards = sorted(folder.glob("*.h5"))
+        lines = run("verify", folder, "--deep")[0].splitlines()
+        told = [line for line in lines if line.startswith("small-train-")]
+        self.assertEqual([line.split(":")[0] for line in told], [shard.name for shard in shards])
+        self.assertEqual(sum(" 1 quarantined, " in line for line in told), 1)
+        self.assertEqual(sum(int(line.split("labels of ")[1].split()[0]) for line in told), 8)  # 9 samples, 1 quarantined
+
+        shards[1].write_bytes(shards[1].read_bytes()[:-1])
+        shards[2].unlink()
+        shards[2].with_suffix(".json").unlink()
+        report = json.loads(run("verify", folder, "--json", expect=1)[0])
+        self.assertFalse(report["sound"])
+        self.assertEqual([shard["condition"] for shard in report["shards"]],
+                         ["done", "of another size", "missing", "done", "done"])
+        self.assertEqual([len(shard["faults"]) for shard in report["shards"]], [0, 1, 1, 0, 0])
+        self.assertEqual(len(report["faults"]), 2)
+        self.assertEqual(report["shards"][0]["size_bytes"], shards[0].stat().st_size)
+        self.assertEqual(json.loads(run("verify", folder, "--progress", "json", expect=1)[0]), report)
 
     def test_wrong_usage_is_64(self):
         run(expect=64)

@@ -129,7 +129,7 @@ TEST_F(ConvertParts, WhatAnotherWorkerFinishesMeanwhileIsTaken) {
     for (const char* file : {"job-train-00002-of-00006.h5", "job-train-00002-of-00006.json"}) {
       std::filesystem::copy_file(out(file, "whole"), out(file));
     }
-    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total);
   };
   const int calls = generator_.calls();
   const ConversionReport report = run(shared);

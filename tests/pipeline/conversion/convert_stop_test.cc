@@ -71,7 +71,7 @@ class ConvertStop : public testing::SmallConversion {
     stopping.since_stop_request = request.since();
     int taken = -1;  // a progress asks its clock when it is made, and for every sample
     stopping.make_progress = [&](std::int64_t total) {
-      return std::make_unique<Progress>(nowhere_, ProgressStyle::kNone, false, total, [&] {
+      return std::make_unique<Progress>(nowhere_, ProgressStyle::kNone, nullptr, total, [&] {
         if (taken++ == samples - 1) request.make_and_wait();
         return std::chrono::steady_clock::time_point();
       });

@@ -225,7 +225,7 @@ TEST_F(Convert, ShowsProgressOfEveryPair) {
   ConversionOptions shows = options();
   shows.make_progress = [&](std::int64_t total) {
     EXPECT_EQ(total, 11);
-    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total);
   };
   run(shows);
   EXPECT_THAT(shown.str(), ::testing::HasSubstr("11/11 pairs"));

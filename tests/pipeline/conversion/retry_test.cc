@@ -392,7 +392,7 @@ TEST_F(Retry, ShowsProgress) {
   std::ostringstream shown;
   options_.make_progress = [&](std::int64_t total) {
     EXPECT_EQ(total, 2);
-    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total);
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total);
   };
   again();
   EXPECT_THAT(shown.str(), HasSubstr("2/2 pairs"));

@@ -151,7 +151,7 @@ class VerifyFolder : public ::testing::Test {
 TEST_F(VerifyFolder, FindsNothingInASoundFolder) {
   const FolderCheck check = verify_folder(out_);
   EXPECT_THAT(check.faults, ElementsAre());
-  EXPECT_EQ(check.shards, 2);
+  EXPECT_EQ(check.shards(), 2);
   EXPECT_EQ(check.samples, 6);
   EXPECT_EQ(check.valid, 6);
 }

@@ -189,7 +189,7 @@ TEST_F(Simulate, CountsFramesAsItGoes) {
   options.output = folder_ / "out";
   options.make_progress = [&](std::int64_t total) {
     EXPECT_EQ(total, 4 + 4 + 3 + 3);
-    return std::make_unique<Progress>(shown, ProgressStyle::kLines, false, total,
+    return std::make_unique<Progress>(shown, ProgressStyle::kLines, nullptr, total,
                                       std::chrono::steady_clock::now,
                                       ProgressUnit{"frames", false});
   };

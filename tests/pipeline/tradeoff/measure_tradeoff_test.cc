@@ -37,7 +37,7 @@ TradeoffOptions small_options(const testing::TemporaryFolder& folder) {
 std::function<std::unique_ptr<Progress>(std::int64_t)> counting(std::int64_t& total) {
   return [&total, silent = std::make_shared<std::ostringstream>()](std::int64_t pairs) {
     total = pairs;
-    return std::make_unique<Progress>(*silent, ProgressStyle::kNone, false, pairs);
+    return std::make_unique<Progress>(*silent, ProgressStyle::kNone, nullptr, pairs);
   };
 }
 

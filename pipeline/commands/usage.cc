@@ -1,0 +1,105 @@
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <numeric>
+
+#include "manifests/values/faults.h"
+#include "pipeline/commands/usage_internal.h"
+#include "pipeline/runtime/errors.h"
+
+namespace eventgan {
+namespace {
+
+std::size_t slips(const std::string& from, const std::string& to) {
+  std::vector<std::size_t> before_last;
+  std::vector<std::size_t> last(to.size() + 1);
+  std::iota(last.begin(), last.end(), std::size_t{0});
+  for (std::size_t i = 1; i <= from.size(); ++i) {
+    std::vector<std::size_t> row(to.size() + 1, i);
+    for (std::size_t j = 1; j <= to.size(); ++j) {
+      const bool is_same = from[i - 1] == to[j - 1];
+      row[j] = std::min({last[j] + 1, row[j - 1] + 1, last[j - 1] + !is_same});
+      if (i > 1 && j > 1 && from[i - 1] == to[j - 2] && from[i - 2] == to[j - 1]) {
+        row[j] = std::min(row[j], before_last[j - 2] + 1);
+      }
+    }
+    before_last = std::exchange(last, std::move(row));
+  }
+  return last.back();
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& command) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : command.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+  }
+  return names;
+}
+
+}  // namespace
+
+std::string nearest_word(const std::string& word, const std::vector<std::string>& words) {
+  std::size_t fewest = std::max<std::size_t>(word.size() / 3, 1) + 1;
+  std::string nearest;
+  for (const std::string& candidate : words) {
+    const std::size_t count = slips(word, candidate);
+    if (count >= fewest) continue;
+    fewest = count;
+    nearest = candidate;
+  }
+  return nearest;
+}
+
+std::string did_you_mean(const std::string& word, const std::vector<std::string>& words) {
+  const std::string nearest = nearest_word(word, words);
+  return nearest.empty() ? "" : "; did you mean " + nearest + "?";
+}
+
+std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const CLI::App& command = chosen.empty() ? app : *chosen.back();
+  const std::string name = chosen.empty() ? "eventgan" : "eventgan " + command.get_name();
+  const std::string help = " (" + name + " --help)";
+  for (const std::string& unknown : command.remaining()) {
+    if (unknown.starts_with("-")) {
+      const std::string option = unknown.substr(0, unknown.find('='));
+      return "expected options of " + name + ", got " + option +
+             did_you_mean(option, option_names(command)) + help;
+    }
+    if (chosen.empty()) {
+      return "expected a command, got " + unknown + did_you_mean(unknown, command_names(app)) +
+             help;
+    }
+  }
+  return error.what() + help;
+}
+
+void add_help_command(CLI::App& app, int& exit_code) {
+  auto* command =
+      app.add_subcommand("help", "Tells how the program or one of its commands is used");
+  const auto name = std::make_shared<std::string>();
+  command->add_option("COMMAND", *name, "The command; default: all in short");
+  command->callback([&app, name, &exit_code] {
+    const auto known =
+        app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });
+    if (name->empty()) {
+      // App::help() would be that of the command that was given: this one's.
+      std::cout << app.get_formatter()->make_help(&app, app.get_name(), CLI::AppFormatMode::Normal);
+    } else if (!known.empty()) {
+      std::cout << known.front()->help(app.get_name());
+    } else {
+      throw UsageError("expected a command, got " + *name +
+                       did_you_mean(*name, command_names(app)) + " (eventgan --help)");
+    }
+    std::cout << std::flush;
+    exit_code = kComplete;
+  });
+}
+
+}  // namespace eventgan

@@ -1,0 +1,203 @@
+"""Every command on a folder that is absent, empty, foreign, broken or of a newer version: one line says so, and nothing is changed."""
+
+import hashlib
+import json
+import re
+import shutil
+import subprocess
+
+import h5py
+import unittest
+
+import program
+from program import run
+from small_job import small_job
+
+NEWER = 99
+DAMAGED = {"cut": b'{"fingerprint":{"annotations":"433a', "empty": b"", "binary": bytes(range(256)),
+           "foreign": b'{"format": "other", "version": 1}\n'}
+# The commands that are given an output folder, with what they need besides.
+ON_FOLDERS = {
+    "status": [], "retry": [], "finalize": [], "verify": [],
+    "export": ["--to", "coco", "--out", "{scratch}/export"],
+}
+ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/pictures"]}
+# Those that are given a document.
+ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "calibrate": ["--out", "{scratch}/w.safetensors"],
+                "tradeoff": ["--out", "{scratch}/tradeoff"]}
+OTHERS = {"realism": [], "import-weights": ["{scratch}/weights.safetensors"]}
+NOT_OF_FOLDERS = {"make-demo", "help"}
+
+
+def commands():
+    return set(re.findall(r"(?m)^  ([a-z-]+) {2,}", run("--help")[0].split("Subcommands:")[1]))
+
+
+def snapshot(folder):
+    return {path.relative_to(folder): path.read_bytes() if path.is_file() else None for path in folder.rglob("*")}
+
+
+def set_version(path, version=NEWER):
+    text, count = re.subn(r'"version":( ?)\d+', rf'"version":\g<1>{version}', path.read_text())
+    assert count >= 1, path
+    path.write_text(text)
+
+
+class ForeignFolders(program.InFolder):
+    @classmethod
+    def setUpClass(cls):
+        cls.keep = program.pathlib.Path(program.tempfile.mkdtemp(prefix="eventgan-"))
+        cls.addClassCleanup(shutil.rmtree, cls.keep)
+        cls.manifest = small_job(cls.keep / "job", cars=3, people=0)
+        run("convert", cls.manifest)
+        run("finalize", cls.keep / "job" / "out")
+
+    def setUp(self):
+        super().setUp()
+        self.scratch = self.folder / "scratch"
+        self.scratch.mkdir()
+        self.out = self.folder / "job" / "out"
+        shutil.copytree(self.keep / "job", self.folder / "job")
+        (self.out / "run.json").write_text(json.dumps({"manifest_folder": str(self.folder / "job")}))
+
+    def run_it(self, *arguments):
+        filled = [str(argument).format(scratch=self.scratch) for argument in arguments]
+        done = subprocess.run([program.PROGRAM, *filled], capture_output=True, text=True, timeout=100)
+        return done, f"{' '.join(filled)}\n{done.stdout}\n{done.stderr}"
+
+    def one_line(self, *arguments, codes=(1, 64, 66)):
+        """Runs a command that must fail with one line of error; the line."""
+        done, where = self.run_it(*arguments)
+        self.assertIn(done.returncode, codes, where)
+        lines = done.stderr.splitlines()
+        self.assertTrue(lines and lines[-1].startswith("error: "), where)
+        # Before it there may be which engine was chosen, and what is to be known of the weights.
+        self.assertFalse([line for line in lines[:-1] if line.startswith("error: ")], where)
+        self.assertEqual(done.stdout, "", where)
+        return lines[-1]
+
+    def reports(self, file, *arguments, code):
+        """Runs a command that reports on the folder with one line for `file`; the line."""
+        done, where = self.run_it(*arguments)
+        self.assertEqual(done.returncode, code, where)
+        lines = [line for line in (done.stdout + done.stderr).splitlines() if f"{file}:" in line and "expected" in line]
+        self.assertEqual(len(lines), 1, where)
+        return lines[0]
+
+    def test_every_command_is_tried(self):
+        self.assertEqual(commands(), {*ON_FOLDERS, *ON_SHARDS, *ON_DOCUMENTS, *OTHERS, *NOT_OF_FOLDERS})
+
+    def test_absent_empty_and_foreign_folders(self):
+        empty, foreign, file = (self.folder / name for name in ["empty", "foreign", "file"])
+        empty.mkdir()
+        (foreign / "below").mkdir(parents=True)
+        (foreign / "notes.txt").write_text("mine")
+        (foreign / "data.h5").write_bytes(b"not HDF5")
+        (foreign / "plan.json").mkdir()
+        file.write_text("a file")
+        for folder in [self.folder / "absent", empty, foreign, file]:
+            before = snapshot(self.folder)
+            for command, rest in {**ON_FOLDERS, **ON_SHARDS, **ON_DOCUMENTS, **OTHERS}.items():
+                with self.subTest(command=command, folder=folder.name):
+                    line = self.one_line(command, folder, *rest)
+                    self.assertIn(str(folder), line)
+            self.assertEqual(snapshot(self.folder), before)
+
+    def test_a_plan_that_is_broken_or_newer(self):
+        on_plans = [[command, self.out, *rest] for command, rest in ON_FOLDERS.items()]
+        on_plans += [["convert", self.folder / "job" / "manifest.json"], ["plan", "--freeze", self.folder / "job" / "manifest.json"]]
+        plan = self.out / "plan.json"
+        whole = plan.read_bytes()
+        for name, data in {**DAMAGED, "half": whole[:len(whole) // 2], "newer": None}.items():
+            plan.write_bytes(whole if data is None else data)
+            if data is None:
+                set_version(plan)
+            before = snapshot(self.out)
+            for arguments in on_plans if name in ("cut", "newer") else on_plans[:1]:
+                with self.subTest(plan=name, command=arguments[0]):
+                    line = self.one_line(*arguments, codes=(1,))
+                    self.assertIn(str(plan), line)
+                    # Nobody who has an old program is told to throw a new one's work away.
+                    self.assertEqual("a newer eventgan" in line, name == "newer")
+                    self.assertEqual("--overwrite" in line, name != "newer")
+            self.assertEqual(snapshot(self.out), before)
+
+    def test_a_marker_that_is_broken_or_newer(self):
+        marker = sorted(self.out.glob("*-of-*.json"))[0]
+        whole = marker.read_text()
+        for name, text in [("newer", None), ("torn", whole[:len(whole) // 2])]:
+            marker.write_text(whole if text is None else text)
+            if text is None:
+                set_version(marker)
+            for command, code in [("status", 0), ("verify", 1), ("finalize", 1), ("retry", 1)]:
+                with self.subTest(marker=name, command=command):
+                    line = self.reports(marker, command, self.out, code=code)
+                    self.assertEqual("got 99" in line, name == "newer")
+            self.assertIn(str(marker), self.one_line("export", self.out, *ON_FOLDERS["export"]))
+
+    def test_a_shard_of_a_newer_format(self):
+        shard = sorted(self.out.glob("*-of-*.h5"))[0]
+        with h5py.File(shard, "r+") as file:
+            file.attrs["format_version"] = file.attrs["format_version"].dtype.type(NEWER)
+        data = shard.read_bytes()
+        marker = shard.with_suffix(".json")
+        said = json.loads(marker.read_text())
+        marker.write_text(json.dumps({**said, "size_bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}))
+        for command, rest in ON_SHARDS.items():
+            self.assertRegex(self.one_line(command, shard, *rest), r"expected format version 1, got 99")
+        for command in ["verify", "finalize"]:
+            self.assertIn("expected format version 1, got 99", self.reports(shard, command, self.out, code=1))
+
+    def test_a_shard_that_no_marker_vouches_for(self):
+        shard = self.folder / "alone.h5"
+        for name, data in {**DAMAGED, "half": sorted(self.out.glob("*-of-*.h5"))[0].read_bytes()[:3000]}.items():
+            shard.write_bytes(data)
+            for command, rest in ON_SHARDS.items():
+                with self.subTest(shard=name, command=command):
+                    self.assertIn(str(shard), self.one_line(command, shard, *rest, codes=(1,)))
+
+    def test_a_description_or_amendments_of_a_newer_version(self):
+        description = self.out / "dataset.json"
+        whole = description.read_text()
+        description.write_text(json.dumps({**json.loads(whole), "version": NEWER}))
+        self.assertRegex(self.one_line("export", self.out, *ON_FOLDERS["export"]), "version 1.*dataset.json")
+        self.reports(description, "verify", self.out, code=1)
+        description.write_text(whole)
+
+        amendments = self.out / "amendments.json"
+        amendments.write_text(json.dumps({"format": "eventgan-amendments", "version": NEWER}))
+        manifest = self.folder / "job" / "manifest.json"
+        for arguments in [["retry", self.out], ["finalize", self.out], ["convert", manifest], ["plan", "--freeze", manifest]]:
+            with self.subTest(command=arguments[0]):
+                self.assertIn(f"{amendments}: $.version", self.one_line(*arguments, codes=(1,)))
+
+    def test_documents_that_are_broken_or_newer(self):
+        examples = {"train": "train.json", "simulate": "simulate.json"}
+        for command, rest in ON_DOCUMENTS.items():
+            whole = (program.SOURCE / "manifests" / "examples" / examples.get(command, "frames.json")).read_bytes()
+            document = self.folder / "document.json"
+            for name, data in {**DAMAGED, "newer": whole}.items() if command == "convert" else [("newer", whole)]:
+                document.write_bytes(data)
+                if name == "newer":
+                    set_version(document)
+                with self.subTest(command=command, document=name):
+                    line = self.one_line(command, document, *rest, codes=(64,))
+                    self.assertIn(str(document), line)
+                    self.assertEqual("$.version" in line, name == "newer")
+
+    def test_output_folders_of_others(self):
+        mine = self.scratch / "notes.txt"
+        mine.write_text("mine")
+        taken = self.scratch / "file"
+        taken.write_text("a file")
+        manifest = self.folder / "job" / "manifest.json"
+        for arguments in [["make-demo", self.scratch], ["convert", manifest, "--output", taken],
+                          ["plan", "--freeze", manifest, "--output", taken],
+                          ["export", self.out, "--to", "coco", "--out", self.scratch]]:
+            with self.subTest(command=arguments[0]):
+                self.assertIn(str(self.scratch), self.one_line(*arguments))
+        self.assertEqual(snapshot(self.scratch), {mine.relative_to(self.scratch): b"mine", taken.relative_to(self.scratch): b"a file"})
+
+
+if __name__ == "__main__":
+    program.main()
