@@ -9,7 +9,7 @@
         sample["persons"]["joints"]         # float64 [persons, J, 2], volume pixels
 
 manifests/guides/shard_format.md says what each field means; the keys are its names. `eventgan_shards.torch` has PyTorch's datasets of
-boxes and poses.
+boxes and poses, `eventgan_shards.evaluate` scores what a network finds.
 """
 
 from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import argparse
 
-import cv2
 import numpy as np
 import torch
 import torchvision
 import training
+from eventgan_shards import pictures
 from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
 
 
@@ -31,13 +31,6 @@ def usable(task: str):
     if task == "keypoints":
         return lambda shards: np.unique(shards.persons[:, 0])
     return lambda shards: [i for i in range(len(shards)) if shards.class_names(i)]
-
-
-def average_precision(correct: np.ndarray, scores: np.ndarray, truths: int) -> float:
-    """Area under the highest precision at each recall and above, of detections [n]; 0 if there is nothing to find."""
-    hits = np.cumsum(correct[np.argsort(-scores, kind="stable")])
-    precision = np.maximum.accumulate((hits / np.arange(1, len(hits) + 1))[::-1])[::-1]
-    return float(np.sum(np.diff(hits, prepend=0) * precision) / max(truths, 1))
 
 
 def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
@@ -96,18 +89,15 @@ def main() -> None:
         return [{name: value.cpu() for name, value in found.items()} for found in model([volume.to(args.device) for volume in volumes])]
 
     def measure() -> dict[str, float]:
-        rows, truths, near = [np.empty((0, 3))], np.zeros(len(classes), int), [np.empty(0, bool)]
+        pairs = []
         for items in training.batches(args, check, list):
-            for found, item in zip(detect([item["volume"] for item in items]), items):
-                true, labels = ~item["ignore"], found["labels"] - 1
-                correct, counts = training.matched(found["boxes"], labels, item["boxes"][true], item["labels"][true], item["boxes"][~true])
-                rows.append(torch.column_stack([correct, found["scores"], labels])[counts].numpy())
-                truths += np.bincount(item["labels"][true], minlength=len(classes))
-                if "keypoints" in found:
-                    near.append(near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item))
-        correct, scores, labels = np.concatenate(rows).T
-        values = {f"AP50 {name}": average_precision(correct[labels == c], scores[labels == c], truths[c]) for c, name in enumerate(classes)}
-        return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))} if args.task == "keypoints" else values
+            found = detect([item.pop("volume") for item in items])  # not kept
+            pairs += zip(items, found)
+        values = training.average_precisions(((item, (found["boxes"], found["labels"] - 1, found["scores"])) for item, found in pairs), classes)
+        if args.task == "detection":
+            return values
+        near = [near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item) for item, found in pairs]
+        return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))}
 
     optimizer = torch.optim.AdamW(model.parameters(), lr=args.lr, weight_decay=1e-4)
     loader = training.batches(args, learn, collate_torchvision, learn=True)
@@ -117,15 +107,11 @@ def main() -> None:
         item = check[i]
         found = detect([item["volume"]])[0]
         sure = found["scores"] > 0.5
-        picture = training.events_picture(item["volume"])
-        training.draw_boxes(picture, item["boxes"][item["ignore"]], training.GREY)
-        training.draw_boxes(picture, item["boxes"][~item["ignore"]], training.GREEN)
         texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
-        training.draw_boxes(picture, found["boxes"][sure], training.YELLOW, texts)
-        for source, kept, colour in ((item, ~item["ignore"], training.GREEN), (found, sure, training.YELLOW)):
-            for x, y, known in source["keypoints"][kept].reshape(-1, 3).tolist() if "keypoints" in source else ():
-                if known:
-                    cv2.circle(picture, (round(2 * x + 0.5), round(2 * y + 0.5)), 2, colour, -1, cv2.LINE_AA)
+        picture = training.draw_item(item, found["boxes"][sure], texts)
+        for source, kept, colour in ((item, ~item["ignore"], pictures.TRUE), (found, sure, pictures.FOUND)):
+            for joints in source["keypoints"][kept].numpy() if "keypoints" in source else ():
+                pictures.draw_joints(picture, joints[joints[:, 2] > 0, :2], colour)
         return item["id"], picture
 
     training.write_pictures(args, len(check), picture_of)

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""Trains ultralytics' YOLOv3 (the archive branch) on the boxes of event-volume shards: its Darknet, its loss, its AP.
+"""Trains ultralytics' YOLOv3 (the archive branch) on the boxes of event-volume shards: its Darknet, its loss.
 
     train_yolov3.py --trainer ../shared/trainers/yolov3 --data out --out cars --minutes 30
 """
@@ -65,7 +65,7 @@ def main() -> None:
     folder = training.use_trainer(args.trainer, "models.py", "train.py", "cfg")
     from models import Darknet
     from train import hyp
-    from utils.utils import ap_per_class, clip_coords, compute_loss, non_max_suppression
+    from utils.utils import clip_coords, compute_loss, non_max_suppression
 
     learnt, checked = training.divided(args, with_boxes)
     classes = args.classes.split(",")
@@ -107,16 +107,9 @@ def main() -> None:
         return found
 
     def measure() -> dict[str, float]:
-        rows, truth = [], []
-        for imgs, _, items in training.batches(args, check, collate):
-            for each, item in zip(detect(imgs, 0.001), items):
-                true = ~item["ignore"]
-                correct, counts = training.matched(each[:, :4], each[:, 5], item["boxes"][true], item["labels"][true], item["boxes"][~true])
-                rows.append(torch.column_stack([correct, each[:, 4:]])[counts].numpy())
-                truth.append(item["labels"][true].numpy())
-        rows, truth = np.concatenate(rows), np.concatenate(truth)
-        _, _, precision, _, of_classes = ap_per_class(rows[:, :1], rows[:, 1], rows[:, 2], truth)
-        return {f"AP50 {name}": float(precision[of_classes == c].sum()) for c, name in enumerate(classes)}
+        pairs = ((item, (each[:, :4], each[:, 5], each[:, 4])) for imgs, _, items in training.batches(args, check, collate)
+                 for item, each in zip(items, detect(imgs, 0.001)))
+        return training.average_precisions(pairs, classes)
 
     groups = {True: [], False: []}
     for name, weight in model.named_parameters():
@@ -128,11 +121,7 @@ def main() -> None:
     def picture_of(i: int) -> tuple[str, np.ndarray]:
         item = check[i]
         found = detect(item["volume"][None], 0.3)[0]
-        picture = training.events_picture(item["volume"])
-        training.draw_boxes(picture, item["boxes"][item["ignore"]], training.GREY)
-        training.draw_boxes(picture, item["boxes"][~item["ignore"]], training.GREEN)
-        training.draw_boxes(picture, found[:, :4], training.YELLOW, [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
-        return item["id"], picture
+        return item["id"], training.draw_item(item, found[:, :4], [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
 
     training.write_pictures(args, len(check), picture_of)
 

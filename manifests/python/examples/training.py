@@ -12,10 +12,9 @@ import pickle
 import sys
 import time
 import types
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
-import cv2
 import numpy as np
 import torch
 from torch import nn
@@ -23,12 +22,12 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan_shards import Shards, read_description  # noqa: E402
+from eventgan_shards import Shards, pictures, read_description  # noqa: E402
+from eventgan_shards.detection_scores import Found, Truth, detection_scores  # noqa: E402
 
 CHECKED_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every"}  # when a run goes on
-GREEN, YELLOW, GREY = (80, 220, 80), (60, 230, 255), (150, 150, 150)
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
@@ -236,53 +235,30 @@ def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
     os.replace(new, path)
 
 
-def matched(found: torch.Tensor, labels: torch.Tensor, boxes: torch.Tensor, classes: torch.Tensor,
-            ignored: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """For boxes found, [n, 4] in the order of their scores, with `labels` [n]: [n] bool, whether it is the first on a true box [m, 4] of
-    its class with an IoU above 0.5; and [n] bool, whether it counts: wrong ones that lie by more than half in an ignored box do not."""
-    correct, counts = torch.zeros(len(found), dtype=torch.bool), torch.ones(len(found), dtype=torch.bool)
-    if len(boxes) and len(found):
-        iou = _shares(found, boxes, union=True) * (labels[:, None] == classes)
-        best, which = iou.max(1)
-        taken = set()
-        for i in torch.nonzero(best > 0.5).flatten().tolist():
-            correct[i] = which[i].item() not in taken
-            taken.add(which[i].item())
-    if len(ignored) and len(found):
-        counts = correct | (_shares(found, ignored, union=False).max(1)[0] <= 0.5)
-    return correct, counts
+def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Tensor, torch.Tensor]]], classes: Sequence[str]) -> dict[str, float]:
+    """AP@0.5 of each class, as PASCAL VOC has it, of items of DetectionDataset, each with what was found in it: boxes [n, 4], labels [n], scores [n]."""
+    found, truth = [], []
+    for image, (item, columns) in enumerate(pairs):
+        boxes, labels, scores = (column.numpy() for column in columns)
+        found.append((np.full(len(boxes), image), labels, boxes, scores))
+        there, labels, ignore = (item[name].numpy() for name in ("boxes", "labels", "ignore"))
+        truth.append((np.full(len(there), image), labels, there, ignore, np.full(len(there), -1)))
+    found, truth = Found.of(*map(np.concatenate, zip(*found))), Truth(*map(np.concatenate, zip(*truth)))
+    scores = detection_scores(found, truth, {name: i for i, name in enumerate(classes)})
+    return {f"AP50 {name}": scores[name]["ap_voc"] for name in classes}
 
 
-def _shares(first: torch.Tensor, second: torch.Tensor, union: bool) -> torch.Tensor:
-    """[n, m]: the intersection of boxes [n, 4] with boxes [m, 4], as a share of the union, or of the first one's area."""
-    overlap = (torch.min(first[:, None, 2:], second[:, 2:]) - torch.max(first[:, None, :2], second[:, :2])).clamp(min=0).prod(2)
-    areas = [(boxes[:, 2:] - boxes[:, :2]).prod(1) for boxes in (first, second)]
-    return overlap / ((areas[0][:, None] + areas[1] - overlap if union else areas[0][:, None]) + 1e-9)
-
-
-def events_picture(volume: torch.Tensor, zoom: int = 2) -> np.ndarray:
-    """BGR [H zoom, W zoom, 3] uint8 of a volume [2B, H, W]: positive events red, negative blue."""
-    positive, negative = volume.cpu().unflatten(0, (2, -1)).sum(1).numpy()
-    both = positive + negative
-    top = np.percentile(both[both > 0], 98) if (both > 0).any() else 1
-    picture = np.clip(np.stack([negative, np.zeros_like(both), positive], -1) / top, 0, 1)
-    return cv2.resize((255 * picture).astype(np.uint8), None, fx=zoom, fy=zoom, interpolation=cv2.INTER_NEAREST)
-
-
-def draw_boxes(picture: np.ndarray, boxes: Iterable[Iterable[float]], colour: tuple[int, int, int], texts: Iterable[str] = (), zoom: int = 2) -> None:
-    """Boxes in volume pixels, whose edges lie half a pixel left of the points of their number, onto events_picture."""
-    texts = iter(texts)
-    for box in boxes:
-        left, top, right, bottom = (round(zoom * float(edge)) for edge in box)
-        cv2.rectangle(picture, (left, top), (right - 1, bottom - 1), colour, 1)
-        cv2.putText(picture, next(texts, ""), (left, top - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarray:
+    """The item's volume with its boxes, and those that were found [n, 4] with their texts."""
+    picture = pictures.of_events(item["volume"].numpy())
+    pictures.draw_boxes(picture, item["boxes"][item["ignore"]], pictures.IGNORED)
+    pictures.draw_boxes(picture, item["boxes"][~item["ignore"]], pictures.TRUE)
+    pictures.draw_boxes(picture, found, pictures.FOUND, texts)
+    return picture
 
 
 def write_pictures(args: argparse.Namespace, count: int, picture_of: Callable[[int], tuple[str, np.ndarray]]) -> None:
     """picture_of(i) for some of `count` items, evenly spread: a name, and what to write under it."""
-    folder = pathlib.Path(args.out, "pictures")
-    folder.mkdir(exist_ok=True)
     with torch.no_grad():
         for i in np.unique(np.linspace(0, count - 1, args.pictures).round().astype(int)).tolist() if args.pictures else ():
-            name, picture = picture_of(i)
-            cv2.imwrite(str(folder / (name.replace("/", "_") + ".png")), picture)
+            pictures.write(pathlib.Path(args.out, "pictures"), *picture_of(i))

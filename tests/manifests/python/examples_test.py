@@ -85,7 +85,7 @@ def test_keypoint_rcnn_learns(data, tmp_path):
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
-    trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "json_tricks", "scipy", "yaml"), tmp_path / "trainer")  # nothing beside it
+    trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")  # nothing beside it
     options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4, 6], pictures=1)

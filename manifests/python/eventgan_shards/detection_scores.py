@@ -1,0 +1,304 @@
+"""Scores of boxes that were found, on arrays: PASCAL VOC's matching and average precision, COCO's, and KITTI's.
+
+What is not defined (a recall where nothing is to be found, a precision where nothing was found) is NaN. An average precision is 0 if all is missed, NaN if there is
+nothing to find.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from .shards import Shards
+
+DONT_CARE = "DontCare"
+BLOCK = 1_000_000  # pairs of boxes that are compared at once
+COCO_IOUS = np.linspace(0.5, 0.95, 10)
+COCO_MOST = 100  # predictions of a class in a sample that COCO counts
+KITTI_CLASSES = {"Car": (0.7, "Van"), "Pedestrian": (0.5, "Person_sitting"), "Cyclist": (0.5, "")}  # least IoU, class that is ignored
+KITTI_LEVELS = {"easy": 40, "moderate": 25, "hard": 25}  # least height in source pixels
+KITTI_POINTS = 41
+
+
+class Found(NamedTuple):
+    """Boxes that were found: n rows, the highest score first, equal ones as they were given. Make it by `of`."""
+
+    image: np.ndarray  # int [n], which picture
+    label: np.ndarray  # int [n], which class
+    xyxy: np.ndarray  # [n, 4] left, top, right, bottom
+    score: np.ndarray  # [n]
+
+    @staticmethod
+    def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]], score: Iterable[float]) -> Found:
+        score = np.asarray(score, float)
+        order = np.argsort(-score, kind="stable")
+        return Found(np.asarray(image, int)[order], np.asarray(label, int)[order], np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
+
+    def rows(self, chosen: np.ndarray) -> Found:
+        return Found(*(column[chosen] for column in self))
+
+
+class Truth(NamedTuple):
+    """Boxes that are there: m rows."""
+
+    image: np.ndarray  # int [m]
+    label: np.ndarray  # int [m]
+    xyxy: np.ndarray  # [m, 4]
+    ignore: np.ndarray  # bool [m]; what is found there neither helps nor hurts
+    difficulty: np.ndarray  # int [m]: 0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 not known or none of them
+
+
+class Overlaps(NamedTuple):
+    """Pairs of boxes of one picture that overlap."""
+
+    first: np.ndarray  # int [k], rows of the first list
+    second: np.ndarray  # int [k], rows of the second
+    iou: np.ndarray  # [k] the intersection as a share of the union
+    share: np.ndarray  # [k] and as one of the first box
+
+
+def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray) -> Overlaps:
+    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], in order of the first and then the second."""
+    order = np.argsort(other_image, kind="stable")
+    begin, end = (np.searchsorted(other_image[order], image, side) for side in ("left", "right"))
+    counts = end - begin
+    areas, other_areas = (np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (xyxy, other_xyxy))
+    parts = []
+    for rows in np.split(np.arange(len(image)), np.searchsorted(np.cumsum(counts), np.arange(BLOCK, counts.sum(), BLOCK))):
+        of_row = counts[rows]
+        i = np.repeat(rows, of_row)
+        j = order[np.arange(len(i)) + np.repeat(begin[rows] - (np.cumsum(of_row) - of_row), of_row)]
+        sides = np.minimum(xyxy[i, 2:], other_xyxy[j, 2:]) - np.maximum(xyxy[i, :2], other_xyxy[j, :2])
+        touch = (sides > 0).all(1)
+        i, j, both = i[touch], j[touch], sides[touch].prod(1)
+        parts.append((i, j, both / (areas[i] + other_areas[j] - both), both / areas[i]))
+    return Overlaps(*map(np.concatenate, zip(*parts)))
+
+
+def turns(group: np.ndarray) -> np.ndarray:
+    """int [n]: how many rows before have the same `group` [n]."""
+    order = np.argsort(group, kind="stable")
+    turn = np.empty(len(group), int)
+    turn[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
+    return turn
+
+
+def rounds(turn: np.ndarray) -> list[np.ndarray]:
+    """Rows of equal `turn` [k], the lowest first; equal ones stay in order."""
+    order = np.argsort(turn, kind="stable")
+    return np.split(order, np.flatnonzero(np.diff(turn[order])) + 1)
+
+
+def strongest(found: Found, iou: float) -> np.ndarray:
+    """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU with it is above
+    `iou`."""
+    left = np.ones(len(found.score), bool)
+    group = _group(found)
+    pairs = overlapping(group, found.xyxy, group, found.xyxy)
+    higher = np.flatnonzero((pairs.first < pairs.second) & (pairs.iou > iou))
+    for rows in rounds(turns(group)[pairs.first[higher]]):
+        first, second = pairs.first[higher[rows]], pairs.second[higher[rows]]
+        left[second[left[first]]] = False
+    return left
+
+
+def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: np.ndarray, others: int) -> np.ndarray:
+    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one picture one after the other; each
+    takes, of the pairs (first, second) [k] in their order, the first that is `allowed` [k, T] and whose second is still free. Pairs are never of two pictures."""
+    trials = allowed.shape[1]
+    choice, free = np.full((len(turn), trials), -1), np.ones((others, trials), bool)
+    order = np.argsort(first, kind="stable")
+    for part in rounds(turn[first[order]]) if len(first) else ():
+        rows = order[part]
+        begin = np.flatnonzero(np.diff(first[rows], prepend=-1))
+        place = np.where(allowed[rows] & free[second[rows]], np.arange(len(rows))[:, None], len(rows))
+        best = np.minimum.reduceat(place, begin)
+        who, trial = np.nonzero(best < len(rows))
+        taken = second[rows[best[who, trial]]]
+        choice[first[rows[begin[who]]], trial] = taken
+        free[taken, trial] = False
+    return choice
+
+
+def match_as_voc(found: Found, truth: Truth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """int [n], the row of the true box that each found one stands for, -1 for none; bool [n], whether it counts.
+
+    As PASCAL VOC's development kit: a found box stands for the true one of its class with which its IoU is greatest, if that is at least `iou` and no box of a
+    higher score has it; a second one on the same is wrong. What stands for none and lies with a share of at least `iou` of its area in a box to be
+    ignored, of whatever class, does not count.
+    """
+    pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
+    same = np.flatnonzero(_same_class(found, truth, pairs))
+    same = same[np.lexsort((-pairs.iou[same], pairs.first[same]))]
+    best = same[np.flatnonzero(np.diff(pairs.first[same], prepend=-1))]
+    best = best[pairs.iou[best] >= iou]
+    stands_for = np.full(len(found.score), -1)
+    rows, earliest = np.unique(pairs.second[best], return_index=True)
+    stands_for[pairs.first[best[earliest]]] = rows
+    return stands_for, (stands_for >= 0) | (_ignored_share(found, truth, pairs) < iou)
+
+
+def match_as_coco(found: Found, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
+    """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the highest score on, each takes
+    the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of all classes. Beyond the 100 best of a class and
+    sample none counts."""
+    pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
+    turn = turns(_group(found))
+    same = np.flatnonzero(_same_class(found, truth, pairs) & (turn[pairs.first] < COCO_MOST))
+    same = same[np.lexsort((-pairs.second[same], -pairs.iou[same]))]
+    least = np.minimum(COCO_IOUS, 1 - 1e-10)
+    right = assigned(pairs.first[same], pairs.second[same], pairs.iou[same, None] >= least, turn, len(truth.image)) >= 0
+    return right, (right | (_ignored_share(found, truth, pairs)[:, None] < least)) & (turn < COCO_MOST)[:, None]
+
+
+def _group(found: Found) -> np.ndarray:
+    return found.image * (found.label.max(initial=0) + 1) + found.label
+
+
+def _same_class(found: Found, truth: Truth, pairs: Overlaps) -> np.ndarray:
+    return (found.label[pairs.first] == truth.label[pairs.second]) & ~truth.ignore[pairs.second]
+
+
+def _ignored_share(found: Found, truth: Truth, pairs: Overlaps) -> np.ndarray:
+    """[n]: the greatest share of each found box that lies in one box to be ignored."""
+    share = np.zeros(len(found.score))
+    rows = truth.ignore[pairs.second]
+    np.maximum.at(share, pairs.first[rows], pairs.share[rows])
+    return share
+
+
+def curve(right: np.ndarray, truths: int) -> tuple[np.ndarray, np.ndarray]:
+    """Recall and precision [n] after each of n found boxes, `right` [n] in the order of their scores, of `truths` boxes to be found."""
+    hits = np.cumsum(right)
+    return hits / max(truths, 1), hits / np.arange(1, len(hits) + 1)
+
+
+def average_precisions(right: np.ndarray, truths: int) -> dict[str, float]:
+    """The area under the curve in three ways, from the highest precision at each recall or above (`right` and `truths` as in `curve`):
+
+    ap_voc        the whole area (PASCAL VOC from 2010 on)
+    ap_voc_11     mean at the recalls 0, 0.1, ... 1 (PASCAL VOC 2007)
+    ap_coco_101   mean at the recalls 0, 0.01, ... 1 (COCO)
+    """
+    if not truths:
+        return dict.fromkeys(("ap_voc", "ap_voc_11", "ap_coco_101"), math.nan)
+    recall, precision = curve(right, truths)
+    envelope = np.append(np.maximum.accumulate(precision[::-1])[::-1], 0)
+
+    def at(points: np.ndarray) -> float:
+        return float(envelope[np.searchsorted(recall, points)].mean())
+
+    return {"ap_voc": float(np.sum(np.diff(recall, prepend=0) * envelope[:-1])), "ap_voc_11": at(np.arange(11) / 10),
+            "ap_coco_101": at(np.linspace(0, 1, 101))}
+
+
+def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou: float = 0.5) -> dict[str, dict[str, float]]:
+    """By the name of each of `classes` (names with labels), and of "all":
+
+    truths, easy, hard        how many boxes count, and how many of these have difficulty 0, and 1 or 2
+    found, right              how many predictions count, and how many of these are right (`match_as_voc`)
+    precision, recall, f1     of all these predictions; recall_easy, recall_hard: shares of those true boxes
+    ap_voc, ap_voc_11, ap_coco_101   see `average_precisions`, all with VOC's matching at `iou`
+    ap_coco                   COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
+
+    "all" counts all classes together, and has the mean of the classes' average precisions, without those that have no box to find.
+    Found boxes of other classes are left out, and so are true ones, unless they are to be ignored.
+    """
+    found = found.rows(np.isin(found.label, list(classes.values())))
+    stands_for, counts = match_as_voc(found, truth, iou)
+    coco_right, coco_counts = match_as_coco(found, truth)
+    met = np.zeros(len(truth.image), bool)
+    met[stands_for[stands_for >= 0]] = True
+
+    def sums(labels: list[int]) -> dict[str, float]:
+        mine = counts & np.isin(found.label, labels)
+        there = ~truth.ignore & np.isin(truth.label, labels)
+        easy, hard = there & (truth.difficulty == 0), there & (truth.difficulty > 0)
+        right = np.count_nonzero(stands_for[mine] >= 0)
+        truths, all_found = np.count_nonzero(there), np.count_nonzero(mine)
+        return {"truths": truths, "easy": np.count_nonzero(easy), "hard": np.count_nonzero(hard), "found": all_found, "right": right,
+                "precision": ratio(right, all_found), "recall_easy": ratio(met[easy].sum(), easy.sum()),
+                "recall_hard": ratio(met[hard].sum(), hard.sum()), "recall": ratio(right, truths), "f1": ratio(2 * right, truths + all_found)}
+
+    scores = {}
+    for name, label in classes.items():
+        own = sums([label])
+        mine = found.label == label
+        coco = [average_precisions(coco_right[kept, i], own["truths"])["ap_coco_101"] for i, kept in enumerate((coco_counts & mine[:, None]).T)]
+        scores[name] = {**own, **average_precisions(stands_for[mine & counts] >= 0, own["truths"]), "ap_coco": float(np.mean(coco))}
+    means = {key: mean([each[key] for each in scores.values()]) for key in ("ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco")}
+    return {**scores, "all": {**sums(list(classes.values())), **means}}
+
+
+def kitti_average_precision(found: Found, truth: Truth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
+    """KITTI's average precision, of 40 recalls, of class `name` at `level`, as its development kit (evaluate_object.cpp) counts it: IoU above 0.7 for cars and 0.5
+    for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found boxes lower than the level's least `height` [n], in source
+    pixels, never count (of whatever class, they may take a true box); those that lie in DontCare do not, either. NaN if the level has no box."""
+    least, neighbour = KITTI_CLASSES[name]
+    rank = list(KITTI_LEVELS).index(level)
+    of_class, small = truth.label == classes[name], height < KITTI_LEVELS[level]
+    counted = of_class & ~truth.ignore & (truth.difficulty >= 0) & (truth.difficulty <= rank)
+    takes, candidate = of_class | (truth.label == classes.get(neighbour, -1)), small | (found.label == classes[name])
+    if not counted.any():
+        return math.nan
+    pairs = overlapping(truth.image, truth.xyxy, found.image, found.xyxy)
+    pairs = Overlaps(*(column[takes[pairs.first] & candidate[pairs.second] & (pairs.iou > least)] for column in pairs))
+    turn = turns(truth.image)
+
+    # Each true box takes the highest score: these scores, at 41 recalls, are the thresholds.
+    choice = assigned(pairs.first, pairs.second, np.ones((len(pairs.first), 1), bool), turn, len(found.score))[counted, 0]
+    choice = choice[choice >= 0]
+    thresholds = _kitti_thresholds(found.score[choice[~small[choice]]], np.count_nonzero(counted))
+
+    # At each threshold each true box takes the one that fits best; small ones come last.
+    order = np.lexsort((np.where(small[pairs.second], 0, -pairs.iou), small[pairs.second]))
+    first, second = pairs.first[order], pairs.second[order]
+    choice = assigned(first, second, found.score[second, None] >= thresholds, turn, len(found.score))
+    row, trial = np.nonzero(choice >= 0)
+    right = np.bincount(trial[counted[row] & ~small[choice[row, trial]]], minlength=len(thresholds))
+    free = ~small[:, None] & candidate[:, None] & (found.score[:, None] >= thresholds)
+    free[choice[row, trial], trial] = False
+    stuff = np.flatnonzero(truth.label == classes.get(DONT_CARE, -1))
+    within = overlapping(found.image, found.xyxy, truth.image[stuff], truth.xyxy[stuff])
+    free[within.first[within.share > least]] = False
+    precision = np.zeros(KITTI_POINTS)
+    precision[:len(thresholds)] = right / np.maximum(right + free.sum(0), 1)
+    return float(np.maximum.accumulate(precision[::-1])[::-1][1:].mean())
+
+
+def _kitti_thresholds(scores: np.ndarray, truths: int) -> np.ndarray:
+    """The scores at which the recall is nearest to 0, 1/40, ... 1."""
+    thresholds, recall = [], 0.0
+    scores = np.sort(scores)[::-1]
+    for i, score in enumerate(scores):
+        here, next_one = (i + 1) / truths, (i + 2) / truths
+        if i < len(scores) - 1 and next_one - recall < recall - here:
+            continue
+        thresholds.append(score)
+        recall += 1 / (KITTI_POINTS - 1)
+    return np.array(thresholds[:KITTI_POINTS])
+
+
+def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> Truth:
+    """The boxes of all samples; `image` is the sample's index, `label` the class's number."""
+    nothing = np.empty(0, int)
+    parts = [(nothing, nothing, np.empty((0, 4)), nothing.astype(bool), nothing)]
+    for i in range(len(shards)):
+        boxes = shards.sample(i, {"boxes"})["boxes"]
+        labels = np.array([numbers[name] for name in shards.class_names(i)], int)[boxes["class_id"]]
+        unknown = np.full(len(labels), -1)
+        parts.append((np.full(len(labels), i), labels, boxes["xyxy"], boxes["ignore"] != 0, boxes.get("difficulty", unknown)))
+    return Truth(*map(np.concatenate, zip(*parts)))
+
+
+def ratio(part: float, whole: float) -> float:
+    return float(part / whole) if whole else math.nan
+
+
+def mean(values: Sequence[float]) -> float:
+    known = np.asarray(values, float)
+    known = known[~np.isnan(known)]
+    return float(known.mean()) if len(known) else math.nan

@@ -1,0 +1,290 @@
+"""Scores of what a network finds in shards: boxes as PASCAL VOC, COCO and KITTI count them, joints as the EventGAN paper and MPII do.
+
+    python3 -m eventgan_shards.evaluate detections found.json --truth out --split val
+    python3 -m eventgan_shards.evaluate poses found.json --truth out --split val --dataset mpii --pictures pictures
+
+The predictions are a list in JSON:
+
+    detections   {"image_id": "000001", "category_id": "Car", "bbox": [left, top, width, height], "score": 0.9}, as COCO's results
+    poses        {"image_id": "000001", "person": 0, "joints": [[x, y], ...]}
+
+image_id is a sample's id, or its place in the split, from 1 on; category_id a class's name, or its place among the sources' classes without DontCare, from 1
+on: the numbers of `eventgan export --to coco`. Boxes and joints are in volume pixels, boxes by edges, joints by centres (shard_format.md, Geometry). `person` is the
+row in the sample, to be left out where there is only one; joints come in the order of Shards.default_joints().
+
+detection_scores.py and pose_scores.py say what each number is. One that is not defined is null in JSON and "-" in a table.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import math
+import pathlib
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Found, Truth, curve, detection_scores, kitti_average_precision, match_as_voc,
+                               read_boxes, strongest)
+from .pose_scores import Persons, pose_scores, read_persons
+from .shards import PathLike, Shards, open_shard
+
+PICTURES = 12  # samples that are drawn
+
+
+def read_predictions(path: PathLike, keys: Sequence[str]) -> list[dict[str, Any]]:
+    """The file's list. What is not one, or lacks keys, is a ValueError."""
+    try:
+        entries = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
+    except ValueError as error:
+        raise ValueError(f"expected JSON, got {error}, in {path}") from error
+    if not isinstance(entries, list):
+        raise ValueError(f"expected a list, got {type(entries).__name__}, in {path}")
+    for number, entry in enumerate(entries):
+        if not isinstance(entry, dict) or not entry.keys() >= set(keys):
+            raise ValueError(f"expected {', '.join(keys)}, got {json.dumps(entry)[:80]}, in {path} (entry {number})")
+    return entries
+
+
+def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int, ...], path: PathLike) -> np.ndarray:
+    """float [n, *shape]: the finite numbers that each entry has under `key`."""
+    values = np.empty((len(entries), *shape))
+    for number, entry in enumerate(entries):
+        try:
+            value = np.array(entry[key], float)
+        except (TypeError, ValueError, OverflowError):
+            value = np.array(np.nan)
+        if value.shape != shape or not np.isfinite(value).all():
+            wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "a finite number"
+            raise ValueError(f"expected {wanted} as {key}, got {json.dumps(entry[key])[:80]}, in {path} (entry {number}, sample {entry['image_id']})")
+        values[number] = value
+    return values
+
+
+class Samples:
+    """The samples that are scored, and what predictions call them."""
+
+    def __init__(self, truth: PathLike, split: str | None, dataset: str | None, ids: PathLike | None) -> None:
+        where = {"dataset": dataset} if dataset else None
+        self.shards = Shards(truth, split=split, where=where, ids=ids)
+        self._of_split, self.classes = Shards(truth, split=split), Shards(truth).known_classes()
+        self._names = self.shards.column("sample_id").tolist()
+        self._all_names = self._of_split.column("sample_id").tolist()
+
+    def of(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
+        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. An id that there is not, or that two scored samples
+        have, is a ValueError."""
+        places = {**dict.fromkeys(self._all_names, -1), **{name: i for i, name in enumerate(self._names)}}
+        twice = {name for name, count in zip(*np.unique(self._names, return_counts=True)) if count > 1}
+        found = np.empty(len(entries), int)
+        for number, entry in enumerate(entries):
+            name = self._name(entry["image_id"])
+            if name not in places or name in twice:
+                raise ValueError(f"expected the image_id of {'a' if name not in places else 'one'} sample of {len(self._all_names)}, got "
+                                 f"{json.dumps(entry['image_id'])}{', which two have' if name in twice else ''}, in {path} (entry {number})")
+            found[number] = places[name]
+        return found
+
+    def _name(self, image_id: Any) -> str | None:
+        if isinstance(image_id, int) and 1 <= image_id <= len(self._all_names):
+            if len(self._splits) > 1:
+                raise ValueError(f"expected --split with samples that are numbered, got shards of {', '.join(self._splits)}")
+            return self._all_names[image_id - 1]
+        return image_id if isinstance(image_id, str) else None
+
+    @functools.cached_property
+    def _splits(self) -> list[str]:
+        return sorted({open_shard(path).attrs["split"] for path in self._of_split.paths})
+
+    def labels(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
+        """int [n]: the place in `classes` of each entry's category. One that there is not is a ValueError."""
+        numbered = [name for name in self.classes if name != DONT_CARE]
+        labels = {**{i + 1: self.classes.index(name) for i, name in enumerate(numbered)}, **{name: self.classes.index(name) for name in numbered}}
+        unknown = [i for i, entry in enumerate(entries) if not isinstance(entry["category_id"], (int, str)) or entry["category_id"] not in labels]
+        if unknown:
+            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got {json.dumps(entries[unknown[0]]['category_id'])}, "
+                             f"in {path} (entry {unknown[0]})")
+        return np.array([labels[entry["category_id"]] for entry in entries], int)
+
+
+def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
+                        iou: float = 0.5) -> tuple[dict[str, Any], Found, Truth]:
+    """What `detections` prints, as a dictionary, with the boxes that it is of. Predictions of a score below `confidence` are removed first, then non-maximum suppression
+    at an IoU of `nms` follows (1: none), as in the paper: what is removed is in no score, the average precisions' neither. Samples of sources without boxes are left out.
+
+    classes: those to score (None: all that have a box to find or a prediction)
+    """
+    shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
+    unknown = [name for name in classes or () if name not in numbers]
+    if unknown:
+        raise ValueError(f"expected classes of {', '.join(numbers)}, got {', '.join(unknown)}")
+    entries = read_predictions(predictions, ("image_id", "category_id", "bbox", "score"))
+    boxes, scores = numbers_of(entries, "bbox", (4,), predictions), numbers_of(entries, "score", (), predictions)
+    wrong = np.flatnonzero((boxes[:, 2:] < 0).any(1))
+    if len(wrong):
+        raise ValueError(f"expected a bbox of left, top, width, height, got {boxes[wrong[0]].tolist()}, in {predictions} (entry {wrong[0]})")
+    labelled = np.array([bool(shards.class_names(i)) for i in range(len(shards))], bool)
+    image = samples.of(entries, predictions)
+    found = Found.of(image, samples.labels(entries, predictions), np.column_stack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]]), scores)
+    found = found.rows((found.image >= 0) & np.append(labelled, False)[found.image])
+    given, truth = len(found.score), read_boxes(shards, numbers)
+    found = found.rows(found.score >= confidence)
+    found = found.rows(strongest(found, nms))
+    if classes is None:
+        there = np.concatenate([found.label, truth.label[~truth.ignore]])
+        classes = [name for name, label in numbers.items() if name != DONT_CARE and (there == label).any()]
+    counts = {"samples": int(labelled.sum()), "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))), "ignored": int(truth.ignore.sum()),
+              "predictions": len(entries), "not_of_these_samples": len(entries) - given, "after_suppression": len(found.score)}
+    result = {"settings": {"confidence": confidence, "nms": nms, "iou": iou}, "counts": counts,
+              "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou)}
+    kitti = _of_kitti(shards, found, truth, numbers, classes)
+    return ({**result, "kitti": kitti} if kitti else result), found, truth
+
+
+def _of_kitti(shards: Shards, found: Found, truth: Truth, numbers: Mapping[str, int], classes: Sequence[str]) -> dict[str, dict[str, float]]:
+    """KITTI's average precisions by class and level, of the samples of kitti_object."""
+    ours = shards.column("dataset") == "kitti_object"
+    found, truth = found.rows(ours[found.image]), Truth(*(column[ours[truth.image]] for column in truth))
+    height = (found.xyxy[:, 3] - found.xyxy[:, 1]) / shards.column("source_to_volume")[found.image, 1, 1]
+    return {name: {level: kitti_average_precision(found, truth, numbers, name, level, height) for level in KITTI_LEVELS}
+            for name in classes if name in KITTI_CLASSES and (truth.difficulty[truth.label == numbers[name]] >= 0).any()}
+
+
+def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False) -> tuple[dict[str, Any], np.ndarray, Persons]:
+    """What `poses` prints, as a dictionary, with the joints found [P, J, 2] in volume pixels (NaN: not found) and the persons that are there."""
+    shards = samples.shards
+    persons = read_persons(shards)
+    entries = read_predictions(predictions, ("image_id", "joints"))
+    image, joints = samples.of(entries, predictions), numbers_of(entries, "joints", (len(persons.names), 2), predictions)
+    rows = {(index, row): i for i, (index, row) in enumerate(persons.place.tolist())}
+    alone = np.bincount(persons.place[:, 0], minlength=len(shards)) == 1
+    found = np.full(persons.joints.shape, np.nan)
+    for number, (entry, index) in enumerate(zip(entries, image.tolist())):
+        if index < 0:
+            continue
+        person = entry.get("person", 0 if alone[index] else None)
+        at = rows.get((index, person)) if isinstance(person, int) else None
+        if at is None or np.isfinite(found[at]).all():
+            what = f"got {json.dumps(person)}" if at is None else f"got {person} twice"
+            raise ValueError(f"expected a person of the {np.count_nonzero(persons.place[:, 0] == index)} there are, {what}, in {predictions} (entry {number}, "
+                             f"sample {entry['image_id']})")
+        found[at] = joints[number]
+    not_found = np.isnan(found).all((1, 2))
+    counts = {"persons": len(persons.place), "not_found": int(not_found.sum()), "predictions": len(entries), "not_of_these_samples": int((image < 0).sum()),
+              "hidden": int(persons.hidden.sum()), "not_annotated": int((~persons.annotated).sum()),
+              "without_head": int(np.isnan(persons.head).sum()), "without_head_box": int(np.isnan(persons.head_box).sum())}
+    return {"settings": {"hidden": hidden}, "counts": counts, "joints": pose_scores(found, persons, hidden)}, found, persons
+
+
+# Tables --------------------------------------------------------------------------------------------------------------------------
+
+
+def table(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str], digits: int = 3) -> str:
+    """A line of headings (the values of `columns`), then one for each row with its values under the keys of `columns`; NaN is "-"."""
+    cells = [[title, *columns.values()]]
+    for name, row in rows.items():
+        cells.append([name, *(_text(row[key], digits) for key in columns)])
+    widths = [max(map(len, column)) for column in zip(*cells)]
+    return "\n".join("  ".join([line[0].ljust(widths[0]), *(text.rjust(width) for text, width in zip(line[1:], widths[1:]))]) for line in cells)
+
+
+def _text(value: float, digits: int) -> str:
+    return str(value) if isinstance(value, int) else "-" if math.isnan(value) else f"{value:.{digits}f}"
+
+
+def detection_tables(result: Mapping[str, Any]) -> str:
+    counts, settings, classes = result["counts"], result["settings"], result["classes"]
+    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} boxes to find, {counts['ignored']} to be "
+             f"ignored; {counts['after_suppression']} of {counts['predictions']} predictions left by confidence {settings['confidence']:g} and non-maximum suppression at "
+             f"IoU {settings['nms']:g}")
+    if counts["not_of_these_samples"]:
+        first += f"; {counts['not_of_these_samples']} are of other samples"
+    tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", "precision": "precision", "recall_easy": "easy recall",
+                                         "recall_hard": "hard recall", "recall": "combined recall", "ap_voc": "AP", "f1": "F1"}),
+              table("average precision", classes, {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points", "ap_coco": "COCO, AP@[.5:.95]"})]
+    if "kitti" in result:
+        tables.append(table("KITTI, 40 recalls", result["kitti"], {level: level for level in KITTI_LEVELS}))
+    return "\n\n".join(tables)
+
+
+def pose_tables(result: Mapping[str, Any]) -> str:
+    counts = result["counts"]
+    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {counts['hidden']} hidden"
+             f"{' (scored all the same)' if result['settings']['hidden'] else ''}; PCKh without {counts['without_head']} persons whose head or shoulders are not "
+             f"annotated, MPII's without {counts['without_head_box']} that have no head box")
+    return first + "\n\n" + table("", result["joints"], {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px", "mpjpe_source": "MPJPE, source px",
+                                                          "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
+
+
+def draw(folder: str, samples: Samples, result: Mapping[str, Any], found: Found | np.ndarray, truth: Truth | Persons) -> None:
+    """Some of the samples, evenly spread: found blue, true green, to be ignored (or of joints: not scored) red; of boxes also precision over recall."""
+    from . import pictures  # OpenCV, which nothing else here needs
+
+    shards, names = samples.shards, samples.shards.column("sample_id")
+    if isinstance(found, Found):
+        numbers = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
+        found = found.rows(np.isin(found.label, list(numbers)))
+        stands_for, counts = match_as_voc(found, truth, result["settings"]["iou"])
+        curves = {}
+        for label, name in numbers.items():
+            mine = counts & (found.label == label)
+            curves[name] = curve(stands_for[mine] >= 0, result["classes"][name]["truths"])
+        pictures.write(folder, "precision_recall", pictures.of_precision(curves))
+    of_samples = np.union1d(found.image, truth.image) if isinstance(found, Found) else np.unique(truth.place[:, 0])
+    for i in of_samples[np.unique(np.linspace(0, len(of_samples) - 1, PICTURES).round().astype(int))] if len(of_samples) else ():
+        picture = pictures.of_events(shards.sample(i, {"volume"})["volume"])
+        if isinstance(found, Found):
+            true, ours = truth.image == i, found.image == i
+            pictures.draw_boxes(picture, truth.xyxy[true & truth.ignore], pictures.IGNORED)
+            pictures.draw_boxes(picture, truth.xyxy[true & ~truth.ignore & np.isin(truth.label, list(numbers))], pictures.TRUE)
+            texts = [f"{numbers[label]} {score:.2f}" for label, score in zip(found.label[ours].tolist(), found.score[ours])]
+            pictures.draw_boxes(picture, found.xyxy[ours], pictures.FOUND, texts)
+        for person in np.flatnonzero(truth.place[:, 0] == i) if isinstance(truth, Persons) else ():
+            scored = truth.scored(result["settings"]["hidden"])[person]
+            pictures.draw_joints(picture, truth.joints[person][truth.annotated[person] & ~scored], pictures.IGNORED)
+            pictures.draw_joints(picture, truth.joints[person][scored], pictures.TRUE)
+            pictures.draw_joints(picture, found[person][scored], pictures.FOUND, truth.joints[person][scored])
+        pictures.write(folder, str(names[i]), picture)
+
+
+def _without_nan(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _without_nan(each) for key, each in value.items()}
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(prog="python3 -m eventgan_shards.evaluate", description="Scores of what a network found in shards.")
+    parser.add_argument("what", choices=["detections", "poses"])
+    parser.add_argument("predictions", help="JSON, a list: image_id, category_id, bbox, score; or image_id, person, joints")
+    parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one")
+    parser.add_argument("--split", help="score the samples of this split alone")
+    parser.add_argument("--dataset", help="score samples of this kind of source alone, such as kitti_object")
+    parser.add_argument("--ids", metavar="FILE", help="score these samples alone, an id a line")
+    parser.add_argument("--classes", type=lambda text: text.split(","), help="detections: names with commas between them (default: all that have a box or a prediction)")
+    parser.add_argument("--confidence", type=float, default=0.2, help="detections: predictions with a score below are removed (default: %(default)s)")
+    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression; 1: none (default: %(default)s)")
+    parser.add_argument("--iou", type=float, default=0.5, help="detections: IoU from which on a box is found (default: %(default)s)")
+    parser.add_argument("--hidden", action="store_true", help="poses: score joints that are annotated and hidden, too, as MPII's own evaluation does")
+    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
+    parser.add_argument("--pictures", metavar="DIR", help="draw precision and recall, and what was found in some samples, into this folder; needs OpenCV")
+    args = parser.parse_args(arguments)
+    try:
+        samples = Samples(args.truth, args.split, args.dataset, args.ids)
+        if args.what == "detections":
+            result, found, truth = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms, args.iou)
+        else:
+            result, found, truth = evaluate_poses(args.predictions, samples, args.hidden)
+        if args.pictures:
+            draw(args.pictures, samples, result, found, truth)
+    except (ImportError, OSError, ValueError) as error:
+        sys.exit(f"error: {error}")
+    print(json.dumps(_without_nan(result), indent=1) if args.json else (detection_tables if args.what == "detections" else pose_tables)(result))
+
+
+if __name__ == "__main__":
+    main()

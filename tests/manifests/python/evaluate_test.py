@@ -1,0 +1,484 @@
+"""eventgan_shards.evaluate: scores worked out by hand, against plain loops of the published rules, and against the trainers' own."""
+
+import inspect
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+import h5py
+import numpy as np
+import pytest
+from conftest import NAME, SOURCE
+
+from eventgan_shards.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Found, Truth, average_precisions, detection_scores,
+                                              kitti_average_precision, match_as_coco, match_as_voc, strongest)
+from eventgan_shards.evaluate import Samples, evaluate_detections, evaluate_poses
+from eventgan_shards.pose_scores import Persons, head_lengths, pose_scores
+
+TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
+CAR, VAN, DONT_CARE = 0, 1, 2
+CLASSES = {"Car": CAR, "Van": VAN}
+
+
+def truth_of(*rows):
+    """Rows of image, label, left, top, right, bottom, ignore, difficulty."""
+    rows = np.array(rows, float).reshape(-1, 8)
+    return Truth(rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:6], rows[:, 6] != 0, rows[:, 7].astype(int))
+
+
+def found_of(*rows):
+    """Rows of image, label, left, top, right, bottom, score."""
+    rows = np.array(rows, float).reshape(-1, 7)
+    return Found.of(rows[:, 0], rows[:, 1], rows[:, 2:6], rows[:, 6])
+
+
+def test_scores_worked_out_by_hand():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 20, 0, 30, 10, 0, 1], [1, CAR, 0, 0, 10, 10, 0, 2], [1, VAN, 50, 0, 60, 10, 0, -1],
+                     [1, DONT_CARE, 80, 0, 100, 20, 1, -1])
+    found = found_of([0, CAR, 0, 0, 10, 10, 0.9],  # right
+                     [0, CAR, 0, 0, 10, 9, 0.8],  # the same car again: wrong
+                     [0, CAR, 20, 0, 30, 5, 0.7],  # IoU 0.5: right
+                     [1, CAR, 50, 0, 60, 10, 0.6],  # a van: wrong
+                     [1, CAR, 90, 0, 110, 10, 0.5],  # half in what is to be ignored: no matter
+                     [1, VAN, 82, 2, 90, 9, 0.5],  # of another class, all the same
+                     [1, CAR, 0, 0, 10, 4.9, 0.4])  # IoU 0.49: wrong
+    scores = detection_scores(found, truth, CLASSES)
+    car = scores["Car"]
+    # right at 1 of 1 and 2 of 3 predictions, of 3 cars: precision 1 up to recall 1/3, 2/3 up to 2/3
+    assert [car[key] for key in ("truths", "easy", "hard", "found", "right")] == [3, 1, 2, 5, 2]
+    assert car["precision"] == 2 / 5 and car["recall"] == 2 / 3 and car["f1"] == 2 * 2 / (3 + 5)
+    assert car["recall_easy"] == 1 and car["recall_hard"] == 1 / 2
+    assert car["ap_voc"] == pytest.approx(1 / 3 + 2 / 3 / 3)
+    assert car["ap_voc_11"] == pytest.approx((4 * 1 + 3 * 2 / 3) / 11)  # 0 to 0.3, 0.4 to 0.6
+    assert car["ap_coco_101"] == pytest.approx((34 * 1 + 33 * 2 / 3) / 101)  # 0 to 0.33, 0.34 to 0.66
+    # with COCO's matching: the second prediction is wrong at each IoU, the third right at 0.5 alone
+    assert car["ap_coco"] == pytest.approx(((34 + 33 * 2 / 3) + 9 * 34) / 10 / 101)
+    van = scores["Van"]
+    assert van["recall"] == van["ap_voc"] == van["ap_coco"] == 0
+    assert math.isnan(van["precision"]) and math.isnan(van["recall_easy"])
+    both = scores["all"]
+    assert both["precision"] == 2 / 5 and both["recall"] == 2 / 4 and both["ap_voc"] == car["ap_voc"] / 2
+
+
+def test_recalls_that_a_point_meets_belong_to_it():
+    right = np.array([True] * 3 + [False])  # recall 0.3 of 10: 0, 0.1, 0.2, 0.3
+    assert average_precisions(right, 10)["ap_voc_11"] == pytest.approx(4 / 11)
+    assert average_precisions(right, 10)["ap_voc"] == pytest.approx(0.3)
+
+
+def test_a_second_one_is_wrong_for_voc_and_takes_another_box_for_coco():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 4, 0, 14, 10, 0, 0])
+    found = found_of([0, CAR, 0, 0, 10, 10, 0.9], [0, CAR, 1, 0, 11, 10, 0.8])  # IoU 9/11 with the first, 7/13 with the second
+    assert match_as_voc(found, truth)[0].tolist() == [0, -1]
+    assert match_as_coco(found, truth)[0][:, 0].tolist() == [True, True]
+
+
+def test_equal_scores_stay_in_the_order_of_the_list():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0])
+    right, wrong = [0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 20, 0, 30, 10, 0.5]
+    assert detection_scores(found_of(right, wrong), truth, CLASSES)["Car"]["ap_voc"] == 1
+    assert detection_scores(found_of(wrong, right), truth, CLASSES)["Car"]["ap_voc"] == 0.5
+    assert strongest(found_of([0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 0, 0, 10, 9, 0.5]), 0.2).tolist() == [True, False]
+
+
+@pytest.mark.parametrize(("truth", "found", "precision", "recall", "ap", "f1"), [
+    ([], [], math.nan, math.nan, math.nan, math.nan),
+    ([], [[0, CAR, 0, 0, 10, 10, 0.5]], 0, math.nan, math.nan, 0),
+    ([[0, CAR, 0, 0, 10, 10, 0, 0]], [], math.nan, 0, 0, 0),
+    ([[0, CAR, 0, 0, 10, 10, 1, 0]], [[0, CAR, 0, 0, 10, 10, 0.5]], math.nan, math.nan, math.nan, math.nan),  # all to be ignored
+    ([[0, CAR, 5, 5, 5, 5, 0, 0]], [[0, CAR, 5, 5, 5, 5, 0.5]], 0, 0, 0, 0),  # without an area nothing overlaps
+])
+def test_edges(truth, found, precision, recall, ap, f1):
+    scores = detection_scores(found_of(*found), truth_of(*truth), CLASSES)
+    for row in (scores["Car"], scores["all"]):
+        values = [row[key] for key in ("precision", "recall", "ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco", "f1")]
+        np.testing.assert_array_equal(values, [precision, recall, ap, ap, ap, ap, f1])
+
+
+def boxes_at_random(rng, images, each):
+    """image [n], label [n], xyxy [n, 4] of about `each` boxes an image, in so little room that many overlap."""
+    image = np.sort(rng.integers(0, images, images * each))
+    corner, size = rng.uniform(0, 120, (len(image), 2)), rng.uniform(8, 60, (len(image), 2))
+    return image, rng.integers(0, 2, len(image)), np.hstack([corner, corner + size])
+
+
+def scene(seed, images=30, each=8):
+    """Found and true boxes: true ones moved a little, some twice, some of the other class, and some from nowhere."""
+    rng = np.random.default_rng(seed)
+    image, label, xyxy = boxes_at_random(rng, images, each)
+    ignore = rng.random(len(image)) < 0.15
+    label = np.where(ignore & (rng.random(len(image)) < 0.5), DONT_CARE, label)
+    truth = Truth(image, label, xyxy, ignore, rng.integers(-1, 3, len(image)))
+    rows = rng.integers(0, len(image), 2 * len(image))
+    moved = xyxy[rows] + rng.normal(0, 0.08, (len(rows), 4)) * np.tile(xyxy[rows, 2:] - xyxy[rows, :2], 2)
+    extra = boxes_at_random(rng, images, each // 2)
+    other = np.where(rng.random(len(rows)) < 0.1, 1 - label[rows] % 2, label[rows] % 2)
+    found = [np.concatenate(pair) for pair in zip((image[rows], other, moved), extra)]
+    return Found.of(*found, rng.permutation(len(found[0])) / len(found[0])), truth
+
+
+def iou_of(a, b, share=False):
+    wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
+    if wide <= 0 or high <= 0:
+        return 0.0
+    area = (a[2] - a[0]) * (a[3] - a[1])
+    return wide * high / (area if share else area + (b[2] - b[0]) * (b[3] - b[1]) - wide * high)
+
+
+def rows_of(boxes, image):
+    return np.flatnonzero(boxes.image == image).tolist()
+
+
+def ignored_by_loops(found, truth, n, least):
+    return any(truth.ignore[m] and iou_of(found.xyxy[n], truth.xyxy[m], share=True) >= least for m in rows_of(truth, found.image[n]))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_voc_s_matching_is_that_of_its_loop(seed):
+    found, truth = scene(seed)
+    taken, expected, counts = set(), [], []
+    for n in range(len(found.score)):
+        same = [m for m in rows_of(truth, found.image[n]) if truth.label[m] == found.label[n] and not truth.ignore[m]]
+        best = max(same, key=lambda m: iou_of(found.xyxy[n], truth.xyxy[m]), default=None)
+        right = best is not None and iou_of(found.xyxy[n], truth.xyxy[best]) >= 0.5 and best not in taken
+        taken |= {best} if right else set()
+        expected.append(best if right else -1)
+        counts.append(right or not ignored_by_loops(found, truth, n, 0.5))
+    stands_for, counted = match_as_voc(found, truth)
+    assert stands_for.tolist() == expected and counted.tolist() == counts
+    assert 0.2 < np.mean(stands_for >= 0) < 0.8 and not counted.all()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_coco_s_matching_is_that_of_its_loop(seed):
+    found, truth = scene(seed)
+    right, counted = match_as_coco(found, truth)
+    for t, least in enumerate(COCO_IOUS):
+        taken = set()
+        for n in range(len(found.score)):
+            free = [m for m in rows_of(truth, found.image[n]) if truth.label[m] == found.label[n] and not truth.ignore[m] and m not in taken]
+            best = max(free, key=lambda m: iou_of(found.xyxy[n], truth.xyxy[m]), default=None)
+            hit = best is not None and iou_of(found.xyxy[n], truth.xyxy[best]) >= least
+            taken |= {best} if hit else set()
+            assert right[n, t] == hit and counted[n, t] == (hit or not ignored_by_loops(found, truth, n, least))
+
+
+def test_coco_counts_a_hundred_of_a_class_and_sample():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0])
+    found = found_of(*([0, CAR, 20 * i, 20, 20 * i + 9, 30, 0.9] for i in range(100)), [0, CAR, 0, 0, 10, 10, 0.1], [0, VAN, 0, 0, 10, 10, 0.1])
+    right, counted = match_as_coco(found, truth)
+    assert not right.any() and counted.sum(0).tolist() == [101] * 10
+
+
+@pytest.mark.parametrize("iou", [0.2, 0.6])
+def test_suppression_is_torchvision_s(iou):
+    torch, ops = pytest.importorskip("torch"), pytest.importorskip("torchvision.ops")
+    found, _ = scene(1)
+    kept = ops.batched_nms(torch.from_numpy(found.xyxy), torch.from_numpy(found.score), torch.from_numpy(2 * found.image + found.label), iou)
+    assert np.flatnonzero(strongest(found, iou)).tolist() == kept.tolist()  # both from the highest score on
+    assert 0 < len(kept) < len(found.score)
+
+
+def kitti_by_loops(found, truth, classes, name, level, height):
+    """The development kit's evaluate_object.cpp, sample by sample, threshold by threshold."""
+    least, neighbour = KITTI_CLASSES[name]
+    rank = list(KITTI_LEVELS).index(level)
+    kind = {}  # of true boxes: 0 counts, 1 is ignored
+    for m in range(len(truth.image)):
+        if truth.label[m] == classes[name]:
+            kind[m] = 0 if 0 <= truth.difficulty[m] <= rank and not truth.ignore[m] else 1
+        elif truth.label[m] == classes.get(neighbour):
+            kind[m] = 1
+    small = {n: height[n] < KITTI_LEVELS[level] for n in range(len(found.score)) if height[n] < KITTI_LEVELS[level] or found.label[n] == classes[name]}
+    images = range(max([*truth.image, *found.image], default=-1) + 1)
+
+    def best_score(m, free):
+        return max((n for n in free if iou_of(found.xyxy[n], truth.xyxy[m]) > least), key=lambda n: found.score[n], default=None)
+
+    def best_fit(m, free):
+        fits = [n for n in free if iou_of(found.xyxy[n], truth.xyxy[m]) > least]
+        return max((n for n in fits if not small[n]), key=lambda n: iou_of(found.xyxy[n], truth.xyxy[m]), default=fits[0] if fits else None)
+
+    def right_and_wrong(choose, threshold):
+        scores, wrong = [], 0
+        for image in images:
+            free = [n for n in rows_of(found, image) if n in small and found.score[n] >= threshold]
+            for m in rows_of(truth, image):
+                n = choose(m, free) if m in kind else None
+                if n is not None:
+                    free.remove(n)
+                    scores += [found.score[n]] if kind[m] == 0 and not small[n] else []
+            stuff = [m for m in rows_of(truth, image) if truth.label[m] == DONT_CARE]
+            wrong += sum(not small[n] and all(iou_of(found.xyxy[n], truth.xyxy[m], share=True) <= least for m in stuff) for n in free)
+        return scores, wrong
+
+    truths = sum(each == 0 for each in kind.values())
+    scores = sorted(right_and_wrong(best_score, -1)[0], reverse=True)
+    thresholds, recall = [], 0.0
+    for i, score in enumerate(scores):
+        last = i == len(scores) - 1
+        if not last and (i + 2) / truths - recall < recall - (i + 1) / truths:
+            continue
+        thresholds.append(score)
+        recall += 1 / 40
+    precision = [0.0] * 41
+    for i, threshold in enumerate(thresholds):
+        right, wrong = right_and_wrong(best_fit, threshold)
+        precision[i] = len(right) / max(len(right) + wrong, 1)
+    return sum(max(precision[i:]) for i in range(1, 41)) / 40
+
+
+@pytest.mark.parametrize("level", KITTI_LEVELS)
+@pytest.mark.parametrize("seed", range(3))
+def test_kitti_s_average_precision_is_that_of_its_development_kit(seed, level):
+    found, truth = scene(seed, images=60)
+    height = (found.xyxy[:, 3] - found.xyxy[:, 1]) * 1.3
+    classes = {**CLASSES, "DontCare": DONT_CARE}
+    expected = kitti_by_loops(found, truth, classes, "Car", level, height)
+    assert kitti_average_precision(found, truth, classes, "Car", level, height) == pytest.approx(expected, abs=1e-12)
+    assert 0.05 < expected < 0.95
+
+
+def test_kitti_without_a_box_of_the_level():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 2])
+    found = found_of([0, CAR, 0, 0, 10, 10, 0.5])
+    assert math.isnan(kitti_average_precision(found, truth, CLASSES, "Car", "easy", np.array([50.0])))
+    assert kitti_average_precision(found, truth, CLASSES, "Car", "hard", np.array([50.0])) == 0  # one box: recall 0 alone has a threshold
+    assert kitti_average_precision(found_of(), truth, CLASSES, "Car", "hard", np.empty(0)) == 0
+
+
+@pytest.fixture
+def trainer(monkeypatch):
+    """Puts the folder of a trainer's modules first on the path; its modules are forgotten afterwards."""
+    before = set(sys.modules)
+
+    def use(path, *modules):
+        if not (TRAINERS / path).is_dir():
+            pytest.skip(f"no ../shared/trainers/{path}")
+        for module in modules:
+            pytest.importorskip(module)
+        monkeypatch.syspath_prepend(str(TRAINERS / path))
+
+    yield use
+    for name in set(sys.modules) - before:
+        if str(TRAINERS) in str(getattr(sys.modules[name], "__file__", None) or ""):
+            del sys.modules[name]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_average_precision_is_yolov3_s(trainer, monkeypatch, seed):
+    trainer("yolov3", "torch", "torchvision", "matplotlib", "tqdm")
+    from utils import utils
+
+    source = inspect.getsource(utils.compute_ap)
+    assert "method = 'interp'" in source  # its other method is the area itself
+    exec(source.replace("method = 'interp'", "method = 'continuous'"), utils.__dict__)
+    found, truth = scene(seed)
+    scores = detection_scores(found, truth, CLASSES)
+    stands_for, counts = match_as_voc(found, truth)
+    precision, recall, ap, f1, classes = utils.ap_per_class(stands_for[counts, None] >= 0, found.score[counts] + 0.2, found.label[counts],
+                                                            truth.label[~truth.ignore])  # it looks at precision and recall at score 0.1
+    assert classes.tolist() == [CAR, VAN]
+    for key, values in (("ap_voc", ap[:, 0]), ("precision", precision[:, 0]), ("recall", recall[:, 0]), ("f1", f1[:, 0])):
+        np.testing.assert_allclose([scores[name][key] for name in CLASSES], values, rtol=0, atol=1e-6)
+
+
+MPII = ["r_ankle", "r_knee", "r_hip", "l_hip", "l_knee", "l_ankle", "pelvis", "thorax", "upper_neck", "head_top", "r_wrist", "r_elbow", "r_shoulder",
+        "l_shoulder", "l_elbow", "l_wrist"]
+
+
+def persons_at_random(rng, count):
+    joints = rng.uniform(0, 200, (count, 16, 2))
+    annotated = rng.random((count, 16)) < 0.9
+    box = np.sort(rng.uniform(0, 120, (count, 2, 2)), axis=1)
+    persons = Persons(MPII, np.stack([np.arange(count), np.zeros(count, int)], 1), joints, joints, annotated, annotated & (rng.random((count, 16)) < 0.2),
+                      head_lengths(MPII, joints, annotated), np.linalg.norm(box[:, 1] - box[:, 0], axis=-1),
+                      np.tile(np.eye(2, 3), (count, 1, 1)))
+    return persons, box, joints + rng.normal(0, 12, joints.shape)
+
+
+@pytest.mark.parametrize("hidden", [True, False])
+def test_pckh_is_pose_resnet_s(trainer, tmp_path, hidden):
+    trainer("pose_resnet/lib", "torch", "easydict", "json_tricks", "scipy", "yaml", "cv2")
+    from core.config import config
+    from dataset.mpii import MPIIDataset
+    from scipy.io import savemat
+
+    persons, box, found = persons_at_random(np.random.default_rng(3), 50)
+    short = ["rank", "rkne", "rhip", "lhip", "lkne", "lank", "pelv", "thor", "neck", "head", "rwri", "relb", "rsho", "lsho", "lelb", "lwri"]
+    (tmp_path / "annot").mkdir()
+    savemat(tmp_path / "annot" / "gt_valid.mat", {"dataset_joints": np.array([short], object), "jnt_missing": (~persons.scored(hidden)).T.astype(float),
+                                                  "pos_gt_src": persons.joints.transpose(1, 2, 0) + 1, "headboxes_src": box.transpose(1, 2, 0) + 1})
+    config.DATASET.ROOT, config.DATASET.TEST_SET = str(tmp_path), "valid"
+    theirs, mean = MPIIDataset.evaluate(None, config, found, "")
+    ours = {name: row["pckh_mpii"] for name, row in pose_scores(found, persons, hidden).items()}
+    for name, joint in (("Shoulder", "shoulder"), ("Elbow", "elbow"), ("Wrist", "wrist"), ("Hip", "hip"), ("Knee", "knee"), ("Ankle", "ankle")):
+        assert 100 * (ours["l_" + joint] + ours["r_" + joint]) / 2 == pytest.approx(theirs[name], abs=1e-6)
+    assert 100 * ours["head_top"] == pytest.approx(theirs["Head"], abs=1e-6)
+    assert 100 * ours["all"] == pytest.approx(mean, abs=1e-6)
+    assert 20 < mean < 95
+
+
+def test_poses_worked_out_by_hand():
+    names = ["head", "left shoulder", "right shoulder", "hand"]
+    joints = np.array([[[0, 0], [-5, 20], [5, 20], [9, 9]], [[0, 0], [-5, 20], [5, 20], [9, 9]], [[-1, -1], [-5, 20], [5, 20], [9, 9]]], float)
+    annotated = ~(joints == -1).all(-1)
+    hidden = np.zeros((3, 4), bool)
+    hidden[1, 3] = True
+    head = head_lengths(names, joints, annotated)
+    np.testing.assert_array_equal(head, [20, 20, np.nan])  # within 6 px is near
+    persons = Persons(names, np.array([[0, 0], [0, 1], [1, 0]]), joints / 2, joints, annotated, hidden, head, np.array([np.nan, np.nan, 100.0]),
+                      np.tile(np.eye(2, 3) / 2, (3, 1, 1)))
+    found = joints.copy()
+    found[0, 3] += [6, 0]  # 6: near
+    found[0, 0] += [3, 6]
+    found[2, 3] += [0, 30]  # 30 = 0.5 x 0.6 x 100: near by the box
+    found[1] = np.nan  # not found
+    scores = pose_scores(found / 2, persons)
+    hand, every = scores["hand"], scores["all"]
+    assert (hand["scored"], hand["left_out"], hand["pckh"], hand["pckh_mpii"]) == (2, 1, 1, 1)
+    assert (hand["mpjpe_source"], hand["mpjpe_volume"]) == (18, 9)
+    assert scores["head"]["pckh"] == 0 and math.isnan(scores["head"]["pckh_mpii"])  # of the third person it is not annotated
+    assert (every["scored"], every["left_out"]) == (10, 2)
+    assert every["pckh"] == 3 / 7 and every["pckh_mpii"] == 1  # the first person's 4, the second's 3; the third's 3
+    assert every["mpjpe_source"] == pytest.approx((6 + math.sqrt(45) + 30) / 7)
+    assert pose_scores(found / 2, persons, hidden=True)["hand"]["scored"] == 3
+
+
+def test_poses_without_a_head_or_a_person():
+    nobody = Persons(["nose"], np.empty((0, 2), int), *np.empty((2, 0, 1, 2)), *np.empty((2, 0, 1), bool), *np.empty((2, 0)), np.empty((0, 2, 3)))
+    row = pose_scores(np.empty((0, 1, 2)), nobody)["all"]
+    assert row["scored"] == 0 and all(math.isnan(row[key]) for key in ("mpjpe_volume", "mpjpe_source", "pckh", "pckh_mpii"))
+    assert np.isnan(head_lengths(["nose"], np.zeros((2, 1, 2)), np.ones((2, 1), bool))).all()
+
+
+def test_a_hundred_thousand_predictions_take_seconds():
+    rng = np.random.default_rng(0)
+    image, label, xyxy = boxes_at_random(rng, 10_000, 10)
+    truth = Truth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool), rng.integers(-1, 3, 50_000))
+    start = time.monotonic()
+    found = Found.of(image, label, xyxy + rng.normal(0, 2, xyxy.shape), rng.random(100_000))
+    found = found.rows(strongest(found, 0.5))
+    detection_scores(found, truth, CLASSES)
+    for level in KITTI_LEVELS:
+        kitti_average_precision(found, truth, CLASSES, "Car", level, found.xyxy[:, 3] - found.xyxy[:, 1])
+    assert time.monotonic() - start < 30
+
+
+# The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare; two persons of nose,
+# left hand, right hand.
+
+
+def write(path, entries):
+    path.write_text(json.dumps(entries))
+    return path
+
+
+def box(image_id, category, bbox, score=0.9):
+    return {"image_id": image_id, "category_id": category, "bbox": bbox, "score": score}
+
+
+def test_detections_of_a_folder(folder, tmp_path):
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000001", "Car", [0, 0, 3, 3], 0.5), box("000003", "Car", [0, 0, 3, 3], 0.1)])
+    result, _, truth = evaluate_detections(found, Samples(folder, None, None, None))
+    car = result["classes"]["Car"]
+    assert result["counts"] == {"samples": 4, "samples_without_prediction": 2, "ignored": int(truth.ignore.sum()), "predictions": 3, "not_of_these_samples": 0,
+                                "after_suppression": 2}
+    assert (car["truths"], car["found"], car["right"]) == (2, 2, 1)
+    numbered = write(tmp_path / "numbered.json", [box(1, 1, [1, 1, 3.25, 3.5]), box(2, 1, [0, 0, 3, 3], 0.5), box(3, 1, [0, 0, 3, 3], 0.1)])
+    assert json.dumps(evaluate_detections(numbered, Samples(folder, "train", None, None))[0]) == json.dumps(result)
+    (tmp_path / "ids.txt").write_text("000000\n000003\n")
+    part, _, _ = evaluate_detections(found, Samples(folder, None, None, tmp_path / "ids.txt"))
+    assert part["counts"]["not_of_these_samples"] == 1 and part["classes"]["Car"]["precision"] == 1
+
+
+def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
+    with h5py.File(folder / NAME, "r+") as file:
+        rows = len(file["labels/boxes/class_id"])
+        if "labels/boxes/difficulty" in file:
+            del file["labels/boxes/difficulty"]
+        file["labels/boxes/difficulty"] = np.zeros(rows, np.int8)
+    marker = (folder / NAME).with_suffix(".json")
+    marker.write_text(json.dumps({**json.loads(marker.read_text()), "size_bytes": (folder / NAME).stat().st_size}))
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5])])
+    result, _, _ = evaluate_detections(found, Samples(folder, None, None, None))
+    assert result["classes"]["Car"]["easy"] == 2 and result["classes"]["Car"]["recall_easy"] == 0.5
+    assert result["kitti"]["Car"].keys() == KITTI_LEVELS.keys()
+
+
+@pytest.mark.parametrize(("entry", "error"), [
+    (box("000002", "Car", [0, 0, 1, 1]), r'expected the image_id of a sample of 4, got "000002", in .*json \(entry 1\)'),
+    (box(5, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 5"),
+    (box("000001", "Bus", [0, 0, 1, 1]), 'expected a category_id of Car, or its number from 1 on, got "Bus"'),
+    (box("000001", 2, [0, 0, 1, 1]), "expected a category_id of Car, or its number from 1 on, got 2"),
+    (box("000001", "DontCare", [0, 0, 1, 1]), 'got "DontCare"'),
+    (box("000001", "Car", [0, 0, math.nan, 1]), r"expected 4 finite numbers as bbox, got .*NaN.* \(entry 1, sample 000001\)"),
+    (box("000001", "Car", [0, 0, 1]), "expected 4 finite numbers as bbox"),
+    (box("000001", "Car", [0, 0, -1, 1]), "expected a bbox of left, top, width, height, got"),
+    (box("000001", "Car", [0, 0, 1, 1], math.nan), "expected a finite number as score, got NaN"),
+    ({"image_id": "000001", "bbox": [0, 0, 1, 1], "score": 1}, "expected image_id, category_id, bbox, score, got"),
+    ([1], "expected image_id, category_id, bbox, score, got"),
+])
+def test_wrong_predictions_are_refused(folder, tmp_path, entry, error):
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3, 3]), entry])
+    with pytest.raises(ValueError, match=error):
+        evaluate_detections(found, Samples(folder, None, None, None))
+
+
+def test_what_is_no_list_and_ids_that_two_have_are_refused(two_shards, tmp_path):
+    for text, error in (("{}", "expected a list, got dict"), ("[", "expected JSON, got")):
+        (tmp_path / "found.json").write_text(text)
+        with pytest.raises(ValueError, match=error):
+            evaluate_detections(tmp_path / "found.json", Samples(two_shards, None, None, None))
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3, 3])])
+    with pytest.raises(ValueError, match='expected the image_id of one sample of 8, got "000000", which two have'):
+        evaluate_detections(found, Samples(two_shards, None, None, None))
+    with pytest.raises(ValueError, match="expected classes of Car, DontCare, got Bus"):
+        evaluate_detections(found, Samples(two_shards, None, None, None), ["Bus"])
+
+
+def test_poses_of_a_folder(folder, tmp_path):
+    samples = Samples(folder, None, None, None)
+    places = samples.shards.joint_places(0, samples.shards.default_joints())
+    first, alone = (samples.shards.labels(i)["persons"]["joints"][:, places] for i in (0, 3))  # two persons, one
+    joints = first + [3.0, 4.0]
+    entries = [{"image_id": "000000", "person": 1, "joints": joints[1].tolist()}, {"image_id": "000004", "joints": alone[0].tolist()}]
+    result, found, persons = evaluate_poses(write(tmp_path / "found.json", entries), samples)
+    assert result["counts"]["persons"] == 3 and result["counts"]["not_found"] == 1 and np.isnan(found[0]).all()
+    of_it = persons.scored(False)[1:]
+    assert result["joints"]["all"]["mpjpe_volume"] == pytest.approx(5 * of_it[0].sum() / of_it.sum())
+    linear = samples.shards.labels(0)["pair"]["source_to_volume"]
+    moved = math.hypot(3 / linear[0, 0], 4 / linear[1, 1])
+    assert result["joints"]["all"]["mpjpe_source"] == pytest.approx(moved * of_it[0].sum() / of_it.sum())
+    for wrong, error in (({}, "expected a person of the 2 there are, got null"), ({"person": 2}, "expected a person of the 2 there are, got 2"),
+                         ({"person": 1}, "got 1 twice"), ({"person": 0, "joints": [[0, 0]]}, "expected 2 x 2 finite numbers as joints")):
+        with pytest.raises(ValueError, match=error):
+            evaluate_poses(write(tmp_path / "wrong.json", [*entries, {"image_id": "000000", "joints": joints[0].tolist(), **wrong}]), samples)
+
+
+def evaluate(*arguments, expect=0):
+    done = subprocess.run([sys.executable, "-m", "eventgan_shards.evaluate", *map(str, arguments)], capture_output=True, text=True,
+                          env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")})
+    assert done.returncode == expect, done.stdout + done.stderr
+    return done.stdout + done.stderr
+
+
+def test_the_command_prints_tables_json_and_pictures(folder, tmp_path):
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5])])
+    said = evaluate("detections", found, "--truth", folder)
+    assert "4 samples (3 without a prediction), 2 boxes to find" in said
+    heading, car = said.split("\n\n")[1].splitlines()[:2]
+    assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500", "0.500", "0.667"] and heading.split()[-1] == "F1"
+    assert json.loads(evaluate("detections", found, "--truth", folder, "--json"))["classes"]["Car"]["recall_easy"] is None
+    poses = write(tmp_path / "poses.json", [])
+    assert "3 persons, 3 of them not found" in evaluate("poses", poses, "--truth", folder)
+    assert "nowhere" in evaluate("detections", poses, "--truth", tmp_path / "nowhere", expect=1)
+    pytest.importorskip("cv2")
+    evaluate("detections", found, "--truth", folder, "--pictures", tmp_path / "boxes")
+    evaluate("poses", poses, "--truth", folder, "--pictures", tmp_path / "joints")
+    assert {path.name for path in (tmp_path / "boxes").iterdir()} >= {"precision_recall.png", "000000.png"}
+    assert len(list((tmp_path / "joints").glob("*.png"))) == 2
