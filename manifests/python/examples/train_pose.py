@@ -56,6 +56,8 @@ def main() -> None:
     persons = read_persons(checked)
     persons = persons.rows(checked.annotated(learn.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
     check.persons = persons.place
+    searched = training.tested(args, checked, with_persons)
+    test = PoseDataset(searched, size, learn.joint_names, sigma=args.sigma)
     if not len(check) or persons.names != learn.joint_names:
         raise SystemExit(f"expected persons with head boxes and the joints that are learnt to check, got {len(check)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")
@@ -80,9 +82,12 @@ def main() -> None:
         maps = model(events.to(args.device)).cpu().numpy()
         return get_final_preds(config, maps, np.asarray(meta["center"]), np.asarray(meta["scale"]))[0]
 
+    def search(dataset: PoseDataset) -> np.ndarray:
+        """[persons, J, 2]: joints in volume pixels."""
+        return np.concatenate([find(events, meta) for events, _, _, meta in training.batches(args, dataset)])
+
     def measure() -> dict[str, float]:
-        found = np.concatenate([find(events, meta) for events, _, _, meta in training.batches(args, check)])
-        scores = pose_scores(found, persons, hidden=True)["all"]
+        scores = pose_scores(search(check), persons, hidden=True)["all"]
         return {"PCKh@0.5": scores["pckh_mpii"], "MPJPE": scores["mpjpe_source"]}
 
     optimizer = torch.optim.Adam(model.parameters(), lr=args.lr)
@@ -96,6 +101,11 @@ def main() -> None:
         pictures.draw_joints(picture, found, pictures.FOUND, np.where(persons.annotated[i][:, None], persons.joints[i], np.nan))
         return f"{meta['image']}_{meta['person']}", picture
 
+    names = searched.column("sample_id")[test.persons[:, 0]]
+    with torch.no_grad():
+        found = search(test).tolist()
+    training.write_predictions(args, ({"image_id": name, "person": person, "joints": joints}
+                                      for name, person, joints in zip(names, test.persons[:, 1].tolist(), found)))
     training.write_pictures(args, len(check), picture_of)
 
 

@@ -8,6 +8,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 
 import numpy as np
 import torch
@@ -15,6 +16,7 @@ import torchvision
 import training
 from eventgan_shards import pictures
 from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
+from torch.utils.data import Dataset
 
 
 def read_args() -> argparse.Namespace:
@@ -72,6 +74,7 @@ def main() -> None:
         else:
             learn = DetectionDataset(learnt, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
             check = DetectionDataset(checked, learn.classes, **place)
+            test = DetectionDataset(training.tested(args, checked, usable(args.task)), learn.classes, **place)
     except ValueError as error:
         raise SystemExit(f"{error}, in {args.data}")
     classes = list(learn.classes)
@@ -88,12 +91,17 @@ def main() -> None:
     def detect(volumes: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
         return [{name: value.cpu() for name, value in found.items()} for found in model([volume.to(args.device) for volume in volumes])]
 
+    def search(dataset: Dataset) -> Iterator[tuple[dict, dict[str, torch.Tensor]]]:
+        """Each item, without its volume, with what is found in it."""
+        for items in training.batches(args, dataset, list):
+            yield from zip(items, detect([item.pop("volume") for item in items]))
+
+    def boxes(found: dict[str, torch.Tensor]) -> tuple[torch.Tensor, ...]:
+        return found["boxes"], found["labels"] - 1, found["scores"]
+
     def measure() -> dict[str, float]:
-        pairs = []
-        for items in training.batches(args, check, list):
-            found = detect([item.pop("volume") for item in items])  # not kept
-            pairs += zip(items, found)
-        values = training.average_precisions(((item, (found["boxes"], found["labels"] - 1, found["scores"])) for item, found in pairs), classes)
+        pairs = list(search(check))
+        values = training.average_precisions(((item, boxes(found)) for item, found in pairs), classes)
         if args.task == "detection":
             return values
         near = [near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item) for item, found in pairs]
@@ -114,6 +122,8 @@ def main() -> None:
                 pictures.draw_joints(picture, joints[joints[:, 2] > 0, :2], colour)
         return item["id"], picture
 
+    if args.task == "detection":
+        training.write_predictions(args, (entry for item, found in search(test) for entry in training.box_predictions(item, boxes(found), classes, place["view"])))
     training.write_pictures(args, len(check), picture_of)
 
 

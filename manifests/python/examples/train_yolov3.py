@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import pathlib
 import re
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
@@ -76,6 +77,7 @@ def main() -> None:
     try:
         learn = DetectionDataset(learnt, classes, (height, width), augmentation, view=view)
         check = DetectionDataset(checked, classes, (height, width), view=view)
+        test = DetectionDataset(training.tested(args, checked, with_boxes), classes, (height, width), view=view)
     except ValueError as error:
         raise SystemExit(f"{error}, in {args.data}")
 
@@ -106,10 +108,13 @@ def main() -> None:
             clip_coords(each, (height, width))
         return found
 
+    def search(dataset: DetectionDataset) -> Iterator[tuple[dict, tuple[torch.Tensor, ...]]]:
+        """Each item with the boxes, labels and scores that are found in it."""
+        for imgs, _, items in training.batches(args, dataset, collate):
+            yield from ((item, (each[:, :4], each[:, 5], each[:, 4])) for item, each in zip(items, detect(imgs, 0.001)))
+
     def measure() -> dict[str, float]:
-        pairs = ((item, (each[:, :4], each[:, 5], each[:, 4])) for imgs, _, items in training.batches(args, check, collate)
-                 for item, each in zip(items, detect(imgs, 0.001)))
-        return training.average_precisions(pairs, classes)
+        return training.average_precisions(search(check), classes)
 
     groups = {True: [], False: []}
     for name, weight in model.named_parameters():
@@ -123,6 +128,7 @@ def main() -> None:
         found = detect(item["volume"][None], 0.3)[0]
         return item["id"], training.draw_item(item, found[:, :4], [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
 
+    training.write_predictions(args, (entry for item, found in search(test) for entry in training.box_predictions(item, found, classes, view)))
     training.write_pictures(args, len(check), picture_of)
 
 

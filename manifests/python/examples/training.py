@@ -24,10 +24,11 @@ sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package
 
 from eventgan_shards import Shards, pictures, read_description  # noqa: E402
 from eventgan_shards.detection_scores import Found, Truth, detection_scores  # noqa: E402
+from eventgan_shards.torch import inverse, move_boxes  # noqa: E402
 
 CHECKED_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
-MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every"}  # when a run goes on
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every", "test"}  # when a run goes on
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
@@ -36,6 +37,8 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--data", required=True, help="folder that eventgan finalize has completed")
     parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and pictures; the same line again goes on")
     parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
+    parser.add_argument("--test", help="folder of shards in whose labelled samples (of its split for checking, if it has one) is searched at the end, for predictions.json; "
+                        "default: those that are checked")
     parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
     parser.add_argument("--epochs", type=int, help="limit")
     parser.add_argument("--steps", type=int, help="limit, in batches")
@@ -126,6 +129,19 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
         print(f"{len(description['quarantined'])} samples are in quarantine and left out")
     print(f"{len(parts[0])} samples to learn, {len(parts[1])} to check, {how}")
     return parts[0], parts[1]
+
+
+def tested(args: argparse.Namespace, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
+    """The samples that predictions.json is of."""
+    if not args.test:
+        return checked
+    try:
+        splits = read_description(args.test)["counts"]["by_split"]
+        shards = Shards(args.test, split=next((name for name in CHECKED_SPLITS if name in splits), None),
+                        where={"dataset": args.dataset} if args.dataset else None, partial=True)
+        return shards[list(usable(shards))]
+    except (OSError, ValueError) as error:
+        sys.exit(str(error))
 
 
 def _divides(shards: Shards, by: str) -> bool:
@@ -246,6 +262,22 @@ def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Ten
     found, truth = Found.of(*map(np.concatenate, zip(*found))), Truth(*map(np.concatenate, zip(*truth)))
     scores = detection_scores(found, truth, {name: i for i, name in enumerate(classes)})
     return {f"AP50 {name}": scores[name]["ap_voc"] for name in classes}
+
+
+def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.Tensor], classes: Sequence[str], view: np.ndarray) -> list[dict]:
+    """What was found in an item of DetectionDataset, as in `average_precisions`, for predictions.json; `view` is the dataset's."""
+    boxes, labels, scores = (column.numpy() for column in found)
+    boxes = move_boxes(boxes, inverse(view))
+    boxes[:, 2:] -= boxes[:, :2]
+    return [{"image_id": item["id"], "category_id": classes[int(label)], "bbox": box, "score": score}
+            for box, label, score in zip(boxes.tolist(), labels, scores.tolist())]
+
+
+def write_predictions(args: argparse.Namespace, entries: Iterable[dict]) -> None:
+    """predictions.json, which `python3 -m eventgan_shards.evaluate` reads."""
+    with torch.no_grad():
+        text = json.dumps(list(entries)) + "\n"
+    _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))
 
 
 def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarray:

@@ -58,6 +58,13 @@ def need_trainer(name, *modules):
     return TRAINERS / name
 
 
+def evaluate(what, out, data, *more):
+    done = subprocess.run([sys.executable, "-m", "eventgan_shards.evaluate", what, out / "predictions.json", "--truth", data, "--json", *more],
+                          capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(EXAMPLES.parent)})
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout)
+
+
 def assert_trained(out, steps, pictures):
     assert [row["step"] for row in history(out)] == steps
     assert all(np.isfinite(row["loss"]) for row in history(out)[1:])
@@ -73,6 +80,9 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     assert "goes on after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
     assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
+    (tmp_path / "ids.txt").write_text("\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
+    scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--confidence", "0", "--nms", "1", "--classes", "Car")
+    assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
     assert "expected --lr 0.0002, with which this run began, got 0.5, in" in said
 
@@ -94,6 +104,10 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
             time.sleep(0.01)
         process.kill()
     assert "goes on after epoch" in train("train_pose", data, tmp_path / "killed", *options)
+    predictions = json.loads((tmp_path / "whole" / "predictions.json").read_text())
+    (tmp_path / "ids.txt").write_text("\n".join(entry["image_id"] for entry in predictions))
+    scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "ids.txt", "--hidden")
+    assert scores["joints"]["all"]["pckh_mpii"] == history(tmp_path / "whole")[-1]["PCKh@0.5"]
     whole, killed = ([{**row, "minutes": 0} for row in history(tmp_path / out)] for out in ("whole", "killed"))
     assert whole == killed
 
@@ -101,7 +115,9 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
 def test_yolov3_learns(data, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
     train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2", "--batch", "2", "--scale", "1",
-          "--every", "9", "--classes", "Car,Van")
+          "--every", "9", "--classes", "Car,Van", "--test", data)
+    scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object", "--confidence", "0", "--nms", "1")
+    assert scores["counts"]["samples"] == 12 and scores["counts"]["not_of_these_samples"] == 0
     assert_trained(tmp_path / "out", [0, 2], pictures=2)
     assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
     said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes", "Bus", expect=1)
