@@ -1,7 +1,7 @@
 """Scores of boxes that were found, on arrays: PASCAL VOC's matching and average precision, COCO's, and KITTI's.
 
-What is not defined (a recall where nothing is to be found, a precision where nothing was found) is NaN. An average precision is 0 if all is missed, NaN if there is
-nothing to find.
+What is not defined (a recall where nothing is to be found, a precision where nothing was found) is NaN. An average precision is 0 if all is
+missed, NaN if there is nothing to find.
 """
 
 from __future__ import annotations
@@ -61,7 +61,8 @@ class Overlaps(NamedTuple):
 
 
 def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray) -> Overlaps:
-    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], in order of the first and then the second."""
+    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], in order of the first and then the
+    second."""
     order = np.argsort(other_image, kind="stable")
     begin, end = (np.searchsorted(other_image[order], image, side) for side in ("left", "right"))
     counts = end - begin
@@ -93,8 +94,8 @@ def rounds(turn: np.ndarray) -> list[np.ndarray]:
 
 
 def strongest(found: Found, iou: float) -> np.ndarray:
-    """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU with it is above
-    `iou`."""
+    """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU
+    with it is above `iou`."""
     left = np.ones(len(found.score), bool)
     group = _group(found)
     pairs = overlapping(group, found.xyxy, group, found.xyxy)
@@ -106,8 +107,9 @@ def strongest(found: Found, iou: float) -> np.ndarray:
 
 
 def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: np.ndarray, others: int) -> np.ndarray:
-    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one picture one after the other; each
-    takes, of the pairs (first, second) [k] in their order, the first that is `allowed` [k, T] and whose second is still free. Pairs are never of two pictures."""
+    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one picture
+    one after the other; each takes, of the pairs (first, second) [k] in their order, the first that is `allowed` [k, T] and whose second is
+    still free. Pairs are never of two pictures."""
     trials = allowed.shape[1]
     choice, free = np.full((len(turn), trials), -1), np.ones((others, trials), bool)
     order = np.argsort(first, kind="stable")
@@ -126,9 +128,9 @@ def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: n
 def match_as_voc(found: Found, truth: Truth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
     """int [n], the row of the true box that each found one stands for, -1 for none; bool [n], whether it counts.
 
-    As PASCAL VOC's development kit: a found box stands for the true one of its class with which its IoU is greatest, if that is at least `iou` and no box of a
-    higher score has it; a second one on the same is wrong. What stands for none and lies with a share of at least `iou` of its area in a box to be
-    ignored, of whatever class, does not count.
+    As PASCAL VOC's development kit: a found box stands for the true one of its class with which its IoU is greatest, if that is at least
+    `iou` and no box of a higher score has it; a second one on the same is wrong. What stands for none and lies with a share of at least
+    `iou` of its area in a box to be ignored, of whatever class, does not count.
     """
     pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
     same = np.flatnonzero(_same_class(found, truth, pairs))
@@ -142,9 +144,9 @@ def match_as_voc(found: Found, truth: Truth, iou: float = 0.5) -> tuple[np.ndarr
 
 
 def match_as_coco(found: Found, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
-    """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the highest score on, each takes
-    the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of all classes. Beyond the 100 best of a class and
-    sample none counts."""
+    """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the
+    highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of
+    all classes. Beyond the 100 best of a class and sample none counts."""
     pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
     turn = turns(_group(found))
     same = np.flatnonzero(_same_class(found, truth, pairs) & (turn[pairs.first] < COCO_MOST))
@@ -234,9 +236,10 @@ def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou
 
 
 def kitti_average_precision(found: Found, truth: Truth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
-    """KITTI's average precision, of 40 recalls, of class `name` at `level`, as its development kit (evaluate_object.cpp) counts it: IoU above 0.7 for cars and 0.5
-    for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found boxes lower than the level's least `height` [n], in source
-    pixels, never count (of whatever class, they may take a true box); those that lie in DontCare do not, either. NaN if the level has no box."""
+    """KITTI's average precision, of 40 recalls, of class `name` at `level`, as its development kit (evaluate_object.cpp) counts it: IoU
+    above 0.7 for cars and 0.5 for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found boxes
+    lower than the level's least `height` [n], in source pixels, never count (of whatever class, they may take a true box); those that lie
+    in DontCare do not, either. NaN if the level has no box."""
     least, neighbour = KITTI_CLASSES[name]
     rank = list(KITTI_LEVELS).index(level)
     of_class, small = truth.label == classes[name], height < KITTI_LEVELS[level]

@@ -8,9 +8,10 @@ The predictions are a list in JSON:
     detections   {"image_id": "000001", "category_id": "Car", "bbox": [left, top, width, height], "score": 0.9}, as COCO's results
     poses        {"image_id": "000001", "person": 0, "joints": [[x, y], ...]}
 
-image_id is a sample's id, or its place in the split, from 1 on; category_id a class's name, or its place among the sources' classes without DontCare, from 1
-on: the numbers of `eventgan export --to coco`. Boxes and joints are in volume pixels, boxes by edges, joints by centres (shard_format.md, Geometry). `person` is the
-row in the sample, to be left out where there is only one; joints come in the order of Shards.default_joints().
+image_id is a sample's id, or its place in the split, from 1 on; category_id a class's name, or its place among the sources' classes without
+DontCare, from 1 on: the numbers of `eventgan export --to coco`. Boxes and joints are in volume pixels, boxes by edges, joints by centres
+(shard_format.md, Geometry). `person` is the row in the sample, to be left out where there is only one; joints come in the order of
+Shards.default_joints().
 
 detection_scores.py and pose_scores.py say what each number is. One that is not defined is null in JSON and "-" in a table.
 """
@@ -34,6 +35,8 @@ from .pose_scores import Persons, pose_scores, read_persons
 from .shards import PathLike, Shards, open_shard
 
 PICTURES = 12  # samples that are drawn
+PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall", "recall": "combined recall", "ap_voc": "AP",
+                 "f1": "F1"}  # of the EventGAN paper's Table 1
 
 
 def read_predictions(path: PathLike, keys: Sequence[str]) -> list[dict[str, Any]]:
@@ -76,8 +79,8 @@ class Samples:
         self._all_names = self._of_split.column("sample_id").tolist()
 
     def of(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. An id that there is not, or that two scored samples
-        have, is a ValueError."""
+        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. An id that there is not, or that two
+        scored samples have, is a ValueError."""
         places = {**dict.fromkeys(self._all_names, -1), **{name: i for i, name in enumerate(self._names)}}
         twice = {name for name, count in zip(*np.unique(self._names, return_counts=True)) if count > 1}
         found = np.empty(len(entries), int)
@@ -106,17 +109,19 @@ class Samples:
         labels = {**{i + 1: self.classes.index(name) for i, name in enumerate(numbered)}, **{name: self.classes.index(name) for name in numbered}}
         unknown = [i for i, entry in enumerate(entries) if not isinstance(entry["category_id"], (int, str)) or entry["category_id"] not in labels]
         if unknown:
-            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got {json.dumps(entries[unknown[0]]['category_id'])}, "
-                             f"in {path} (entry {unknown[0]})")
+            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got "
+                             f"{json.dumps(entries[unknown[0]]['category_id'])}, in {path} (entry {unknown[0]})")
         return np.array([labels[entry["category_id"]] for entry in entries], int)
 
 
 def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
                         iou: float = 0.5) -> tuple[dict[str, Any], Found, Truth]:
-    """What `detections` prints, as a dictionary, with the boxes that it is of. Predictions of a score below `confidence` are removed first, then non-maximum suppression
-    at an IoU of `nms` follows (1: none), as in the paper: what is removed is in no score, the average precisions' neither. Samples of sources without boxes are left out.
+    """What `detections` prints, as a dictionary, with the boxes that it is of.
 
     classes: those to score (None: all that have a box to find or a prediction)
+    confidence, nms: predictions of a lower score are removed first, then non-maximum suppression at this IoU follows (1: none), as in the paper: what is
+        removed is in no score, the average precisions' neither
+    Samples of sources without boxes are left out; that all are is a ValueError, and so are predictions that do not hold what they should.
     """
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
     unknown = [name for name in classes or () if name not in numbers]
@@ -128,8 +133,11 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     if len(wrong):
         raise ValueError(f"expected a bbox of left, top, width, height, got {boxes[wrong[0]].tolist()}, in {predictions} (entry {wrong[0]})")
     labelled = np.array([bool(shards.class_names(i)) for i in range(len(shards))], bool)
+    if not labelled.any():
+        raise ValueError("expected samples of sources with boxes, got none")
     image = samples.of(entries, predictions)
-    found = Found.of(image, samples.labels(entries, predictions), np.column_stack([boxes[:, :2], boxes[:, :2] + boxes[:, 2:]]), scores)
+    boxes[:, 2:] += boxes[:, :2]
+    found = Found.of(image, samples.labels(entries, predictions), boxes, scores)
     found = found.rows((found.image >= 0) & np.append(labelled, False)[found.image])
     given, truth = len(found.score), read_boxes(shards, numbers)
     found = found.rows(found.score >= confidence)
@@ -137,8 +145,9 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     if classes is None:
         there = np.concatenate([found.label, truth.label[~truth.ignore]])
         classes = [name for name, label in numbers.items() if name != DONT_CARE and (there == label).any()]
-    counts = {"samples": int(labelled.sum()), "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))), "ignored": int(truth.ignore.sum()),
-              "predictions": len(entries), "not_of_these_samples": len(entries) - given, "after_suppression": len(found.score)}
+    counts = {"samples": int(labelled.sum()), "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))),
+              "ignored": int(truth.ignore.sum()), "predictions": len(entries), "not_of_these_samples": len(entries) - given,
+              "after_suppression": len(found.score)}
     result = {"settings": {"confidence": confidence, "nms": nms, "iou": iou}, "counts": counts,
               "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou)}
     kitti = _of_kitti(shards, found, truth, numbers, classes)
@@ -158,6 +167,8 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
     """What `poses` prints, as a dictionary, with the joints found [P, J, 2] in volume pixels (NaN: not found) and the persons that are there."""
     shards = samples.shards
     persons = read_persons(shards)
+    if not persons.names:
+        raise ValueError("expected samples of sources with joints, got none")
     entries = read_predictions(predictions, ("image_id", "joints"))
     image, joints = samples.of(entries, predictions), numbers_of(entries, "joints", (len(persons.names), 2), predictions)
     rows = {(index, row): i for i, (index, row) in enumerate(persons.place.tolist())}
@@ -180,10 +191,7 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
     return {"settings": {"hidden": hidden}, "counts": counts, "joints": pose_scores(found, persons, hidden)}, found, persons
 
 
-# Tables --------------------------------------------------------------------------------------------------------------------------
-
-
-def table(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[str, str], digits: int = 3) -> str:
+def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str], digits: int = 3) -> str:
     """A line of headings (the values of `columns`), then one for each row with its values under the keys of `columns`; NaN is "-"."""
     cells = [[title, *columns.values()]]
     for name, row in rows.items():
@@ -192,20 +200,20 @@ def table(title: str, rows: Mapping[str, Mapping[str, float]], columns: Mapping[
     return "\n".join("  ".join([line[0].ljust(widths[0]), *(text.rjust(width) for text, width in zip(line[1:], widths[1:]))]) for line in cells)
 
 
-def _text(value: float, digits: int) -> str:
-    return str(value) if isinstance(value, int) else "-" if math.isnan(value) else f"{value:.{digits}f}"
+def _text(value: float | str, digits: int) -> str:
+    return str(value) if isinstance(value, (int, str)) else "-" if math.isnan(value) else f"{value:.{digits}f}"
 
 
 def detection_tables(result: Mapping[str, Any]) -> str:
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
-    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} boxes to find, {counts['ignored']} to be "
-             f"ignored; {counts['after_suppression']} of {counts['predictions']} predictions left by confidence {settings['confidence']:g} and non-maximum suppression at "
-             f"IoU {settings['nms']:g}")
+    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} boxes to find, "
+             f"{counts['ignored']} to be ignored; {counts['after_suppression']} of {counts['predictions']} predictions left by confidence "
+             f"{settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
     if counts["not_of_these_samples"]:
         first += f"; {counts['not_of_these_samples']} are of other samples"
-    tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", "precision": "precision", "recall_easy": "easy recall",
-                                         "recall_hard": "hard recall", "recall": "combined recall", "ap_voc": "AP", "f1": "F1"}),
-              table("average precision", classes, {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points", "ap_coco": "COCO, AP@[.5:.95]"})]
+    tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", **PAPER_COLUMNS}),
+              table("average precision", classes, {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points",
+                                                   "ap_coco": "COCO, AP@[.5:.95]"})]
     if "kitti" in result:
         tables.append(table("KITTI, 40 recalls", result["kitti"], {level: level for level in KITTI_LEVELS}))
     return "\n\n".join(tables)
@@ -213,42 +221,50 @@ def detection_tables(result: Mapping[str, Any]) -> str:
 
 def pose_tables(result: Mapping[str, Any]) -> str:
     counts = result["counts"]
-    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {counts['hidden']} hidden"
-             f"{' (scored all the same)' if result['settings']['hidden'] else ''}; PCKh without {counts['without_head']} persons whose head or shoulders are not "
-             f"annotated, MPII's without {counts['without_head_box']} that have no head box")
-    return first + "\n\n" + table("", result["joints"], {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px", "mpjpe_source": "MPJPE, source px",
-                                                          "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
+    hidden = f"{counts['hidden']} hidden ones scored, too" if result["settings"]["hidden"] else f"{counts['hidden']} hidden"
+    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {hidden}; "
+             f"PCKh without {counts['without_head']} persons whose head or shoulders are not annotated, MPII's without {counts['without_head_box']} that have "
+             "no head box")
+    return first + "\n\n" + table("", result["joints"], {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px",
+                                                          "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
 
 
-def draw(folder: str, samples: Samples, result: Mapping[str, Any], found: Found | np.ndarray, truth: Truth | Persons) -> None:
-    """Some of the samples, evenly spread: found blue, true green, to be ignored (or of joints: not scored) red; of boxes also precision over recall."""
+def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Found, truth: Truth) -> None:
+    """Precision over recall, and some of the samples, evenly spread: found blue, true green, to be ignored red."""
     from . import pictures  # OpenCV, which nothing else here needs
 
-    shards, names = samples.shards, samples.shards.column("sample_id")
-    if isinstance(found, Found):
-        numbers = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
-        found = found.rows(np.isin(found.label, list(numbers)))
-        stands_for, counts = match_as_voc(found, truth, result["settings"]["iou"])
-        curves = {}
-        for label, name in numbers.items():
-            mine = counts & (found.label == label)
-            curves[name] = curve(stands_for[mine] >= 0, result["classes"][name]["truths"])
-        pictures.write(folder, "precision_recall", pictures.of_precision(curves))
-    of_samples = np.union1d(found.image, truth.image) if isinstance(found, Found) else np.unique(truth.place[:, 0])
-    for i in of_samples[np.unique(np.linspace(0, len(of_samples) - 1, PICTURES).round().astype(int))] if len(of_samples) else ():
-        picture = pictures.of_events(shards.sample(i, {"volume"})["volume"])
-        if isinstance(found, Found):
-            true, ours = truth.image == i, found.image == i
-            pictures.draw_boxes(picture, truth.xyxy[true & truth.ignore], pictures.IGNORED)
-            pictures.draw_boxes(picture, truth.xyxy[true & ~truth.ignore & np.isin(truth.label, list(numbers))], pictures.TRUE)
-            texts = [f"{numbers[label]} {score:.2f}" for label, score in zip(found.label[ours].tolist(), found.score[ours])]
-            pictures.draw_boxes(picture, found.xyxy[ours], pictures.FOUND, texts)
-        for person in np.flatnonzero(truth.place[:, 0] == i) if isinstance(truth, Persons) else ():
-            scored = truth.scored(result["settings"]["hidden"])[person]
-            pictures.draw_joints(picture, truth.joints[person][truth.annotated[person] & ~scored], pictures.IGNORED)
-            pictures.draw_joints(picture, truth.joints[person][scored], pictures.TRUE)
-            pictures.draw_joints(picture, found[person][scored], pictures.FOUND, truth.joints[person][scored])
-        pictures.write(folder, str(names[i]), picture)
+    names = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
+    found = found.rows(np.isin(found.label, list(names)))
+    stands_for, counts = match_as_voc(found, truth, result["settings"]["iou"])
+    curves = {name: curve(stands_for[counts & (found.label == label)] >= 0, result["classes"][name]["truths"]) for label, name in names.items()}
+    pictures.write(folder, "precision_recall", pictures.of_precision(curves))
+    true = ~truth.ignore & np.isin(truth.label, list(names))
+    for i in _some(np.union1d(found.image, truth.image)):
+        there, ours = truth.image == i, np.flatnonzero(found.image == i)
+        picture = pictures.of_events(samples.shards.sample(i, {"volume"})["volume"])
+        pictures.draw_boxes(picture, truth.xyxy[there & truth.ignore], pictures.IGNORED)
+        pictures.draw_boxes(picture, truth.xyxy[there & true], pictures.TRUE)
+        pictures.draw_boxes(picture, found.xyxy[ours], pictures.FOUND, [f"{names[found.label[n]]} {found.score[n]:.2f}" for n in ours])
+        pictures.write(folder, samples.shards.column("sample_id")[i], picture)
+
+
+def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: np.ndarray, persons: Persons) -> None:
+    """Some of the samples, evenly spread: joints found blue, true green, annotated and not scored red."""
+    from . import pictures
+
+    scored = persons.scored(result["settings"]["hidden"])
+    for i in _some(np.unique(persons.place[:, 0])):
+        picture = pictures.of_events(samples.shards.sample(i, {"volume"})["volume"])
+        for row in np.flatnonzero(persons.place[:, 0] == i):
+            true = persons.joints[row]
+            pictures.draw_joints(picture, true[persons.annotated[row] & ~scored[row]], pictures.IGNORED)
+            pictures.draw_joints(picture, true[scored[row]], pictures.TRUE)
+            pictures.draw_joints(picture, found[row][scored[row]], pictures.FOUND, true[scored[row]])
+        pictures.write(folder, samples.shards.column("sample_id")[i], picture)
+
+
+def _some(values: np.ndarray) -> list[int]:
+    return values[np.unique(np.linspace(0, len(values) - 1, min(PICTURES, len(values))).round().astype(int))].tolist()
 
 
 def _without_nan(value: Any) -> Any:
@@ -265,7 +281,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--split", help="score the samples of this split alone")
     parser.add_argument("--dataset", help="score samples of this kind of source alone, such as kitti_object")
     parser.add_argument("--ids", metavar="FILE", help="score these samples alone, an id a line")
-    parser.add_argument("--classes", type=lambda text: text.split(","), help="detections: names with commas between them (default: all that have a box or a prediction)")
+    parser.add_argument("--classes", type=lambda text: text.split(","),
+                        help="detections: names with commas between them (default: all that have a box or a prediction)")
     parser.add_argument("--confidence", type=float, default=0.2, help="detections: predictions with a score below are removed (default: %(default)s)")
     parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression; 1: none (default: %(default)s)")
     parser.add_argument("--iou", type=float, default=0.5, help="detections: IoU from which on a box is found (default: %(default)s)")
@@ -276,14 +293,16 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         samples = Samples(args.truth, args.split, args.dataset, args.ids)
         if args.what == "detections":
-            result, found, truth = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms, args.iou)
+            result, *boxes = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms, args.iou)
+            text, draw = detection_tables(result), functools.partial(draw_detections, args.pictures, samples, result, *boxes)
         else:
-            result, found, truth = evaluate_poses(args.predictions, samples, args.hidden)
+            result, *joints = evaluate_poses(args.predictions, samples, args.hidden)
+            text, draw = pose_tables(result), functools.partial(draw_poses, args.pictures, samples, result, *joints)
         if args.pictures:
-            draw(args.pictures, samples, result, found, truth)
+            draw()
     except (ImportError, OSError, ValueError) as error:
         sys.exit(f"error: {error}")
-    print(json.dumps(_without_nan(result), indent=1) if args.json else (detection_tables if args.what == "detections" else pose_tables)(result))
+    print(json.dumps(_without_nan(result), indent=1) if args.json else text)
 
 
 if __name__ == "__main__":

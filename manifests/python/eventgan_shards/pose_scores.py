@@ -64,8 +64,8 @@ def head_lengths(names: Sequence[str], joints: np.ndarray, annotated: np.ndarray
 
 
 def near_head(error: np.ndarray, scored: np.ndarray, head: np.ndarray, at: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """PCKh: int [J] and int [J], how many of the joints that are `scored` [P, J] have an `error` [P, J] of at most `at` x 0.6 x `head` [P], and how many there are, of
-    persons whose `head` is known. NaN is a joint that was not found."""
+    """PCKh: int [J] and int [J], how many of the joints that are `scored` [P, J] have an `error` [P, J] of at most `at` x 0.6 x `head` [P],
+    and how many there are, of persons whose `head` is known. NaN is a joint that was not found."""
     scored = scored & np.isfinite(head)[:, None]
     return (scored & (error <= at * 0.6 * head[:, None])).sum(0), scored.sum(0)
 
@@ -75,12 +75,12 @@ def pose_scores(joints: np.ndarray, persons: Persons, hidden: bool = False) -> d
 
     scored, left_out          joints that count, and those that do not: not annotated, or hidden (unless `hidden`, as MPII's own evaluation has it)
     mpjpe_volume, mpjpe_source   mean distance in pixels of those that count and were found
-    pckh                      PCKh@0.5, as in the EventGAN paper: the share of those that count that are within half of 0.6 x the distance of head and middle of the
-                              shoulders, of persons in whom these are annotated
+    pckh                      PCKh@0.5, as in the EventGAN paper: the share of those that count that are within half of 0.6 x the distance of
+                              head and middle of the shoulders, of persons in whom these are annotated
     pckh_mpii                 MPII's own: half of 0.6 x the diagonal of the head's box, of persons who have one
 
-    Both shares are of source pixels, which no stretching changes; joints that were not found are missed. "all" is of all joints that count together, and for
-    pckh_mpii without pelvis and thorax, as MPII has it.
+    Both shares are of source pixels, which no stretching changes; joints that were not found are missed. "all" is of all joints that count
+    together, and for pckh_mpii without pelvis and thorax, as MPII has it.
     """
     scored = persons.scored(hidden)
     error = np.linalg.norm(joints - persons.joints, axis=-1)

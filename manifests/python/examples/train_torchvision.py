@@ -123,7 +123,8 @@ def main() -> None:
         return item["id"], picture
 
     if args.task == "detection":
-        training.write_predictions(args, (entry for item, found in search(test) for entry in training.box_predictions(item, boxes(found), classes, place["view"])))
+        training.write_predictions(args, (entry for item, found in search(test)
+                                          for entry in training.box_predictions(item, boxes(found), classes, place["view"])))
     training.write_pictures(args, len(check), picture_of)
 
 

@@ -37,7 +37,7 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--data", required=True, help="folder that eventgan finalize has completed")
     parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and pictures; the same line again goes on")
     parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
-    parser.add_argument("--test", help="folder of shards in whose labelled samples (of its split for checking, if it has one) is searched at the end, for predictions.json; "
+    parser.add_argument("--test", help="folder of shards whose labelled samples (of its split for checking, if it has one) predictions.json is of at the end; "
                         "default: those that are checked")
     parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
     parser.add_argument("--epochs", type=int, help="limit")
@@ -101,15 +101,19 @@ class _NoWriter:
         return lambda *_, **__: None
 
 
+def checked_split(description: dict[str, Any]) -> str | None:
+    """The folder's split for checking, of its dataset.json; None if it has none."""
+    return next((name for name in CHECKED_SPLITS if name in description["counts"]["by_split"]), None)
+
+
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
     """The samples to learn and those to check, of which `usable` gives the positions of those with labels: by the folder's
     splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no labelled frame."""
     where = {"dataset": args.dataset} if args.dataset else None
     try:
         description = read_description(args.data)
-        splits = description["counts"]["by_split"]
-        checked = next((name for name in CHECKED_SPLITS if name in splits), None)
-        if checked and "train" in splits and not args.overfit:
+        checked = checked_split(description)
+        if checked and "train" in description["counts"]["by_split"] and not args.overfit:
             parts, how = [Shards(args.data, split=split, where=where, partial=True) for split in ("train", checked)], f"of split {checked}"
             parts = [part[list(usable(part))] for part in parts]
         else:
@@ -136,9 +140,9 @@ def tested(args: argparse.Namespace, checked: Shards, usable: Callable[[Shards],
     if not args.test:
         return checked
     try:
-        splits = read_description(args.test)["counts"]["by_split"]
-        shards = Shards(args.test, split=next((name for name in CHECKED_SPLITS if name in splits), None),
-                        where={"dataset": args.dataset} if args.dataset else None, partial=True)
+        description = read_description(args.test)
+        where = {"dataset": args.dataset} if args.dataset in description["counts"]["by_dataset"] else None
+        shards = Shards(args.test, split=checked_split(description), where=where, partial=True)
         return shards[list(usable(shards))]
     except (OSError, ValueError) as error:
         sys.exit(str(error))

@@ -369,8 +369,8 @@ def test_a_hundred_thousand_predictions_take_seconds():
     assert time.monotonic() - start < 30
 
 
-# The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare; two persons of nose,
-# left hand, right hand.
+# The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare, and two
+# persons; the last one.
 
 
 def write(path, entries):
@@ -383,7 +383,8 @@ def box(image_id, category, bbox, score=0.9):
 
 
 def test_detections_of_a_folder(folder, tmp_path):
-    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000001", "Car", [0, 0, 3, 3], 0.5), box("000003", "Car", [0, 0, 3, 3], 0.1)])
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000001", "Car", [0, 0, 3, 3], 0.5),
+                                            box("000003", "Car", [0, 0, 3, 3], 0.1)])
     result, _, truth = evaluate_detections(found, Samples(folder, None, None, None))
     car = result["classes"]["Car"]
     assert result["counts"] == {"samples": 4, "samples_without_prediction": 2, "ignored": int(truth.ignore.sum()), "predictions": 3, "not_of_these_samples": 0,
