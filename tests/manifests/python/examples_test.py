@@ -124,6 +124,19 @@ def test_yolov3_learns(data, tmp_path):
     assert "got Bus" in said and str(data) in said
 
 
+def test_the_experiment_in_small(tmp_path):
+    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
+    line = [sys.executable, EXAMPLES / "experiment.py", "detection", "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
+    first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
+    assert first.returncode == 0, first.stdout + first.stderr
+    assert first.stdout.count("train_yolov3.py") == 4 and "train_yolov3.py" not in again.stdout  # done before
+    rows = json.loads((tmp_path / "out" / "scores.json").read_text())
+    assert list(rows) == ["EventGAN", "log difference", "ESIM", "Frame"] and all(len(row["ap_voc"]) == 1 for row in rows.values())
+    assert "combined recall" in again.stdout
+    for name in ("camera", "frames"):  # exchanged volumes are sound ones
+        subprocess.run([PROGRAM, "verify", tmp_path / "out" / "demo" / name], check=True, capture_output=True)
+
+
 def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     said = train("train_torchvision", tmp_path, tmp_path / "out", expect=1)
     assert f"got no {tmp_path / 'dataset.json'}" in said and "Traceback" not in said
