@@ -184,7 +184,7 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
             raise ValueError(f"expected a person of the {np.count_nonzero(persons.place[:, 0] == index)} there are, {what}, in {predictions} (entry {number}, "
                              f"sample {entry['image_id']})")
         found[at] = joints[number]
-    not_found = np.isnan(found).all((1, 2))
+    not_found = np.isnan(found).all((1, 2)) & persons.scored(hidden).any(1)
     counts = {"persons": len(persons.place), "not_found": int(not_found.sum()), "predictions": len(entries), "not_of_these_samples": int((image < 0).sum()),
               "hidden": int(persons.hidden.sum()), "not_annotated": int((~persons.annotated).sum()),
               "without_head": int(np.isnan(persons.head).sum()), "without_head_box": int(np.isnan(persons.head_box).sum())}

@@ -26,7 +26,7 @@ def draw_boxes(picture: np.ndarray, boxes: Iterable[Iterable[float]], colour: tu
     for box in boxes:
         left, top, right, bottom = (round(ZOOM * float(edge)) for edge in box)
         cv2.rectangle(picture, (left, top), (right - 1, bottom - 1), colour, 1)
-        cv2.putText(picture, next(texts, ""), (left, top - 3), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+        cv2.putText(picture, next(texts, ""), (left, max(top - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
 
 
 def draw_joints(picture: np.ndarray, joints: np.ndarray, colour: tuple[int, int, int], true: np.ndarray | None = None) -> None:
