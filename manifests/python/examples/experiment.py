@@ -1,11 +1,15 @@
 #!/usr/bin/python3
-"""The EventGAN paper's experiment with detectors, in small, with a stand-in for the camera: trained on made events, tested on "real" ones.
+"""The EventGAN paper's experiments, in small, with a stand-in for the camera: networks trained on made events, tested on "real" ones.
 
-    experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out experiment
+    experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
+    experiment.py pose --program build/release/eventgan --trainer ../shared/trainers/pose_resnet --out poses
 
-The demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny learns on each, and on the grey frames. The
-"camera" is the sensor model with noise on the scenes that are not learnt, moved from frame to frame along their optical flow; the detectors
-of the three kinds of events are tested on its volumes, that of the frames on frames. The same line again goes on where it was.
+detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny learns on each, and on the grey frames. The
+detectors of the three kinds of events are tested on the "camera's" volumes, that of the frames on frames.
+pose: pose_resnet learns on the demo's figures as the network converts them, and is tested on the "camera's" volumes: as it is, and after its last layer has
+learnt on the camera's for 1 and for 5 epochs; and one that has learnt on the camera's alone.
+
+The "camera" is the sensor model with noise, moved from frame to frame along their optical flow. The same line again goes on where it was.
 """
 
 from __future__ import annotations
@@ -26,24 +30,25 @@ import h5py
 import numpy as np
 import training
 from eventgan_shards import Sample, Shards, read_description
-from eventgan_shards.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, table
+from eventgan_shards.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
 
 EXAMPLES = pathlib.Path(__file__).resolve().parent
 GENERATORS = {"EventGAN": {"weights": "shipped"}, "log difference": {"kind": "difference"}, "ESIM": {"kind": "esim"}}
 SENSOR = {"threshold_spread": 0.03, "refractory_s": 0.0005, "leak_rate_hz": 0.1, "shot_noise_rate_hz": 0.2}  # of the "camera"
 FRAMES_PER_SECOND = 10
+POSE_COLUMNS = {"mpjpe_volume": "MPJPE, volume px", "pckh": "PCKh@0.5"}  # of the EventGAN paper's Table 2
 
 
 def read_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["detection"])
+    parser.add_argument("what", choices=["detection", "pose"])
     parser.add_argument("--program", default="eventgan", help="the eventgan program")
-    parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3")
+    parser.add_argument("--trainer", required=True, help="detection: folder of ultralytics/yolov3; pose: of microsoft/human-pose-estimation.pytorch")
     parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for everything; the same line again goes on")
     parser.add_argument("--scenes", type=int, default=400)
-    parser.add_argument("--minutes", type=float, default=6.0, help="that each of the twelve detectors learns")
+    parser.add_argument("--minutes", type=float, default=6.0, help="that each network learns")
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with boxes, in place of the stand-in")
+    parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, in place of the stand-in")
     parser.add_argument("--small", action="store_true", help="15 scenes, one seed, 5 steps: whether it runs, not what comes out")
     args = parser.parse_args()
     if args.small:
@@ -59,19 +64,21 @@ def run(*command: Any, **options: Any) -> None:
         sys.exit(f"error: expected exit code 0, got {done.returncode}, of {command[0]}")
 
 
-def manifest(demo: pathlib.Path, name: str, generator: Mapping[str, Any], splits: Mapping[str, list[int]]) -> dict[str, Any]:
-    """The demo's own, of the streets of these splits alone, each with its gaps. Volumes of events are divided by their 98th percentile, as in the paper."""
+def manifest(demo: pathlib.Path, name: str, dataset: str, generator: Mapping[str, Any], splits: Mapping[str, list[int]]) -> dict[str, Any]:
+    """The demo's own, of these splits of the dataset alone, each with its gaps. Volumes of events are divided by their 98th percentile, as in the
+    paper."""
     text = re.sub(r"(?m)^\s*//.*$", "", (demo / "manifest.json").read_text(encoding="utf-8"))
     whole = json.loads(text)
-    streets = [source for source in whole["sources"] if source["dataset"] == "kitti_object" and source.get("split", "train") in splits]
-    for source in streets:
+    sources = [source for source in whole["sources"] if source["dataset"] == dataset and source.get("split", "train") in splits]
+    for source in sources:
         source["pairs"]["gaps"] = splits[source.get("split", "train")]
     # Not compressed, so that volumes can be exchanged in place.
-    return {**whole, "name": name, "sources": streets, "generator": generator, "volume": {"bins": 9, "normalize": "none" if name == "frames" else "eta98"},
+    return {**whole, "name": name, "sources": sources, "generator": generator,
+            "volume": {"bins": 9, "normalize": "none" if name == "frames" else "eta98"},
             "output": {"directory": name, "samples_per_shard": 64, "dtype": "float16", "deflate_level": 0}}
 
 
-def convert(args: argparse.Namespace, name: str, generator: Mapping[str, Any], splits: Mapping[str, list[int]],
+def convert(args: argparse.Namespace, name: str, dataset: str, generator: Mapping[str, Any], splits: Mapping[str, list[int]],
             volume_of: Callable[[Sample], np.ndarray] | None = None) -> pathlib.Path:
     """OUT/demo/NAME, finalized: its volumes made by the generator or, where it is given, by `volume_of`."""
     demo = args.out / "demo"
@@ -81,7 +88,7 @@ def convert(args: argparse.Namespace, name: str, generator: Mapping[str, Any], s
     if volume_of:  # half of them may be exchanged
         shutil.rmtree(folder, ignore_errors=True)
     path = demo / f"{name}.json"
-    path.write_text(json.dumps(manifest(demo, name, generator, splits), indent=1), encoding="utf-8")
+    path.write_text(json.dumps(manifest(demo, name, dataset, generator, splits), indent=1), encoding="utf-8")
     run(args.program, "convert", path, "--progress", "none")
     if volume_of:
         exchange_volumes(folder, volume_of)
@@ -129,8 +136,18 @@ def frame_volume(demo: pathlib.Path, shape: tuple[int, int, int], sample: Sample
     return volume
 
 
+def camera(args: argparse.Namespace, dataset: str, splits: Mapping[str, list[int]]) -> pathlib.Path:
+    """The folder of the "camera's" volumes, or --truth."""
+    if args.truth:
+        return args.truth
+    placed = Shards(convert(args, "placed", dataset, {"kind": "difference"}, splits))  # for the frames and labels; its volumes are not used
+    recordings = simulate(args, placed)
+    shape = placed[0]["volume"].shape
+    return convert(args, "camera", dataset, {"kind": "difference"}, splits, lambda sample: camera_volume(recordings, shape, sample))
+
+
 def simulate(args: argparse.Namespace, placed: Shards) -> pathlib.Path:
-    """A recording of the "camera" for each sample, from its previous to its labelled frame: SAMPLE.hdf5 in the folder."""
+    """A recording of the "camera" for each sample, from its previous to its next frame: SAMPLE.hdf5 in the folder."""
     demo, folder = args.out / "demo", args.out / "camera"
     sources = []
     for i in range(len(placed)):
@@ -138,7 +155,7 @@ def simulate(args: argparse.Namespace, placed: Shards) -> pathlib.Path:
         frames = folder / "frames" / pair["sample_id"]
         frames.mkdir(parents=True, exist_ok=True)
         for number, name in enumerate(("prev_path", "next_path")):
-            shutil.copy(demo / pair[name], frames / f"{number}.png")
+            shutil.copy(demo / pair[name], frames / (str(number) + pathlib.Path(pair[name]).suffix))
         sources.append({"path": f"frames/{pair['sample_id']}", "name": pair["sample_id"], "frames_per_second": FRAMES_PER_SECOND})
     _, _, width, height = place_of(placed.labels(0))
     path = folder / "camera.json"
@@ -166,15 +183,55 @@ def camera_volume(recordings: pathlib.Path, shape: tuple[int, int, int], sample:
     return np.minimum(volume / eta98(volume), 1)
 
 
-def train(args: argparse.Namespace, name: str, data: pathlib.Path, test: pathlib.Path, seed: int) -> dict[str, float]:
-    """The scores of a detector that has learnt on `data`, in the volumes of `test`."""
+def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, test: pathlib.Path, seed: int, *options: Any) -> pathlib.Path:
+    """The folder of a network that has learnt on `data`, with what it finds in `test`."""
     out = args.out / "runs" / f"{name}-{seed}".replace(" ", "-")
     if not (out / "predictions.json").exists():
-        limits = ["--steps", 5] if args.small else ["--minutes", args.minutes]
-        run(sys.executable, EXAMPLES / "train_yolov3.py", "--trainer", args.trainer, "--data", data, "--dataset", "kitti_object", "--out", out, "--test", test,
-            "--seed", seed, *limits, "--every", 1000)
-    result, _, _ = evaluate_detections(out / "predictions.json", Samples(test, training.checked_split(read_description(test)), None, None), ["Car"])
-    return result["classes"]["Car"]
+        limits = options or (["--steps", 5] if args.small else ["--minutes", args.minutes])
+        run(sys.executable, EXAMPLES / script, "--trainer", args.trainer, "--data", data, "--out", out, "--test", test, "--seed", seed, "--every", 1000,
+            *limits)
+    return out
+
+
+def samples_of(folder: pathlib.Path) -> Samples:
+    """Those that `train` tests on."""
+    return Samples(folder, training.checked_split(read_description(folder)), None, None)
+
+
+def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
+    """The scores of each seed, by what the detectors have learnt on."""
+    both, dataset = {"train": [1, 2, 3], "val": [1]}, "kitti_object"
+    data = {name: convert(args, name.replace(" ", "-"), dataset, generator, both) for name, generator in GENERATORS.items()}
+    real = camera(args, dataset, {"val": [1]})
+    shape = Shards(data["EventGAN"])[0]["volume"].shape
+    data["Frame"] = convert(args, "frames", dataset, {"kind": "difference"}, both, lambda sample: frame_volume(args.out / "demo", shape, sample))
+    scores: dict[str, list[dict[str, float]]] = {}
+    for seed in range(args.seeds):
+        for name, folder in data.items():
+            test = folder if name == "Frame" else real
+            out = train(args, "train_yolov3.py", name, folder, test, seed)
+            result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
+            scores.setdefault(name, []).append(result["classes"]["Car"])
+    return scores
+
+
+def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
+    """The scores of each seed, by what the networks have learnt on."""
+    dataset = "mpii"
+    made = convert(args, "EventGAN", dataset, GENERATORS["EventGAN"], {"train": [2, 4], "val": [2]})
+    real = camera(args, dataset, {"train": [2], "val": [2]})
+    scores: dict[str, list[dict[str, float]]] = {}
+    for seed in range(args.seeds):
+        learnt = train(args, "train_pose.py", "EventGAN", made, real, seed)
+        outs = {"EventGAN": learnt}
+        for epochs, name in ((1, "1 epoch"), (5, "5 epochs")):
+            tuned = "--pretrained", learnt / "weights.pt", "--last-layer", "--epochs", epochs
+            outs[f"EventGAN, last layer {name}"] = train(args, "train_pose.py", f"tuned-{epochs}", real, real, seed, *tuned)
+        outs["camera"] = train(args, "train_pose.py", "camera", real, real, seed)
+        for name, out in outs.items():
+            result, _, _ = evaluate_poses(out / "predictions.json", samples_of(real))
+            scores.setdefault(name, []).append(result["joints"]["all"])
+    return scores
 
 
 def spread(values: list[float]) -> str:
@@ -183,22 +240,14 @@ def spread(values: list[float]) -> str:
 
 def main() -> None:
     args = read_args()
-    demo, both = args.out / "demo", {"train": [1, 2, 3], "val": [1]}
-    if not (demo / "manifest.json").exists():
-        run(args.program, "make-demo", demo, "--scenes", args.scenes)
-    data = {name: convert(args, name.replace(" ", "-"), generator, both) for name, generator in GENERATORS.items()}
-    placed = Shards(data["log difference"], split="val")
-    shape = placed[0]["volume"].shape
-    if not args.truth:
-        recordings = simulate(args, placed)
-        args.truth = convert(args, "camera", {"kind": "difference"}, {"val": [1]}, lambda sample: camera_volume(recordings, shape, sample))
-    data["Frame"] = convert(args, "frames", {"kind": "difference"}, both, lambda sample: frame_volume(demo, shape, sample))
-    rows = {}
-    for name, folder in data.items():
-        scores = [train(args, name, folder, folder if name == "Frame" else args.truth, seed) for seed in range(args.seeds)]
-        rows[name] = {key: [each[key] for each in scores] for key in PAPER_COLUMNS}
+    if not (args.out / "demo" / "manifest.json").exists():  # it comes last
+        shutil.rmtree(args.out / "demo", ignore_errors=True)
+        run(args.program, "make-demo", args.out / "demo", "--scenes", args.scenes)
+    columns = PAPER_COLUMNS if args.what == "detection" else POSE_COLUMNS
+    scores = detection(args) if args.what == "detection" else pose(args)
+    rows = {name: {key: [each[key] for each in of_seeds] for key in columns} for name, of_seeds in scores.items()}
     (args.out / "scores.json").write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    print(table("", {name: {key: spread(values) for key, values in row.items()} for name, row in rows.items()}, PAPER_COLUMNS))
+    print(table("", {name: {key: spread(values) for key, values in row.items()} for name, row in rows.items()}, columns))
 
 
 if __name__ == "__main__":

@@ -25,6 +25,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--filters", type=int, default=128, help="of each of the three deconvolutions")
     parser.add_argument("--rotation", type=float, default=15.0, help="deviation of the crops' angles in degrees; Simple Baselines': 30")
     parser.add_argument("--sigma", type=float, default=1.5, help="of the heatmaps, in their pixels")
+    parser.add_argument("--last-layer", action="store_true", help="learn the last layer alone, with --pretrained")
     return training.begin(parser)
 
 
@@ -66,8 +67,9 @@ def main() -> None:
     config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = len(learn.joint_names), list(size), args.layers
     config.MODEL.EXTRA.NUM_DECONV_FILTERS = [args.filters] * 3
     model = get_pose_net(config, is_train=False)
+    model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
-    model = exchange_first_convolution(model, 18).to(args.device).to(memory_format=torch.channels_last)
+    model = model.to(args.device).to(memory_format=torch.channels_last)
     for layer in model.deconv_layers if args.device == "cpu" else ():
         if isinstance(layer, torch.nn.ConvTranspose2d):  # PyTorch 1.13 leaves it to the system's BLAS there, several times slower
             layer.forward = functools.partial(deconvolution, layer)
@@ -75,6 +77,8 @@ def main() -> None:
 
     def loss_of(batch: tuple, _: float) -> torch.Tensor:
         events, target, weight, _ = batch
+        if args.last_layer:
+            model.eval()  # nor do the other layers' means and variances change
         return 1000 * criterion(model(events.to(args.device)), target.to(args.device), weight.to(args.device))
 
     def find(events: torch.Tensor, meta: dict) -> np.ndarray:
@@ -90,7 +94,9 @@ def main() -> None:
         scores = pose_scores(search(check), persons, hidden=True)["all"]
         return {"PCKh@0.5": scores["pckh_mpii"], "MPJPE": scores["mpjpe_source"]}
 
-    optimizer = torch.optim.Adam(model.parameters(), lr=args.lr)
+    if args.last_layer:
+        model.requires_grad_(False).final_layer.requires_grad_(True)
+    optimizer = torch.optim.Adam([weight for weight in model.parameters() if weight.requires_grad], lr=args.lr)
     training.fit(args, model, optimizer, training.batches(args, learn, learn=True), loss_of, measure, "PCKh@0.5")
 
     def picture_of(i: int) -> tuple[str, np.ndarray]:

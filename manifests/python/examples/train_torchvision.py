@@ -80,8 +80,9 @@ def main() -> None:
     classes = list(learn.classes)
     print(f"input {height} x {width}, classes " + ", ".join(classes))
     model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), (height, width), args.regions)
+    model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
-    model = exchange_first_convolution(model, 18).to(args.device)
+    model = model.to(args.device)
 
     def loss_of(batch: tuple, _: float) -> torch.Tensor:
         images, targets = batch

@@ -90,8 +90,9 @@ def main() -> None:
     own.write_text(adapted(cfg, len(classes), anchors))
     with torch.no_grad():  # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
         model = Darknet(str(own), (height, width))
+    model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
-    model = exchange_first_convolution(model, 18).to(args.device).to(memory_format=torch.channels_last)
+    model = model.to(args.device).to(memory_format=torch.channels_last)
     model.eval()(torch.zeros(1, 18, height, width, device=args.device))  # it makes its grids only if it does not begin with training
     model.nc, model.hyp = len(classes), {**hyp, "cls": hyp["cls"] * len(classes) / 80, "obj": hyp["obj"] * max(height, width) / 320}
 

@@ -46,7 +46,7 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--every", type=int, default=1, help="check after each such number of epochs, and at the end")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--lr", type=float, help="highest learning rate: it rises for 5 %% of the way and falls to 1 %% as a cosine")
-    parser.add_argument("--pretrained", help=".pt file of weights to begin with; those that do not fit, and the first layer, begin anew")
+    parser.add_argument("--pretrained", help=".pt file of weights to begin with; those that do not fit begin anew")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--threads", type=int, help="default: all cores")

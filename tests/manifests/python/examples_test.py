@@ -108,6 +108,10 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     (tmp_path / "ids.txt").write_text("\n".join(entry["image_id"] for entry in predictions))
     scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "ids.txt", "--hidden")
     assert scores["joints"]["all"]["pckh_mpii"] == history(tmp_path / "whole")[-1]["PCKh@0.5"]
+    weights = torch.load(tmp_path / "whole" / "weights.pt")
+    train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt", "--last-layer")
+    tuned = torch.load(tmp_path / "tuned" / "weights.pt")
+    assert {name.split(".")[0] for name in weights if not torch.equal(weights[name], tuned[name])} == {"final_layer"}
     whole, killed = ([{**row, "minutes": 0} for row in history(tmp_path / out)] for out in ("whole", "killed"))
     assert whole == killed
 
@@ -124,16 +128,19 @@ def test_yolov3_learns(data, tmp_path):
     assert "got Bus" in said and str(data) in said
 
 
-def test_the_experiment_in_small(tmp_path):
-    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
-    line = [sys.executable, EXAMPLES / "experiment.py", "detection", "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
+@pytest.mark.parametrize(("what", "trainer", "score", "names"), [
+    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", ["EventGAN", "log difference", "ESIM", "Frame"]),
+    ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", ["EventGAN", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"])])
+def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
+    trainer = need_trainer(*trainer)
+    line = [sys.executable, EXAMPLES / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
     first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
     assert first.returncode == 0, first.stdout + first.stderr
-    assert first.stdout.count("train_yolov3.py") == 4 and "train_yolov3.py" not in again.stdout  # done before
+    assert first.stdout.count("examples/train_") == 4 and "examples/train_" not in again.stdout  # done before
     rows = json.loads((tmp_path / "out" / "scores.json").read_text())
-    assert list(rows) == ["EventGAN", "log difference", "ESIM", "Frame"] and all(len(row["ap_voc"]) == 1 for row in rows.values())
-    assert "combined recall" in again.stdout
-    for name in ("camera", "frames"):  # exchanged volumes are sound ones
+    assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
+    assert all(name in again.stdout for name in names)
+    for name in ("camera", "frames") if what == "detection" else ("camera",):  # exchanged volumes are sound ones
         subprocess.run([PROGRAM, "verify", tmp_path / "out" / "demo" / name], check=True, capture_output=True)
 
 
