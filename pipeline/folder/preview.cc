@@ -366,6 +366,9 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
     return {video};
   }
   const std::vector<Chosen> chosen = choose(shards, options);
+  if (chosen.empty()) {
+    throw InputError("expected a valid sample, got none, in " + where.string());
+  }
   fs::create_directories(options.out);
   std::vector<fs::path> pictures;
   if (options.sheet) {

@@ -36,8 +36,8 @@ struct PreviewOptions {
 /// Returns what it wrote. `warnings` gets a line for each sample whose frames could not be shown.
 ///
 /// Of a folder every shard that is done counts, and of those that no sample is chosen from only the
-/// overview is read. Throws InputError if there is no shard, UsageError for a choice that leaves no
-/// sample; what ShardReader throws.
+/// overview is read. Throws InputError if there is no shard or no valid sample to choose from,
+/// UsageError for slots, ids or a class that none has; what ShardReader throws.
 std::vector<std::filesystem::path> preview(const std::filesystem::path& where,
                                            const PreviewOptions& options,
                                            std::vector<std::string>& warnings);
