@@ -4,7 +4,7 @@ _eventgan() {
   local cur prev words cword split
   _init_completion -s || return
   local command=${words[1]}
-  if [[ $cword -eq 1 || ( $cword -eq 2 && $command == help ) ]]; then
+  if [[ $cword -eq 1 || ( $command == help && $cur != -* ) ]]; then
     COMPREPLY=($(compgen -W "${!_eventgan_options[*]} --help --version" -- "$cur"))
   elif [[ -n ${_eventgan_words["$command $prev"]-} ]]; then
     COMPREPLY=($(compgen -W "${_eventgan_words["$command $prev"]}" -- "$cur"))
