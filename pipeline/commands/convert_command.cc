@@ -110,8 +110,10 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "SHARD_INDEX, Slurm, Kubernetes or Open MPI says in the environment, else all")
       ->option_text("I/N");
   command
-      ->add_option("--limit", arguments->limit,
-                   "A trial: N pairs alone, the first of each source, in the folder OUTPUT-trial-N")
+      ->add_option(
+          "--limit", arguments->limit,
+          "A trial: N pairs alone, the first of each source, in the folder OUTPUT-trial-N, OUTPUT "
+          "being the manifest's folder; or in that of --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
   command

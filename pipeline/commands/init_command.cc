@@ -41,6 +41,10 @@ void refuse_to_overwrite(const fs::path& file) {
 }
 
 int run(const InitArguments& arguments) {
+  if (arguments.where.size() > 2) {
+    throw UsageError("expected PATH or DATASET PATH, got " +
+                     std::to_string(arguments.where.size()) + " arguments");
+  }
   const fs::path path = arguments.where.back();
   const fs::path out = arguments.out;
   if (path.empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
@@ -71,12 +75,12 @@ void add_init_command(CLI::App& app, int& exit_code) {
       "init", "Finds out which dataset lies in a folder, and writes a manifest for it");
   const auto arguments = std::make_shared<InitArguments>();
   command
-      ->add_option("WHERE", arguments->where,
+      ->add_option("PATH", arguments->where,
                    "The folder or video, and in front of it, where that is to be checked, which "
                    "dataset it is: kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, "
                    "human36m or frames")
       ->required()
-      ->expected(1, 2)
+      ->expected(-1)
       ->option_text("[DATASET] PATH");
   command->add_option("--out", arguments->out, "The manifest, a new file; default: manifest.json")
       ->option_text("FILE");

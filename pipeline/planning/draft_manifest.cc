@@ -6,10 +6,9 @@
 
 #include <algorithm>
 #include <map>
-#include <memory>
 #include <nlohmann/json.hpp>
-#include <optional>
 #include <set>
+#include <stdexcept>
 #include <string_view>
 
 #include "manifests/documents/job_manifest.h"
