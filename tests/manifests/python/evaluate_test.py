@@ -359,13 +359,13 @@ def test_a_hundred_thousand_predictions_take_seconds():
     rng = np.random.default_rng(0)
     image, label, xyxy = boxes_at_random(rng, 10_000, 10)
     truth = Truth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool), rng.integers(-1, 3, 50_000))
-    start = time.monotonic()
+    start = time.process_time()
     found = Found.of(image, label, xyxy + rng.normal(0, 2, xyxy.shape), rng.random(100_000))
     found = found.rows(strongest(found, 0.5))
     detection_scores(found, truth, CLASSES)
     for level in KITTI_LEVELS:
         kitti_average_precision(found, truth, CLASSES, "Car", level, found.xyxy[:, 3] - found.xyxy[:, 1])
-    assert time.monotonic() - start < 30
+    assert time.process_time() - start < 30
 
 
 # The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare, and two
