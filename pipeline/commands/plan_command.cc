@@ -62,7 +62,7 @@ int run(const PlanArguments& arguments) {
   const LoadedGenerator loaded = load_generator(manifest);
   tell_generator(loaded);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
-                             /*stop=*/{}, /*trace=*/nullptr, show_phases(arguments.progress));
+                             {.show_phase = show_phases(arguments.progress)});
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
   const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
