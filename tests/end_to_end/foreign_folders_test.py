@@ -18,14 +18,14 @@ DAMAGED = {"cut": b'{"fingerprint":{"annotations":"433a', "empty": b"", "binary"
            "foreign": b'{"format": "other", "version": 1}\n'}
 # The commands that are given an output folder, with what they need besides.
 ON_FOLDERS = {
-    "status": [], "retry": [], "finalize": [], "verify": [],
+    "status": [], "retry": [], "finalize": [], "verify": [], "report": [],
     "export": ["--to", "coco", "--out", "{scratch}/export"],
 }
 ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/pictures"]}
 # Those that are given a document.
 ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "calibrate": ["--out", "{scratch}/w.safetensors"],
                 "tradeoff": ["--out", "{scratch}/tradeoff"]}
-OTHERS = {"realism": [], "import-weights": ["{scratch}/weights.safetensors"]}
+OTHERS = {"init": ["--out", "{scratch}/manifest.json"], "realism": [], "import-weights": ["{scratch}/weights.safetensors"]}
 NOT_OF_FOLDERS = {"make-demo", "help"}
 
 
