@@ -154,7 +154,7 @@ class Draft {
     text += fmt::format(R"({{
   "format": "eventgan-manifest",
   "version": 1,
-  "name": "{}",  // files are named {}-train-00000-of-00117.h5
+  "name": "{}",  // shards are named {}-SPLIT-NUMBER-of-COUNT.h5
   "seed": 7,  // decides which gap each labelled frame gets
 
   "sources": [
@@ -185,6 +185,9 @@ class Draft {
     std::string keys = key("root", found_.root);
     if (!found_.layout.empty()) {
       keys += fmt::format("      \"layout\": \"{}\",\n", found_.layout);
+    }
+    if (found_.layout == "official") {
+      keys += "      \"every\": 5,  // of 50 frames a second: a gap of 1 is a tenth of a second\n";
     }
     if (found_.raw_root) keys += key("raw_root", *found_.raw_root);
     if (found_.devkit) keys += key("devkit", *found_.devkit);

@@ -31,7 +31,7 @@ std::string preprocessing_json(const ImageSpec& image);
 /// avx2 fma"; "other" where it is no x86-64.
 std::string instruction_sets();
 
-/// Name and version of this program: "eventgan 0.1.0".
+/// Name and version of this program: "eventgan 0.2.0".
 std::string program_version();
 
 /// That and what else decides over a shard's bytes: the libraries that are loaded, the engines, the

@@ -27,8 +27,8 @@ class Settings:
 
 
 SETTINGS = {
-    "full": Settings(5, 5, 40, (260, 861), ["untrained:32", "shipped"]),
-    "quick": Settings(2, 4, 16, (260, 861), ["untrained:32", "shipped"]),
+    "full": Settings(5, 5, 40, (260, 861), ["untrained:32", "shipped:16", "shipped:8"]),
+    "quick": Settings(2, 4, 16, (260, 861), ["shipped:16", "shipped:8"]),
     "trial": Settings(1, 1, 3, (32, 32), ["untrained:2"]),
 }
 
