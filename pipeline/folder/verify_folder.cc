@@ -291,6 +291,8 @@ std::string to_text(const FolderCheck& check, bool deep) {
   for (const std::string& note : check.notes) text += "note: " + note + "\n";
   for (const ShardCheck& shard : check.by_shard) text += line_of(shard, deep) + "\n";
   for (const std::string& fault : check.faults) text += fault + "\n";
+  if (deep)
+    text += fmt::format("labels of {} samples compared with their sources\n", check.compared);
   if (!check.sound()) {
     return text + fmt::format("{} faults in {} shards\n", check.faults.size(), check.shards());
   }
