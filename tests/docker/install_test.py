@@ -72,8 +72,9 @@ class Install(unittest.TestCase):
         pages = self.prefix / "share" / "eventgan"
         for folder in ["manifests/examples", "manifests/schemas", "manifests/guides", "docker/slurm", "docker/kubernetes"]:
             here, there = pages / folder, SOURCE / folder
-            self.assertEqual({path.name: path.read_bytes() for path in here.iterdir()},
-                             {path.name: path.read_bytes() for path in there.iterdir()})
+            installed, written = ({path.relative_to(top): path.read_bytes() for path in top.rglob("*") if path.is_file()}
+                                  for top in (here, there))
+            self.assertEqual(installed, written)
         documents = list(pages.rglob("*.md"))
         self.assertGreaterEqual(len(documents), 14)
         for page in documents:

@@ -5,6 +5,7 @@ import os
 import pathlib
 import re
 import shutil
+import sys
 import tempfile
 import unittest
 
@@ -17,12 +18,15 @@ from moving_picture import texture
 from program import SHARED, SOURCE, run, shard_bytes, text
 from small_job import save_picture, small_job, write_cars, write_people
 
+sys.path.insert(0, str(SOURCE / "tests" / "fuzz"))
+from make_corpus import Cdf
+
 EXAMPLES = SOURCE / "manifests" / "examples"
 
 
-def write_video(path, frames, height=48, width=64):
+def write_video(path, frames, height=48, width=64, frames_per_second=25):
     path.parent.mkdir(parents=True, exist_ok=True)
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), 25, (width, height))
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), frames_per_second, (width, height))
     picture = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
     for shift in range(frames):
         video.write(picture[:, shift:shift + width])
@@ -272,6 +276,7 @@ class Examples(program.InFolder):
         run("make-demo", cls.tree / "demo")
         for name in ["kitti", "mpii", "h36m"]:
             (cls.tree / "demo" / name).rename(cls.tree / name)
+        cls.write_human36m(frames=60)
         write_video(cls.tree / "clip.mp4", 91)
         random = np.random.default_rng(7)
         for k in range(202):
@@ -279,6 +284,14 @@ class Examples(program.InFolder):
         cls.write_raw()
         for example in EXAMPLES.glob("*.json"):
             shutil.copy(example, cls.tree)
+
+    @classmethod
+    def write_human36m(cls, frames):
+        write_video(cls.tree / "h36m" / "S1" / "Videos" / "Walking.54138969.mp4", frames, frames_per_second=50)
+        poses = cls.tree / "h36m" / "S1" / "MyPoseFeatures" / "D2_Positions" / "Walking.54138969.cdf"
+        poses.parent.mkdir(parents=True)
+        joints = np.random.default_rng(8).uniform(5, 40, (frames, 64)).astype("<f4")
+        poses.write_bytes(Cdf().file(frames, 64, numbers=joints.tobytes()))
 
     @classmethod
     def write_raw(cls):

@@ -178,8 +178,8 @@ class Cdf:
         body = struct.pack(">" + fields, *values) + tail
         return struct.pack(">QI", 12 + len(body), kind) + body
 
-    def file(self, rows=2, columns=3, following=0):
-        numbers = struct.pack("<6f" if self.encoding == 6 else ">6f", *(range(6) if self.row_major else (0, 3, 1, 4, 2, 5)))
+    def file(self, rows=2, columns=3, following=0, numbers=b""):
+        numbers = numbers or struct.pack("<6f" if self.encoding == 6 else ">6f", *(range(6) if self.row_major else (0, 3, 1, 4, 2, 5)))
         packed = gzip.compress(numbers, mtime=0)
         values = self.record(13, "IQ", 0, len(packed), tail=packed) if self.packs_values else self.record(7, "", tail=numbers)
         index = self.VALUES + len(values)

@@ -10,7 +10,7 @@ SOURCE = pathlib.Path(os.environ["EVENTGAN_SOURCE_DIR"])
 FLOORS = [
     ["manifests/values"],
     ["manifests/documents"],
-    ["stages/base/files"],
+    ["stages/base/files", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/pictures"],
     ["stages/base/archives"],
     ["stages/frames", "stages/recordings", "stages/labels", "stages/events", "stages/generator", "stages/training",
