@@ -116,6 +116,9 @@ ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
     marker.stage_seconds[stage] = seconds.number(0, kMostSeconds);
   }
   marker.wall_seconds = object.at("wall_seconds").number(0, kMostSeconds);
+  if (const auto peak = object.find("peak_bytes")) {
+    marker.peak_bytes = peak->integer<std::int64_t>(0, INT64_MAX);
+  }
   object.finish();
   // A slot is either good or accounted for. Only worth saying if the numbers themselves are sound.
   const auto lost = static_cast<int>(marker.quarantined.size());
@@ -156,7 +159,8 @@ std::string to_json(const ShardMarker& marker) {
                    {"gaps", gaps},
                    {"optional_columns", marker.contents.optional_columns},
                    {"stage_seconds", marker.stage_seconds},
-                   {"wall_seconds", marker.wall_seconds}});
+                   {"wall_seconds", marker.wall_seconds},
+                   {"peak_bytes", marker.peak_bytes}});
 }
 
 ShardMarker parse_marker(std::string_view text, const std::string& name) {

@@ -106,6 +106,8 @@ struct ShardMarker {
   ShardContents contents;
   std::map<std::string, double> stage_seconds;  ///< busy time by stage
   double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
+  /// Most memory of the writer's process up to the commit; 0: not known.
+  std::int64_t peak_bytes = 0;
   bool operator==(const ShardMarker&) const = default;
 };
 

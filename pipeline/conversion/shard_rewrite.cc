@@ -34,6 +34,7 @@ ShardRewrite::ShardRewrite(std::filesystem::path folder, ShardMarker marker,
   // What the shard has cost so far; the work of a retry comes on top.
   marker_.stage_seconds = before_.stage_seconds;
   marker_.wall_seconds = before_.wall_seconds;
+  marker_.peak_bytes = before_.peak_bytes;
 }
 
 void ShardRewrite::redo(int slot, const SampleMessage& message) {

@@ -8,6 +8,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "pipeline/planning/fingerprint.h"
+#include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/base/files/atomic_file.h"
@@ -122,6 +123,7 @@ bool ShardSink::commit() {
   marker_.contents = std::move(receipt.contents);
   add_write_seconds(start_ns, marker_);
   marker_.wall_seconds = seconds_since(committed_at_);
+  marker_.peak_bytes = static_cast<std::int64_t>(peak_memory_bytes());
   {
     const TraceSpan file(job_.options.trace, "write marker", "shard");
     write_file_atomically(job_.folder / marker_name(shard_->name), to_json(marker_));

@@ -592,14 +592,20 @@ std::string time(const Survey& survey) {
   rows.push_back(text_cell("<b>all stages</b>") + right_cell(seconds_text(busy)) + right_cell("") +
                  right_cell(fmt::format("{:.3g} ms", 1e3 * busy / samples)));
   std::string html =
-      "<section><h2>Time</h2>" + table({"stage", "#busy", "#share", "#a sample"}, rows);
+      "<section><h2>Time and memory</h2>" + table({"stage", "#busy", "#share", "#a sample"}, rows);
   html += fmt::format(
       "<p class=note>Busy time of all threads, of the runs that committed the shards. From commit "
       "to "
-      "commit the workers took {} together, {:.3g} samples a second of one worker. Memory is not "
-      "recorded with the shards; <code>eventgan tradeoff</code> measures it.</p></section>",
+      "commit the workers took {} together, {:.3g} samples a second of one worker. The stages "
+      "share "
+      "one process: {}.</p></section>",
       seconds_text(survey.wall_seconds),
-      survey.wall_seconds > 0 ? samples / survey.wall_seconds : 0.0);
+      survey.wall_seconds > 0 ? samples / survey.wall_seconds : 0.0,
+      survey.peak_bytes > 0
+          ? fmt::format("the worker that took most memory had <span data-key=peak_bytes "
+                        "data-value={}>{}</span> resident",
+                        survey.peak_bytes, bytes_text(survey.peak_bytes))
+          : "how much memory it took was not recorded");
   return html;
 }
 

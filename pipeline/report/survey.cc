@@ -140,6 +140,7 @@ class Surveyor {
       survey_.stage_seconds[stage] += seconds;
     }
     survey_.wall_seconds += marker.wall_seconds;
+    survey_.peak_bytes = std::max(survey_.peak_bytes, marker.peak_bytes);
   }
 
   void add_overview(const ShardState& shard, const ShardOverview& overview) {

@@ -85,6 +85,7 @@ struct Survey {
   static constexpr std::size_t kMostQuarantined = 50;
   std::map<std::string, double> stage_seconds;
   double wall_seconds = 0;
+  std::int64_t peak_bytes = 0;  ///< of the worker that took most; 0: not known
 
   // Of at most kMostVolumes volumes, which the manifest's seed draws from all valid ones.
   int volumes = 0;

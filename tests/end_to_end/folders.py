@@ -4,7 +4,7 @@ import hashlib
 import json
 import pathlib
 
-OF_ONE_RUN = ("stage_seconds", "wall_seconds")  # the only fields in which two runs' markers differ
+OF_ONE_RUN = ("stage_seconds", "wall_seconds", "peak_bytes")  # the only fields in which two runs' markers differ
 
 
 def temporaries(folder):

@@ -225,6 +225,7 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_EQ(marker.contents.persons, (std::vector<std::int32_t>{0, 0}));
   EXPECT_EQ(marker.contents.gaps, (std::map<int, std::int64_t>{{1, 1}, {2, 1}}));
   EXPECT_GT(marker.wall_seconds, 0);
+  EXPECT_GT(marker.peak_bytes, 1 << 20);
 }
 
 TEST_F(ShardSinkTest, AClaimStandsUntilTheFileItselfIsThere) {

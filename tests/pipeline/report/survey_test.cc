@@ -55,6 +55,7 @@ TEST_F(SurveyFolder, HasTheNumbersOfEverySample) {
   EXPECT_EQ(survey.gaps.at(1).least_s, std::nullopt) << "pictures have no time";
   EXPECT_TRUE(survey.flags.empty());
   EXPECT_TRUE(survey.stage_seconds.contains("generate"));
+  EXPECT_GT(survey.peak_bytes, 1 << 20);
 
   // The fake generator's bin b of 9 is (b + 1) / 9 of the change, 2 x 20 / 255 (float16: 3 digits).
   const double change = 2 * 20 / 255.0;
