@@ -20,7 +20,7 @@ std::string weights_warning(const JobManifest& manifest) {
   if (name->origin == WeightsOrigin::kUntrained) return untrained_warning(weights);
   if (name->origin == WeightsOrigin::kFile) return "";
   return "the weights are those that come with the program (" + shipped_weights_name(weights) +
-         "), trained on some minutes of recordings: fit to try things with. For results import or "
+         "), trained on four seconds of recordings: fit to try things with. For results import or "
          "train weights (README, \"The generator's weights\").";
 }
 
