@@ -107,7 +107,9 @@ std::size_t run_graph(const std::function<const PlannedShard*()>& next_shard,
   std::size_t arrived = 0;  // touched by the serial writer alone
 
   flow::input_node<Message> source(graph, [&](oneapi::tbb::flow_control& control) -> Message {
-    Message message = stop ? nullptr : cursor.next(order(), at_writer);
+    const StopOrder now = order();  // before at_writer is read, else an order that comes between
+                                    // finds no shard at the writer and breaks off its first one
+    Message message = stop ? nullptr : cursor.next(now, at_writer);
     if (!message) control.stop();
     if (message && trace) ++trace->gauges().samples_in_flight;
     return message;
