@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <numeric>
+#include <utility>
 
 #include "manifests/values/faults.h"
 #include "pipeline/commands/usage_internal.h"

@@ -8,6 +8,7 @@
 #include <cstddef>
 
 #include "stages/shards/codec/quantization.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 namespace {
