@@ -8,6 +8,7 @@
 #include <bit>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <new>
 #include <stdexcept>
 #include <string>
@@ -63,9 +64,16 @@ void clear_upper_halves() {}
 }  // namespace
 
 struct Deflater::Compressor {
+  /// isal_deflate_stateless_init() leaves fields as they were, among them hist_bits, the reach of
+  /// matches: all zero from the start, or the same bytes deflate to others from call to call.
+  struct Isal {
+    isal_zstream stream{};
+    std::array<std::uint8_t, ISAL_DEF_LVL1_DEFAULT> memory{};
+  };
+
   explicit Compressor(int level) {
     if (level == 1) {
-      isal_memory.resize(ISAL_DEF_LVL1_DEFAULT);
+      isal = std::make_unique<Isal>();
     } else if (library = libdeflate_alloc_compressor(level); library == nullptr) {
       throw std::bad_alloc();
     }
@@ -76,11 +84,11 @@ struct Deflater::Compressor {
 
   /// Both return the size of what they wrote; 0 if `room` did not do.
   std::size_t with_isal(std::span<const std::byte> bytes, std::span<std::byte> room) {
-    isal_zstream stream;
+    isal_zstream& stream = isal->stream;
     isal_deflate_stateless_init(&stream);
     stream.level = 1;
-    stream.level_buf = isal_memory.data();
-    stream.level_buf_size = static_cast<std::uint32_t>(isal_memory.size());
+    stream.level_buf = isal->memory.data();
+    stream.level_buf_size = static_cast<std::uint32_t>(isal->memory.size());
     stream.gzip_flag = IGZIP_ZLIB;
     stream.end_of_stream = 1;
     // The library's interface is not const, but it only reads its input.
@@ -97,7 +105,7 @@ struct Deflater::Compressor {
   }
 
   libdeflate_compressor* library = nullptr;  ///< none at level 1
-  std::vector<std::uint8_t> isal_memory;     ///< at level 1
+  std::unique_ptr<Isal> isal;                ///< at level 1
 };
 
 Deflater::Deflater(int level) : compressor_(std::make_unique<Compressor>(level)) {}
