@@ -63,12 +63,19 @@ SampleStages::SampleStages(const JobManifest& manifest,
     : manifest_(manifest),
       datasets_(datasets),
       generator_(generator),
+      in_flight_(static_cast<std::size_t>(in_flight)),
       reader_(manifest.directory, manifest.image, in_flight),
       codec_(manifest.output.dtype, manifest.output.deflate_level) {}
 
 void SampleStages::read(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kRead);
   const PlannedSample& planned = message.planned();
+  const auto slot = static_cast<std::size_t>(message.slot);
+  const std::vector<PlannedSample>& samples = message.shard->samples;
+  for (std::size_t i = slot == 0 ? 1 : slot + in_flight_;
+       i <= slot + in_flight_ && i < samples.size(); ++i) {
+    reader_.expect(samples[i].pair);
+  }
   message.sample.sample_id = planned.sample_id;
   message.sample.sequence = planned.sequence;
   message.sample.origin = frame_origin(

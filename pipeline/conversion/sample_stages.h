@@ -58,7 +58,8 @@ class SampleStages {
   SampleStages(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
                const Generator& generator, int in_flight);
 
-  /// Decodes and prepares the frames, reads the annotation, maps its labels.
+  /// Decodes and prepares the frames, reads the annotation, maps its labels; and has the pictures
+  /// of the shard's next `in_flight` samples loaded meanwhile.
   void read(SampleMessage& message) const;
 
   /// Runs the generator on the prepared frames.
@@ -77,6 +78,7 @@ class SampleStages {
   const JobManifest& manifest_;
   const std::vector<std::unique_ptr<Dataset>>& datasets_;
   const Generator& generator_;
+  std::size_t in_flight_;
   PairReader reader_;
   VolumeCodec codec_;
   mutable std::mutex spare_volumes_mutex_;

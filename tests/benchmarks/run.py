@@ -25,6 +25,7 @@ import pair_counts
 import picture_sizes
 import reading
 import scopes
+import slow_disk
 import stages
 import storage
 import threads
@@ -36,7 +37,7 @@ from measuring.picture import draw
 from measuring.report import markdown
 
 PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
-         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading,
+         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "slow_disk": slow_disk,
          "scopes": scopes, "v2e": v2e}
 
 

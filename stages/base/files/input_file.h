@@ -29,6 +29,10 @@ InputFile open_input(const std::filesystem::path& file, std::string& reason);
 /// Throws std::runtime_error naming the path unless open_input would open it. Thread safe.
 void require_regular_file(const std::filesystem::path& file);
 
+/// Asks the system to load the file into its cache, and does not wait for it; does nothing if the
+/// file cannot be opened: who reads it will say why. Thread safe.
+void load_ahead(const std::filesystem::path& file);
+
 /// The whole file as it stands; none if it cannot be read, and then `reason` says why. Thread safe.
 std::optional<std::string> try_read_file(const std::filesystem::path& file, std::string& reason);
 

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "stages/base/files/input_file.h"
 #include "stages/base/pictures/picture_file.h"
 #include "stages/frames/decoding/prepared_frame.h"
 
@@ -106,6 +107,12 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair) co
     return fault_in(*current, error.what());
   }
   return both;
+}
+
+void PairReader::expect(const FramePair& pair) const {
+  for (const FrameRef* frame : {&pair.previous, &pair.next}) {
+    if (frame->video_frame < 0) load_ahead(base_ / frame->path);
+  }
 }
 
 Outcome<PreparedPair> PairReader::read(const FramePair& pair) const {

@@ -84,6 +84,10 @@ class PairReader {
   /// A fault if a file is missing, empty, truncated, not a picture, or the sizes differ.
   Outcome<PreparedPair> read(const FramePair& pair) const;
 
+  /// Has the system load the pictures of a pair that will be read soon, so that reading it does not
+  /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
+  void expect(const FramePair& pair) const;
+
  private:
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair) const;
   SharedFrame frame(const FrameRef& ref) const;

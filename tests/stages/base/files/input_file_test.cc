@@ -1,10 +1,17 @@
 #include "stages/base/files/input_file.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/mman.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
+#include <algorithm>
+#include <chrono>
 #include <stdexcept>
+#include <thread>
+#include <vector>
 
 #include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
@@ -56,6 +63,45 @@ TEST(OpenInput, TakesRegularFilesOnlyAndNeverWaits) {
   std::filesystem::create_symlink("file", folder / "link");
   EXPECT_EQ(read_text_file(folder / "link"), "text");
   require_regular_file(folder / "link");
+}
+
+/// Whether all of the file lies in the system's cache.
+bool is_cached(const std::filesystem::path& file) {
+  std::string reason;
+  const InputFile opened = open_input(file, reason);
+  const std::size_t size = std::filesystem::file_size(file);
+  void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, ::fileno(opened.get()), 0);
+  const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+  std::vector<unsigned char> pages((size + page - 1) / page);
+  const bool known = mapped != MAP_FAILED && ::mincore(mapped, size, pages.data()) == 0;
+  ::munmap(mapped, size);
+  return known && std::ranges::all_of(pages, [](unsigned char state) { return state & 1; });
+}
+
+TEST(LoadAhead, BringsAllOfAFileIntoTheCache) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "file";
+  testing::write_file(file, std::string(3'000'001, 'x'));
+  {
+    std::string reason;
+    const InputFile opened = open_input(file, reason);
+    ::fdatasync(::fileno(opened.get()));
+    ::posix_fadvise(::fileno(opened.get()), 0, 0, POSIX_FADV_DONTNEED);
+  }
+  if (is_cached(file)) GTEST_SKIP() << "this file system keeps its files in memory";
+  load_ahead(file);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
+  while (!is_cached(file) && std::chrono::steady_clock::now() < end) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  EXPECT_TRUE(is_cached(file));
+}
+
+TEST(LoadAhead, OfWhatIsNoFileDoesNothing) {
+  const testing::TemporaryFolder folder;
+  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
+  testing::write_file(folder / "empty", "");
+  for (const char* name : {"fifo", "empty", "none", "."}) load_ahead(folder / name);
 }
 
 TEST(FileBytes, ReadsParts) {
