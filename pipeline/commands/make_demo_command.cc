@@ -10,10 +10,16 @@
 namespace eventgan {
 namespace {
 
-constexpr std::uint64_t kSeed = 7;
+struct DemoOptions {
+  std::string folder;
+  std::uint64_t seed = 7;
+  int scenes = 0;
+  int between = 0;
+};
 
-int run(const std::string& folder, int scenes) {
-  write_demo_dataset(folder, kSeed, scenes);
+int run(const DemoOptions& options) {
+  const std::string& folder = options.folder;
+  write_demo_dataset(folder, options.seed, options.scenes, options.between);
   std::cout << "a small KITTI, MPII and Human3.6M dataset is in " << folder
             << "\nnext:  eventgan convert "
             << (std::filesystem::path(folder) / "manifest.json").string() << std::endl;
@@ -26,15 +32,24 @@ void add_make_demo_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("make-demo",
                                      "Writes a small synthetic dataset with exact labels, and a "
                                      "manifest, to try the program with");
-  const auto folder = std::make_shared<std::string>();
-  const auto scenes = std::make_shared<int>(0);
-  command->add_option("DIR", *folder, "A new or empty folder")->required();
+  const auto options = std::make_shared<DemoOptions>();
+  command->add_option("DIR", options->folder, "A new or empty folder")->required();
+  auto* scenes =
+      command
+          ->add_option(
+              "--scenes", options->scenes,
+              "So many streets with cars and so many figures, a fifth of them for validation: "
+              "enough to train on; default: a drive of 12 labelled frames and 7 figures")
+          ->check(CLI::Range(1, 100000));
+  command->add_option("--seed", options->seed, "Other scenes for another number; default: 7");
   command
-      ->add_option("--scenes", *scenes,
-                   "So many streets with cars and so many figures, a fifth of them for validation: "
-                   "enough to train on; default: a drive of 12 labelled frames and 7 figures")
-      ->check(CLI::Range(1, 100000));
-  command->callback([folder, scenes, &exit_code] { exit_code = run(*folder, *scenes); });
+      ->add_option(
+          "--between", options->between,
+          "So many pictures between the frame before a labelled one and it, and for figures "
+          "the frame after it: what a camera of events sees, for eventgan simulate")
+      ->check(CLI::Range(1, 1000))
+      ->needs(scenes);
+  command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 
 }  // namespace eventgan

@@ -94,10 +94,11 @@ void require_new_or_empty(const std::filesystem::path& folder) {
 
 }  // namespace
 
-void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes) {
+void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes,
+                        int between) {
   require_new_or_empty(folder);
-  write_kitti_layout(folder / "kitti" / "training", seed, scenes);
-  write_mpii_layout(folder / "mpii", seed, scenes);
+  write_kitti_layout(folder / "kitti" / "training", seed, scenes, between);
+  write_mpii_layout(folder / "mpii", seed, scenes, between);
   write_human36m_layout(folder / "h36m", seed);
   // Last: where there is a manifest, all it speaks of is there.
   write_text(folder / "manifest.json", demo_manifest(seed, scenes));

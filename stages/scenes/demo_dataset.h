@@ -17,8 +17,11 @@ std::string demo_manifest(std::uint64_t seed, int scenes = 0);
 /// three: moving textured cars over a moving road; an articulated figure seen as MPII and as
 /// Human3.6M. Every label is computed from the scene's geometry, not from pixels. `scenes` > 0: so
 /// many streets and, if that is more than seven, so many figures, each of its own seed, to train
-/// on. The same arguments give the same bytes. Throws std::runtime_error naming the path if
-/// something cannot be written; UsageError if `folder` exists and is not empty.
-void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes = 0);
+/// on. `between` > 0: beside each labelled frame so many moments between the frames, for
+/// `eventgan simulate` (see the layouts' writers). The same arguments give the same bytes. Throws
+/// std::runtime_error naming the path if something cannot be written; UsageError if `folder` exists
+/// and is not empty.
+void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes = 0,
+                        int between = 0);
 
 }  // namespace eventgan

@@ -55,11 +55,11 @@ FigureScene::FigureScene(std::uint64_t seed, const Intrinsics& camera,
   }
 }
 
-std::vector<Limb3d> FigureScene::limbs_of(std::size_t figure, int frame) const {
+std::vector<Limb3d> FigureScene::limbs_of(std::size_t figure, double frame) const {
   return limbs(pose(figures_[figure], frame), figures_[figure].clothes);
 }
 
-FigureScene::Drawing FigureScene::draw(int frame) const {
+FigureScene::Drawing FigureScene::draw(double frame) const {
   struct Part {
     Limb3d limb;
     int figure;
@@ -80,7 +80,7 @@ FigureScene::Drawing FigureScene::draw(int frame) const {
   return drawing;
 }
 
-Picture FigureScene::picture(int frame) const {
+Picture FigureScene::picture(double frame) const {
   const Drawing drawing = draw(frame);
   Picture picture = black_picture(size());
   for (int y = 0; y < size().height; ++y) {
@@ -91,9 +91,9 @@ Picture FigureScene::picture(int frame) const {
   return picture;
 }
 
-std::vector<int> FigureScene::objects(int frame) const { return draw(frame).objects; }
+std::vector<int> FigureScene::objects(double frame) const { return draw(frame).objects; }
 
-std::vector<FigureLabel> FigureScene::labels(int frame) const {
+std::vector<FigureLabel> FigureScene::labels(double frame) const {
   std::vector<Limb3d> all;
   for (std::size_t i = 0; i < figures_.size(); ++i) {
     for (const Limb3d& limb : limbs_of(i, frame)) all.push_back(limb);

@@ -21,7 +21,8 @@ struct FigureLabel {
 };
 
 /// Figures that walk and wave in front of a textured wall, seen by a camera that stands still.
-/// Every picture and label is a pure function of the constructor's arguments and the frame.
+/// Every picture and label is a pure function of the constructor's arguments and the frame, which
+/// may be any moment between two whole ones.
 class FigureScene {
  public:
   FigureScene(std::uint64_t seed, const Intrinsics& camera, std::vector<FigureMotion> figures);
@@ -29,13 +30,13 @@ class FigureScene {
   static ImageSize size() { return {240, 320}; }
   const Intrinsics& camera() const { return camera_; }
 
-  Picture picture(int frame) const;
+  Picture picture(double frame) const;
 
   /// [y, x]: the index of the figure seen at each pixel's centre, -1 for the wall.
-  std::vector<int> objects(int frame) const;
+  std::vector<int> objects(double frame) const;
 
   /// One for each figure, in the order given.
-  std::vector<FigureLabel> labels(int frame) const;
+  std::vector<FigureLabel> labels(double frame) const;
 
  private:
   /// What both of the above are made of.
@@ -43,8 +44,8 @@ class FigureScene {
     std::vector<Colour> canvas;  ///< [y, x]
     std::vector<int> objects;
   };
-  Drawing draw(int frame) const;
-  std::vector<Limb3d> limbs_of(std::size_t figure, int frame) const;
+  Drawing draw(double frame) const;
+  std::vector<Limb3d> limbs_of(std::size_t figure, double frame) const;
 
   Texture texture_;
   Intrinsics camera_;

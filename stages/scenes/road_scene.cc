@@ -38,7 +38,7 @@ struct Course {
 
 class Traffic {
  public:
-  Traffic(std::uint64_t seed, int frame)
+  Traffic(std::uint64_t seed, double frame)
       : random_(CounterRandom(seed).keyed("traffic")), seconds_(frame * kFrameSeconds) {}
 
   /// Adds the next vehicle; its looks depend on its number alone.
@@ -72,7 +72,7 @@ class Traffic {
 
 }  // namespace
 
-std::vector<Vehicle> traffic(std::uint64_t seed, int frame) {
+std::vector<Vehicle> traffic(std::uint64_t seed, double frame) {
   Traffic road(seed, frame);
   road.add({0.2, 15, kCameraSpeed + 0.8, kAway});
   road.add({3.5, 8, kCameraSpeed - 0.7, kAway});
@@ -254,7 +254,7 @@ class Tracer {
 
 RoadScene::RoadScene(std::uint64_t seed) : seed_(seed), surroundings_(seed, camera().focal_x) {}
 
-Picture RoadScene::picture(int frame) const {
+Picture RoadScene::picture(double frame) const {
   const Intrinsics eye = camera();
   const std::vector<Candidate> candidates = candidates_of(in_view(frame), eye.focal_x);
   Tracer tracer(surroundings_, frame * kFrameSeconds * kCameraSpeed);
@@ -274,7 +274,7 @@ Picture RoadScene::picture(int frame) const {
   return picture;
 }
 
-std::vector<int> RoadScene::objects(int frame) const {
+std::vector<int> RoadScene::objects(double frame) const {
   const Intrinsics eye = camera();
   const std::vector<Candidate> candidates = candidates_of(in_view(frame), eye.focal_x);
   Tracer tracer(surroundings_, frame * kFrameSeconds * kCameraSpeed);
@@ -320,7 +320,7 @@ int occlusion_of(const Rectangle& box, const std::vector<RoadLabel>& nearer) {
 
 }  // namespace
 
-std::vector<RoadLabel> RoadScene::in_view(int frame) const {
+std::vector<RoadLabel> RoadScene::in_view(double frame) const {
   std::vector<Vehicle> vehicles = traffic(seed_, frame);
   std::sort(vehicles.begin(), vehicles.end(), [](const Vehicle& a, const Vehicle& b) {
     return a.location.z != b.location.z ? a.location.z < b.location.z : a.number < b.number;
@@ -342,7 +342,7 @@ std::vector<RoadLabel> RoadScene::in_view(int frame) const {
   return seen;
 }
 
-std::vector<RoadLabel> RoadScene::labels(int frame) const {
+std::vector<RoadLabel> RoadScene::labels(double frame) const {
   std::vector<RoadLabel> labels;
   std::vector<RoadLabel> nearer;
   for (const RoadLabel& label : in_view(frame)) {

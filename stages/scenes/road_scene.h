@@ -17,7 +17,7 @@ inline constexpr double kCameraSpeed = 6.0;    ///< forward, m/s
 /// All vehicles ahead of the camera at a frame: one ahead in the same lane, one being overtaken on
 /// the right, oncoming ones on the left and parked ones on both sides. A pure function of seed and
 /// frame.
-std::vector<Vehicle> traffic(std::uint64_t seed, int frame);
+std::vector<Vehicle> traffic(std::uint64_t seed, double frame);
 
 /// Where a ray ends that meets no vehicle.
 struct Background {
@@ -58,7 +58,8 @@ struct RoadLabel {
 inline constexpr double kDontCareDistance = 45;  ///< m
 
 /// A drive through a street with traffic, seen by a camera like KITTI's at half its resolution.
-/// Every picture and label is a pure function of seed and frame; a frame lasts kFrameSeconds.
+/// Every picture and label is a pure function of seed and frame, which lasts kFrameSeconds and may
+/// be any moment between two whole ones.
 class RoadScene {
  public:
   explicit RoadScene(std::uint64_t seed);
@@ -66,18 +67,18 @@ class RoadScene {
   ImageSize size() const { return {188, 621}; }
   Intrinsics camera() const { return {360.0, 360.0, 305.0, 88.0}; }
 
-  Picture picture(int frame) const;
+  Picture picture(double frame) const;
 
   /// [y, x]: the Vehicle::number seen at each pixel's centre, -1 for the surroundings.
-  std::vector<int> objects(int frame) const;
+  std::vector<int> objects(double frame) const;
 
   /// The vehicles whose outline reaches at least two pixels into the picture and that no nearer one
   /// covers wholly, nearest first.
-  std::vector<RoadLabel> labels(int frame) const;
+  std::vector<RoadLabel> labels(double frame) const;
 
  private:
   /// Every vehicle of which any part may be in the picture, nearest first.
-  std::vector<RoadLabel> in_view(int frame) const;
+  std::vector<RoadLabel> in_view(double frame) const;
 
   std::uint64_t seed_;
   RoadSurroundings surroundings_;

@@ -87,13 +87,17 @@ void write_frame(const std::filesystem::path& root, int number, const RoadScene&
 
 }  // namespace
 
-void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes) {
+void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes,
+                        int between) {
   for (const char* folder : {"image_2", "prev_2", "label_2", "calib"}) make_folder(root / folder);
   if (scenes > 0) {
     for (int i = 0; i < scenes; ++i) {
       const RoadScene scene(seed + static_cast<std::uint64_t>(i));
       FrameFiles files(scene);
-      write_frame(root, i, scene, kPreviousFrames + i % kFramesOfADrive, files);
+      const int labelled = kPreviousFrames + i % kFramesOfADrive;
+      write_frame(root, i, scene, labelled, files);
+      write_moments([&](double frame) { return scene.picture(frame); }, labelled - 1, labelled,
+                    between, root / "between_2" / numbered(i, 6));
     }
     return;
   }

@@ -18,7 +18,9 @@ std::string kitti_calibration(const Intrinsics& camera);
 
 /// Writes a drive (RoadScene) as KITTI's object set lays it out, 12 labelled frames with three
 /// previous frames each: `root`/{image_2, prev_2, label_2, calib}; or, of `scenes` > 0, so many
-/// drives with a labelled frame each. Throws std::runtime_error naming the path.
-void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes = 0);
+/// drives with a labelled frame each, and then in between_2/NAME/ the moments (write_moments) from
+/// the frame before the labelled one to it. Throws std::runtime_error naming the path.
+void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes = 0,
+                        int between = 0);
 
 }  // namespace eventgan

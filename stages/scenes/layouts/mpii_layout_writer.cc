@@ -223,7 +223,8 @@ FigureScene scene_of(std::uint64_t seed, int image) {
 
 }  // namespace
 
-void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes) {
+void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes,
+                       int between) {
   make_folder(root / "images");
   std::vector<DemoMpiiEntry> entries;
   for (int image = 0; image < std::max(kImages, scenes); ++image) {
@@ -235,6 +236,8 @@ void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, in
       write_jpeg(scene.picture(number), sequence / (numbered(number, 8) + ".jpg"));
     }
     copy_output(sequence / (numbered(kKeyFrame, 8) + ".jpg"), root / "images" / (name + ".jpg"));
+    write_moments([&](double frame) { return scene.picture(frame); }, kKeyFrame - 1, kKeyFrame + 1,
+                  between, root / "between" / name);
     entries.push_back({name, image + 1, image != kTestImage, scene.labels(kKeyFrame)});
   }
   write_mat_file(root / "mpii_human_pose_v1_u12_1.mat", "RELEASE", mpii_release(entries));

@@ -9,8 +9,10 @@ namespace eventgan {
 /// each image the 13 frames of video around it in sequences/NAME/. Six training images (or
 /// `scenes` less one, if that is more) with full annotations, one of them with two people, and a
 /// test image without joints. As in the original, coordinates count from 1, `is_visible` is a
-/// number, a character or empty, and scale is the person's height / 200 px. Throws
+/// number, a character or empty, and scale is the person's height / 200 px. In between/NAME/ are
+/// the moments (write_moments) from the frame before the labelled one to that after it. Throws
 /// std::runtime_error naming the path.
-void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes = 0);
+void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes = 0,
+                       int between = 0);
 
 }  // namespace eventgan

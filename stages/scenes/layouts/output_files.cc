@@ -34,4 +34,13 @@ void make_folder(const std::filesystem::path& path) {
   if (error) throw std::runtime_error("cannot make " + path.string() + ": " + error.message());
 }
 
+void write_moments(const std::function<Picture(double)>& picture, int first, int last, int between,
+                   const std::filesystem::path& folder) {
+  if (between == 0) return;
+  make_folder(folder);
+  for (int i = 0; i <= (last - first) * (between + 1); ++i) {
+    write_png(picture(first + i / (between + 1.0)), folder / (numbered(i, 5) + ".png"));
+  }
+}
+
 }  // namespace eventgan

@@ -85,12 +85,23 @@ TEST(DemoDataset, IsCompleteSmallAndTheSameForTheSameSeed) {
 
 TEST(DemoDataset, ScenesAreStreetsOfTheirOwn) {
   const TemporaryFolder folder;
-  write_demo_dataset(folder / "two", 7, 2);
+  write_demo_dataset(folder / "two", 7, 2, 3);
   const Files files = content_of(folder / "two");
   EXPECT_EQ(files.at("kitti/training/label_2/000001.txt"), kitti_labels(RoadScene(8).labels(4)));
   EXPECT_EQ(files.count("kitti/training/image_2/000002.png"), 0u);
   EXPECT_EQ(files.count("kitti/training/prev_2/000001_03.png"), 1u);
   EXPECT_EQ(files.count("mpii/images/000000007.jpg"), 1u);
+
+  // Between the frame before and the labelled one; around the labelled figure.
+  const std::string street = "kitti/training/between_2/000001/0000";
+  EXPECT_EQ(files.at(street + "0.png"), files.at("kitti/training/prev_2/000001_01.png"));
+  EXPECT_EQ(files.at(street + "4.png"), files.at("kitti/training/image_2/000001.png"));
+  EXPECT_EQ(files.count(street + "5.png"), 0u);
+  write_png(RoadScene(8).picture(3.5), folder / "half.png");
+  EXPECT_EQ(files.at(street + "2.png"), read_file(folder / "half.png"));
+  EXPECT_NE(files.at(street + "2.png"), files.at(street + "1.png"));
+  EXPECT_EQ(files.count("mpii/between/000000001/00008.png"), 1u);
+  EXPECT_EQ(files.count("mpii/between/000000001/00009.png"), 0u);
 }
 
 TEST(DemoDataset, RefusesAFolderWithContentAndAFile) {
