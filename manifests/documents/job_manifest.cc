@@ -304,6 +304,9 @@ GeneratorSpec read_generator(const StrictValue& value) {
   if (const auto engine = keys.find("engine", {kNetwork})) {
     spec.engine = engine->choice(kEngineWords);
   }
+  if (const auto device = keys.find("device", {kNetwork})) {
+    spec.device = device->choice(kDeviceWords);
+  }
   if (const auto precision = keys.find("precision", {kNetwork})) {
     spec.precision = precision->choice(kPrecisionWords);
   }

@@ -35,9 +35,16 @@ enum class Precision {
 /// What computes the network.
 enum class Engine { kTorch, kOnednn };
 
+/// Where the network is computed.
+enum class Device {
+  kCpu,
+  kCuda  ///< the first CUDA device that LibTorch sees; kTorch alone
+};
+
 /// The manifest's words for these values.
 std::string_view to_string(Precision precision);
 std::string_view to_string(Engine engine);
+std::string_view to_string(Device device);
 
 enum class DatasetKind {
   kKittiObject,
@@ -141,6 +148,7 @@ struct GeneratorSpec {
   std::string weights = "shipped";
   /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
   std::optional<Engine> engine;
+  Device device = Device::kCpu;               ///< kNetwork
   Precision precision = Precision::kFloat32;  ///< kNetwork
   ScopeSpec scope;                            ///< kNetwork
   SensorSpec sensor;                          ///< kEsim, kDifference

@@ -7,6 +7,7 @@ std::string_view to_string(Precision precision) { return word_of(kPrecisionWords
 std::string_view to_string(Engine engine) {
   return word_of(kEngineWords, std::optional<Engine>(engine));
 }
+std::string_view to_string(Device device) { return word_of(kDeviceWords, device); }
 
 std::string_view to_string(DatasetKind kind) { return word_of(kDatasetWords, kind); }
 std::string_view to_string(Human36mLayout layout) { return word_of(kLayoutWords, layout); }

@@ -68,6 +68,9 @@ inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std
                                          Word<std::optional<Engine>>{"torch", Engine::kTorch},
                                          Word<std::optional<Engine>>{"onednn", Engine::kOnednn}};
 
+inline constexpr std::array kDeviceWords{Word<Device>{"cpu", Device::kCpu},
+                                         Word<Device>{"cuda", Device::kCuda}};
+
 inline constexpr std::array kScopeWords{
     Word<Scope>{"whole", Scope::kWhole}, Word<Scope>{"motion", Scope::kMotion},
     Word<Scope>{"labels", Scope::kLabels}, Word<Scope>{"labels_only", Scope::kLabelsOnly}};

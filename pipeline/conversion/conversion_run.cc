@@ -264,18 +264,22 @@ GraphLimits graph_limits(const std::vector<const PlannedShard*>& shards, const G
                          int threads, std::size_t memory_bytes) {
   std::size_t sample_bytes = 1;
   std::size_t generator_bytes = 1;
+  int device_calls = 0;
   for (const PlannedShard* shard : shards) {
     const VolumeShape shape{generator.bins(), shard->volume_size};
     sample_bytes = std::max(sample_bytes, kVolumeCopies * shape.value_count() * sizeof(float));
     generator_bytes = std::max(generator_bytes, generator.working_bytes(shard->volume_size));
+    device_calls = std::max(device_calls, generator.device_calls(shard->volume_size));
   }
-  const std::size_t generators = memory_bytes / 4 * 3 / generator_bytes;
-  const auto at_once = static_cast<std::size_t>(threads);
+  const int generators = static_cast<int>(
+      std::clamp<std::size_t>(memory_bytes / 4 * 3 / generator_bytes, 1,
+                              static_cast<std::size_t>(device_calls > 0 ? device_calls : threads)));
+  const int waiting = device_calls > 0 ? generators : 0;
+  const auto at_once = static_cast<std::size_t>(threads + waiting);
   const std::size_t in_flight =
       std::clamp(kInFlightBytes / sample_bytes, at_once + 1, 4 * at_once + 4);
   const std::size_t most = std::max<std::size_t>(memory_bytes / 2 / sample_bytes, 1);
-  return {threads, std::min(in_flight, most),
-          static_cast<int>(std::clamp<std::size_t>(generators, 1, at_once))};
+  return {threads, std::min(in_flight, most), generators, waiting};
 }
 
 void check_pairs_fit(const std::vector<const PlannedShard*>& shards, const Generator& generator,
@@ -301,9 +305,10 @@ void check_pairs_fit(const std::vector<const PlannedShard*>& shards, const Gener
 std::size_t run_conversion_graph(const std::function<const PlannedShard*()>& next_shard,
                                  const ConversionBodies& bodies, const GraphLimits& limits,
                                  const std::function<StopOrder()>& order, TraceRecorder* trace) {
+  const int threads = limits.threads + limits.waiting;
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
-                                           static_cast<std::size_t>(limits.threads));
-  oneapi::tbb::task_arena arena(limits.threads);
+                                           static_cast<std::size_t>(threads));
+  oneapi::tbb::task_arena arena(threads);
   return arena.execute([&] { return run_graph(next_shard, bodies, limits, order, trace); });
 }
 

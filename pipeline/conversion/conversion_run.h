@@ -86,16 +86,18 @@ std::vector<const PlannedShard*> run_conversion(const char* name, const Conversi
 // ---- What it consists of
 
 struct GraphLimits {
-  int threads = 1;            ///< the one budget of threads, the calling one included
+  int threads = 1;            ///< the one budget of threads at work, the calling one included
   std::size_t in_flight = 2;  ///< samples between source and writer at most; ≥ 1
-  int generators = 1;         ///< calls of the generator at the same time; 1..threads
+  int generators = 1;         ///< calls of the generator at the same time; ≥ 1
+  int waiting = 0;            ///< threads beside these for calls that wait for a device
 };
 
 /// Limits for a graph over `shards`: enough samples under way to keep every one of `threads`
 /// threads busy while the writer commits a shard, and not more of the largest ones than fit into a
 /// gibibyte, at least threads + 1 unless these take more than half of `memory_bytes`; as many
 /// generators at once as threads, and not more of them than fit into three quarters of
-/// `memory_bytes` at the largest size, at least one.
+/// `memory_bytes` at the largest size, at least one. For a generator on a device its device_calls
+/// take the place of the threads' calls, in threads of their own, since they do nothing but wait.
 GraphLimits graph_limits(const std::vector<const PlannedShard*>& shards, const Generator& generator,
                          int threads, std::size_t memory_bytes);
 

@@ -5,6 +5,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 
 namespace eventgan {
 namespace {
@@ -47,7 +48,7 @@ bool torch_able(Precision precision, const OnednnSupport& onednn) {
 
 }  // namespace
 
-EngineSupport engine_support(Precision precision) {
+EngineSupport engine_support(Precision precision, Device device) {
   const OnednnSupport onednn = onednn_support(precision);
   EngineSupport support;
   support.onednn_built = onednn.built;
@@ -56,6 +57,11 @@ EngineSupport engine_support(Precision precision) {
   support.native =
       onednn.built ? onednn.native : precision != Precision::kBfloat16 || has_bfloat16();
   support.processor = onednn.built ? onednn.instruction_set : processor_name();
+  if (device == Device::kCuda) {
+    CudaSupport cuda = cuda_support(precision);
+    support.cuda = std::move(cuda.device);
+    support.cuda_lack = std::move(cuda.lack);
+  }
   return support;
 }
 
@@ -106,6 +112,28 @@ EngineChoice fastest(Precision precision, const EngineSupport& support) {
   return chosen(Engine::kTorch, "auto: " + missing);
 }
 
+EngineChoice on_cuda(const EngineRequest& request, const EngineSupport& support) {
+  if (request.engine == Engine::kOnednn) {
+    throw UsageError(
+        "$.generator.engine: expected \"auto\" or \"torch\" on device cuda, got \"onednn\", which "
+        "computes on processors alone");
+  }
+  if (request.precision == Precision::kInt8) {
+    throw UsageError(
+        "$.generator.precision: expected \"float32\" or \"bfloat16\" on device cuda, got \"int8\", "
+        "which oneDNN alone has, on processors");
+  }
+  if (support.cuda.empty()) {
+    throw UsageError("$.generator.device: expected \"cpu\", got \"cuda\": " + support.cuda_lack);
+  }
+  if (!support.cuda_lack.empty()) {
+    throw UsageError("$.generator.precision: expected \"float32\", got " +
+                     quoted(to_string(request.precision)) + ": " + support.cuda_lack);
+  }
+  return chosen(Engine::kTorch,
+                request.engine ? "as the manifest says" : "auto: the engine of device cuda");
+}
+
 /// Why a precision is a bad bargain on this processor; empty if it is none.
 std::string advice(Precision precision, const EngineSupport& support) {
   if (precision == Precision::kFloat32 || support.native) return "";
@@ -118,6 +146,7 @@ std::string advice(Precision precision, const EngineSupport& support) {
 }  // namespace
 
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support) {
+  if (request.device == Device::kCuda) return on_cuda(request, support);
   EngineChoice choice = request.engine ? asked(*request.engine, request.precision, support)
                                        : fastest(request.precision, support);
   if (request.precision == Precision::kInt8 && !request.calibrated) {

@@ -13,16 +13,20 @@ struct EngineRequest {
   Precision precision = Precision::kFloat32;
   bool calibrated = false;  ///< whether the weights carry a calibration
   std::string weights;      ///< what messages call the weights
+  Device device = Device::kCpu;
 };
 
-/// What this program and this processor offer for one precision. "Able": it is computed by compiled
-/// kernels, not by loops that take many times as long.
+/// What this program and this machine offer for one precision on one device. "Able": it is computed
+/// by compiled kernels, not by loops that take many times as long.
 struct EngineSupport {
   bool onednn_built = false;
   bool onednn_able = false;
   bool torch_able = false;
   bool native = false;    ///< the processor has instructions made for the precision
   std::string processor;  ///< its instruction set, for messages: "avx512_core_vnni"
+  // On Device::kCuda, for messages:
+  std::string cuda = {};       ///< the device; empty if there is none
+  std::string cuda_lack = {};  ///< why it does not compute the precision; empty if it does
 };
 
 struct EngineChoice {
@@ -32,12 +36,12 @@ struct EngineChoice {
 };
 
 /// The engine that a job gets: the one it asks for, else oneDNN where that is built in and able,
-/// else LibTorch. Throws UsageError saying what the weights, the program or the processor lack, and
-/// what would work. Pure.
+/// else LibTorch; on CUDA LibTorch. Throws UsageError saying what the weights, the program, the
+/// processor or the device lack, and what would work. Pure.
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support);
 
 /// What there is for a precision on the processor that runs this, as oneDNN sees it
-/// (ONEDNN_MAX_CPU_ISA minded).
-EngineSupport engine_support(Precision precision);
+/// (ONEDNN_MAX_CPU_ISA minded), and, only for Device::kCuda, on the CUDA device (cuda_support).
+EngineSupport engine_support(Precision precision, Device device = Device::kCpu);
 
 }  // namespace eventgan

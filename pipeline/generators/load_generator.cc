@@ -70,17 +70,21 @@ LoadedGenerator load_simulator(const JobManifest& manifest) {
   return loaded;
 }
 
-std::string choice_text(const EngineChoice& choice, Precision precision,
+std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,
                         const EngineSupport& support, const std::optional<GapRange>& gaps) {
   std::string text = "generator: ";
-  text.append(to_string(choice.engine)).append(" ").append(to_string(precision));
-  text += " on " + support.processor + " (" + choice.reason + "), " + describe_training_gaps(gaps);
+  text.append(to_string(choice.engine)).append(" ").append(to_string(spec.precision));
+  text += " on " + (spec.device == Device::kCuda ? support.cuda : support.processor) + " (" +
+          choice.reason + "), " + describe_training_gaps(gaps);
   return gaps ? text : text + ", so none is marked as extrapolated";
 }
 
 /// Weights that the engine refuses are an input that cannot be used.
 std::unique_ptr<Generator> make_engine(Engine engine, const Weights& weights,
                                        const GeneratorSpec& spec) try {
+  if (spec.device == Device::kCuda) {
+    return make_batched_generator(weights, spec.precision, spec.device);
+  }
   return engine == Engine::kOnednn ? make_onednn_generator(weights, spec.precision)
                                    : make_torch_generator(weights, spec.precision);
 } catch (const std::invalid_argument&) {
@@ -94,13 +98,15 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   const GeneratorSpec& spec = manifest.generator;
   if (spec.kind != GeneratorKind::kNetwork) return load_simulator(manifest);
   LoadedWeights loaded = load_weights(manifest);
-  const EngineSupport support = engine_support(spec.precision);
-  const EngineChoice choice = choose_engine(
-      {spec.engine, spec.precision, loaded.weights.calibration != nullptr, spec.weights}, support);
+  const EngineSupport support = engine_support(spec.precision, spec.device);
+  const EngineChoice choice =
+      choose_engine({spec.engine, spec.precision, loaded.weights.calibration != nullptr,
+                     spec.weights, spec.device},
+                    support);
   LoadedGenerator result;
   result.generator = make_engine(choice.engine, loaded.weights, spec);
   result.weights_hash = std::move(loaded.hash);
-  result.choice = choice_text(choice, spec.precision, support, loaded.weights.training_gaps);
+  result.choice = choice_text(choice, spec, support, loaded.weights.training_gaps);
   for (const std::string& warning : {loaded.warning, choice.warning}) {
     if (!warning.empty()) result.warnings.push_back(warning);
   }

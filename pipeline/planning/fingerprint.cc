@@ -175,7 +175,7 @@ std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSI
 
 std::string version_text() {
   std::string engines;
-  for (const char* name : {"libtorch_cpu", "libdnnl", "libtbb"}) {
+  for (const char* name : {"libtorch_cpu", "libtorch_cuda", "libdnnl", "libtbb"}) {
     std::filesystem::path file = library_file(name);
     if (file.empty()) continue;
     std::error_code unknown;  // the name that has the whole version is behind a link

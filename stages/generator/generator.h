@@ -61,6 +61,10 @@ class Generator {
   /// hardly any.
   virtual std::size_t working_bytes(ImageSize) const { return 0; }
 
+  /// Calls at the same time that keep a device beside the processor busy: their threads wait for
+  /// it, and use no core. 0: a call computes on its own thread.
+  virtual int device_calls(ImageSize) const { return 0; }
+
   /// What it was trained on; beyond it, it extrapolates. None: not known, or not trained at all (a
   /// model of a sensor).
   virtual std::optional<GapRange> training_gaps() const { return std::nullopt; }

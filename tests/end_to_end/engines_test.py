@@ -145,6 +145,31 @@ class Engines(program.InFolder):
         _, err = run("convert", self.manifest(engine="torch", precision="int8"), expect=64)
         self.assertIn("LibTorch has no int8 for this network", err)
 
+    def test_cuda_gives_the_volumes_of_the_processor_or_is_refused_before_any_work(self):
+        path = self.manifest("cuda.json", device="cuda")
+        if not self.is_offered(path):
+            for command in ("plan", "convert"):
+                out, err = run(command, path, "--progress", "none", expect=64)
+                self.assertEqual(out, "")
+                self.assertRegex(err, r'\A\S+ \$\.generator\.device: expected "cpu", got "cuda": '
+                                      r"LibTorch (was built without CUDA|finds no CUDA device)\n\Z")
+            self.assertFalse((self.job / "cuda").exists())
+            return
+        volumes, err = self.convert("cuda", device="cuda")
+        self.assertRegex(err, r"(?m)^generator: torch float32 on cuda: .+ \(auto: the engine of device cuda\), trained on gaps 1-6$")
+        self.assert_near(volumes, self.convert("torch", engine="torch")[0])
+        shards = []
+        for threads in (1, 3):
+            run("convert", path, "--progress", "none", "--overwrite", "--threads", threads)
+            shards.append(program.shard_bytes(self.job / "cuda"))
+        self.assertEqual(*shards)
+
+    def test_cuda_takes_neither_onednn_nor_int8(self):
+        _, err = run("plan", self.manifest(engine="onednn", device="cuda"), expect=64)
+        self.assertIn('$.generator.engine: expected "auto" or "torch" on device cuda, got "onednn"', err)
+        _, err = run("plan", self.manifest(precision="int8", device="cuda"), expect=64)
+        self.assertIn('$.generator.precision: expected "float32" or "bfloat16" on device cuda, got "int8"', err)
+
     # Calibration.
 
     def calibrate(self, *arguments, expect=0, **generator):

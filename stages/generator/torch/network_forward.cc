@@ -16,19 +16,19 @@
 namespace eventgan {
 namespace {
 
-/// at::conv2d for one group, by oneDNN wherever LibTorch has it: left to itself LibTorch takes
-/// small tensors to a matrix product of its own, which with a plain BLAS is several times slower.
-/// bias: [out], or none. Thread safe. Throws c10::Error.
+/// at::conv2d for one group, on the CPU by oneDNN wherever LibTorch has it: left to itself LibTorch
+/// takes small tensors to a matrix product of its own, which with a plain BLAS is several times
+/// slower. bias: [out], or none. Thread safe. Throws c10::Error.
 at::Tensor convolution(const at::Tensor& x, const at::Tensor& weight, const at::Tensor& bias,
                        int stride, int padding) {
-  if (!at::hasMKLDNN()) return at::conv2d(x, weight, bias, stride, padding);
+  if (!x.is_cpu() || !at::hasMKLDNN()) return at::conv2d(x, weight, bias, stride, padding);
   const std::int64_t paddings[] = {padding, padding};
   const std::int64_t strides[] = {stride, stride};
   const std::int64_t dilations[] = {1, 1};
   return at::mkldnn_convolution(x, weight, bias, paddings, strides, dilations, /*groups=*/1);
 }
 
-constexpr int kRows = 2;  // dimension of a tensor [1, C, H, W]
+constexpr int kRows = 2;  // dimension of a tensor [B, C, H, W]
 constexpr int kColumns = 3;
 
 /// Every second position from `first` on, `count` of them.
@@ -45,32 +45,33 @@ at::Tensor doubled_end(const at::Tensor& x, int dimension, std::int64_t doubled_
 
 /// Nearest doubling along one dimension.
 at::Tensor doubled_along(const at::Tensor& x, int dimension, std::int64_t doubled_size) {
-  const at::Tensor positions = at::arange(doubled_size, at::kLong).floor_divide(2);
+  const at::Tensor positions =
+      at::arange(doubled_size, x.options().dtype(at::kLong)).floor_divide(2);
   return x.index_select(dimension, positions).contiguous(at::MemoryFormat::ChannelsLast);
 }
 
 }  // namespace
 
 at::Tensor kernel_tensor(const std::vector<float>& kernel, int out_channels, int in_channels,
-                         int side, at::ScalarType type) {
+                         int side, const at::TensorOptions& kind) {
   const at::Tensor values =
       at::from_blob(const_cast<float*>(kernel.data()), {out_channels, in_channels, side, side});
-  return values.to(type, /*non_blocking=*/false, /*copy=*/true, at::MemoryFormat::ChannelsLast);
+  return values.to(kind, /*non_blocking=*/false, /*copy=*/true, at::MemoryFormat::ChannelsLast);
 }
 
-at::Tensor bias_tensor(const std::vector<float>& bias, at::ScalarType type) {
+at::Tensor bias_tensor(const std::vector<float>& bias, const at::TensorOptions& kind) {
   const auto count = static_cast<std::int64_t>(bias.size());
-  return at::from_blob(const_cast<float*>(bias.data()), {count}).to(type, false, /*copy=*/true);
+  return at::from_blob(const_cast<float*>(bias.data()), {count}).to(kind, false, /*copy=*/true);
 }
 
-DecoderForward::DecoderForward(const Convolution& decoder, at::ScalarType type) {
+DecoderForward::DecoderForward(const Convolution& decoder, const at::TensorOptions& kind) {
   const DecoderKernels kernels = decoder_kernels(decoder);
   const int out = decoder.out_channels;
   const int in = kernels.doubled_channels;
-  skip_ = kernel_tensor(kernels.skip, out, out, 3, type);
-  bias_ = bias_tensor(decoder.bias, type);
-  phases_ = kernel_tensor(kernels.phases, 4 * out, in, 2, type);
-  doubled_ = kernel_tensor(kernels.doubled, out, in, 3, type);
+  skip_ = kernel_tensor(kernels.skip, out, out, 3, kind);
+  bias_ = bias_tensor(decoder.bias, kind);
+  phases_ = kernel_tensor(kernels.phases, 4 * out, in, 2, kind);
+  doubled_ = kernel_tensor(kernels.doubled, out, in, 3, kind);
 }
 
 at::Tensor DecoderForward::operator()(const at::Tensor& x, const at::Tensor& skip) const {
@@ -114,11 +115,6 @@ void DecoderForward::add_last_column(const at::Tensor& x, at::Tensor& sum) const
       .add_(convolution(end, doubled_, {}, 1, 1).narrow(kRows, 0, rows).slice(kColumns, -1));
 }
 
-namespace {
-
-/// LibTorch keeps its thread count per calling thread, and oneDNN reads OpenMP's; without both, a
-/// worker silently takes every core. The last bits of a convolution depend on the count, so it is
-/// one, always.
 void use_one_thread() {
   thread_local const bool done = [] {
     at::set_num_threads(1);
@@ -128,6 +124,8 @@ void use_one_thread() {
   static_cast<void>(done);
 }
 
+namespace {
+
 at::Tensor observed(const std::string& name, at::Tensor x, const TensorObserver& observe) {
   if (observe) observe(name, x);
   return x;
@@ -135,16 +133,17 @@ at::Tensor observed(const std::string& name, at::Tensor x, const TensorObserver&
 
 }  // namespace
 
-NetworkForward::NetworkForward(const Weights& weights, at::ScalarType type) try : type_(type) {
+NetworkForward::NetworkForward(const Weights& weights, const at::TensorOptions& kind) try
+    : kind_(kind) {
   check_weights(weights, "the weights");
   for (const Convolution& convolution : weights.convolutions) {
     if (convolution.name.starts_with("decoders.")) {
-      decoders_.emplace_back(convolution, type);
+      decoders_.emplace_back(convolution, kind);
       continue;
     }
     layers_[convolution.name] = {kernel_tensor(convolution.weight, convolution.out_channels,
-                                               convolution.in_channels, convolution.kernel, type),
-                                 bias_tensor(convolution.bias, type), convolution.stride,
+                                               convolution.in_channels, convolution.kernel, kind),
+                                 bias_tensor(convolution.bias, kind), convolution.stride,
                                  (convolution.kernel - 1) / 2};
   }
 } catch (const c10::Error&) {
@@ -172,9 +171,16 @@ at::Tensor NetworkForward::residual(const std::string& block, const at::Tensor& 
 
 at::Tensor NetworkForward::operator()(std::span<const float> frames, ImageSize size,
                                       const TensorObserver& observe) const {
+  return (*this)(at::from_blob(const_cast<float*>(frames.data()), {1, 2, size.height, size.width}),
+                 observe);
+}
+
+at::Tensor NetworkForward::operator()(const at::Tensor& frames,
+                                      const TensorObserver& observe) const {
   use_one_thread();
-  at::Tensor x = at::from_blob(const_cast<float*>(frames.data()), {1, 2, size.height, size.width})
-                     .to(type_)
+  // First to the device, there into its type: the other way round the CPU would convert.
+  at::Tensor x = frames.to(kind_.device(), frames.scalar_type(), /*non_blocking=*/true)
+                     .to(kind_)
                      .contiguous(at::MemoryFormat::ChannelsLast);
   x = leaky("head", x, observe);
   std::vector<at::Tensor> skips;

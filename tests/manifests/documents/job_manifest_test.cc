@@ -63,6 +63,7 @@ TEST(JobManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(manifest.image.fit, ImageFit::kStretch);
   EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
   EXPECT_EQ(manifest.generator.engine, std::nullopt);
+  EXPECT_EQ(manifest.generator.device, Device::kCpu);
   EXPECT_EQ(manifest.generator.precision, Precision::kFloat32);
   EXPECT_EQ(manifest.volume.bins, 9);
   EXPECT_EQ(manifest.volume.normalize, Normalization::kNone);
@@ -87,7 +88,8 @@ TEST(JobManifest, HoldsEveryValueGiven) {
        "pairs": {"gaps": [2]}},
       {"dataset": "frames", "root": "h", "frames_per_second": 29.97, "pairs": {"gaps": [2]}}],
     "image": {"width": 861, "height": 260, "fit": "crop", "grey": "after_resize", "blur": 5},
-    "generator": {"weights": "untrained:8", "engine": "onednn", "precision": "int8",
+    "generator": {"weights": "untrained:8", "engine": "onednn", "device": "cuda",
+                  "precision": "int8",
                   "scope": "labels", "motion_threshold": 2.5, "motion_margin_px": 0,
                   "label_margin_px": 100, "tile_px": 32},
     "volume": {"bins": 3, "normalize": "eta98"},
@@ -120,6 +122,7 @@ TEST(JobManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.image.blur, 5);
   EXPECT_EQ(manifest.generator.weights, "untrained:8");
   EXPECT_EQ(manifest.generator.engine, Engine::kOnednn);
+  EXPECT_EQ(manifest.generator.device, Device::kCuda);
   EXPECT_EQ(manifest.generator.precision, Precision::kInt8);
   EXPECT_EQ(manifest.generator.scope.scope, Scope::kLabels);
   EXPECT_EQ(manifest.generator.scope.motion_threshold, 2.5);

@@ -57,6 +57,7 @@ TEST(ManifestSchema, ListsTheSameWords) {
   EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
   EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
   EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
+  EXPECT_EQ(listed("/properties/generator/properties/device"), words(kDeviceWords));
   EXPECT_EQ(listed("/properties/generator/properties/precision"), words(kPrecisionWords));
   EXPECT_EQ(listed("/properties/generator/properties/scope"), words(kScopeWords));
   EXPECT_EQ(listed("/properties/volume/properties/normalize"), words(kNormalizationWords));
@@ -81,6 +82,7 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/generator/properties/precision"), to_string(generator.precision));
   EXPECT_EQ(stated("/properties/generator/properties/engine"),
             word_of(kEngineWords, generator.engine));
+  EXPECT_EQ(stated("/properties/generator/properties/device"), to_string(generator.device));
   EXPECT_EQ(stated("/properties/generator/properties/scope"), to_string(generator.scope.scope));
   EXPECT_EQ(stated("/properties/generator/properties/motion_threshold"),
             generator.scope.motion_threshold);

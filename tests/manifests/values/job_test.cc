@@ -33,6 +33,7 @@ TEST(JobWords, GoThereAndBack) {
   expect_one_to_one(kGreyWords);
   expect_one_to_one(kGeneratorWords);
   expect_one_to_one(kPrecisionWords);
+  expect_one_to_one(kDeviceWords);
   expect_one_to_one(kScopeWords);
   expect_one_to_one(kNormalizationWords);
   expect_one_to_one(kStoredTypeWords);

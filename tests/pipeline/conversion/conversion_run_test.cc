@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <deque>
 #include <map>
+#include <mutex>
 #include <stdexcept>
 
 #include "tests/pipeline/runtime/trace_reading.h"
@@ -292,12 +295,17 @@ const testing::FakeGenerator kGenerator;
 /// Needs a kilobyte for each pixel.
 class LargeGenerator final : public Generator {
  public:
+  explicit LargeGenerator(int device_calls = 0) : device_calls_(device_calls) {}
   int bins() const override { return 9; }
   GenerationNotes generate(std::span<const float>, ImageSize, std::span<float>) const override {
     return {};
   }
   std::string description() const override { return "large"; }
   std::size_t working_bytes(ImageSize size) const override { return 1024 * size.pixel_count(); }
+  int device_calls(ImageSize) const override { return device_calls_; }
+
+ private:
+  int device_calls_;
 };
 
 TEST(GraphLimits, KeepThreadsBusyWithSmallSamples) {
@@ -335,6 +343,48 @@ TEST(GraphLimits, HoldFewerSamplesWhereTheyTakeMoreThanHalfOfTheMemory) {
   const std::size_t gibibyte = std::size_t{1} << 30;
   EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 2 * gibibyte).in_flight, 7u);
   EXPECT_EQ(graph_limits({&large}, kGenerator, 8, 1000).in_flight, 1u);
+}
+
+TEST(GraphLimits, GiveCallsThatWaitForADeviceThreadsOfTheirOwn) {
+  const PlannedShard small{"s.h5", 0, {20, 30}, {}};
+  const LargeGenerator generator(/*device_calls=*/4);
+  const GraphLimits limits = graph_limits({&small}, generator, 2, kMuch);
+  EXPECT_EQ(limits.threads, 2);
+  EXPECT_EQ(limits.generators, 4);
+  EXPECT_EQ(limits.waiting, 4);
+  EXPECT_EQ(limits.in_flight, 4 * (2 + 4) + 4u);
+  EXPECT_EQ(graph_limits({&small}, kGenerator, 2, kMuch).waiting, 0);
+  // 1024 x 1024 pixels with a kilobyte each: two in three quarters of 3 GiB.
+  const PlannedShard large{"l.h5", 0, {1024, 1024}, {}};
+  EXPECT_EQ(graph_limits({&large}, generator, 2, std::size_t{3} << 30).generators, 2);
+}
+
+TEST(ConversionGraphOnADevice, ReadsOnWhileAllItsCallsWait) {
+  constexpr int kWaiting = 4;
+  const PlannedShard shards = shard("s", 40);
+  Recorder recorder;
+  ConversionBodies bodies = recorder.bodies();
+  std::mutex mutex;
+  std::condition_variable changed;
+  int read = 0, waiting = 0;
+  bool filled = false;
+  bodies.read = [&](SampleMessage&) {
+    const std::lock_guard lock(mutex);
+    ++read;
+    changed.notify_all();
+  };
+  bodies.generate = [&](SampleMessage&) {  // until all calls wait and as many more are read
+    std::unique_lock lock(mutex);
+    ++waiting;
+    changed.notify_all();
+    EXPECT_TRUE(changed.wait_for(lock, std::chrono::seconds(20), [&] {
+      return filled = filled || (waiting == kWaiting && read == 2 * kWaiting);
+    }));
+    --waiting;
+  };
+  const GraphLimits limits{1, 2 * kWaiting, kWaiting, kWaiting};
+  EXPECT_EQ(run_conversion_graph(one_by_one({&shards}), bodies, limits, go_on), 40u);
+  EXPECT_TRUE(filled);
 }
 
 TEST(CheckPairsFit, NamesThePairThatDoesNot) {

@@ -12,6 +12,7 @@
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/verify_folder.h"
 #include "pipeline/generators/load_generator.h"
+#include "stages/generator/torch/torch_generator.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 #include "tests/pipeline/conversion/small_conversion.h"
@@ -53,6 +54,17 @@ TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(shards("one"), shards("two"));
   EXPECT_EQ(shards("two"), shards("again"));
   EXPECT_EQ(shards("one"), shards("five"));
+}
+
+TEST_F(Convert, InBatchesGivesTheSameBytesForAnyNumberOfThreads) {
+  const auto generator =
+      make_batched_generator(load_weights(manifest_).weights, Precision::kFloat32, Device::kCpu);
+  for (const int threads : {1, 3}) {
+    const auto folder = std::to_string(threads);
+    EXPECT_EQ(convert(manifest_, *generator, "weights", options(folder, threads)).written, 11);
+  }
+  EXPECT_EQ(shards("1"), shards("3"));
+  EXPECT_THAT(verify_folder(folder_ / "3").faults, ::testing::IsEmpty());
 }
 
 TEST_F(Convert, WarnsOnceOfVolumesBeyondTheCalibration) {

@@ -144,6 +144,48 @@ TEST(ChooseEngine, RefusesBfloat16WhereNothingComputesItInReasonableTime) {
   }
 }
 
+EngineSupport cuda_of(const std::string& device, const std::string& lack) {
+  EngineSupport support = all_of();
+  support.cuda = device;
+  support.cuda_lack = lack;
+  return support;
+}
+
+EngineRequest on_cuda(std::optional<Engine> engine, Precision precision) {
+  EngineRequest asked = request(engine, precision);
+  asked.device = Device::kCuda;
+  return asked;
+}
+
+TEST(ChooseEngine, OnCudaItIsLibtorch) {
+  EngineSupport support = cuda_of("cuda: NVIDIA H100 (compute capability 9.0)", "");
+  // What the processor lacks does not matter.
+  support.onednn_built = support.onednn_able = support.torch_able = support.native = false;
+  for (const Precision precision : {kFloat32, kBfloat16}) {
+    EngineChoice choice = choose_engine(on_cuda({}, precision), support);
+    EXPECT_EQ(choice.engine, kTorch);
+    EXPECT_EQ(choice.reason, "auto: the engine of device cuda");
+    EXPECT_EQ(choice.warning, "");
+    choice = choose_engine(on_cuda(kTorch, precision), support);
+    EXPECT_EQ(choice.engine, kTorch);
+    EXPECT_EQ(choice.reason, "as the manifest says");
+  }
+  EXPECT_EQ(refusal(on_cuda(kOnednn, kFloat32), support),
+            "$.generator.engine: expected \"auto\" or \"torch\" on device cuda, got \"onednn\", "
+            "which computes on processors alone");
+  EXPECT_EQ(refusal(on_cuda({}, kInt8), support),
+            "$.generator.precision: expected \"float32\" or \"bfloat16\" on device cuda, got "
+            "\"int8\", which oneDNN alone has, on processors");
+}
+
+TEST(ChooseEngine, RefusesCudaWhereThereIsNoneAndBfloat16WhereTheDeviceHasNone) {
+  EXPECT_EQ(refusal(on_cuda({}, kFloat32), cuda_of("", "LibTorch was built without CUDA")),
+            "$.generator.device: expected \"cpu\", got \"cuda\": LibTorch was built without CUDA");
+  EXPECT_EQ(
+      refusal(on_cuda({}, kBfloat16), cuda_of("cuda: Tesla T4", "Tesla T4 has no bfloat16")),
+      "$.generator.precision: expected \"float32\", got \"bfloat16\": Tesla T4 has no bfloat16");
+}
+
 /// Weights that do not say of themselves that they are untrained.
 Weights trained_weights() {
   Weights weights = untrained_weights(1, 9, 1);
@@ -194,7 +236,10 @@ TEST(LoadGenerator, MakesTheEngineThatIsAskedForAndSaysWhich) {
   EXPECT_THAT(torch.choice, ::testing::EndsWith(
                                 "(as the manifest says), training gaps unknown, so none is marked "
                                 "as extrapolated"));
-  EXPECT_THAT(torch.generator->description(), ::testing::StartsWith("torch float32"));
+  // Where this changes, folders that were begun before are refused.
+  EXPECT_THAT(torch.generator->description(),
+              ::testing::StartsWith("torch float32, 1 thread, LibTorch "));
+  EXPECT_THAT(torch.generator->description(), ::testing::Not(::testing::HasSubstr("cuda")));
 
   manifest.generator.engine = std::nullopt;
   const EngineSupport support = engine_support(Precision::kFloat32);
@@ -220,6 +265,20 @@ TEST(LoadGenerator, KnowsWhatGapsTheWeightsWereTrainedOn) {
     EXPECT_THAT(loaded.choice, ::testing::EndsWith(", trained on gaps 1-5"));
     EXPECT_THAT(loaded.generator->description(), ::testing::EndsWith(", trained on gaps 1-5"));
   }
+}
+
+TEST(LoadGenerator, MakesTheOneOnCudaOrRefusesIt) {
+  JobManifest manifest;
+  manifest.generator.weights = "untrained:1";
+  manifest.generator.device = Device::kCuda;
+  const EngineSupport support = engine_support(Precision::kFloat32, Device::kCuda);
+  if (!support.cuda_lack.empty()) {
+    EXPECT_THROW(load_generator(manifest), UsageError);
+    return;
+  }
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_THAT(loaded.choice, ::testing::StartsWith("generator: torch float32 on cuda: "));
+  EXPECT_THAT(loaded.generator->description(), ::testing::StartsWith("torch float32 on cuda: "));
 }
 
 TEST(LoadGenerator, RefusesInt8WithoutACalibration) {
