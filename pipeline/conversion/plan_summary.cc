@@ -156,14 +156,15 @@ nlohmann::json by_gap_json(const std::map<int, std::int64_t>& counts) {
   return json;
 }
 
-std::string estimate_text(const TrialEstimate& estimate, int threads) {
+std::string estimate_text(const TrialEstimate& estimate, int threads, Device device) {
   if (estimate.pairs_measured == 0) return "no pair could be tried: no estimate of size and time\n";
   return fmt::format(
       "about {:.1f} MB and {:.0f} s with {} thread{} ({:.3f} s a pair on one thread, measured on "
       "{} "
-      "pair{})\n",
+      "pair{}{})\n",
       estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
-      estimate.seconds_per_pair, estimate.pairs_measured, estimate.pairs_measured == 1 ? "" : "s");
+      estimate.seconds_per_pair, estimate.pairs_measured, estimate.pairs_measured == 1 ? "" : "s",
+      device == Device::kCpu ? "" : " one by one; in batches the device takes less");
 }
 
 }  // namespace
@@ -178,7 +179,7 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
   }
   return text +
          fmt::format("in all {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
-         estimate_text(estimate, threads);
+         estimate_text(estimate, threads, manifest.generator.device);
 }
 
 std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job,

@@ -33,7 +33,7 @@ inline constexpr double kMostSaturated = 5e-4;
 /// inference engines, and where tests put a fake.
 ///
 /// Thread safety: `generate` may be called from several threads at once; the engine keeps no state
-/// between calls, so a volume depends on its two frames alone.
+/// between calls, so a volume depends on its two frames alone, on CUDA but for its last bits.
 class Generator {
  public:
   virtual ~Generator() = default;

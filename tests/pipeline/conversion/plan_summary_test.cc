@@ -56,6 +56,13 @@ TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
 }
 
+TEST_F(PlanSummary, SaysThatADeviceIsFasterThanItsTrial) {
+  manifest_.generator.device = Device::kCuda;
+  EXPECT_THAT(
+      plan_text(manifest_, job_, estimate_, 2),
+      ::testing::HasSubstr("measured on 2 pairs one by one; in batches the device takes less)\n"));
+}
+
 TEST_F(PlanSummary, JsonHasTheSameNumbers) {
   const auto json = nlohmann::json::parse(plan_summary_json(manifest_, job_, estimate_, 2));
   EXPECT_EQ(json["pairs"], 3);
