@@ -90,9 +90,11 @@ std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
 SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
   SelectionSpec spec;
   if (const auto ids = object.find("ids")) spec.ids = read_path(*ids);
-  spec.subjects = read_words(keys.find("subjects", {DatasetKind::kHuman36m}));
-  spec.cameras = read_words(keys.find("cameras", {DatasetKind::kHuman36m}));
-  spec.actions = read_words(keys.find("actions", {DatasetKind::kHuman36m}));
+  using enum DatasetKind;
+  spec.subjects = read_words(keys.find("subjects", {kHuman36m, kDhp19}));
+  spec.cameras = read_words(keys.find("cameras", {kHuman36m, kDhp19}));
+  spec.actions = read_words(keys.find("actions", {kHuman36m, kDhp19}));
+  spec.without_actions = read_words(keys.find("without_actions", {kDhp19}));
   if (const auto fraction = object.find("fraction")) {
     const auto ends = fraction->elements(2);
     if (ends.size() == 2) {
@@ -101,6 +103,28 @@ SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
     } else if (!ends.empty()) {
       fraction->fault("an array of 2");
     }
+  }
+  return spec;
+}
+
+/// A label of dhp19 is the mean pose of a window, which is of so many events as the dataset's
+/// authors took.
+constexpr std::int64_t kDhp19Events = 7500;
+
+WindowSpec read_window(SpecialKeys& keys, std::optional<DatasetKind> dataset) {
+  using enum DatasetKind;
+  WindowSpec spec;
+  const auto duration = keys.find("window_s", {kRecording});
+  const auto events = keys.find("window_events", {kRecording, kDhp19});
+  if (duration) spec.duration_s = duration->number(1e-6, 1e3);
+  if (events) spec.events = events->integer<std::int64_t>(1, 1'000'000'000);
+  if (duration && events) events->fault("no such key beside window_s, which decides it");
+  if (const auto place = keys.find("label_at", {kRecording})) {
+    spec.label = place->choice(kLabelPlaceWords);
+  }
+  if (dataset == kDhp19) {
+    spec.events = spec.events.value_or(kDhp19Events);
+    spec.label = LabelPlace::kMiddle;
   }
   return spec;
 }
@@ -121,7 +145,7 @@ SourceSpec read_source(const StrictValue& value) {
   spec.devkit = keys.find_path("devkit", {kKittiObject});
   // Neither is of use without the other: the devkit's mapping says which raw frame a picture is.
   if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
-  spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m});
+  spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m, kRecording});
   if (dataset == kMpiiList && !spec.annotations)
     spec.annotations = read_path(object.at("annotations"));
   spec.sequences = keys.find_path("sequences", {kMpii, kMpiiList});
@@ -137,8 +161,20 @@ SourceSpec read_source(const StrictValue& value) {
     spec.frames_per_second = rate->number(1e-6, 1e6);
   }
 
+  if (const auto camera = keys.find("camera", {kRecording})) {
+    spec.camera = camera->text("\"left\" or \"right\"", [](std::string_view text) {
+      return text == "left" || text == "right";
+    });
+  }
+
   spec.selection = read_selection(object, keys);
-  spec.pairs = read_pairs(object.at("pairs"));
+  spec.window = read_window(keys, dataset);
+  if (!dataset || !has_events(*dataset)) {
+    spec.pairs = read_pairs(object.at("pairs"));
+  } else if (const auto pairs = object.find("pairs")) {
+    pairs->fault("no such key for dataset \"" + std::string(to_string(*dataset)) +
+                 "\", whose samples are windows of events");
+  }
   object.finish();
   return spec;
 }
@@ -160,6 +196,8 @@ struct Preset {
 constexpr Preset kKitti{"kitti", GreyOrder::kBeforeResize, 3};
 constexpr Preset kMpii{"mpii", GreyOrder::kBeforeResize, 0};
 constexpr Preset kDemo{"demo", GreyOrder::kAfterResize, 0};
+/// Of events, which have no grey values.
+constexpr Preset kNoPreset{"", GreyOrder::kBeforeResize, 0};
 constexpr std::array kPresetWords{Word<Preset>{kKitti.name, kKitti},
                                   Word<Preset>{kMpii.name, kMpii}, Word<Preset>{kDemo.name, kDemo}};
 
@@ -176,6 +214,9 @@ const Preset& preset_of(DatasetKind dataset) {
       return kMpii;
     case DatasetKind::kFrames:
       return kDemo;
+    case DatasetKind::kRecording:
+    case DatasetKind::kDhp19:
+      return kNoPreset;
   }
   throw std::logic_error("preset_of: not a kind of dataset");
 }
@@ -217,7 +258,11 @@ ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& so
   const auto preset = object.find("preset");
   const auto grey = object.find("grey");
   const auto blur = object.find("blur");
-  if (preset || (!grey && !blur)) {
+  if (!sources.empty() && std::ranges::all_of(sources, has_events, &SourceSpec::dataset)) {
+    for (const auto& key : {preset, grey, blur}) {
+      if (key) key->fault("no such key for events, which have no grey values");
+    }
+  } else if (preset || (!grey && !blur)) {
     const Preset chosen = preset ? preset->choice(kPresetWords) : default_preset(sources, object);
     spec.preset = chosen.name;
     spec.grey = chosen.grey;
@@ -337,6 +382,19 @@ GeneratorSpec read_generator(const StrictValue& value) {
   return spec;
 }
 
+/// Events are the only volumes that a dataset of events can give, and no other dataset has them.
+void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
+  const bool wants_events = manifest.generator.kind == GeneratorKind::kEvents;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    const DatasetKind dataset = manifest.sources[i].dataset;
+    if (has_events(dataset) == wants_events) continue;
+    StrictObject source = sources[i].object();
+    source.at("dataset").fault(
+        wants_events ? "a dataset of events (recording, dhp19), since generator.kind is \"events\""
+                     : "a dataset of frames, since generator.kind is not \"events\"");
+  }
+}
+
 constexpr std::string_view kFormat = "eventgan-manifest";
 constexpr int kVersion = 1;
 
@@ -395,14 +453,14 @@ JobManifest read_document(const StrictValue& document) {
   if (!object.has_format(kFormat, kVersion)) return manifest;
   manifest.name = read_name(object.at("name"));
   if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
-  for (const StrictValue& source : object.at("sources").elements(1)) {
-    manifest.sources.push_back(read_source(source));
-  }
+  const std::vector<StrictValue> sources = object.at("sources").elements(1);
+  for (const StrictValue& source : sources) manifest.sources.push_back(read_source(source));
   const StrictValue image = object.at("image");
   manifest.image = read_image(image, manifest.sources);
   if (const auto generator = object.find("generator")) {
     manifest.generator = read_generator(*generator);
   }
+  check_kind(manifest, sources);
   if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
   manifest.output = read_output(object.at("output"));
   if (const auto errors = object.find("errors")) manifest.errors = read_errors(*errors);

@@ -58,7 +58,7 @@ std::map<int, std::int64_t> read_gaps(const StrictValue& value, int samples) {
   for (const StrictValue& element : value.elements()) {
     StrictObject object = element.object();
     const StrictValue gap = object.at("gap");
-    const auto number = gap.sound_integer(1, kMostGap);
+    const auto number = gap.sound_integer(0, kMostGap);
     if (number && !gaps.empty() && *number <= gaps.rbegin()->first) {
       gap.fault("gaps in ascending order");
     }

@@ -68,7 +68,7 @@ PlannedSample read_planned_sample(const StrictValue& value) {
   sample.label_key = object.at("label").text();
   sample.pair.previous = read_frame(object.at("previous"));
   sample.pair.next = read_frame(object.at("next"));
-  sample.pair.gap_frames = object.at("gap").integer(1, kLargestGap);
+  sample.pair.gap_frames = object.at("gap").integer(0, kLargestGap);
   sample.pair.label_index = object.at("label_index").integer<std::int64_t>(-kMost, kMost);
   sample.pair.label_position = object.at("label_position").number(0, 1);
   if (const auto fault = object.find("fault")) sample.fault = fault->text();
@@ -94,7 +94,7 @@ SourceSummary read_source_summary(const StrictValue& value) {
   source.labelled_frames = object.at("labelled_frames").integer<std::int64_t>(0, kMost);
   for (const StrictValue& element : object.at("pairs_by_gap").elements()) {
     StrictObject entry = element.object();
-    const int gap = entry.at("gap").integer(1, kLargestGap);
+    const int gap = entry.at("gap").integer(0, kLargestGap);
     source.pairs_by_gap[gap] = entry.at("pairs").integer<std::int64_t>(0, kMost);
     entry.finish();
   }

@@ -34,7 +34,7 @@ struct FrameRef {
   std::string path;
   std::int64_t index = -1;  ///< the frame's own number in its sequence, as the dataset counts
   std::int64_t video_frame =
-      -1;  ///< position in the video counted from 0; -1 if `path` is a picture
+      -1;  ///< position in the video or recording counted from 0; -1 if `path` is a picture
   double time_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN if unknown
 
   bool operator==(const FrameRef& other) const {
@@ -51,11 +51,13 @@ struct FrameOrigin {
   bool operator==(const FrameOrigin&) const = default;
 };
 
-/// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to.
+/// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to. Of
+/// events: the begin and the end of a window, as the recording's last frames at or before them.
 struct FramePair {
   FrameRef previous;
   FrameRef next;
-  int gap_frames = 0;  ///< frames from previous to next, 1..6: of those stored, or taken of a video
+  int gap_frames = 0;  ///< frames from previous to next, 1..6: of those stored, or taken of a
+                       ///< video; 0 of a window of events
   std::int64_t label_index = -1;  ///< FrameRef::index of the labelled frame
   /// Where the labelled frame lies: 0 = previous frame, 1 = next frame, 0.5 = in the middle.
   double label_position = 1;

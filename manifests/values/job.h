@@ -53,8 +53,16 @@ enum class DatasetKind {
   kMpii,
   kMpiiList,
   kHuman36m,
-  kFrames
+  kFrames,
+  kRecording,  ///< of an event camera, with frames
+  kDhp19
 };
+
+/// Whether the dataset's samples are windows of real events (GeneratorKind::kEvents), not pairs of
+/// frames.
+constexpr bool has_events(DatasetKind dataset) {
+  return dataset == DatasetKind::kRecording || dataset == DatasetKind::kDhp19;
+}
 
 /// How the Human3.6M source is laid out on disk (DESIGN section 8).
 enum class Human36mLayout { kFetch, kExtracted, kOfficial };
@@ -75,10 +83,22 @@ struct PairSpec {
   std::optional<double> max_gap_s = std::nullopt;
 };
 
+/// Where in its window of events a label lies.
+enum class LabelPlace { kEnd, kMiddle };
+
+/// Which events around a label's time make its volume: those of one interval between frames, or as
+/// many seconds, or as many events.
+struct WindowSpec {
+  std::optional<double> duration_s;    ///< 1e-6..1e3
+  std::optional<std::int64_t> events;  ///< 1..1e9; of dhp19 always given
+  LabelPlace label = LabelPlace::kEnd;
+};
+
 /// Which labelled frames of a dataset are taken: those for which all of it holds.
 struct SelectionSpec {
   std::optional<std::string> ids;  ///< a text file, as written in the manifest: a sample_id a line
   std::vector<std::string> subjects, cameras, actions;  ///< human36m: one of these; empty: any
+  std::vector<std::string> without_actions;             ///< dhp19: none of these
   /// Sequences (human36m: subject and action; frames without: sample_id) whose number in [0, 1),
   /// which the seed gives them, lies in [first, last): [0, 0.8] and [0.8, 1] share no sequence.
   std::array<double, 2> fraction{0, 1};
@@ -99,6 +119,8 @@ struct SourceSpec {
   std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
   SelectionSpec selection;
   PairSpec pairs;
+  std::string camera = "left";  ///< recording, in MVSEC's layout: "left" or "right"
+  WindowSpec window;            ///< recording, dhp19: in place of `pairs`
 };
 
 enum class ImageFit { kStretch, kLetterbox, kCrop };
@@ -117,11 +139,12 @@ struct ImageSpec {
   int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
 };
 
-/// What makes the volumes: the EventGAN network, or a model to compare it with.
+/// What makes the volumes: the EventGAN network, a model to compare it with, or a camera.
 enum class GeneratorKind {
   kNetwork,
-  kEsim,       ///< a random affine motion of the previous frame (stages/events/simulation)
-  kDifference  ///< log intensity on a line from the previous frame to the next
+  kEsim,        ///< a random affine motion of the previous frame (stages/events/simulation)
+  kDifference,  ///< log intensity on a line from the previous frame to the next
+  kEvents       ///< none: the camera's own events, of datasets that have them
 };
 
 /// Which part of a volume is generated; the rest is zeros.
@@ -202,6 +225,7 @@ std::string_view to_string(DatasetKind kind);
 std::string_view to_string(Human36mLayout layout);
 std::string_view to_string(PairSide side);
 std::string_view to_string(PairChoice choice);
+std::string_view to_string(LabelPlace place);
 std::string_view to_string(ImageFit fit);
 std::string_view to_string(GreyOrder order);
 std::string_view to_string(GeneratorKind kind);

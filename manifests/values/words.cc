@@ -13,6 +13,7 @@ std::string_view to_string(DatasetKind kind) { return word_of(kDatasetWords, kin
 std::string_view to_string(Human36mLayout layout) { return word_of(kLayoutWords, layout); }
 std::string_view to_string(PairSide side) { return word_of(kSideWords, side); }
 std::string_view to_string(PairChoice choice) { return word_of(kChoiceWords, choice); }
+std::string_view to_string(LabelPlace place) { return word_of(kLabelPlaceWords, place); }
 std::string_view to_string(ImageFit fit) { return word_of(kFitWords, fit); }
 std::string_view to_string(GreyOrder order) { return word_of(kGreyWords, order); }
 std::string_view to_string(GeneratorKind kind) { return word_of(kGeneratorWords, kind); }

@@ -38,7 +38,9 @@ inline constexpr std::array kDatasetWords{
     Word<DatasetKind>{"mpii", DatasetKind::kMpii},
     Word<DatasetKind>{"mpii_list", DatasetKind::kMpiiList},
     Word<DatasetKind>{"human36m", DatasetKind::kHuman36m},
-    Word<DatasetKind>{"frames", DatasetKind::kFrames}};
+    Word<DatasetKind>{"frames", DatasetKind::kFrames},
+    Word<DatasetKind>{"recording", DatasetKind::kRecording},
+    Word<DatasetKind>{"dhp19", DatasetKind::kDhp19}};
 
 inline constexpr std::array kLayoutWords{
     Word<Human36mLayout>{"fetch", Human36mLayout::kFetch},
@@ -52,6 +54,9 @@ inline constexpr std::array kSideWords{Word<PairSide>{"before", PairSide::kBefor
 inline constexpr std::array kChoiceWords{Word<PairChoice>{"one", PairChoice::kOne},
                                          Word<PairChoice>{"all", PairChoice::kAll}};
 
+inline constexpr std::array kLabelPlaceWords{Word<LabelPlace>{"end", LabelPlace::kEnd},
+                                             Word<LabelPlace>{"middle", LabelPlace::kMiddle}};
+
 inline constexpr std::array kFitWords{Word<ImageFit>{"stretch", ImageFit::kStretch},
                                       Word<ImageFit>{"letterbox", ImageFit::kLetterbox},
                                       Word<ImageFit>{"crop", ImageFit::kCrop}};
@@ -62,7 +67,8 @@ inline constexpr std::array kGreyWords{Word<GreyOrder>{"before_resize", GreyOrde
 inline constexpr std::array kGeneratorWords{
     Word<GeneratorKind>{"network", GeneratorKind::kNetwork},
     Word<GeneratorKind>{"esim", GeneratorKind::kEsim},
-    Word<GeneratorKind>{"difference", GeneratorKind::kDifference}};
+    Word<GeneratorKind>{"difference", GeneratorKind::kDifference},
+    Word<GeneratorKind>{"events", GeneratorKind::kEvents}};
 
 inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std::nullopt},
                                          Word<std::optional<Engine>>{"torch", Engine::kTorch},

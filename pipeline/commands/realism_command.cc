@@ -38,13 +38,15 @@ const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::k
                                                     {"difference", RealismMethod::kDifference},
                                                     {"esim", RealismMethod::kEsim}};
 
-/// As told, else by what is there: a folder is ECD's, a file is MVSEC's.
+/// As told, else by what is there.
 RecordingFormat format_of(const RealismArguments& arguments, const std::string& recording) {
   for (const RecordingFormat format :
        {RecordingFormat::kMvsec, RecordingFormat::kEventgan, RecordingFormat::kEcd}) {
     if (arguments.format == to_string(format)) return format;
   }
-  return std::filesystem::is_directory(recording) ? RecordingFormat::kEcd : RecordingFormat::kMvsec;
+  const bool is_folder = std::filesystem::is_directory(recording);
+  return find_recording_format(recording, arguments.camera)
+      .value_or(is_folder ? RecordingFormat::kEcd : RecordingFormat::kMvsec);
 }
 
 template <class Number>
@@ -139,8 +141,7 @@ void add_choices(CLI::App& command, RealismArguments& arguments) {
                   "Recordings of events and frames; TRAINING.json: those of its validation")
       ->required();
   command
-      .add_option("--format", arguments.format,
-                  "mvsec, eventgan or ecd; default: a folder is ecd, a file mvsec")
+      .add_option("--format", arguments.format, "mvsec, eventgan or ecd; default: what lies there")
       ->check(CLI::IsMember({"mvsec", "eventgan", "ecd"}));
   command.add_option("--camera", arguments.camera, "mvsec: left or right")
       ->check(CLI::IsMember({"left", "right"}));

@@ -112,6 +112,11 @@ Computation reference_of(const std::string& text) {
 int run(TradeoffArguments& arguments) {
   const StopSignal signal;
   const JobManifest manifest = read_job_manifest(arguments.manifest);
+  if (manifest.generator.kind == GeneratorKind::kEvents) {
+    throw UsageError(
+        "$.generator.kind: expected a generator of events from frames, got \"events\", of which "
+        "there is one configuration");
+  }
   TradeoffOptions& options = arguments.options;
   options.axes = axes_of(arguments, manifest);
   options.only_native = arguments.precisions.empty();

@@ -137,10 +137,14 @@ std::string without_partner_text(const SourceSpec& spec, const SourceSummary& su
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
                         const std::map<int, std::int64_t>& without_partner, std::int64_t shards) {
   std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset), spec.root, spec.split);
-  text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
-  text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
-                      by_gap_text(summary.pairs_by_gap));
-  text += without_partner_text(spec, summary, without_partner);
+  if (has_events(spec.dataset)) {
+    text += fmt::format("  windows          {}\n", pairs_of(summary));
+  } else {
+    text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
+    text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
+                        by_gap_text(summary.pairs_by_gap));
+    text += without_partner_text(spec, summary, without_partner);
+  }
   if (summary.faults > 0) {
     text += fmt::format(
         "  to quarantine    {}  (a frame is missing inside the sequence, or a note says why)\n",

@@ -1,5 +1,6 @@
 #include "pipeline/conversion/sample_stages.h"
 
+#include <cmath>
 #include <limits>
 #include <new>
 #include <optional>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "pipeline/runtime/threads.h"
+#include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
 #include "stages/labels/label_mapping.h"
@@ -53,6 +55,7 @@ void SampleMessage::fail(std::string reason) {
   if (!reason.ends_with(id)) reason += id;
   sample.fault = std::move(reason);
   prepared = {};
+  events = {};
   volume = {};
   chunk = {};
 }
@@ -70,40 +73,78 @@ SampleStages::SampleStages(const JobManifest& manifest,
 void SampleStages::read(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kRead);
   const PlannedSample& planned = message.planned();
+  message.sample.sample_id = planned.sample_id;
+  message.sample.sequence = planned.sequence;
+  const auto source = static_cast<std::size_t>(message.shard->source);
+  const DatasetKind kind = manifest_.sources[source].dataset;
+  message.sample.origin = frame_origin(kind, planned.sequence);
+  message.sample.pair = planned.pair;
+  message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
+  if (!planned.fault.empty()) {
+    message.fail(planned.fault);
+  } else if (has_events(kind)) {
+    read_events(message, *datasets_[source]);
+  } else {
+    read_frames(message);
+  }
+  read_labels(message, *datasets_[source]);
+} catch (const std::bad_alloc&) {
+  name_sample(message, "read");
+}
+
+void SampleStages::read_frames(SampleMessage& message) const {
   const auto slot = static_cast<std::size_t>(message.slot);
   const std::vector<PlannedSample>& samples = message.shard->samples;
   for (std::size_t i = slot == 0 ? 1 : slot + in_flight_;
        i <= slot + in_flight_ && i < samples.size(); ++i) {
     reader_.expect(samples[i].pair);
   }
-  message.sample.sample_id = planned.sample_id;
-  message.sample.sequence = planned.sequence;
-  message.sample.origin = frame_origin(
-      manifest_.sources[static_cast<std::size_t>(message.shard->source)].dataset, planned.sequence);
-  message.sample.pair = planned.pair;
-  message.sample.source_to_volume.fill(std::numeric_limits<double>::quiet_NaN());
-  if (!planned.fault.empty()) {
-    message.fail(planned.fault);
+  Outcome<PreparedPair> prepared = reader_.read(message.planned().pair);
+  if (is_fault(prepared)) {
+    message.fail(std::get<SampleFault>(prepared).reason);
   } else {
-    Outcome<PreparedPair> prepared = reader_.read(planned.pair);
-    if (is_fault(prepared)) {
-      message.fail(std::get<SampleFault>(prepared).reason);
-    } else {
-      message.prepared = std::move(std::get<PreparedPair>(prepared));
-      const Placement& placement = message.prepared.placement;
-      message.sample.source_size = placement.source;
-      message.sample.source_to_volume = placement.source_to_volume();
-      if (placement.volume != message.shard->volume_size) {
-        message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
-                     size_text(placement.volume) + ", in " + frame_names(planned.pair) +
-                     " (a plan of today has it in another shard: convert into another folder, or "
-                     "with --overwrite)");
-      }
-    }
+    message.prepared = std::move(std::get<PreparedPair>(prepared));
+    take_placement(message);
   }
-  read_labels(message, *datasets_[static_cast<std::size_t>(message.shard->source)]);
-} catch (const std::bad_alloc&) {
-  name_sample(message, "read");
+}
+
+void SampleStages::read_events(SampleMessage& message, const Dataset& dataset) const {
+  Outcome<EventWindow> outcome = dataset.events(message.planned().label_key);
+  if (is_fault(outcome)) {
+    message.fail(std::get<SampleFault>(outcome).reason);
+    return;
+  }
+  EventWindow& window = std::get<EventWindow>(outcome);
+  // Of so many events, which alone tell when their window begins and ends.
+  FramePair& pair = message.sample.pair;
+  if (std::isnan(pair.previous.time_s) && !window.events.empty()) {
+    pair.previous.time_s = window.events.front().t_s;
+    pair.next.time_s = window.events.back().t_s;
+  }
+  PreparedPair& prepared = message.prepared;
+  prepared.placement = place(window.sensor, manifest_.image);
+  const VisiblePart part = visible_part(prepared.placement);
+  prepared.content = part.size;
+  prepared.content_x = part.volume_x;
+  prepared.content_y = part.volume_y;
+  message.events = std::move(window.events);
+  place_events(prepared.placement, message.events);
+  for (Event& event : message.events) {
+    event.x -= part.volume_x;
+    event.y -= part.volume_y;
+  }
+  take_placement(message);
+}
+
+void SampleStages::take_placement(SampleMessage& message) const {
+  const Placement& placement = message.prepared.placement;
+  message.sample.source_size = placement.source;
+  message.sample.source_to_volume = placement.source_to_volume();
+  if (placement.volume == message.shard->volume_size) return;
+  message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
+               size_text(placement.volume) + ", in " + frame_names(message.planned().pair) +
+               " (a plan of today has it in another shard: convert into another folder, or "
+               "with --overwrite)");
 }
 
 void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {
@@ -145,6 +186,11 @@ void SampleStages::generate(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
+  if (manifest_.generator.kind == GeneratorKind::kEvents) {
+    message.volume = event_volume(message.events, {generator_.bins(), prepared.content});
+    message.events = {};
+    return;
+  }
   message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
   const ScopeSpec& scope = manifest_.generator.scope;
   if (scope.scope == Scope::kWhole) {

@@ -34,8 +34,9 @@ struct SampleMessage {
   std::size_t number = 0;
   const PlannedShard* shard = nullptr;
   int slot = 0;
-  ShardSample sample;            ///< read: everything but statistics
-  PreparedPair prepared;         ///< read → generate
+  ShardSample sample;         ///< read: everything but statistics
+  PreparedPair prepared;      ///< read → generate; of events without `input`
+  std::vector<Event> events;  ///< read → generate: of datasets of events, in pixels of the content
   std::vector<float> volume;     ///< generate → finish: [2 bins, H, W] of the content
   GenerationNotes notes;         ///< generate → write
   std::vector<std::byte> chunk;  ///< finish → write
@@ -58,11 +59,11 @@ class SampleStages {
   SampleStages(const JobManifest& manifest, const std::vector<std::unique_ptr<Dataset>>& datasets,
                const Generator& generator, int in_flight);
 
-  /// Decodes and prepares the frames, reads the annotation, maps its labels; and has the pictures
-  /// of the shard's next `in_flight` samples loaded meanwhile.
+  /// Decodes and prepares the frames, or reads and places the events; reads the annotation, maps
+  /// its labels. Has the pictures of the shard's next `in_flight` samples loaded meanwhile.
   void read(SampleMessage& message) const;
 
-  /// Runs the generator on the prepared frames.
+  /// Runs the generator on the prepared frames; or makes the events' volume.
   void generate(SampleMessage& message) const;
 
   /// Checks the volume and takes its statistics, normalises if asked, encodes it into the volume's
@@ -70,6 +71,10 @@ class SampleStages {
   void finish(SampleMessage& message) const;
 
  private:
+  void read_frames(SampleMessage& message) const;
+  void read_events(SampleMessage& message, const Dataset& dataset) const;
+  /// Keeps where the source lies in the volume; fails if that is not what was planned.
+  void take_placement(SampleMessage& message) const;
   void read_labels(SampleMessage& message, const Dataset& dataset) const;
   /// A volume that went through `finish`, as large as that, to be overwritten; else a new one. A
   /// new vector is set to zero first, which of a large volume costs as much as a stage of ours.

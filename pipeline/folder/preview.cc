@@ -1,5 +1,7 @@
 #include "pipeline/folder/preview.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -17,6 +19,7 @@
 #include "stages/events/pictures/picture_output.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
+#include "stages/recordings/recording.h"
 
 namespace eventgan {
 namespace {
@@ -29,12 +32,28 @@ std::string picture_name(const fs::path& shard, int slot) {
   return shard.stem().string() + "_" + number + ".png";
 }
 
+/// The frame of a recording of events; a fault names its file.
+Outcome<ColourFrame> decode_recorded(const fs::path& folder, const JobManifest& manifest,
+                                     const FrameRef& frame) try {
+  const auto source = std::ranges::find_if(manifest.sources, [&](const SourceSpec& spec) {
+    return spec.dataset == DatasetKind::kRecording && frame.path.starts_with(spec.root);
+  });
+  const std::string camera = source == manifest.sources.end() ? "left" : source->camera;
+  fs::path path = folder / frame.path;
+  if (path.filename() == "events.txt") path = path.parent_path();
+  const auto format = find_recording_format(path, camera).value_or(RecordingFormat::kMvsec);
+  const GreyImage grey = open_recording(path, format, camera)->frame(frame.video_frame);
+  ColourFrame colour{grey.size, {}};
+  for (const std::uint8_t pixel : grey.pixels) colour.bgr.insert(colour.bgr.end(), 3, pixel);
+  return colour;
+} catch (const std::exception& error) {
+  return SampleFault{error.what()};
+}
+
 /// The colour frame laid into the volume; empty, with a warning, if it cannot be had.
-std::vector<std::uint8_t> frame_picture(const FrameDecoder& decoder, const FrameRef& frame,
+std::vector<std::uint8_t> frame_picture(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
                                         const ShardSample& sample, const ImageSpec& image,
                                         std::vector<std::string>& warnings) {
-  if (!sample.valid) return {};
-  const Outcome<ColourFrame> decoded = decoder.decode(frame, sample.pair.video_stride());
   if (is_fault(decoded)) {
     warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
     return {};
@@ -57,7 +76,8 @@ struct PreviewReader::State {
   FrameDecoder decoder;
   fs::path shard;  ///< that `reader` has open
   std::optional<ShardReader> reader;
-  ImageSpec image;
+  JobManifest manifest;
+  bool has_events = false;  ///< is made of a camera's events
 
   void open(const fs::path& file) {
     if (reader && shard == file) return;
@@ -65,13 +85,14 @@ struct PreviewReader::State {
     renew_time_limit();
     reader.emplace(file);
     lift_time_limit();
-    image = parse_job_manifest(reader->header().manifest_text, frames, file.string()).image;
+    manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
+    has_events = manifest.generator.kind == GeneratorKind::kEvents;
     shard = file;
   }
 };
 
 PreviewReader::PreviewReader(fs::path frames, std::vector<std::string>& warnings)
-    : state_(new State{frames, warnings, FrameDecoder(frames), {}, std::nullopt, {}}) {}
+    : state_(new State{frames, warnings, FrameDecoder(frames), {}, std::nullopt, {}, {}}) {}
 PreviewReader::~PreviewReader() = default;
 PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;
 
@@ -86,12 +107,22 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   if (sample.valid) content.volume = reader.volume(slot);
   lift_time_limit();
   const auto frame = [&](const FrameRef& which) {
-    return frame_picture(state_->decoder, which, sample, state_->image, state_->warnings);
+    // Of events there may be no frames, or none yet.
+    if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
+      return std::vector<std::uint8_t>();
+    }
+    return frame_picture(state_->has_events
+                             ? decode_recorded(state_->frames, state_->manifest, which)
+                             : state_->decoder.decode(which, sample.pair.video_stride()),
+                         which, sample, state_->manifest.image, state_->warnings);
   };
   content.previous_bgr = frame(sample.pair.previous);
   content.next_bgr = frame(sample.pair.next);
-  content.title = header.dataset + " " + sample.sample_id + ", gap " +
-                  std::to_string(sample.pair.gap_frames) + (sample.valid ? "" : ", QUARANTINED");
+  const FramePair& pair = sample.pair;
+  content.title = header.dataset + " " + sample.sample_id +
+                  (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
+                                      : ", gap " + std::to_string(pair.gap_frames)) +
+                  (sample.valid ? "" : ", QUARANTINED");
   content.label_position = sample.pair.label_position;
   content.annotation = std::move(sample.annotation);
   content.labels = std::move(sample.labels);
@@ -299,7 +330,7 @@ Sequence read_sequence(const Shards& shards, const PreviewOptions& options) {
       const int gap = pairs.gap_frames[slot];
       const auto [known, is_new] = frames.try_emplace(pairs.label_index[slot]);
       if (is_new || gap < known->second.gap) {
-        known->second = {{i, static_cast<int>(slot)}, gap, pairs.gap_s[slot] / gap};
+        known->second = {{i, static_cast<int>(slot)}, gap, pairs.gap_s[slot] / std::max(gap, 1)};
       }
     }
   }

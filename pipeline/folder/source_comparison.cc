@@ -162,7 +162,9 @@ std::vector<std::string> SourceComparison::sample_faults(const Dataset& dataset,
     return {"expected the annotation that the shard holds, got none: " +
             std::get<SampleFault>(read).reason};
   }
-  const std::optional<ImageSize> size = picture_size(stored.pair.next.path);
+  const std::optional<ImageSize> size = manifest_.generator.kind == GeneratorKind::kEvents
+                                            ? std::optional(dataset.sensor_size(planned.label_key))
+                                            : picture_size(stored.pair.next.path);
   if (size && *size != stored.source_size) {
     return {"expected a source size of " + size_text(*size) + " as of " + stored.pair.next.path +
             ", got " + size_text(stored.source_size)};

@@ -1,10 +1,15 @@
 #include "pipeline/generators/load_generator.h"
 
+#include <cstddef>
 #include <exception>
+#include <memory>
 #include <optional>
+#include <span>
 #include <stdexcept>
+#include <string>
 #include <utility>
 
+#include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/generators/choose_engine.h"
@@ -62,10 +67,36 @@ LoadedWeights load_weights(const JobManifest& manifest) {
 
 namespace {
 
-LoadedGenerator load_simulator(const JobManifest& manifest) {
+/// Stands where a camera's events make the volumes: says what they are, and generates none.
+class CameraEvents final : public Generator {
+ public:
+  explicit CameraEvents(int bins) : bins_(bins) {}
+
+  int bins() const override { return bins_; }
+
+  /// Sums are formed in double, then rounded.
+  std::size_t working_bytes(ImageSize size) const override {
+    return VolumeShape{bins_, size}.value_count() * sizeof(double);
+  }
+
+  GenerationNotes generate(std::span<const float>, ImageSize, std::span<float>) const override {
+    throw std::logic_error("expected frames to generate events from, got events");
+  }
+
+  std::string description() const override { return "events of a camera"; }
+
+ private:
+  int bins_;
+};
+
+LoadedGenerator load_without_weights(const JobManifest& manifest) {
+  const int bins = manifest.volume.bins;
   LoadedGenerator loaded;
-  loaded.generator =
-      make_simulated_generator(manifest.generator, manifest.volume.bins, manifest.seed);
+  if (manifest.generator.kind == GeneratorKind::kEvents) {
+    loaded.generator = std::make_unique<CameraEvents>(bins);
+  } else {
+    loaded.generator = make_simulated_generator(manifest.generator, bins, manifest.seed);
+  }
   loaded.weights_hash = sha256_hex(loaded.generator->description());
   return loaded;
 }
@@ -96,7 +127,7 @@ std::unique_ptr<Generator> make_engine(Engine engine, const Weights& weights,
 
 LoadedGenerator load_generator(const JobManifest& manifest) {
   const GeneratorSpec& spec = manifest.generator;
-  if (spec.kind != GeneratorKind::kNetwork) return load_simulator(manifest);
+  if (spec.kind != GeneratorKind::kNetwork) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
   const EngineSupport support = engine_support(spec.precision, spec.device);
   const EngineChoice choice =

@@ -63,6 +63,9 @@ Habits habits_of(DatasetKind dataset) {
               {1},
               "No width and height: volumes are as large as the pictures.",
               ""};
+    case DatasetKind::kRecording:
+    case DatasetKind::kDhp19:
+      break;  // find_source knows neither
   }
   throw std::logic_error("habits_of: not a kind of dataset");
 }

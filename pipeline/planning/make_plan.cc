@@ -116,17 +116,31 @@ PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
   return result;
 }
 
+PlannedSample window_of(const Dataset& dataset, const LabelledFrame& frame,
+                        const WindowSpec& spec) {
+  const double position = spec.label == LabelPlace::kMiddle ? 0.5 : 1;
+  return {frame.sample_id,
+          frame.sequence,
+          frame.label_key,
+          {dataset.neighbour(frame, -1).frame, dataset.neighbour(frame, 1).frame, 0,
+           frame.frame.index, position},
+          frame.fault};
+}
+
 }  // namespace
 
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed) {
+  if (has_events(source.dataset)) return {{window_of(dataset, frame, source.window)}, {}};
   return source.pairs.choose == PairChoice::kOne ? choose_one(dataset, frame, source, seed)
                                                  : choose_all(dataset, frame, source);
 }
 
 void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
                   PlannedSample& sample) {
-  const Window place = window(source.pairs.side, sample.pair.gap_frames);
+  const Window place = has_events(source.dataset)
+                           ? Window{-1, 1}
+                           : window(source.pairs.side, sample.pair.gap_frames);
   const auto renew = [&](FrameRef& planned, int steps) {
     const FrameRef today = dataset.neighbour(frame, steps).frame;
     if (today == planned) planned.time_s = today.time_s;
@@ -214,8 +228,10 @@ class SizeProbe {
   explicit SizeProbe(const JobManifest& manifest) : manifest_(manifest) {}
 
   /// {0, 0} if neither frame of the pair can be read.
-  ImageSize volume_size(const PlannedSample& sample) {
+  ImageSize volume_size(const SourceSpec& source, const Dataset& dataset,
+                        const PlannedSample& sample) {
     if (manifest_.image.size) return *manifest_.image.size;
+    if (has_events(source.dataset)) return dataset.sensor_size(sample.label_key);
     const ImageSize size = probe(sample.pair.next.path);
     return size == ImageSize{} ? probe(sample.pair.previous.path) : size;
   }
@@ -268,7 +284,7 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
       ++planned.pairs;
       ++summary.pairs_by_gap[sample.pair.gap_frames];
       summary.faults += !sample.fault.empty();
-      const ImageSize size = probe.volume_size(sample);
+      const ImageSize size = probe.volume_size(spec, dataset, sample);
       layout.add(std::move(sample), size);
     }
   }
@@ -342,12 +358,14 @@ void fill_hole(const Dataset& dataset, const SourceSpec& spec, std::uint64_t see
   }
 }
 
-void settle_sizes(const JobManifest& manifest, Plan& plan) {
+void settle_sizes(const JobManifest& manifest,
+                  const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan) {
   SizeProbe probe(manifest);
   for (PlannedShard& shard : plan.shards) {
     if (!shard.size_unknown) continue;
+    const auto source = static_cast<std::size_t>(shard.source);
     for (const PlannedSample& sample : shard.samples) {
-      const ImageSize size = probe.volume_size(sample);
+      const ImageSize size = probe.volume_size(manifest.sources[source], *datasets[source], sample);
       if (size == ImageSize{}) continue;
       shard.volume_size = size;
       break;
@@ -452,7 +470,7 @@ void complete_plan(const JobManifest& manifest,
     }
   }
   renew_samples(manifest, datasets, plan);
-  settle_sizes(manifest, plan);
+  settle_sizes(manifest, datasets, plan);
 }
 
 }  // namespace eventgan

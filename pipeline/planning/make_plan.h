@@ -33,6 +33,8 @@ struct PairChoiceResult {
 /// side are added to the sample id as "ID@before2". A gap that meets a hole in the sequence becomes
 /// a sample with a fault that names the missing file (choose = one: only if no gap can be had). All
 /// pairs of a frame that is itself at fault (LabelledFrame::fault) have that fault.
+///
+/// Of a dataset of events: its one window, of gap 0.
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed);
 

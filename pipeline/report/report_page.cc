@@ -321,6 +321,11 @@ std::string origin(const Survey& survey, const PageContext& context) {
   std::string html = "<section><h2>What it was made of</h2><div class=scroll><table class=facts>";
   for (std::size_t i = 0; i < std::min(manifest.sources.size(), kMostRows); ++i) {
     const SourceSpec& source = manifest.sources[i];
+    if (has_events(source.dataset)) {
+      html += fact("source", fmt::format("windows of events of {} from <code>{}</code>",
+                                         escaped(source_name(survey, i)), escaped(source.root)));
+      continue;
+    }
     std::string gaps;
     for (const int gap : source.pairs.gaps) {
       gaps += (gaps.empty() ? "" : ", ") + std::to_string(gap);

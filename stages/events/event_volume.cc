@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <stdexcept>
 #include <string>
@@ -63,6 +64,28 @@ std::vector<float> event_volume(std::span<const Event> events, const VolumeShape
     if (above > 0) pixel[plane] += above;
   }
   return {volume.begin(), volume.end()};
+}
+
+namespace {
+
+/// floor((place + 0.5) scaled / source) in whole numbers.
+int scaled_place(int place, int source, int scaled) {
+  return static_cast<int>((2 * std::int64_t{place} + 1) * scaled / (2 * std::int64_t{source}));
+}
+
+}  // namespace
+
+void place_events(const Placement& placement, std::vector<Event>& events) {
+  const ImageSize source = placement.source;
+  const ImageSize scaled = placement.scaled;
+  for (Event& event : events) {
+    event.x = scaled_place(event.x, source.width, scaled.width) + placement.offset_x;
+    event.y = scaled_place(event.y, source.height, scaled.height) + placement.offset_y;
+  }
+  std::erase_if(events, [&](const Event& event) {
+    return event.x < 0 || event.x >= placement.volume.width || event.y < 0 ||
+           event.y >= placement.volume.height;
+  });
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "manifests/values/events.h"
+#include "manifests/values/placement.h"
 
 namespace eventgan {
 
@@ -13,6 +14,11 @@ namespace eventgan {
 /// finite, events that are not in time order, or a first and last one so far apart (1e307) that
 /// (B-1)(t_N - t_1) is not finite. Thread safe.
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape);
+
+/// Takes events of a picture into the volume that it is placed in: an event comes to the pixel that
+/// the centre of its own falls in, x' = floor((x + 0.5) s) + offset, whatever `s`; none is added or
+/// spread. Those that a crop cuts away are removed. Order and times stay. Thread safe.
+void place_events(const Placement& placement, std::vector<Event>& events);
 
 /// The average-timestamp picture of the paper, per polarity: at each pixel the mean of the bins'
 /// times τ_b = 0.1 + 0.9 b/(B-1), weighted by the volume: T(x,y) = Σ_b τ_b V_b / (Σ_b V_b + 1e-5);

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "stages/frames/events/dhp19_dataset.h"
+#include "stages/frames/events/recording_dataset.h"
 #include "stages/frames/human36m/human36m_dataset.h"
 #include "stages/frames/kitti/kitti_object_dataset.h"
 #include "stages/frames/kitti/kitti_raw_dataset.h"
@@ -11,6 +13,14 @@
 #include "stages/frames/sequences/frames_dataset.h"
 
 namespace eventgan {
+
+ImageSize Dataset::sensor_size(const std::string& label_key) const {
+  throw std::logic_error("expected a dataset of events, got one of frames (" + label_key + ")");
+}
+
+Outcome<EventWindow> Dataset::events(const std::string& label_key) const {
+  throw std::logic_error("expected a dataset of events, got one of frames (" + label_key + ")");
+}
 
 std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesystem::path& base) {
   switch (spec.dataset) {
@@ -28,6 +38,10 @@ std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesys
       return open_human36m_dataset(spec, base);
     case DatasetKind::kFrames:
       return open_frames_dataset(spec, base);
+    case DatasetKind::kRecording:
+      return open_recording_dataset(spec, base);
+    case DatasetKind::kDhp19:
+      return open_dhp19_dataset(spec, base);
   }
   throw std::logic_error("open_dataset: not a kind of dataset");
 }
@@ -50,6 +64,7 @@ FrameOrigin human36m_origin(const std::string& sequence) {
 FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence) {
   switch (dataset) {
     case DatasetKind::kHuman36m:
+    case DatasetKind::kDhp19:
       return human36m_origin(sequence);
     case DatasetKind::kKittiRaw:
     case DatasetKind::kKittiObject:
@@ -58,6 +73,7 @@ FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence) {
     case DatasetKind::kMpii:
     case DatasetKind::kMpiiList:
     case DatasetKind::kFrames:
+    case DatasetKind::kRecording:
       break;
   }
   return {};

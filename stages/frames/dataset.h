@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
@@ -36,6 +37,12 @@ struct Neighbour {
   FrameRef frame;
 };
 
+/// The events that a sample of real events is made of.
+struct EventWindow {
+  ImageSize sensor;           ///< the source picture that coordinates and labels are in
+  std::vector<Event> events;  ///< in time order; none: nothing happened
+};
+
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
 /// their labels say. Opening one lists files and reads annotation files; it decodes no picture, but
 /// for KITTI object with its raw drives, a picture of each drive, and videos.
@@ -60,6 +67,14 @@ class Dataset {
 
   /// Reads one annotation. A fault if it is malformed ("expected X, got Y, in PATH:LINE").
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
+
+  /// Of a dataset of events (has_events), in which every "labelled frame" is a window: its
+  /// neighbours -1 and 1 are the window's begin and end, always present, and no other is. Their
+  /// times are NaN where the window is of so many events, which tell. `pairs` of these datasets is
+  /// not looked at. Both throw std::logic_error for a dataset of frames.
+  virtual ImageSize sensor_size(const std::string& label_key) const;
+  /// A fault if what is stored is malformed.
+  virtual Outcome<EventWindow> events(const std::string& label_key) const;
 
   /// Where a person finds that annotation: the file's path as FrameRef::path is written, and the
   /// place in it (`kitti/training/label_2/001497.txt`, `h36m/S1/Directions-1/annot.h5#5`,

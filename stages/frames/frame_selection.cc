@@ -42,15 +42,15 @@ std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) 
   return ids;
 }
 
-/// Keeps the frames whose word is among `wanted`, which must all occur.
+/// Keeps the frames whose word is among `named`, which must all occur, or all others.
 template <class WordOf>
-void keep(std::vector<LabelledFrame>& frames, const std::set<std::string>& wanted, WordOf word_of,
-          const std::string& what, const std::string& where) {
-  std::set<std::string> missing = wanted;
+void keep(std::vector<LabelledFrame>& frames, const std::set<std::string>& named, WordOf word_of,
+          const std::string& what, const std::string& where, bool others = false) {
+  std::set<std::string> missing = named;
   std::erase_if(frames, [&](const LabelledFrame& frame) {
     const std::string word = word_of(frame);
     missing.erase(word);
-    return !wanted.contains(word);
+    return named.contains(word) == others;
   });
   if (missing.empty()) return;
   throw InputError("expected " + what + " of the source, got " + std::to_string(missing.size()) +
@@ -78,17 +78,19 @@ FrameSelection select_frames(const std::vector<LabelledFrame>& frames, const Sou
         [](const LabelledFrame& frame) { return frame.sample_id; }, "sample ids", *selection.ids);
   }
   const auto keep_origin = [&](const std::vector<std::string>& words,
-                               std::string FrameOrigin::*part, const char* what) {
+                               std::string FrameOrigin::*part, const char* what,
+                               bool others = false) {
     if (words.empty()) return;
     keep(
         selected, {words.begin(), words.end()},
         [&](const LabelledFrame& frame) {
           return frame_origin(spec.dataset, frame.sequence).*part;
         },
-        what, spec.root);
+        what, spec.root, others);
   };
   keep_origin(selection.subjects, &FrameOrigin::subject, "subjects");
   keep_origin(selection.cameras, &FrameOrigin::camera, "cameras");
+  keep_origin(selection.without_actions, &FrameOrigin::action, "actions", /*others=*/true);
   keep_origin(selection.actions, &FrameOrigin::action, "actions");
 
   const CounterRandom random = CounterRandom(seed).keyed("fraction");

@@ -113,10 +113,11 @@ void for_each_line(std::string_view text, Take take) {
   }
 }
 
-[[noreturn]] void refuse_length() {
-  throw EventFault("expected lines of up to " + std::to_string(kLongestLine) +
-                   " bytes, got a longer one");
+std::string long_line_text() {
+  return "expected lines of up to " + std::to_string(kLongestLine) + " bytes, got a longer one";
 }
+
+[[noreturn]] void refuse_length() { throw EventFault(long_line_text()); }
 
 }  // namespace
 
@@ -171,6 +172,46 @@ std::int64_t EcdEventFile::first_byte_after(double time_s) const {
     return false;
   });
   return found;
+}
+
+std::int64_t EcdEventFile::skip_lines(std::int64_t byte, std::int64_t lines) const {
+  while (lines > 0 && byte < file_.size_bytes()) {
+    const std::string bytes = file_.read(byte, std::min(byte + kBytesPerRead, file_.size_bytes()));
+    std::size_t at = 0;
+    for (; lines > 0 && at < bytes.size(); --lines) {
+      at = std::min(bytes.find('\n', at), bytes.size() - 1) + 1;
+      if (bytes[at - 1] != '\n') break;  // the line goes on behind what was read
+    }
+    byte += static_cast<std::int64_t>(at);
+  }
+  while (lines < 0 && byte > 0) {
+    const std::int64_t begin = std::max<std::int64_t>(byte - kBytesPerRead, 0);
+    const std::string bytes = file_.read(begin, byte);
+    // The line before starts behind the last line end but the one that ends it.
+    std::size_t at = bytes.size();
+    for (; lines < 0 && at > 0; ++lines) {
+      const std::size_t end = at >= 2 ? bytes.rfind('\n', at - 2) : std::string::npos;
+      if (end == std::string::npos && begin > 0) break;  // it starts before what was read
+      at = end == std::string::npos ? 0 : end + 1;
+    }
+    if (at == bytes.size()) refuse(EventFault(long_line_text()), begin);
+    byte = begin + static_cast<std::int64_t>(at);
+  }
+  return byte;
+}
+
+std::optional<std::array<double, 2>> EcdEventFile::span() const {
+  const std::int64_t end = file_.size_bytes();
+  if (end == 0) return std::nullopt;
+  const auto time_at = [&](std::int64_t byte) {
+    const std::string bytes = file_.read(byte, std::min(byte + kLongestLine, end));
+    try {
+      return parse_ecd_event_time(std::string_view(bytes).substr(0, bytes.find('\n')));
+    } catch (const EventFault& fault) {
+      refuse(fault, byte);
+    }
+  };
+  return std::array{time_at(0), time_at(skip_lines(end, -1))};
 }
 
 std::vector<Event> EcdEventFile::events(std::int64_t begin, std::int64_t end,

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -52,7 +54,14 @@ class EcdEventFile {
   /// none. Throws InputError "expected X, got Y, in FILE (line 3)", the line counted from 1.
   std::int64_t first_byte_after(double time_s) const;
 
-  /// The events of the lines in begin..end, both from `first_byte_after`. Throws likewise.
+  /// Where the line begins that is `lines` lines before (negative) or after the one that begins at
+  /// `byte`; the file's start or end if there are fewer.
+  std::int64_t skip_lines(std::int64_t byte, std::int64_t lines) const;
+
+  /// Times of the first and last line; none of an empty file.
+  std::optional<std::array<double, 2>> span() const;
+
+  /// The events of the lines in begin..end, both line starts. Throws likewise.
   std::vector<Event> events(std::int64_t begin, std::int64_t end, EventCheck check) const;
 
  private:

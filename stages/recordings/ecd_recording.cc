@@ -160,6 +160,18 @@ std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,
       begin, end, EventCheck(size_, images_.times_s[range.first], images_.times_s[range.last]));
 }
 
+std::vector<Event> EcdRecording::events_in(double after_s, double until_s) const {
+  return events_.events(events_.first_byte_after(after_s), events_.first_byte_after(until_s),
+                        EventCheck(size_, after_s, until_s));
+}
+
+std::vector<Event> EcdRecording::events_around(double time_s, std::int64_t before,
+                                               std::int64_t after) const {
+  const std::int64_t middle = events_.first_byte_after(time_s);
+  return events_.events(events_.skip_lines(middle, -before), events_.skip_lines(middle, after),
+                        EventCheck::of_any_time(size_));
+}
+
 std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
   frame_position(index, frame_count() - 1, name_);
   return std::nullopt;

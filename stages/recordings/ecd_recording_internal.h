@@ -37,6 +37,10 @@ class EcdRecording final : public Recording {
   GreyImage frame(std::int64_t index) const override;
   std::vector<Event> events_between(std::int64_t first_frame,
                                     std::int64_t last_frame) const override;
+  std::vector<Event> events_in(double after_s, double until_s) const override;
+  std::vector<Event> events_around(double time_s, std::int64_t before,
+                                   std::int64_t after) const override;
+  std::optional<std::array<double, 2>> event_span() const override { return events_.span(); }
   std::optional<FlowField> flow(std::int64_t index) const override;
   std::vector<std::string> notes() const override;
 

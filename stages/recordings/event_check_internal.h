@@ -32,6 +32,12 @@ class EventCheck {
   EventCheck(ImageSize size, double after_s, double until_s)
       : size_(size), last_s_(after_s), until_s_(until_s) {}
 
+  /// The same without bounds of the times.
+  static EventCheck of_any_time(ImageSize size) {
+    using Limits = std::numeric_limits<double>;
+    return {size, -Limits::infinity(), Limits::max()};
+  }
+
   /// The next event of the stretch. Throws EventFault.
   Event take(const StoredEvent& stored);
 

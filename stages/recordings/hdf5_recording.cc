@@ -1,3 +1,5 @@
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <cmath>
 #include <system_error>
@@ -187,8 +189,45 @@ std::vector<Event> Hdf5Recording::events_between(std::int64_t first_frame,
   const double after_s = frame_time_s(first_frame);
   const double until_s = frame_time_s(last_frame);
   return read_locked(what, [&, first = first, last = last] {
-    return read_events(events_until(first), events_until(last), after_s, until_s);
+    return read_events(events_until(first), events_until(last),
+                       EventCheck(size(), after_s, until_s));
   });
+}
+
+std::vector<Event> Hdf5Recording::events_in(double after_s, double until_s) const {
+  return read_locked(fmt::format("events of {} s to {} s", after_s, until_s), [&] {
+    return read_events(events_until_time(after_s), events_until_time(until_s),
+                       EventCheck(size(), after_s, until_s));
+  });
+}
+
+std::vector<Event> Hdf5Recording::events_around(double time_s, std::int64_t before,
+                                                std::int64_t after) const {
+  return read_locked(fmt::format("events around {} s", time_s), [&] {
+    const std::int64_t middle = events_until_time(time_s);
+    return read_events(std::max<std::int64_t>(middle - before, 0),
+                       middle + std::min(after, event_count() - middle),
+                       EventCheck::of_any_time(size()));
+  });
+}
+
+std::optional<std::array<double, 2>> Hdf5Recording::event_span() const {
+  if (event_count() == 0) return std::nullopt;
+  return read_locked("first and last event", [&] {
+    return std::array{event_times(0, 1)[0], event_times(event_count() - 1, 1)[0]};
+  });
+}
+
+/// The frame before tells where to look first.
+std::int64_t Hdf5Recording::events_until_time(double time_s) const {
+  const std::vector<double>& frames = tables_.frame_times_s;
+  const auto next = std::ranges::upper_bound(frames, time_s);
+  const std::int64_t guess =
+      next == frames.begin() ? 0
+                             : events_until(static_cast<std::size_t>(next - frames.begin()) - 1);
+  return count_events_until(
+      time_s, guess, event_count(),
+      [&](std::int64_t begin, std::int64_t count) { return event_times(begin, count); });
 }
 
 std::int64_t Hdf5Recording::events_until(std::size_t frame) const {
@@ -220,8 +259,8 @@ void Hdf5Recording::refuse(const EventFault& fault, std::int64_t event) const {
                    std::to_string(event) + ")");
 }
 
-std::vector<Event> Hdf5Recording::read_events(std::int64_t begin, std::int64_t end, double after_s,
-                                              double until_s) const {
+std::vector<Event> Hdf5Recording::read_events(std::int64_t begin, std::int64_t end,
+                                              EventCheck check) const {
   if (end < begin) {
     throw InputError("expected times that never fall, got others, in " + name_ + " (events " +
                      std::to_string(end) + ".." + std::to_string(begin) + ")");
@@ -229,7 +268,6 @@ std::vector<Event> Hdf5Recording::read_events(std::int64_t begin, std::int64_t e
   std::vector<Event> events;
   events.reserve(static_cast<std::size_t>(end - begin));
   std::vector<StoredEvent> rows;
-  EventCheck check(size(), after_s, until_s);
   std::int64_t next = begin;
   try {
     while (next < end) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -57,14 +58,18 @@ class Hdf5Recording final : public Recording {
   GreyImage frame(std::int64_t index) const override;
   std::vector<Event> events_between(std::int64_t first_frame,
                                     std::int64_t last_frame) const override;
+  std::vector<Event> events_in(double after_s, double until_s) const override;
+  std::vector<Event> events_around(double time_s, std::int64_t before,
+                                   std::int64_t after) const override;
+  std::optional<std::array<double, 2>> event_span() const override;
   std::optional<FlowField> flow(std::int64_t index) const override;
 
  private:
   std::int64_t event_count() const { return static_cast<std::int64_t>(tables_.events.dims()[0]); }
   std::int64_t events_until(std::size_t frame) const;
+  std::int64_t events_until_time(double time_s) const;
   std::vector<double> event_times(std::int64_t first, std::int64_t count) const;
-  std::vector<Event> read_events(std::int64_t begin, std::int64_t end, double after_s,
-                                 double until_s) const;
+  std::vector<Event> read_events(std::int64_t begin, std::int64_t end, EventCheck check) const;
 
   [[noreturn]] void refuse(const EventFault& fault, std::int64_t event) const;
 

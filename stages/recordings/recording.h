@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
@@ -48,6 +49,17 @@ class Recording {
   virtual std::vector<Event> events_between(std::int64_t first_frame,
                                             std::int64_t last_frame) const = 0;
 
+  /// Events with after_s < t ≤ until_s, in time order; throws likewise.
+  virtual std::vector<Event> events_in(double after_s, double until_s) const = 0;
+
+  /// The last `before` events with t ≤ time_s and the first `after` ones behind them, fewer where
+  /// the recording ends; throws likewise.
+  virtual std::vector<Event> events_around(double time_s, std::int64_t before,
+                                           std::int64_t after) const = 0;
+
+  /// Times of the first and the last event; none if there is no event. Throws InputError.
+  virtual std::optional<std::array<double, 2>> event_span() const = 0;
+
   /// The true flow from frame `index` to the next one, of recordings that know it (simulated ones);
   /// its values are finite. Throws InputError (cause nested) if it cannot be read.
   virtual std::optional<FlowField> flow(std::int64_t index) const = 0;
@@ -56,6 +68,11 @@ class Recording {
   /// the frames read since then.
   virtual std::vector<std::string> notes() const { return {}; }
 };
+
+/// What lies at `path`: a folder with events.txt is ECD's, an HDF5 file tells by its datasets; none
+/// if it is neither, or holds other data.
+std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
+                                                     const std::string& camera = "left");
 
 /// Opens a recording: reads the frames' times and checks that everything is there and fits
 /// together; where a frame's events end is looked up when first asked for. Throws InputError

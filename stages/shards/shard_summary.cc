@@ -98,7 +98,7 @@ std::string text_of(const Point& p) { return fmt::format("({:g} {:g})", p.x, p.y
 std::string text_of(const FrameRef& frame) {
   const std::string text = fmt::format("{}, frame {}", frame.path, frame.index);
   if (frame.video_frame < 0) return text;
-  return fmt::format("{} (frame {} of the video)", text, frame.video_frame);
+  return fmt::format("{} (frame {} of the file)", text, frame.video_frame);
 }
 
 void describe_boxes(const ShardHeader& header, const ShardSample& sample, Lines& line) {
@@ -168,8 +168,12 @@ std::string describe_sample(const ShardReader& reader, int slot) {
   line.add("valid", sample.valid ? "yes" : "no: quarantined, the marker beside the shard says why");
   line.add("previous", text_of(pair.previous));
   line.add("next", text_of(pair.next));
-  line("gap", "{} frames{}", pair.gap_frames,
-       std::isfinite(pair.gap_s()) ? fmt::format(", {:g} s", pair.gap_s()) : "");
+  const bool is_window = pair.gap_frames == 0;  // of events
+  const std::string seconds =
+      std::isfinite(pair.gap_s()) ? fmt::format("{:g} s", pair.gap_s()) : "";
+  line(is_window ? "window" : "gap", "{}{}{}",
+       is_window ? "" : fmt::format("{} frames", pair.gap_frames),
+       is_window || seconds.empty() ? "" : ", ", seconds);
   line("label", "frame {}, at {:g} of the way from previous to next", pair.label_index,
        pair.label_position);
   line.add("source size", text_of(sample.source_size));

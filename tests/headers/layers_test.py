@@ -1,4 +1,5 @@
-"""Which room may include which: every arrow points downward, and no stage knows another."""
+"""Which room may include which: every arrow points downward, and no stage knows another but for recordings, on which datasets of
+events stand."""
 
 import os
 import pathlib
@@ -13,7 +14,8 @@ FLOORS = [
     ["stages/base/files", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/pictures"],
     ["stages/base/archives"],
-    ["stages/frames", "stages/recordings", "stages/labels", "stages/events", "stages/generator", "stages/training",
+    ["stages/recordings"],
+    ["stages/frames", "stages/labels", "stages/events", "stages/generator", "stages/training",
      "stages/shards", "stages/scenes", "stages/exports"],
     ["pipeline/runtime"],
     ["pipeline/planning"],

@@ -61,6 +61,23 @@ std::vector<Event> FakeRecording::events_between(std::int64_t first_frame,
   return {begin, end};
 }
 
+std::vector<Event> FakeRecording::events_in(double after_s, double until_s) const {
+  return {std::ranges::upper_bound(events_, after_s, {}, &Event::t_s),
+          std::ranges::upper_bound(events_, until_s, {}, &Event::t_s)};
+}
+
+std::vector<Event> FakeRecording::events_around(double time_s, std::int64_t before,
+                                                std::int64_t after) const {
+  const auto middle = std::ranges::upper_bound(events_, time_s, {}, &Event::t_s);
+  return {middle - std::min<std::int64_t>(before, middle - events_.begin()),
+          middle + std::min<std::int64_t>(after, events_.end() - middle)};
+}
+
+std::optional<std::array<double, 2>> FakeRecording::event_span() const {
+  if (events_.empty()) return std::nullopt;
+  return std::array{events_.front().t_s, events_.back().t_s};
+}
+
 std::optional<FlowField> FakeRecording::flow(std::int64_t index) const {
   if (flows_.empty()) return std::nullopt;
   return flows_.at(at(index));

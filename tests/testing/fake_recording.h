@@ -25,6 +25,10 @@ class FakeRecording final : public Recording {
   GreyImage frame(std::int64_t index) const override { return frames_.at(at(index)); }
   std::vector<Event> events_between(std::int64_t first_frame,
                                     std::int64_t last_frame) const override;
+  std::vector<Event> events_in(double after_s, double until_s) const override;
+  std::vector<Event> events_around(double time_s, std::int64_t before,
+                                   std::int64_t after) const override;
+  std::optional<std::array<double, 2>> event_span() const override;
   std::optional<FlowField> flow(std::int64_t index) const override;
 
  private:

@@ -171,7 +171,7 @@ TEST(Marker, EveryRuleIsChecked) {
        "$.persons: expected an array of 4 (a number for each sample), got an array of 3"},
       {"/persons", "null", "$.persons: expected an array, got null"},
       {"/classes/Car", "0", "$.classes.Car: expected an integer 1..9223372036854775807, got 0"},
-      {"/gaps/0/gap", "7", "$.gaps[0].gap: expected an integer 1..6, got 7"},
+      {"/gaps/0/gap", "7", "$.gaps[0].gap: expected an integer 0..6, got 7"},
       {"/gaps/1/gap", "1", "$.gaps[1].gap: expected gaps in ascending order, got 1"},
       {"/gaps/1/samples", "5", "$.gaps[1].samples: expected an integer 1..4, got 5"},
       {"/gaps/0/pairs", "1", "$.gaps[0].pairs: expected one of the keys gap, samples"},

@@ -113,7 +113,7 @@ TEST(PlanJson, NamesTheDamagedLineAndEveryFaultInIt) {
   EXPECT_THAT([&] { parse_plan(text, "plan.json"); },
               ThrowsMessage<std::runtime_error>(
                   "plan.json:8: $.shards[0].samples[1].id: expected text, got null\n"
-                  "plan.json:8: $.shards[0].samples[1].gap: expected an integer 1..6, got 9"));
+                  "plan.json:8: $.shards[0].samples[1].gap: expected an integer 0..6, got 9"));
 }
 
 struct Damage {

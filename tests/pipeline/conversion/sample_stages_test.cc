@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "stages/events/volume_statistics.h"
+#include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "tests/testing/fake_dataset.h"
 #include "tests/testing/fake_generator.h"
@@ -73,6 +74,121 @@ TEST_F(SampleStagesTest, MakesAWholeSample) {
   for (const Stage stage : {Stage::kRead, Stage::kGenerate, Stage::kFinish}) {
     EXPECT_GT(message.seconds[static_cast<std::size_t>(stage)], 0.0);
   }
+}
+
+/// A camera of 4x2 pixels, whose windows are what they are set to.
+class CameraDataset final : public Dataset {
+ public:
+  const LabelSchema& label_schema() const override { return schema_; }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
+  Neighbour neighbour(const LabelledFrame&, int) const override { return {}; }
+  ImageSize sensor_size(const std::string&) const override { return {2, 4}; }
+  Outcome<EventWindow> events(const std::string&) const override {
+    if (!fault.empty()) return SampleFault{fault};
+    return EventWindow{{2, 4}, window};
+  }
+  Outcome<Annotation> annotation(const std::string&) const override {
+    Annotation annotation;
+    annotation.boxes = {{.class_id = 0, .xyxy = {1, 0, 3, 1}, .difficulty = 2}};
+    return annotation;
+  }
+  std::string label_place(const std::string&) const override { return "cars.csv"; }
+  std::vector<std::string> annotation_files() const override { return {}; }
+
+  std::vector<Event> window;
+  std::string fault;
+
+ private:
+  LabelSchema schema_;
+  std::vector<LabelledFrame> frames_;
+};
+
+class CameraStagesTest : public SampleStagesTest {
+ protected:
+  CameraStagesTest() {
+    auto camera = std::make_unique<CameraDataset>();
+    camera_ = camera.get();
+    datasets_[0] = std::move(camera);
+    manifest_.sources[0].dataset = DatasetKind::kRecording;
+    manifest_.generator.kind = GeneratorKind::kEvents;
+    shard_.volume_size = {2, 4};
+    const double unknown = std::nan("");
+    shard_.samples = {{"r/1", "r", "r/1", {{"r.h5", 0, 0, unknown}, {"r.h5", 1, 1, unknown}}, ""}};
+  }
+
+  std::vector<float> volume(const SampleMessage& message) {
+    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
+    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
+    return dequantize(stored.value(), StoredType::kFloat32, 1);
+  }
+
+  CameraDataset* camera_;
+};
+
+TEST_F(CameraStagesTest, MakesTheVolumeOfTheCamerasEvents) {
+  // t* = 8 (t - 1) / 2: 0 at 1 s; 4 at 2 s; 8 at 3 s.
+  camera_->window = {{0, 0, 1, true}, {1, 1, 2, false}, {1, 1, 2, false}, {3, 1, 3, true}};
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  std::vector<float> expected(18 * 8, 0.0f);
+  expected[0] = 1;                    // bin 0 of the positive ones, row 0, column 0
+  expected[(9 + 4) * 8 + 4 + 1] = 2;  // bin 4 of the negative ones, row 1, column 1
+  expected[8 * 8 + 4 + 3] = 1;        // bin 8 of the positive ones, row 1, column 3
+  EXPECT_EQ(volume(message), expected);
+  EXPECT_EQ(generator_.calls(), 0);
+  EXPECT_EQ(message.sample.statistics.flags, 0u);
+  EXPECT_EQ(message.sample.statistics.sum_negative, 2);
+  // The window is of so many events, which tell its times.
+  EXPECT_EQ(message.sample.pair.previous.time_s, 1);
+  EXPECT_EQ(message.sample.pair.next.time_s, 3);
+  EXPECT_EQ(message.sample.labels.boxes.at(0).clipped, (Rectangle{1, 0, 3, 1}));
+}
+
+TEST_F(CameraStagesTest, TimesThatThePlanKnowsStay) {
+  camera_->window = {{0, 0, 1, true}};
+  shard_.samples[0].pair.previous.time_s = 0.5;
+  shard_.samples[0].pair.next.time_s = 1.5;
+  const SampleMessage message = run();
+  EXPECT_EQ(message.sample.pair.previous.time_s, 0.5);
+  EXPECT_EQ(message.sample.pair.next.time_s, 1.5);
+  EXPECT_EQ(volume(message)[0], 1);  // one event: t* = 0
+}
+
+TEST_F(CameraStagesTest, AWindowWithoutEventsIsEmptyAndValid) {
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  EXPECT_EQ(message.sample.statistics.flags, kFlagEmpty);
+  EXPECT_THAT(volume(message), ::testing::Each(0.0f));
+}
+
+TEST_F(CameraStagesTest, GeometryIsThatOfFrames) {
+  manifest_.image.size =
+      shard_.volume_size = {8, 8};  // letterboxed: by 2, two rows above and below
+  manifest_.image.fit = ImageFit::kLetterbox;
+  camera_->window = {{3, 1, 1, true}};
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  // (3.5 x 2, 1.5 x 2 + 2) = (7, 5).
+  const std::vector<float> values = volume(message);
+  EXPECT_EQ(values[5 * 8 + 7], 1);
+  EXPECT_EQ(std::ranges::count(values, 0.0f), std::ssize(values) - 1);
+  EXPECT_EQ(message.sample.labels.boxes.at(0).clipped, (Rectangle{2, 2, 6, 4}));
+}
+
+TEST_F(CameraStagesTest, NormalisesAsItDoesGeneratedVolumes) {
+  manifest_.volume.normalize = Normalization::kEta98;
+  camera_->window = {{0, 0, 1, true}, {0, 0, 1, true}, {1, 0, 1, true}};
+  // Of the values 1 and 2 the k = max(int(0.98 x 2), 1) = 1st is 1: both become 1.
+  const SampleMessage message = run();
+  EXPECT_EQ(volume(message)[0], 1);
+  EXPECT_EQ(volume(message)[1], 1);
+  EXPECT_EQ(message.sample.statistics.eta98, 1);
+}
+
+TEST_F(CameraStagesTest, EventsThatCannotBeReadQuarantineTheSample) {
+  camera_->fault = "expected a finite time, got nan, in r.h5 (event 3)";
+  const SampleMessage message = run();
+  EXPECT_EQ(message.sample.fault, camera_->fault + " (r/1)");
 }
 
 TEST_F(SampleStagesTest, LetterboxBordersHoldNoEvents) {

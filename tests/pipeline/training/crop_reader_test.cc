@@ -222,6 +222,14 @@ class CountedRecording final : public Recording {
     ++*reads_;
     return bar_.events_between(first, last);
   }
+  std::vector<Event> events_in(double after_s, double until_s) const override {
+    return bar_.events_in(after_s, until_s);
+  }
+  std::vector<Event> events_around(double time_s, std::int64_t before,
+                                   std::int64_t after) const override {
+    return bar_.events_around(time_s, before, after);
+  }
+  std::optional<std::array<double, 2>> event_span() const override { return bar_.event_span(); }
   std::optional<FlowField> flow(std::int64_t) const override { return std::nullopt; }
 
  private:

@@ -95,6 +95,29 @@ TEST(EventVolume, CountsBeyondWhatFloat32CanCountTo) {
   EXPECT_EQ(event_volume(events, {1, {1, 1}})[0], float((1 << 24) + 8));
 }
 
+TEST(PlacedEvents, ComeToThePixelThatTheirCentreFallsIn) {
+  // 4x2 pixels stretched to 6x1: columns (x + 0.5) 1.5 = 0.75, 2.25, 3.75, 5.25; all rows to 0.
+  std::vector<Event> events{{0, 0, 1, true}, {1, 1, 2, false}, {2, 0, 2, true}, {3, 1, 3, true}};
+  place_events({{2, 4}, {1, 6}, {1, 6}, 0, 0}, events);
+  EXPECT_EQ(events, (std::vector<Event>{
+                        {0, 0, 1, true}, {2, 0, 2, false}, {3, 0, 2, true}, {5, 0, 3, true}}));
+}
+
+TEST(PlacedEvents, LieInsideTheBordersAndAreCutWithThePicture) {
+  std::vector<Event> letterboxed{{0, 0, 1, true}, {3, 1, 2, true}};
+  place_events({{2, 4}, {2, 4}, {6, 4}, 0, 2}, letterboxed);  // two rows of border above
+  EXPECT_EQ(letterboxed, (std::vector<Event>{{0, 2, 1, true}, {3, 3, 2, true}}));
+  std::vector<Event> cut{{0, 0, 1, true}, {1, 0, 1, true}, {2, 1, 2, true}, {3, 1, 3, true}};
+  place_events({{2, 4}, {2, 4}, {2, 2}, -1, 0}, cut);  // a column less on either side
+  EXPECT_EQ(cut, (std::vector<Event>{{0, 0, 1, true}, {1, 1, 2, true}}));
+}
+
+TEST(PlacedEvents, StayWhereTheyAreInASizeOfTheirOwn) {
+  std::vector<Event> events{{8191, 8191, 1, true}, {0, 0, 1, true}};
+  place_events({{8192, 8192}, {8192, 8192}, {8192, 8192}, 0, 0}, events);
+  EXPECT_EQ(events, (std::vector<Event>{{8191, 8191, 1, true}, {0, 0, 1, true}}));
+}
+
 TEST(EventVolume, EqualsThePublishedCode) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto golden = data / "golden" / "golden.h5";

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
+#include <array>
 #include <cstdio>
 #include <string>
 
@@ -130,6 +132,39 @@ TEST_F(EcdEventFileTest, ReadsAnyStretchOfALongFile) {
   const std::vector<Event> all = between(file, -1, 1e9);
   ASSERT_EQ(all.size(), static_cast<std::size_t>(kCount));
   for (int i = 0; i < kCount; ++i) ASSERT_EQ(all[static_cast<std::size_t>(i)].x, i % 100) << i;
+}
+
+TEST_F(EcdEventFileTest, CountsLinesInALongFile) {
+  // Lines of 10 to 14 bytes, in all more than the mebibyte that is read at once.
+  constexpr int kLines = 200'000;
+  std::string text;
+  std::vector<std::int64_t> begins;
+  for (int i = 0; i < kLines; ++i) {
+    begins.push_back(std::ssize(text));
+    text += std::to_string(i) + " 1 1 1\n";
+  }
+  begins.push_back(std::ssize(text));
+  for (const bool ends_with_line : {true, false}) {
+    testing::write_file(path_, ends_with_line ? text : text.substr(0, text.size() - 1));
+    begins.back() = std::ssize(text) - (ends_with_line ? 0 : 1);
+    const EcdEventFile file(path_);
+    for (const int line : {0, 1, 7, 90'000, 150'000, kLines - 1, kLines}) {
+      for (const int step : {-170'000, -1, 0, 1, 3, 170'000}) {
+        const int there = std::clamp(line + step, 0, kLines);
+        EXPECT_EQ(file.skip_lines(begins[line], step), begins[there]) << line << " " << step;
+      }
+    }
+    EXPECT_EQ(file.span(), (std::array{0.0, kLines - 1.0}));
+  }
+}
+
+TEST_F(EcdEventFileTest, HasNoSpanWithoutEventsAndNamesALineThatIsNone) {
+  testing::write_file(path_, "");
+  EXPECT_EQ(EcdEventFile(path_).span(), std::nullopt);
+  EXPECT_EQ(EcdEventFile(path_).skip_lines(0, -5), 0);
+  testing::write_file(path_, "1 0 0 1\nx 0 0 1\n");
+  EXPECT_THAT([&] { EcdEventFile(path_).span(); },
+              ThrowsMessage<InputError>(HasSubstr("(line 2)")));
 }
 
 TEST_F(EcdEventFileTest, NeedsNoEventsAndNoLastLineEnd) {
@@ -265,6 +300,17 @@ TEST_F(EcdRecordingTest, ReadsEventsAfterAFrameUpToAnother) {
             (std::vector<Event>{{0, 2, 1.75, true}, {3, 0, 2.0, true}}));
   EXPECT_EQ(recording.events_between(0, 2).size(), 4u);
   EXPECT_THAT(recording.events_between(1, 1), IsEmpty());
+}
+
+TEST_F(EcdRecordingTest, ReadsEventsOfAnyTimesAndSoManyAroundATime) {
+  const EcdRecording recording = open();
+  const std::vector<Event> all = recording.events_in(-1, 9);
+  ASSERT_GE(all.size(), 4u);
+  EXPECT_EQ(recording.event_span(), (std::array{all.front().t_s, all.back().t_s}));
+  EXPECT_EQ(recording.events_around(all[1].t_s, 2, 1),
+            (std::vector<Event>{all[0], all[1], all[2]}));
+  EXPECT_EQ(recording.events_around(9, 1000, 1000), all);
+  EXPECT_EQ(recording.events_in(all[0].t_s, all[1].t_s), (std::vector<Event>{all[1]}));
 }
 
 TEST_F(EcdRecordingTest, GivesFewerEventsWhereThereAreNone) {

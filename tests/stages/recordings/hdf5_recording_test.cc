@@ -135,6 +135,36 @@ TEST_F(Hdf5RecordingTest, ReadsEventsAfterAFrameUpToAnother) {
 }
 
 // The index of files of others counts differently, or is not there.
+TEST_F(Hdf5RecordingTest, ReadsEventsOfAnyTimes) {
+  const Hdf5Recording recording = open();
+  const std::vector<Event> all = testing::small_events();  // 0.5 1 1.25 1.25 1.75 2 2.5 s
+  EXPECT_THAT(recording.events_in(1.0, 1.25), ElementsAre(all[2], all[3]));
+  EXPECT_THAT(recording.events_in(0.4, 1.1), ElementsAre(all[0], all[1]));
+  EXPECT_THAT(recording.events_in(2.4, 9.0), ElementsAre(all[6]));
+  EXPECT_THAT(recording.events_in(1.25, 1.7), IsEmpty());
+  EXPECT_THAT(recording.events_in(7, 9), IsEmpty());
+  EXPECT_EQ(recording.event_span(), (std::array{0.5, 2.5}));
+}
+
+TEST_F(Hdf5RecordingTest, ReadsSoManyEventsAroundATime) {
+  const Hdf5Recording recording = open();
+  const std::vector<Event> all = testing::small_events();
+  EXPECT_THAT(recording.events_around(1.3, 2, 0), ElementsAre(all[2], all[3]));
+  EXPECT_THAT(recording.events_around(1.25, 1, 1), ElementsAre(all[3], all[4]));
+  EXPECT_THAT(recording.events_around(1.0, 9, 1), ElementsAre(all[0], all[1], all[2]));
+  EXPECT_THAT(recording.events_around(2.1, 0, 9), ElementsAre(all[6]));
+  EXPECT_THAT(recording.events_around(0.1, 5, 0), IsEmpty());
+}
+
+TEST_F(Hdf5RecordingTest, MayHaveNoEvents) {
+  datasets_["davis/left/events"] = {{0, 4}, std::vector<double>{}};
+  datasets_["davis/left/image_raw_event_inds"] = {{3}, std::vector<std::int64_t>{-1, -1, -1}};
+  const Hdf5Recording empty = open();
+  EXPECT_THAT(empty.events_around(1, 5, 5), IsEmpty());
+  EXPECT_THAT(empty.events_in(0, 5), IsEmpty());
+  EXPECT_EQ(empty.event_span(), std::nullopt);
+}
+
 TEST_F(Hdf5RecordingTest, TrustsTimesMoreThanTheEventIndex) {
   for (const std::vector<std::int64_t>& index :
        {std::vector<std::int64_t>{2, 4, 6}, {0, 0, 0}, {-9, 700, std::int64_t{1} << 62}}) {

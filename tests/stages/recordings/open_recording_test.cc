@@ -8,6 +8,7 @@
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -85,6 +86,21 @@ TEST(OpenRecordingTest, IsReadByManyThreads) {
   for (int i = 0; i < 6; ++i) threads.emplace_back(read);
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(wrong, 0);
+}
+
+TEST(FindRecordingFormat, TellsByWhatIsThere) {
+  const testing::TemporaryFolder folder;
+  testing::write_hdf5(folder / "m.h5", testing::small_mvsec());
+  EXPECT_EQ(find_recording_format(folder / "m.h5"), RecordingFormat::kMvsec);
+  EXPECT_EQ(find_recording_format(folder / "m.h5", "right"), std::nullopt);
+  testing::write_hdf5(folder / "e.h5", {{"davis/events/data", {{0, 4}, std::vector<double>{}}}});
+  EXPECT_EQ(find_recording_format(folder / "e.h5"), RecordingFormat::kEventgan);
+  testing::write_file(folder / "ecd/events.txt", "");
+  EXPECT_EQ(find_recording_format(folder / "ecd"), RecordingFormat::kEcd);
+  testing::write_file(folder / "text", "text");
+  EXPECT_EQ(find_recording_format(folder / "text"), std::nullopt);
+  EXPECT_EQ(find_recording_format(folder.path()), std::nullopt);
+  EXPECT_EQ(find_recording_format(folder / "absent"), std::nullopt);
 }
 
 }  // namespace

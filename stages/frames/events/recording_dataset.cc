@@ -1,0 +1,388 @@
+#include "stages/frames/events/recording_dataset.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <optional>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "stages/frames/events/recording_labels.h"
+#include "stages/frames/source_folders.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kSameTime_s = 1e-6;  // what labels written with six decimals can lose
+constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+
+/// One recording of the source.
+struct Recorded {
+  std::string path;  ///< as FrameRef::path is written
+  std::unique_ptr<Recording> recording;
+  std::vector<double> frame_times_s;
+  std::array<double, 2> span{};  ///< first and last time of a frame or an event
+  std::string label_file;        ///< written as `path`; empty: none
+  RecordingLabels labels;        ///< class_id is the source's
+
+  /// The last frame at or before the time; -1 if there is none.
+  std::int64_t frame_at(double time_s) const {
+    return std::ranges::upper_bound(frame_times_s, time_s) - frame_times_s.begin() - 1;
+  }
+
+  FrameRef ref(double time_s) const {
+    const std::int64_t frame = frame_at(time_s);
+    return {path, frame, frame, time_s};
+  }
+};
+
+/// Begin (exclusive) and end of a window in seconds.
+using Span = std::array<double, 2>;
+
+/// The window of a time by the frames around it.
+Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace place) {
+  const auto after = std::ranges::lower_bound(frames, time_s);
+  const std::ptrdiff_t last =
+      std::clamp<std::ptrdiff_t>(after - frames.begin(), 1, std::ssize(frames) - 1);
+  const double before_s = frames[static_cast<std::size_t>(last) - 1];
+  const double last_s = frames[static_cast<std::size_t>(last)];
+  const double length_s = last_s - before_s;
+  if (place == LabelPlace::kMiddle) return {time_s - length_s / 2, time_s + length_s / 2};
+  return {time_s == last_s ? before_s : time_s - length_s, time_s};
+}
+
+class RecordingDataset final : public Dataset {
+ public:
+  RecordingDataset(const SourceSpec& spec, const fs::path& base)
+      : window_(spec.window), camera_(spec.camera) {
+    find_recordings(spec, base);
+    find_labels(spec, base);
+    for (auto& [name, recorded] : recordings_) open(recorded, base);
+    number_classes();
+    for (const auto& [name, recorded] : recordings_) list_times(name, recorded);
+    if (labelled_.empty()) {
+      throw InputError("expected labels or frames to make samples of, got none, in " + spec.root);
+    }
+    std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
+    std::ranges::sort(annotation_files_);
+  }
+
+  const LabelSchema& label_schema() const override { return schema_; }
+  const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
+  std::vector<std::string> annotation_files() const override { return annotation_files_; }
+
+  std::vector<std::string> notes() const override {
+    std::vector<std::string> notes = notes_;
+    for (const auto& [name, recorded] : recordings_) {
+      std::ranges::move(recorded.recording->notes(), std::back_inserter(notes));
+    }
+    return notes;
+  }
+
+  Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
+    if (steps == 0) return {Neighbour::State::kPresent, labelled.frame};
+    if (steps != 1 && steps != -1) return {};
+    const Recorded& recorded = recordings_.at(labelled.sequence);
+    FrameRef edge = labelled.frame;
+    if (const std::optional<Span> span = span_of(recorded, labelled.frame.time_s)) {
+      edge = recorded.ref((*span)[steps < 0 ? 0 : 1]);
+    } else {
+      edge.time_s = kNan;
+    }
+    return {Neighbour::State::kPresent, std::move(edge)};
+  }
+
+  ImageSize sensor_size(const std::string& label_key) const override {
+    return find(label_key).first.recording->size();
+  }
+
+  Outcome<EventWindow> events(const std::string& label_key) const override try {
+    const auto& [recorded, time_s] = find(label_key);
+    const Recording& recording = *recorded.recording;
+    EventWindow window{recording.size(), {}};
+    if (const std::optional<Span> span = span_of(recorded, time_s)) {
+      window.events = recording.events_in((*span)[0], (*span)[1]);
+    } else {
+      const std::int64_t after =
+          window_.label == LabelPlace::kMiddle ? *window_.events - *window_.events / 2 : 0;
+      window.events = recording.events_around(time_s, *window_.events - after, after);
+    }
+    return window;
+  } catch (const InputError& error) {
+    return SampleFault{error.what()};
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    const auto& [recorded, time_s] = find(label_key);
+    if (recorded.label_file.empty()) return Annotation{};
+    // The key has the time of the label, or of the frame that it was taken to.
+    const auto& labels = recorded.labels.annotations;
+    const auto label = labels.lower_bound(time_s - kSameTime_s);
+    if (label != labels.end() && label->first <= time_s + kSameTime_s) return label->second;
+    return SampleFault{"expected labels of " + std::to_string(time_s) + " s, got none, in " +
+                       recorded.label_file};
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    const auto& [recorded, time_s] = find(label_key);
+    return fmt::format("{} ({:.6f} s)",
+                       recorded.label_file.empty() ? recorded.path : recorded.label_file, time_s);
+  }
+
+ private:
+  /// The recording and the time that a label_key names. Throws InputError if there is none.
+  std::pair<const Recorded&, double> find(const std::string& label_key) const {
+    const std::size_t slash = std::min(label_key.rfind('/'), label_key.size());
+    const auto recorded = recordings_.find(label_key.substr(0, slash));
+    double time_s = 0;
+    const char* const end = label_key.data() + label_key.size();
+    const char* const begin = label_key.data() + std::min(slash + 1, label_key.size());
+    const auto [stop, error] = std::from_chars(begin, end, time_s);
+    if (recorded == recordings_.end() || error != std::errc() || stop != end) {
+      throw InputError("expected a recording and a time of the source, got " + label_key);
+    }
+    return {recorded->second, time_s};
+  }
+
+  /// None where so many events make the window, whatever their times.
+  std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
+    if (window_.events) return std::nullopt;
+    if (!window_.duration_s) return frame_window(recorded.frame_times_s, time_s, window_.label);
+    const double after_s = window_.label == LabelPlace::kMiddle ? *window_.duration_s / 2 : 0;
+    return Span{time_s - (*window_.duration_s - after_s), time_s + after_s};
+  }
+
+  void add(const std::string& name, const std::string& path) {
+    const auto [recorded, is_new] = recordings_.try_emplace(name);
+    if (!is_new) {
+      throw InputError("expected recordings of different names, got " + name + " twice, in " +
+                       path);
+    }
+    recorded->second.path = path;
+  }
+
+  void find_recordings(const SourceSpec& spec, const fs::path& base) {
+    const auto format_at = [&](const fs::path& path) {
+      return find_recording_format(path, camera_);
+    };
+    const auto spelled = [](const std::string& path, RecordingFormat format) {
+      const bool is_folder = format == RecordingFormat::kEcd;
+      return is_folder ? (fs::path(path) / "events.txt").generic_string() : path;
+    };
+    const fs::path root = base / spec.root;
+    if (const auto format = format_at(root)) {
+      fs::path named = fs::absolute(root).lexically_normal();
+      if (!named.has_filename()) named = named.parent_path();
+      const bool is_folder = *format == RecordingFormat::kEcd;
+      add((is_folder ? named.filename() : named.stem()).string(), spelled(spec.root, *format));
+      default_labels_ = named.parent_path();
+      return;
+    }
+    const SourceRoot folder(spec.root, base);
+    folder.require_folder("");
+    std::vector<std::string> left_out;
+    for (const std::string& name : folder.folders_in("")) {
+      if (const auto format = format_at(folder.on_disk(name))) {
+        add(name, spelled(folder.written(name), *format));
+      } else {
+        left_out.push_back(name);
+      }
+    }
+    for (const fs::path name : folder.files_in("")) {
+      if (const auto format = format_at(folder.on_disk(name.string()))) {
+        add(name.stem().string(), spelled(folder.written(name.string()), *format));
+      } else if (name.extension() != ".csv" && name.extension() != ".json") {
+        left_out.push_back(name.string());
+      }
+    }
+    if (recordings_.empty()) {
+      throw InputError(
+          "expected a recording in the layout of MVSEC, ECD or EventGAN, or a folder of them, got "
+          "none, in " +
+          root.string());
+    }
+    if (!left_out.empty()) {
+      notes_.push_back(counted(left_out, "files and folders left out in " + folder.written("")));
+    }
+    default_labels_ = root;
+  }
+
+  void find_labels(const SourceSpec& spec, const fs::path& base) {
+    const fs::path named = base / spec.annotations.value_or("");
+    if (spec.annotations && !fs::is_directory(named)) {
+      if (recordings_.size() > 1) {
+        throw UsageError("annotations: expected a folder of NAME.csv or NAME.json for " +
+                         std::to_string(recordings_.size()) + " recordings, got a file, in " +
+                         spec.root);
+      }
+      read_labels(recordings_.begin()->second, *spec.annotations, named);
+      return;
+    }
+    const fs::path folder = spec.annotations ? named : default_labels_;
+    for (auto& [name, recorded] : recordings_) {
+      const std::array files = {folder / (name + ".csv"), folder / (name + ".json")};
+      if (fs::exists(files[0]) && fs::exists(files[1])) {
+        throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
+                         files[1].string());
+      }
+      for (const fs::path& file : files) {
+        if (fs::exists(file)) read_labels(recorded, written(file, spec, base), file);
+      }
+    }
+    if (annotation_files_.empty()) {
+      if (!spec.annotations) return;
+      throw InputError("expected NAME.csv or NAME.json of a recording, got none, in " +
+                       folder.string());
+    }
+    std::vector<std::string> without;
+    std::erase_if(recordings_, [&](const auto& entry) {
+      if (!entry.second.label_file.empty()) return false;
+      without.push_back(entry.first);
+      return true;
+    });
+    if (!without.empty()) {
+      notes_.push_back(counted(without, "recordings without labels left out in " + spec.root));
+    }
+  }
+
+  /// Relative to the manifest where the root is.
+  static std::string written(const fs::path& file, const SourceSpec& spec, const fs::path& base) {
+    if (spec.annotations) return (fs::path(*spec.annotations) / file.filename()).generic_string();
+    if (fs::path(spec.root).is_absolute()) return file.generic_string();
+    return file.lexically_normal()
+        .lexically_relative(fs::absolute(base).lexically_normal())
+        .generic_string();
+  }
+
+  void read_labels(Recorded& recorded, const std::string& path, const fs::path& file) try {
+    recorded.labels = read_recording_labels(file);
+    recorded.label_file = path;
+    annotation_files_.push_back(path);
+  } catch (const InputError&) {
+    throw;
+  } catch (const std::runtime_error& error) {
+    throw InputError(error.what());
+  }
+
+  void open(Recorded& recorded, const fs::path& base) {
+    fs::path path = base / recorded.path;
+    if (path.filename() == "events.txt") {
+      annotation_files_.push_back(
+          (fs::path(recorded.path).parent_path() / "images.txt").generic_string());
+      path = path.parent_path();
+    }
+    const auto format = find_recording_format(path, camera_);
+    recorded.recording = open_recording(path, format.value_or(RecordingFormat::kMvsec), camera_);
+    const Recording& recording = *recorded.recording;
+    for (std::int64_t i = 0; i < recording.frame_count(); ++i) {
+      recorded.frame_times_s.push_back(recording.frame_time_s(i));
+    }
+    if (recorded.frame_times_s.size() < 2 && !window_.duration_s && !window_.events) {
+      throw InputError(
+          "expected two frames or more, or window_s or window_events, got one frame, "
+          "in " +
+          recorded.path);
+    }
+    recorded.span = {recorded.frame_times_s.front(), recorded.frame_times_s.back()};
+    if (const auto events = recording.event_span()) {
+      recorded.span[0] = std::min(recorded.span[0], (*events)[0]);
+      recorded.span[1] = std::max(recorded.span[1], (*events)[1]);
+    }
+  }
+
+  /// Numbers the classes of all recordings by their names' order, whatever the order of the files.
+  void number_classes() {
+    std::map<std::string, int> numbers;
+    const std::vector<std::string>* joints = nullptr;
+    for (const auto& [name, recorded] : recordings_) {
+      for (const std::string& class_name : recorded.labels.class_names) numbers[class_name] = 0;
+      if (recorded.label_file.empty() || recorded.labels.joint_names.empty()) continue;
+      if (joints != nullptr && *joints != recorded.labels.joint_names) {
+        throw InputError(
+            "expected the same joint_names in all labels of a source, got others, in " +
+            recorded.label_file);
+      }
+      joints = &recorded.labels.joint_names;
+    }
+    if (joints != nullptr) schema_.joint_names = *joints;
+    for (auto& [class_name, number] : numbers) {
+      number = static_cast<int>(schema_.class_names.size());
+      schema_.class_names.push_back(class_name);
+    }
+    for (auto& [name, recorded] : recordings_) {
+      for (auto& [time_s, annotation] : recorded.labels.annotations) {
+        for (Box& box : annotation.boxes) {
+          box.class_id =
+              numbers.at(recorded.labels.class_names[static_cast<std::size_t>(box.class_id)]);
+        }
+      }
+    }
+  }
+
+  void list_times(const std::string& name, const Recorded& recorded) {
+    const std::vector<double>& frames = recorded.frame_times_s;
+    if (recorded.label_file.empty()) {
+      // The first frame ends no interval.
+      const bool by_frames = !window_.duration_s && !window_.events;
+      for (std::size_t i = by_frames ? 1 : 0; i < frames.size(); ++i) {
+        list_time(name, recorded, frames[i]);
+      }
+      return;
+    }
+    for (const auto& [labelled_s, annotation] : recorded.labels.annotations) {
+      const auto near = std::ranges::lower_bound(frames, labelled_s - kSameTime_s);
+      const bool on_frame = near != frames.end() && *near <= labelled_s + kSameTime_s;
+      list_time(name, recorded, on_frame ? *near : labelled_s);
+    }
+  }
+
+  void list_time(const std::string& name, const Recorded& recorded, double time_s) {
+    LabelledFrame frame;
+    frame.sample_id = fmt::format("{}/{:017.6f}", name, time_s);
+    frame.sequence = name;
+    frame.frame = recorded.ref(time_s);
+    frame.label_key = fmt::format("{}/{}", name, time_s);  // exactly, as short as can be
+    if (time_s < recorded.span[0] || time_s > recorded.span[1]) {
+      frame.fault = fmt::format(
+          "expected a time between {} s and {} s, which the recording lasts, got {} s, in {} ({})",
+          recorded.span[0], recorded.span[1], time_s, label_place(frame.label_key),
+          frame.sample_id);
+    }
+    if (!labelled_.empty() && labelled_.back().sequence == name &&
+        time_s - labelled_.back().frame.time_s <= 2 * kSameTime_s) {
+      throw InputError(fmt::format(
+          "expected times more than two microseconds apart, got {} s and another, in {}", time_s,
+          label_place(frame.label_key)));
+    }
+    labelled_.push_back(std::move(frame));
+  }
+
+  WindowSpec window_;
+  std::string camera_;
+  std::map<std::string, Recorded> recordings_;  ///< by name
+  fs::path default_labels_;                     ///< where labels lie unless the manifest says
+  LabelSchema schema_;
+  std::vector<LabelledFrame> labelled_;
+  std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
+  std::vector<std::string> notes_;
+};
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_recording_dataset(const SourceSpec& spec, const fs::path& base) {
+  return std::make_unique<RecordingDataset>(spec, base);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "manifests/values/job.h"
+#include "stages/frames/dataset.h"
+
+namespace eventgan {
+
+/// Recordings of an event camera with frames (stages/recordings), with labels or without.
+///
+/// The root is a recording (an HDF5 file, an ECD folder) or a folder of recordings, named NAME as
+/// its file or folder. Labels are NAME.csv or NAME.json (read_recording_labels) beside it, or what
+/// the manifest's `annotations` names. A sample is a labelled time; of a source without labels the
+/// time of a frame. Of a source with labels, recordings without are left out, with a note.
+///
+/// The window of a time t, which lies at its end (SourceSpec::window):
+///   frames      (t - d, t], d the interval between the two frames around t, or next to it beyond
+///               them; for a frame's own time it begins exactly at the frame before;
+///   duration_s  (t - duration_s, t];
+///   events      the last so many events with a time ≤ t.
+/// With t in its middle it is shifted by half of its length, of n events by the later n - n/2. A
+/// label within a microsecond of a frame has the frame's time. A time outside the recording's
+/// frames and events is at fault.
+///
+/// sample_id is NAME/SECONDS with six decimals, and the same two stand in label_key. FrameRef::path
+/// is the HDF5 file or the folder's events.txt, and FrameRef::video_frame the last frame at or
+/// before the time, -1 if there is none.
+///
+/// Relative paths start at `base`. Throws InputError if there is no recording, or one or its labels
+/// cannot be read; UsageError if `annotations` does not fit.
+std::unique_ptr<Dataset> open_recording_dataset(const SourceSpec& spec,
+                                                const std::filesystem::path& base);
+
+}  // namespace eventgan

@@ -1,0 +1,240 @@
+#include "stages/frames/events/recording_dataset.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "tests/stages/recordings/small_recording.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+constexpr char kLabelHeader[] = "time_s,left,top,right,bottom,class,category\n";
+
+/// The small recording: frames at 1, 1.5 and 2 s; events at 0.5, 1, 1.25, 1.25, 1.75, 2 and 2.5 s.
+class RecordingDatasetTest : public ::testing::Test {
+ protected:
+  RecordingDatasetTest() {
+    spec_.dataset = DatasetKind::kRecording;
+    spec_.root = "drive.h5";
+    testing::write_hdf5(folder_ / "drive.h5", testing::small_mvsec());
+  }
+
+  std::unique_ptr<Dataset> open() const { return open_recording_dataset(spec_, folder_.path()); }
+
+  void label(const std::string& rows) {
+    testing::write_file(folder_ / "drive.csv", kLabelHeader + rows);
+  }
+
+  static std::vector<std::string> ids(const Dataset& dataset) {
+    std::vector<std::string> names;
+    for (const LabelledFrame& frame : dataset.labelled_frames()) names.push_back(frame.sample_id);
+    return names;
+  }
+
+  /// Begin and end of a sample's window.
+  static std::array<double, 2> window(const Dataset& dataset, std::size_t sample) {
+    const LabelledFrame& frame = dataset.labelled_frames().at(sample);
+    return {dataset.neighbour(frame, -1).frame.time_s, dataset.neighbour(frame, 1).frame.time_s};
+  }
+
+  static std::vector<Event> events(const Dataset& dataset, std::size_t sample) {
+    const auto outcome = dataset.events(dataset.labelled_frames().at(sample).label_key);
+    EXPECT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+    return std::get<EventWindow>(outcome).events;
+  }
+
+  testing::TemporaryFolder folder_;
+  SourceSpec spec_;
+  const std::vector<Event> all_ = testing::small_events();
+};
+
+TEST_F(RecordingDatasetTest, WithoutLabelsEachFrameEndsItsInterval) {
+  const auto dataset = open();
+  EXPECT_THAT(ids(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000002.000000"));
+  EXPECT_EQ(window(*dataset, 0), (std::array{1.0, 1.5}));
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[4], all_[5]));
+  const LabelledFrame& frame = dataset->labelled_frames()[0];
+  EXPECT_EQ(dataset->neighbour(frame, -1).frame, (FrameRef{"drive.h5", 0, 0}));
+  EXPECT_EQ(dataset->neighbour(frame, 1).frame, (FrameRef{"drive.h5", 1, 1}));
+  EXPECT_EQ(dataset->neighbour(frame, 2).state, Neighbour::State::kBeyond);
+  EXPECT_EQ(dataset->sensor_size(frame.label_key), (ImageSize{3, 4}));
+  EXPECT_EQ(std::get<Annotation>(dataset->annotation(frame.label_key)), Annotation{});
+  EXPECT_THAT(dataset->annotation_files(), IsEmpty());
+}
+
+TEST_F(RecordingDatasetTest, LabelsAreAtTheEndOrInTheMiddleOfTheirWindows) {
+  // On a frame but for what six decimals lose; between two; without a box.
+  label("1.5000004,0,0,2,1,car,easy\n1.75,0,0,1,1,bus,\n2.25\n");
+  auto dataset = open();
+  EXPECT_THAT(ids(*dataset), ElementsAre("drive/0000000001.500000", "drive/0000000001.750000",
+                                         "drive/0000000002.250000"));
+  EXPECT_EQ(window(*dataset, 0), (std::array{1.0, 1.5}));
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.25, 1.75}));
+  EXPECT_EQ(window(*dataset, 2), (std::array{1.75, 2.25}));  // as long as the last interval
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[4]));
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("bus", "car"));
+  const auto annotation = dataset->annotation(dataset->labelled_frames()[0].label_key);
+  EXPECT_EQ(std::get<Annotation>(annotation).boxes.at(0),
+            (Box{.class_id = 1, .xyxy = {0, 0, 2, 1}, .difficulty = 0}));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("drive.csv"));
+  EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key),
+            "drive.csv (1.500000 s)");
+  spec_.window.label = LabelPlace::kMiddle;
+  dataset = open();
+  EXPECT_EQ(window(*dataset, 0), (std::array{1.25, 1.75}));
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.5, 2.0}));
+}
+
+TEST_F(RecordingDatasetTest, AWindowMayLastSoManySeconds) {
+  label("1\n1.5\n2.5\n");
+  spec_.window.duration_s = 0.25;
+  auto dataset = open();
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.25, 1.5}));
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[1]));
+  EXPECT_THAT(events(*dataset, 1), IsEmpty());  // 1.25 is no part of it
+  EXPECT_THAT(events(*dataset, 2), ElementsAre(all_[6]));
+  spec_.window.label = LabelPlace::kMiddle;
+  dataset = open();
+  EXPECT_EQ(window(*dataset, 1), (std::array{1.375, 1.625}));
+}
+
+TEST_F(RecordingDatasetTest, AWindowMayHoldSoManyEvents) {
+  label("0.5\n1.25\n2.5\n");
+  spec_.window.events = 3;
+  auto dataset = open();
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[0]));  // there are no more
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[1], all_[2], all_[3]));
+  EXPECT_THAT(events(*dataset, 2), ElementsAre(all_[4], all_[5], all_[6]));
+  EXPECT_TRUE(std::isnan(window(*dataset, 1)[0]));
+  EXPECT_TRUE(std::isnan(window(*dataset, 1)[1]));
+  spec_.window.label = LabelPlace::kMiddle;  // one up to the time, two behind it
+  dataset = open();
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[3], all_[4], all_[5]));
+}
+
+TEST_F(RecordingDatasetTest, WithoutLabelsTheFirstFrameEndsAWindowOfItsOwn) {
+  spec_.window.events = 1;
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 3u);
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[1]));
+}
+
+TEST_F(RecordingDatasetTest, OneFrameNeedsAWindow) {
+  auto datasets = testing::small_mvsec();
+  datasets["davis/left/image_raw"].shape[0] = 1;
+  datasets["davis/left/image_raw"].values = std::vector<std::uint8_t>(12);
+  datasets["davis/left/image_raw_ts"] = {{1}, std::vector<double>{1.0}};
+  datasets.erase("davis/left/image_raw_event_inds");
+  datasets.erase("davis/left/flow_dist");
+  testing::write_hdf5(folder_ / "one.h5", datasets);
+  spec_.root = "one.h5";
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("expected two frames or more, or window_s")));
+  spec_.window.duration_s = 1;
+  EXPECT_THAT(events(*open(), 0), ElementsAre(all_[0], all_[1]));
+}
+
+TEST_F(RecordingDatasetTest, TimesOutsideTheRecordingAreFaults) {
+  label("0.25\n0.5\n2.5\n2.75,1,1,2,2,car,\n");
+  const auto dataset = open();
+  const std::vector<LabelledFrame>& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[0].fault,
+            "expected a time between 0.5 s and 2.5 s, which the recording lasts, got 0.25 s, in "
+            "drive.csv (0.250000 s) (drive/0000000000.250000)");
+  EXPECT_EQ(frames[1].fault, "");
+  EXPECT_EQ(frames[2].fault, "");
+  EXPECT_THAT(frames[3].fault, HasSubstr("got 2.75 s"));
+  EXPECT_EQ(window(*dataset, 1), (std::array{0.0, 0.5}));  // as long as the first interval
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[0]));
+}
+
+TEST_F(RecordingDatasetTest, CorruptEventsAreTheFaultOfTheirWindow) {
+  auto datasets = testing::small_mvsec();
+  std::get<std::vector<double>>(datasets["davis/left/events"].values)[4 * 4] = std::nan("");
+  testing::write_hdf5(folder_ / "bad.h5", datasets);
+  spec_.root = "bad.h5";
+  const auto dataset = open();
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
+  const auto outcome = dataset->events(dataset->labelled_frames()[1].label_key);
+  ASSERT_TRUE(is_fault(outcome));
+  EXPECT_THAT(std::get<SampleFault>(outcome).reason, AllOf(HasSubstr("got"), HasSubstr("event 4")));
+}
+
+TEST_F(RecordingDatasetTest, AFolderHoldsRecordingsOfAnyLayout) {
+  testing::write_hdf5(folder_ / "all/b.hdf5", testing::small_mvsec());
+  testing::write_file(folder_ / "all/a/images.txt", "1.0 x.pgm\n2.0 x.pgm\n");
+  testing::write_file(folder_ / "all/a/x.pgm", "P5 2 1 255\nab");
+  testing::write_file(folder_ / "all/a/events.txt", "1.25 1 0 1\n1.5 0 0 0\n");
+  testing::write_file(folder_ / "all/b_gt.hdf5", "no recording");
+  spec_.root = "all";
+  auto dataset = open();
+  EXPECT_THAT(ids(*dataset),
+              ElementsAre("a/0000000002.000000", "b/0000000001.500000", "b/0000000002.000000"));
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(Event{1, 0, 1.25, true}, Event{0, 0, 1.5, false}));
+  EXPECT_EQ(dataset->sensor_size("a/2"), (ImageSize{1, 2}));
+  EXPECT_EQ(dataset->labelled_frames()[0].frame.path, "all/a/events.txt");
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("all/a/images.txt"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 files and folders left out in all: b_gt.hdf5"));
+  // With labels of one of them the others are left out.
+  testing::write_file(folder_ / "labels/b.csv", std::string(kLabelHeader) + "1.75,0,0,1,1,car,\n");
+  spec_.annotations = "labels";
+  dataset = open();
+  EXPECT_THAT(ids(*dataset), ElementsAre("b/0000000001.750000"));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("labels/b.csv"));
+  EXPECT_THAT(dataset->notes(), Contains("1 recordings without labels left out in all: a"));
+}
+
+TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
+  label("1.5\n");
+  testing::write_file(folder_ / "drive.json",
+                      R"({"format": "eventgan-labels", "version": 1, "samples": []})");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("labels in one file, got two")));
+  spec_.annotations = "drive.json";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got none, in drive.h5")));
+  spec_.annotations = "absent.csv";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("absent.csv")));
+  spec_.annotations.reset();
+  std::filesystem::remove(folder_ / "drive.json");
+  label("1.75\n1.750001\n");
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("more than two microseconds apart")));
+  label("1.75,a,2,3,4,car,\n");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("drive.csv (line 2)")));
+  spec_.camera = "right";
+  EXPECT_THROW(open(), InputError);
+  spec_.root = "absent";
+  EXPECT_THROW(open(), InputError);
+  testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
+  testing::write_hdf5(folder_ / "all/a.hdf5", testing::small_mvsec());
+  spec_.root = "all";
+  spec_.camera = "left";
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got a twice")));
+  const auto dataset = [&] {
+    spec_.root = "drive.h5";
+    label("1.75\n");
+    return open();
+  }();
+  EXPECT_THROW(dataset->sensor_size("drive/x"), InputError);
+  EXPECT_TRUE(is_fault(dataset->events("other/1.75")));
+  EXPECT_TRUE(is_fault(dataset->annotation("drive/1.5")));
+}
+
+}  // namespace
+}  // namespace eventgan

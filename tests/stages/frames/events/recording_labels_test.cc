@@ -1,0 +1,134 @@
+#include "stages/frames/events/recording_labels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+class RecordingLabelsTest : public ::testing::Test {
+ protected:
+  RecordingLabels read(const std::string& name, const std::string& text) {
+    testing::write_file(folder_ / name, text);
+    return read_recording_labels(folder_ / name);
+  }
+
+  void refuses(const std::string& name, const std::string& text,
+               const std::vector<std::string>& parts) {
+    for (const std::string& part : parts) {
+      EXPECT_THAT([&] { read(name, text); }, ThrowsMessage<InputError>(HasSubstr(part))) << text;
+    }
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+constexpr char kHeader[] = "time_s,left,top,right,bottom,class,category\n";
+
+TEST_F(RecordingLabelsTest, CsvHasALineABoxAndTimesWithout) {
+  const RecordingLabels labels =
+      read("a.csv", std::string(kHeader) +
+                        "1.5,1,2,30.25,40,car,easy\r\n2.5,5,6,7,8,bus,hard\n 1.5 , 9,9,11,12,car,\n"
+                        "\n3\n4,,,,,,\n2.5,0,0,1,1,car,dont_care");
+  EXPECT_THAT(labels.class_names, ElementsAre("car", "bus"));
+  ASSERT_EQ(labels.annotations.size(), 4u);
+  const Annotation& first = labels.annotations.at(1.5);
+  ASSERT_EQ(first.boxes.size(), 2u);
+  EXPECT_EQ(first.boxes[0], (Box{.class_id = 0, .xyxy = {1, 2, 30.25, 40}, .difficulty = 0}));
+  EXPECT_EQ(first.boxes[1], (Box{.class_id = 0, .xyxy = {9, 9, 11, 12}}));
+  EXPECT_EQ(first.original, "1.5,1,2,30.25,40,car,easy\n 1.5 , 9,9,11,12,car,\n");
+  const Annotation& second = labels.annotations.at(2.5);
+  EXPECT_EQ(second.boxes[0], (Box{.class_id = 1, .xyxy = {5, 6, 7, 8}, .difficulty = 2}));
+  EXPECT_EQ(second.boxes[1], (Box{.class_id = 0, .xyxy = {0, 0, 1, 1}, .ignore = true}));
+  EXPECT_THAT(labels.annotations.at(3).boxes, IsEmpty());
+  EXPECT_EQ(labels.annotations.at(3).original, "3\n");
+  EXPECT_THAT(labels.annotations.at(4).boxes, IsEmpty());
+}
+
+TEST_F(RecordingLabelsTest, CsvMayHaveItsColumnsInAnyOrderAndNoCategory) {
+  const RecordingLabels labels = read("a.csv",
+                                      "\xEF\xBB\xBF"
+                                      "class, bottom,right,top,left,time_s\ncar,4,3,2,1,0.25\n");
+  EXPECT_EQ(labels.annotations.at(0.25).boxes.at(0), (Box{.class_id = 0, .xyxy = {1, 2, 3, 4}}));
+}
+
+TEST_F(RecordingLabelsTest, CsvNamesEveryLineThatIsWrong) {
+  const std::string place = (folder_ / "a.csv").string();
+  refuses("a.csv",
+          std::string(kHeader) +
+              "x,1,2,3,4,car,\n1,1,2,nan,4,car,\n1,1,2,3,4,,\n"
+              "1,1,2,3,4,car,eazy\n1,2,3\n\xff\n1,1,2,3,4,\"a,b\",easy\n",
+          {"expected a time in seconds, got \"x\", in " + place + " (line 2)",
+           "expected right in pixels, got \"nan\", in " + place + " (line 3)",
+           "expected a class, got none, in " + place + " (line 4)",
+           "expected easy, hard, dont_care or nothing, got \"eazy\", in " + place + " (line 5)",
+           "expected 7 fields, none with a comma in it, got 3, in " + place + " (line 6)",
+           "expected UTF-8, got other bytes, in " + place + " (line 7)",
+           "got 8, in " + place + " (line 8)"});
+  refuses("a.csv", "time_s,left,top,right,bottom,class,catgory\n1,1,2,3,4,car,easy\n",
+          {"each once, got \"catgory\", in " + place + " (line 1)"});
+  refuses("a.csv", "time_s,left,top,right,bottom,class,class\n", {"got \"class\""});
+  refuses("a.csv", "time_s,left,top,right,class\n", {"expected a column bottom, got none"});
+  refuses("a.csv", "", {"expected a header line"});
+  refuses("a.csv", std::string(kHeader) + "1e999,,,,,,\n", {"expected a time in seconds"});
+}
+
+TEST_F(RecordingLabelsTest, JsonHasBoxesAndPersons) {
+  const RecordingLabels labels = read("a.json", R"({
+    "format": "eventgan-labels", "version": 1, "joint_names": ["head", "foot"],
+    "samples": [
+      { "time_s": 1.5, "boxes": [
+          { "left": 1, "top": 2, "right": 3, "bottom": 4.5, "class": "car", "category": "hard" },
+          { "left": 1, "top": 2, "right": 3, "bottom": 4, "class": "bus" }] },
+      { "time_s": 0.5, "persons": [
+          { "joints": [[10, 20, 1], []], "center": [5, 6], "scale": 0.5, "head_box": [1, 2, 3, 4] },
+          { "joints": [[10, 20], [30.5, 40, 0]] }] },
+      { "time_s": 2 }] })");
+  EXPECT_THAT(labels.class_names, ElementsAre("car", "bus"));
+  EXPECT_THAT(labels.joint_names, ElementsAre("head", "foot"));
+  EXPECT_THAT(labels.annotations.at(1.5).boxes,
+              ElementsAre(Box{.class_id = 0, .xyxy = {1, 2, 3, 4.5}, .difficulty = 2},
+                          Box{.class_id = 1, .xyxy = {1, 2, 3, 4}}));
+  const std::vector<Person>& persons = labels.annotations.at(0.5).persons;
+  ASSERT_EQ(persons.size(), 2u);
+  EXPECT_THAT(persons[0].joints, ElementsAre(Joint{{10, 20}, 1}, Joint{kMissingPoint, 0}));
+  EXPECT_EQ(persons[0].center, (Point{5, 6}));
+  EXPECT_EQ(persons[0].scale, 0.5);
+  EXPECT_EQ(persons[0].head_box, (Rectangle{1, 2, 3, 4}));
+  EXPECT_THAT(persons[1].joints, ElementsAre(Joint{{10, 20}, -1}, Joint{{30.5, 40}, 0}));
+  EXPECT_EQ(persons[1].center, kMissingPoint);
+  EXPECT_EQ(labels.annotations.at(2).original, R"({"time_s":2})");
+}
+
+TEST_F(RecordingLabelsTest, JsonTellsEveryFaultAndTheNearestKey) {
+  refuses("a.json", R"({ "format": "eventgan-labels", "version": 1, "joint_names": ["head"],
+    "samples": [
+      { "time_s": "now", "boxs": [] },
+      { "time_s": 1, "boxes": [{ "left": 1, "top": 2, "right": 3, "class": "", "category": "eazy" }],
+        "persons": [{ "joints": [[1], [2, 3]] }] },
+      { "time_s": 1 }] })",
+          {R"($.samples[0].time_s: expected a number)", R"(expected the key "boxes" or none)",
+           "$.samples[1].boxes[0].bottom: expected a number",
+           R"($.samples[1].boxes[0].class: expected a class, got "")",
+           R"(expected "easy", "hard" or "dont_care", got "eazy")",
+           "$.samples[1].persons[0].joints[0]: expected [x, y], [x, y, visible] or []",
+           "$.samples[1].persons[0].joints: expected as many as joint_names, 1, got 2",
+           "$.samples[2]: expected each time once"});
+  refuses("a.json", R"({"format": "coco", "version": 1})", {"expected \"eventgan-labels\""});
+  refuses("a.json", "{", {"a.json"});
+}
+
+}  // namespace
+}  // namespace eventgan
