@@ -64,11 +64,14 @@ void clear_upper_halves() {}
 }  // namespace
 
 struct Deflater::Compressor {
-  /// isal_deflate_stateless_init() leaves fields as they were, among them hist_bits, the reach of
-  /// matches: all zero from the start, or the same bytes deflate to others from call to call.
+  /// ISA-L's level 0 with codes of our own. Its levels 1 and 2 (2.30) hash what a register holds
+  /// from before, the stream's address, so that the same bytes are deflated to others now and then.
+  /// All zero from the start, since isal_deflate_stateless_init() leaves fields as they were, among
+  /// them hist_bits, the reach of matches.
   struct Isal {
     isal_zstream stream{};
-    std::array<std::uint8_t, ISAL_DEF_LVL1_DEFAULT> memory{};
+    isal_huff_histogram histogram{};
+    isal_hufftables codes{};
   };
 
   explicit Compressor(int level) {
@@ -82,17 +85,29 @@ struct Deflater::Compressor {
   Compressor(const Compressor&) = delete;
   Compressor& operator=(const Compressor&) = delete;
 
+  /// The shortest codes for a sample of the bytes: of every eighth block, of few blocks for all.
+  /// That finds as good ones as all blocks do, for an eighth of the time.
+  void choose_codes(std::span<const std::byte> bytes) {
+    constexpr std::size_t kBlock = std::size_t{1} << 15;  // the reach of matches
+    const std::size_t step = kBlock * std::clamp<std::size_t>(bytes.size() / kBlock / 8, 1, 8);
+    isal->histogram = {};
+    for (std::size_t at = 0; at < bytes.size(); at += step) {
+      const std::span<const std::byte> block =
+          bytes.subspan(at, std::min(kBlock, bytes.size() - at));
+      isal_update_histogram(input_of(block), static_cast<int>(block.size()), &isal->histogram);
+    }
+    isal_create_hufftables(&isal->codes, &isal->histogram);
+  }
+
   /// Both return the size of what they wrote; 0 if `room` did not do.
   std::size_t with_isal(std::span<const std::byte> bytes, std::span<std::byte> room) {
+    choose_codes(bytes);
     isal_zstream& stream = isal->stream;
     isal_deflate_stateless_init(&stream);
-    stream.level = 1;
-    stream.level_buf = isal->memory.data();
-    stream.level_buf_size = static_cast<std::uint32_t>(isal->memory.size());
+    stream.hufftables = &isal->codes;
     stream.gzip_flag = IGZIP_ZLIB;
     stream.end_of_stream = 1;
-    // The library's interface is not const, but it only reads its input.
-    stream.next_in = reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(bytes.data()));
+    stream.next_in = input_of(bytes);
     stream.avail_in = static_cast<std::uint32_t>(bytes.size());
     stream.next_out = reinterpret_cast<std::uint8_t*>(room.data());
     stream.avail_out = static_cast<std::uint32_t>(room.size());
@@ -102,6 +117,11 @@ struct Deflater::Compressor {
   }
   std::size_t with_libdeflate(std::span<const std::byte> bytes, std::span<std::byte> room) {
     return libdeflate_zlib_compress(library, bytes.data(), bytes.size(), room.data(), room.size());
+  }
+
+  /// ISA-L's interface is not const, but it only reads its input.
+  static std::uint8_t* input_of(std::span<const std::byte> bytes) {
+    return reinterpret_cast<std::uint8_t*>(const_cast<std::byte*>(bytes.data()));
   }
 
   libdeflate_compressor* library = nullptr;  ///< none at level 1

@@ -19,10 +19,10 @@ void split_into_planes(std::span<const std::uint32_t> numbers, std::byte* planes
                        std::size_t plane_size);
 
 /// Compresses into zlib's format, again and again with the same memory: at level 1 with ISA-L,
-/// three times as fast as libdeflate at its quickest and a few percent larger; above with
-/// libdeflate. What comes out depends on the bytes and the level alone, not on what was compressed
-/// before; ISA-L's also on whether the processor has SSE4.2 (its kernels for AVX2 and AVX-512 give
-/// the same bytes). Thread safety: one thread at a time.
+/// three times as fast as libdeflate at its quickest and 5 to 12 % larger; above with libdeflate.
+/// What comes out depends on the bytes and the level alone, not on what was compressed before, nor
+/// on addresses; ISA-L's also on whether the processor has SSE4.2 (its kernels for that, AVX, and
+/// AVX2 give the same bytes). Thread safety: one thread at a time.
 class Deflater {
  public:
   /// `level` 1..9. Throws std::bad_alloc.

@@ -11,6 +11,7 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <memory>
 #include <random>
 #include <span>
 #include <string>
@@ -97,6 +98,27 @@ TEST(Deflater, WhatLayInMemoryDoesNotMatter) {
       if (first.empty()) first.assign(bytes.begin(), bytes.end());
       ASSERT_EQ(std::vector<std::byte>(bytes.begin(), bytes.end()), first)
           << "level " << level << ", memory of " << value;
+    }
+  }
+}
+
+TEST(Deflater, WhereItLiesInMemoryDoesNotMatter) {
+  std::vector<std::vector<std::byte>> inputs;
+  for (unsigned i = 0; i < 40; ++i) {
+    inputs.push_back(noise(300 + 29 * i, 256));
+    for (std::size_t place = 0; place < inputs[i].size(); ++place) {
+      if (place % 5 > 1) inputs[i][place] = std::byte{0};
+    }
+  }
+  std::vector<std::vector<std::byte>> first(inputs.size());
+  std::vector<std::unique_ptr<Deflater>> deflaters;  // kept, so that each has another address
+  for (int count = 0; count < 400; ++count) {
+    deflaters.push_back(std::make_unique<Deflater>(1));
+    for (std::size_t i = 0; i < inputs.size(); ++i) {
+      const auto bytes = deflaters.back()->deflate(inputs[i]);
+      if (count == 0) first[i].assign(bytes.begin(), bytes.end());
+      ASSERT_EQ(std::vector<std::byte>(bytes.begin(), bytes.end()), first[i])
+          << "deflater " << count << ", input " << i;
     }
   }
 }
