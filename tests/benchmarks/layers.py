@@ -6,7 +6,6 @@ Multiply-adds a second against what the processor can (float32 with AVX-512: 32 
 
 import dataclasses
 import json
-import math
 import os
 import re
 import statistics
@@ -35,7 +34,7 @@ SETTINGS = {
     "trial": Settings(["untrained:2"], (32, 32), 1),
 }
 KINDS = ["head", "encoders", "residual blocks", "decoders: doubled part", "decoders: skip part", "prediction"]
-OWN = "own loops: phases, rounding, planes"
+OWN = "the engine's own code"
 # oneDNN's line of a convolution that was run ends in its shape and milliseconds: [ic, oc, ih, oh, kernel h, stride h, iw, ow].
 LINE = re.compile(r"^onednn_verbose,exec,cpu,convolution,.*_?ic(\d+)oc(\d+)_ih(\d+)oh(\d+)kh(\d+)sh(\d+).*_iw(\d+)ow(\d+)kw\d+.*,([\d.e-]+)$")
 
@@ -95,7 +94,7 @@ def measure(bench):
             columns += [f"{precision}: ms", "10^9 multiply-adds a second"]
             for kind in KINDS:
                 milliseconds = statistics.median(one[kind][0] for one in passes)
-                cells[kind] += [number(milliseconds), number(passes[0][kind][1] / milliseconds / 1e6 if milliseconds else math.nan)]
+                cells[kind] += [number(milliseconds), number(passes[0][kind][1] / milliseconds / 1e6) if milliseconds else ""]
             convolutions = [sum(sums[0] for sums in one.values()) for one in passes]
             cells[OWN] += [number(statistics.median(total - part for total, part in zip(totals, convolutions))), ""]
             cells["all"] += [number(statistics.median(totals)), ""]
@@ -104,7 +103,8 @@ def measure(bench):
             table.add(name, *values)
         tables.append(table)
     text = (f"{settings.size[0]}x{settings.size[1]}, one core, medians of {settings.passes} passes. oneDNN's own times of its "
-            "convolutions (ONEDNN_VERBOSE), the rest by difference.")
+            "convolutions (ONEDNN_VERBOSE), the rest by difference: combining phases, rounding and planes, and of width 8 all "
+            "that happens at full resolution.")
     return Section("Layers", text, tables)
 
 

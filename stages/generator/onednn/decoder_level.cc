@@ -33,7 +33,8 @@ RowConvolutionSetup setup_of(ImageSize input, ImageSize output, dnnl::memory::da
 
 }  // namespace
 
-DecoderLevel::DecoderLevel(NetworkLayers& layers, int level, ImageSize large, BufferLayout& layout)
+DecoderLevel::DecoderLevel(NetworkLayers& layers, int level, ImageSize large, bool by_strips,
+                           BufferLayout& layout)
     : small_(half_size(large)),
       large_(large),
       channels_(layers.at(layer_name(level, "skip")).numbers().out_channels),
@@ -47,8 +48,10 @@ DecoderLevel::DecoderLevel(NetworkLayers& layers, int level, ImageSize large, Bu
   const LayerNumbers& phases = layers.at(layer_name(level, "phases")).numbers();
   const std::size_t weights_bytes =
       phases.weight.size() * dnnl::memory::data_type_size(layers.stored_type());
-  strips_ =
-      decoder_strips(large.height, phase_rows_of_strip(phases_.output_row_bytes(), weights_bytes));
+  if (by_strips) {
+    strips_ = decoder_strips(large.height,
+                             phase_rows_of_strip(phases_.output_row_bytes(), weights_bytes));
+  }
   int most_phase_rows = 0;
   for (const DecoderStrip& strip : strips_) {
     phases_.prepare(strip.first_phase_row, strip.phase_row_count);

@@ -29,9 +29,11 @@ struct EngineRun {
 /// the skip connection, strip by strip, so that they stay in the cache until they are combined.
 class DecoderLevel {
  public:
-  /// `large` is the skip connection's size; the small one is half of it, rounded up. Adds its
-  /// buffers to `layout`. Throws dnnl::error.
-  DecoderLevel(NetworkLayers& layers, int level, ImageSize large, BufferLayout& layout);
+  /// `large` is the skip connection's size; the small one is half of it, rounded up. by_strips:
+  /// else there are none, but edges, tiles and pixels. Adds its buffers to `layout`. Throws
+  /// dnnl::error.
+  DecoderLevel(NetworkLayers& layers, int level, ImageSize large, bool by_strips,
+               BufferLayout& layout);
 
   const std::vector<DecoderStrip>& strips() const { return strips_; }
   int most_rows() const { return most_rows_; }
@@ -45,6 +47,9 @@ class DecoderLevel {
                const std::byte* skip) const;
 
   DecoderRow row(const EngineRun& run, const DecoderStrip& strip, int y) const;
+
+  /// Where the phases do not hold what begins at pixel first_x of row y: whole_row, last_pixel.
+  void add_edges(const EngineRun& run, int y, int first_x, DecoderRow& row) const;
 
   /// In place of strips: computes a piece, and calls visit(y, first_x, DecoderRow) for each of its
   /// rows in the picture.
@@ -88,7 +93,6 @@ class DecoderLevel {
   };
   Edge make_edge(NetworkLayers& layers, const std::string& name, int across, int along,
                  BufferLayout& layout) const;
-  void add_edges(const EngineRun& run, int y, int first_x, DecoderRow& row) const;
   void gather(const std::byte* small, int row, int column, std::byte* pixel) const;
   void run_edge(const EngineRun& run, const Edge& edge) const;
 

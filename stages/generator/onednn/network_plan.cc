@@ -24,13 +24,20 @@ NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
       base_channels_(layers.base_channels()),
       bins_(layers.bins()),
       stored_type_(layers.stored_type()) {
-  plan_head(layers);
+  const bool narrow = NarrowLayers::fit(base_channels_);
+  skips_[0] = add_activations(size_, base_channels_);
+  if (narrow) {
+    plan_narrow(layers);
+  } else {
+    plan_head(layers);
+  }
   plan_encoders(layers);
   plan_residual_blocks(layers);
   plan_decoders(layers);
-  plan_prediction(layers);
+  if (!narrow) plan_prediction(layers);
 
-  std::size_t scratch_bytes = std::max(head_->scratch_bytes(), prediction_->scratch_bytes());
+  std::size_t scratch_bytes =
+      narrow ? 0 : std::max(head_->scratch_bytes(), prediction_->scratch_bytes());
   for (const auto* list : {&encoders_, &residuals_}) {
     for (const FusedConvolution& convolution : *list) {
       scratch_bytes = std::max(scratch_bytes, convolution.scratch_bytes());
@@ -48,6 +55,16 @@ NetworkPlan::Buffer NetworkPlan::add_activations(ImageSize size, int channels) {
   return {layout_.add(bytes), bytes};
 }
 
+void NetworkPlan::plan_narrow(NetworkLayers& layers) {
+  // For a row of the head. It also is what a row written to the end of skips_[0] reaches into.
+  const std::size_t pixels = size_.width + NarrowLayers::kPixels;
+  head_rows_buffer_ = layout_.add(pixels * NarrowLayers::kChannels * sizeof(float));
+  const auto numbers = [&](const std::string& name) { return layers.at(name).numbers(); };
+  const bool tiles = dnnl::get_effective_cpu_isa() == dnnl::cpu_isa::avx512_core_amx;
+  narrow_.emplace(numbers("head"), numbers("decoders.3.skip"), numbers("decoders.3.phases"),
+                  numbers("pred"), size_, tiles, layout_);
+}
+
 void NetworkPlan::plan_head(NetworkLayers& layers) {
   RowConvolutionSetup setup;
   setup.input = setup.output = size_;
@@ -55,7 +72,6 @@ void NetworkPlan::plan_head(NetworkLayers& layers) {
   setup.activation = Activation::kLeakyRelu;
   RowConvolution& head = head_.emplace(setup, layers.at("head"), engine_);
   input_ = layout_.add(2 * size_.pixel_count() * sizeof(float));
-  skips_[0] = add_activations(size_, base_channels_);
   // Float32 activations are written where they stay.
   head_rows_ = stored_type_ == Type::f32
                    ? size_.height
@@ -105,7 +121,8 @@ void NetworkPlan::plan_residual_blocks(NetworkLayers& layers) {
 void NetworkPlan::plan_decoders(NetworkLayers& layers) {
   for (int level = 0; level < kNetworkLevels; ++level) {
     const ImageSize large = sizes_[kNetworkLevels - 1 - level];
-    decoders_.emplace_back(layers, level, large, layout_);
+    const bool by_strips = level < kNetworkLevels - 1 || !narrow_;
+    decoders_.emplace_back(layers, level, large, by_strips, layout_);
     if (level < kNetworkLevels - 1) {
       decoded_[level] = add_activations(large, decoders_[level].channels());
     }
@@ -124,19 +141,33 @@ void NetworkPlan::plan_prediction(NetworkLayers& layers) {
 
 template <class Stored>
 void NetworkPlan::run_head(const EngineRun& run, const float* frames) const {
+  auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
+  const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
+  if (narrow_) {
+    for (int y = 0; y < size_.height; ++y) {
+      Stored* const row = stored + y * row_values;
+      if constexpr (std::is_same_v<Stored, float>) {
+        narrow_->head_row(frames, y, run.block, row);
+      } else {
+        auto* const values = reinterpret_cast<float*>(run.block + head_rows_buffer_);
+        narrow_->head_row(frames, y, run.block, values);
+        store_activations(values, row_values, row);
+        run.saturation.add(row, row_values);
+      }
+    }
+    return;
+  }
   auto* input = reinterpret_cast<float*>(run.block + input_);
   const std::size_t pixels = size_.pixel_count();
   for (std::size_t i = 0; i < pixels; ++i) {
     input[2 * i] = frames[i];
     input[2 * i + 1] = frames[pixels + i];
   }
-  auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
   if constexpr (std::is_same_v<Stored, float>) {
     head_->run(run.stream, 0, size_.height, input, stored, run.scratch);
     return;
   }
   auto* rows = reinterpret_cast<float*>(run.block + head_rows_buffer_);
-  const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
   for (int row = 0; row < size_.height; row += head_rows_) {
     const int count = std::min(head_rows_, size_.height - row);
     head_->run(run.stream, row, count, input, rows, run.scratch);
@@ -162,6 +193,7 @@ void NetworkPlan::run_decoder(const EngineRun& run, int level, const std::byte* 
   }
 }
 
+template <class Stored>
 void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
                                    float* volume) const {
   const DecoderLevel& decoder = decoders_.back();
@@ -170,6 +202,16 @@ void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
   auto* predicted = reinterpret_cast<float*>(run.block + predicted_rows_);
   const std::ptrdiff_t row_values = static_cast<std::ptrdiff_t>(size_.width) * decoder.channels();
   decoder.compute_edges(run, small);
+  if (narrow_) {
+    for (int y = 0; y < size_.height; ++y) {
+      DecoderRow edges;
+      edges.width = size_.width;
+      decoder.add_edges(run, y, 0, edges);
+      narrow_->volume_row(reinterpret_cast<const Stored*>(small),
+                          reinterpret_cast<const Stored*>(skip), edges, y, run.block, volume);
+    }
+    return;
+  }
   for (const DecoderStrip& strip : decoder.strips()) {
     decoder.compute(run, strip, small, skip);
     for (int y = 0; y < strip.row_count; ++y) {
@@ -223,7 +265,7 @@ SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* 
       run_decoder<Stored>(run, level, small);
       small = at(decoded_[level]);
     }
-    run_last_decoder(run, small, volume);
+    run_last_decoder<Stored>(run, small, volume);
   });
   return saturation;
 }
@@ -327,12 +369,12 @@ SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
 
 std::vector<std::string> NetworkPlan::implementations() const {
   std::vector<std::string> names;
-  head_->list_implementations(names);
+  if (head_) head_->list_implementations(names);
   for (const auto* list : {&encoders_, &residuals_}) {
     for (const FusedConvolution& convolution : *list) names.push_back(convolution.implementation());
   }
   for (const DecoderLevel& decoder : decoders_) decoder.list_implementations(names);
-  prediction_->list_implementations(names);
+  if (prediction_) prediction_->list_implementations(names);
   return names;
 }
 

@@ -15,6 +15,7 @@
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/decoder_level_internal.h"
 #include "stages/generator/onednn/fused_convolution_internal.h"
+#include "stages/generator/onednn/narrow_layers.h"
 #include "stages/generator/onednn/network_layers_internal.h"
 
 namespace eventgan {
@@ -49,6 +50,7 @@ class NetworkPlan {
   };
 
   Buffer add_activations(ImageSize size, int channels);
+  void plan_narrow(NetworkLayers& layers);
   void plan_head(NetworkLayers& layers);
   void plan_encoders(NetworkLayers& layers);
   void plan_residual_blocks(NetworkLayers& layers);
@@ -62,6 +64,7 @@ class NetworkPlan {
   void run_head(const EngineRun& run, const float* frames) const;
   template <class Stored>
   void run_decoder(const EngineRun& run, int level, const std::byte* small) const;
+  template <class Stored>
   void run_last_decoder(const EngineRun& run, const std::byte* small, float* volume) const;
   template <class Stored>
   void run_decoder_tiles(const EngineRun& run, const TiledLayers& layers, const TiledWork& work,
@@ -76,6 +79,8 @@ class NetworkPlan {
   dnnl::memory::data_type stored_type_;
   BufferLayout layout_;
 
+  /// Where it fits, in place of `head_`, the last decoder's strips and `prediction_`.
+  std::optional<NarrowLayers> narrow_;
   std::size_t input_ = 0;             ///< [y, x, frame] float32
   std::size_t head_rows_buffer_ = 0;  ///< float32
   int head_rows_ = 0;                 ///< of a strip

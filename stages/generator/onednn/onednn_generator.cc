@@ -16,6 +16,7 @@
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
+#include "stages/generator/onednn/narrow_layers.h"
 #include "stages/generator/onednn/network_plan_internal.h"
 #include "stages/generator/onednn/tiled_layers_internal.h"
 
@@ -98,6 +99,11 @@ std::string version_text() {
          std::to_string(version->patch);
 }
 
+std::string narrow_text(int base_channels) {
+  if (!NarrowLayers::fit(base_channels)) return "";
+  return ", narrow layers " + std::to_string(NarrowLayers::kVersion);
+}
+
 std::size_t stored_bytes(Precision precision) {
   switch (precision) {
     case Precision::kFloat32:
@@ -117,7 +123,8 @@ class OnednnGenerator final : public Generator {
         training_gaps_(weights.training_gaps),
         precision_(precision),
         description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
-                     version_text() + ", " + onednn_support(precision).instruction_set + ", " +
+                     version_text() + ", " + onednn_support(precision).instruction_set +
+                     narrow_text(weights.base_channels) + ", " +
                      describe_training_gaps(weights.training_gaps)),
         layers_(weights, precision, dnnl::engine(dnnl::engine::kind::cpu, 0)),
         plans_(layers_) {}

@@ -79,25 +79,30 @@ class Engines : public ::testing::TestWithParam<EngineCase> {
 };
 
 TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
-  const Weights weights = untrained_weights(2, 3, 5);
-  const auto generator = engine(weights);
   // The steps of int8 suit pictures like those it was calibrated on: a few pixels' values may be
   // small against them.
   const bool whole_numbers = GetParam().precision == Precision::kInt8;
   const ImageSize usual{48, 64};
-  const float usual_largest =
-      std::ranges::max(testing::plain_network(weights, natural_frames(usual, 11), usual));
-  for (const ImageSize size :
-       {ImageSize{16, 32}, ImageSize{17, 23}, ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{33, 1},
-        ImageSize{31, 18}, ImageSize{2, 2}, ImageSize{3, 50}, ImageSize{18, 31}}) {
-    const auto frames = natural_frames(size, 11);
-    const auto volume = generated(*generator, frames, size);
-    const auto expected = testing::plain_network(weights, frames, size);
-    const std::string what = testing::size_text(size);
-    if (whole_numbers) {
-      EXPECT_LE(largest_difference(volume, expected), 0.1f * usual_largest) << what;
-    } else {
-      expect_near(volume, expected, what);
+  // Layers of width 8 have kernels of their own.
+  for (const int base_channels : {2, 8}) {
+    const Weights weights = untrained_weights(base_channels, 3, 5);
+    const auto generator = engine(weights);
+    const float usual_largest =
+        std::ranges::max(testing::plain_network(weights, natural_frames(usual, 11), usual));
+    for (const ImageSize size :
+         {ImageSize{16, 32}, ImageSize{17, 23}, ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{33, 1},
+          ImageSize{31, 18}, ImageSize{2, 2}, ImageSize{3, 50}, ImageSize{18, 31}, ImageSize{4, 64},
+          ImageSize{5, 95}, ImageSize{2, 97}}) {
+      const auto frames = natural_frames(size, 11);
+      const auto volume = generated(*generator, frames, size);
+      const auto expected = testing::plain_network(weights, frames, size);
+      const std::string what =
+          testing::size_text(size) + ", width " + std::to_string(base_channels);
+      if (whole_numbers) {
+        EXPECT_LE(largest_difference(volume, expected), 0.1f * usual_largest) << what;
+      } else {
+        expect_near(volume, expected, what);
+      }
     }
   }
 }
@@ -151,24 +156,25 @@ TileMask some_tiles(ImageSize size, int origin_y, int origin_x, std::uint64_t se
 }
 
 TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
-  const Weights weights = untrained_weights(4, 3, 5);
-  const auto generator = engine(weights);
   const std::map<Precision, float> largest = {
       {Precision::kFloat32, 1e-5f}, {Precision::kBfloat16, 0.02f}, {Precision::kInt8, 1e-5f}};
   std::uint64_t seed = 0;
-  for (const ImageSize size : {ImageSize{320, 480}, ImageSize{255, 401}, ImageSize{64, 700},
-                               ImageSize{49, 33}, ImageSize{1, 37}, ImageSize{5, 1}}) {
-    for (const int origin : {0, 5}) {
-      const TileMask wanted = some_tiles(size, origin, 15 - origin, seed++);
-      const auto frames = natural_frames(size, 11);
-      std::vector<float> expected = generated(*generator, frames, size);
-      clear_unwanted(wanted, expected);
-      std::vector<float> volume(expected.size(), -1.0f);
-      generator->generate_tiles(frames, wanted, volume);
-      EXPECT_LE(largest_difference(volume, expected),
-                largest.at(GetParam().precision) * std::ranges::max(expected))
-          << testing::size_text(size) << " " << origin;
-      for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_GE(volume[i], 0.0f) << i;
+  for (const int base_channels : {4, 8}) {
+    const auto generator = engine(untrained_weights(base_channels, 3, 5));
+    for (const ImageSize size : {ImageSize{320, 480}, ImageSize{255, 401}, ImageSize{64, 700},
+                                 ImageSize{49, 33}, ImageSize{1, 37}, ImageSize{5, 1}}) {
+      for (const int origin : {0, 5}) {
+        const TileMask wanted = some_tiles(size, origin, 15 - origin, seed++);
+        const auto frames = natural_frames(size, 11);
+        std::vector<float> expected = generated(*generator, frames, size);
+        clear_unwanted(wanted, expected);
+        std::vector<float> volume(expected.size(), -1.0f);
+        generator->generate_tiles(frames, wanted, volume);
+        EXPECT_LE(largest_difference(volume, expected),
+                  largest.at(GetParam().precision) * std::ranges::max(expected))
+            << testing::size_text(size) << " " << origin << ", width " << base_channels;
+        for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_GE(volume[i], 0.0f) << i;
+      }
     }
   }
 }
@@ -193,7 +199,8 @@ TEST_P(Engines, EqualsTheReferenceWithShippedWeightsAtTheUsualSize) {
 }
 
 TEST_P(Engines, DependsOnItsFramesAlone) {
-  const auto generator = engine(untrained_weights(4, 9, 1));
+  const Weights weights = untrained_weights(8, 9, 1);
+  const auto generator = engine(weights);
   const ImageSize size{37, 45};
   const auto frames = natural_frames(size, 1);
   const auto first = generated(*generator, frames, size);
@@ -209,7 +216,7 @@ TEST_P(Engines, DependsOnItsFramesAlone) {
   }
   threads.clear();
   for (const auto& volume : volumes) EXPECT_EQ(volume, first);
-  EXPECT_EQ(generated(*engine(untrained_weights(4, 9, 1)), frames, size), first)
+  EXPECT_EQ(generated(*engine(weights), frames, size), first)
       << "another engine of the same weights";
 }
 
@@ -231,14 +238,16 @@ TEST_P(Engines, IsTheSameWhateverTheCallersOpenmpSettingIs) {
 }
 
 TEST_P(Engines, LosesNoNan) {
-  const auto generator = engine(untrained_weights(4, 9, 1));
   const ImageSize size{20, 21};
-  for (const float bad :
-       {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
-    auto frames = natural_frames(size, 1);
-    frames[200] = bad;
-    const auto volume = generated(*generator, frames, size);
-    EXPECT_TRUE(std::ranges::any_of(volume, [](float value) { return !std::isfinite(value); }));
+  for (const int base_channels : {4, 8}) {
+    const auto generator = engine(untrained_weights(base_channels, 9, 1));
+    for (const float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+      auto frames = natural_frames(size, 1);
+      frames[200] = bad;
+      const auto volume = generated(*generator, frames, size);
+      EXPECT_TRUE(std::ranges::any_of(volume, [](float value) { return !std::isfinite(value); }));
+    }
   }
 }
 

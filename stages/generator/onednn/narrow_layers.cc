@@ -1,0 +1,413 @@
+#include "stages/generator/onednn/narrow_layers.h"
+
+#include <algorithm>
+#include <bit>
+#include <cstring>
+#include <type_traits>
+
+#include "stages/generator/onednn/onednn_generator.h"
+#include "stages/generator/weights.h"
+
+#if defined(__x86_64__)
+#define EVENTGAN_AVX512 __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")))
+#else
+#define EVENTGAN_AVX512
+#endif
+#define EVENTGAN_LANES_INLINE EVENTGAN_AVX512 [[gnu::always_inline]] inline
+
+namespace eventgan {
+namespace {
+
+constexpr int kLanes = 16;
+constexpr int kOutputs = NarrowLayers::kChannels;
+using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+/// Pixels that are computed at once.
+constexpr int kPixels = NarrowLayers::kPixels, kVectors = kPixels / kLanes;
+/// The same anywhere in memory.
+using LanesInMemory =
+    float __attribute__((vector_size(kLanes * sizeof(float)), aligned(alignof(float)), may_alias));
+
+EVENTGAN_LANES_INLINE Lanes load(const float* values) {
+  return *reinterpret_cast<const LanesInMemory*>(values);
+}
+
+EVENTGAN_LANES_INLINE void store(Lanes lanes, float* values) {
+  *reinterpret_cast<LanesInMemory*>(values) = lanes;
+}
+
+EVENTGAN_LANES_INLINE Lanes leaky_relu(Lanes sum) { return sum > 0 ? sum : sum * kLeakySlope; }
+
+EVENTGAN_LANES_INLINE Lanes evens(Lanes a, Lanes b) {
+  return __builtin_shufflevector(a, b, 0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30);
+}
+
+EVENTGAN_LANES_INLINE Lanes odds(Lanes a, Lanes b) {
+  return __builtin_shufflevector(a, b, 1, 3, 5, 7, 9, 11, 13, 15, 17, 19, 21, 23, 25, 27, 29, 31);
+}
+
+EVENTGAN_LANES_INLINE Lanes first_in_turns(Lanes a, Lanes b) {
+  return __builtin_shufflevector(a, b, 0, 16, 1, 17, 2, 18, 3, 19, 4, 20, 5, 21, 6, 22, 7, 23);
+}
+
+EVENTGAN_LANES_INLINE Lanes last_in_turns(Lanes a, Lanes b) {
+  return __builtin_shufflevector(a, b, 8, 24, 9, 25, 10, 26, 11, 27, 12, 28, 13, 29, 14, 30, 15,
+                                 31);
+}
+
+/// 16 pixels of [x, channel] become [channel, x].
+template <int kChannels>
+EVENTGAN_LANES_INLINE void to_planes(Lanes (&lanes)[kChannels]) {
+#pragma GCC unroll 4
+  for (int rounds = 1; rounds < kChannels; rounds *= 2) {
+    Lanes halves[kChannels];
+#pragma GCC unroll 8
+    for (int i = 0; i < kChannels / 2; ++i) {
+      halves[i] = evens(lanes[2 * i], lanes[2 * i + 1]);
+      halves[i + kChannels / 2] = odds(lanes[2 * i], lanes[2 * i + 1]);
+    }
+#pragma GCC unroll 16
+    for (int i = 0; i < kChannels; ++i) lanes[i] = halves[i];
+  }
+}
+
+/// And back.
+template <int kChannels>
+EVENTGAN_LANES_INLINE void to_pixels(Lanes (&lanes)[kChannels]) {
+#pragma GCC unroll 4
+  for (int rounds = 1; rounds < kChannels; rounds *= 2) {
+    Lanes turns[kChannels];
+#pragma GCC unroll 8
+    for (int i = 0; i < kChannels / 2; ++i) {
+      turns[2 * i] = first_in_turns(lanes[i], lanes[i + kChannels / 2]);
+      turns[2 * i + 1] = last_in_turns(lanes[i], lanes[i + kChannels / 2]);
+    }
+#pragma GCC unroll 16
+    for (int i = 0; i < kChannels; ++i) lanes[i] = turns[i];
+  }
+}
+
+EVENTGAN_LANES_INLINE Lanes widened(const float* values) { return load(values); }
+
+EVENTGAN_LANES_INLINE Lanes widened(const Bfloat16* values) {
+  using Bits [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
+  std::uint16_t upper __attribute__((vector_size(kLanes * sizeof(std::uint16_t))));
+  std::memcpy(&upper, values, sizeof upper);
+  return std::bit_cast<Lanes>(__builtin_convertvector(upper, Bits) << 16);
+}
+
+EVENTGAN_LANES_INLINE Lanes widened(const std::uint8_t* values) {
+  std::uint8_t whole __attribute__((vector_size(kLanes)));
+  std::memcpy(&whole, values, sizeof whole);
+  return __builtin_convertvector(whole, Lanes);
+}
+
+/// A row [x, channel] into planes: planes[channel * pitch + 1 + x].
+template <int kChannels, class Stored>
+EVENTGAN_LANES_INLINE void read_row(const Stored* pixels, int width, std::ptrdiff_t pitch,
+                                    float* planes) {
+  int x = 0;
+  for (; x + kLanes <= width; x += kLanes) {
+    Lanes lanes[kChannels];
+#pragma GCC unroll 16
+    for (int i = 0; i < kChannels; ++i) lanes[i] = widened(pixels + x * kChannels + i * kLanes);
+    to_planes(lanes);
+#pragma GCC unroll 16
+    for (int c = 0; c < kChannels; ++c) store(lanes[c], planes + c * pitch + 1 + x);
+  }
+  // What stands behind the row may be anything, but its neighbour here is zero.
+  if (x < width) {
+    Stored rest[kChannels * kLanes] = {};
+    std::copy(pixels + x * kChannels, pixels + width * kChannels, rest);
+    Lanes lanes[kChannels];
+#pragma GCC unroll 16
+    for (int i = 0; i < kChannels; ++i) lanes[i] = widened(rest + i * kLanes);
+    to_planes(lanes);
+#pragma GCC unroll 16
+    for (int c = 0; c < kChannels; ++c) store(lanes[c], planes + c * pitch + 1 + x);
+  }
+}
+
+/// Adds what one row of a kernel makes of one row of `channels` planes, for kVectors x 16 pixels
+/// whose leftmost neighbours begin at `planes`.
+template <int kVectors, int kSums>
+EVENTGAN_LANES_INLINE void add_row(const float* planes, std::ptrdiff_t pitch, int channels,
+                                   int columns, const float* weights,
+                                   Lanes (&sums)[kVectors][kSums]) {
+  for (int c = 0; c < channels; ++c, planes += pitch) {
+    for (int column = 0; column < columns; ++column, weights += kSums) {
+      Lanes input[kVectors];
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) input[v] = load(planes + column + v * kLanes);
+#pragma GCC unroll 16
+      for (int o = 0; o < kSums; ++o) {
+#pragma GCC unroll 2
+        for (int v = 0; v < kVectors; ++v) sums[v][o] += input[v] * weights[o];
+      }
+    }
+  }
+}
+
+/// A row of the volume, and what makes it of the last decoder's sums.
+struct Prediction {
+  const std::vector<float>& decoder_bias;
+  const std::vector<float>& weights;  ///< [out, in]
+  const std::vector<float>& bias;
+  ImageSize size;
+  float* row;  ///< of the first channel
+};
+
+/// For the pixels from x on.
+EVENTGAN_LANES_INLINE void predict(Lanes (&sums)[kVectors][kOutputs], int x,
+                                   const Prediction& prediction) {
+#pragma GCC unroll 2
+  for (int v = 0; v < kVectors; ++v) {
+#pragma GCC unroll 8
+    for (int o = 0; o < kOutputs; ++o)
+      sums[v][o] = leaky_relu(sums[v][o] + prediction.decoder_bias[o]);
+  }
+  const auto plane_stride = static_cast<std::ptrdiff_t>(prediction.size.pixel_count());
+  const int pixels = std::min(kPixels, prediction.size.width - x);
+  const float* weights = prediction.weights.data();
+  float* plane = prediction.row + x;
+  for (const float bias : prediction.bias) {
+    Lanes values[kVectors] = {Lanes{} + bias, Lanes{} + bias};
+#pragma GCC unroll 8
+    for (int c = 0; c < kOutputs; ++c) {
+#pragma GCC unroll 2
+      for (int v = 0; v < kVectors; ++v) values[v] += sums[v][c] * weights[c];
+    }
+#pragma GCC unroll 2
+    for (Lanes& value : values) value = value <= 0 ? Lanes{} : value;
+    // The next pixels but one: written long ago, if ever.
+    __builtin_prefetch(plane + 2 * kPixels, 1);
+    __builtin_prefetch(plane + 2 * kPixels + kLanes, 1);
+    if (pixels == kPixels) {
+      store(values[0], plane);
+      store(values[1], plane + kLanes);
+    } else {
+      std::memcpy(plane, values, pixels * sizeof(float));
+    }
+    weights += kOutputs;
+    plane += plane_stride;
+  }
+}
+
+std::ptrdiff_t rounded_up(std::ptrdiff_t values, std::ptrdiff_t step) {
+  return (values + step - 1) / step * step;
+}
+
+/// Of a number of cache lines that is odd, so that the planes lie in different parts of a cache.
+std::ptrdiff_t pitch_of(std::ptrdiff_t values) { return rounded_up(values, 2 * kLanes) + kLanes; }
+
+/// Weights [group out, in, row, column] in the order [group, row, in, column, out], and with what
+/// int8 multiplies the sums.
+std::vector<float> packed(const LayerNumbers& layer, int groups) {
+  const int out = layer.out_channels / groups, in = layer.in_channels, side = layer.kernel;
+  std::vector<float> weights;
+  for (int i = 0; i < groups * side * in * side * out; ++i) {
+    const int o = i / (side * in * side * out) * out + i % out;
+    const int column = i / out % side;
+    const int c = i / (out * side) % in;
+    const int row = i / (out * side * in) % side;
+    const float scale = layer.output_scales.empty() ? 1.0f : layer.output_scales[o];
+    weights.push_back(layer.weight[((o * in + c) * side + row) * side + column] * scale);
+  }
+  return weights;
+}
+
+std::vector<float> scaled_bias(const LayerNumbers& layer) {
+  std::vector<float> bias = layer.bias;
+  bias.resize(layer.out_channels);
+  for (std::size_t o = 0; o < layer.output_scales.size(); ++o) bias[o] *= layer.output_scales[o];
+  return bias;
+}
+
+}  // namespace
+
+bool NarrowLayers::fit(int base_channels) {
+  // Without AVX-512 there is no bfloat16.
+  return base_channels == kChannels && onednn_support(Precision::kBfloat16).able;
+}
+
+NarrowLayers::NarrowLayers(const LayerNumbers& head, const LayerNumbers& skip,
+                           const LayerNumbers& phases, const LayerNumbers& pred, ImageSize size,
+                           bool tiles, BufferLayout& layout)
+    : size_(size),
+      pitch_(pitch_of(rounded_up(size.width, 2 * kLanes) + 2 * kLanes)),
+      small_pitch_(pitch_of(rounded_up(size.width / 2 + 1, kLanes) + 2)),
+      head_(packed(head, 1)),
+      skip_(packed(skip, 1)),
+      phases_(packed(phases, 2)),
+      prediction_(pred.weight),
+      head_bias_(head.bias),
+      skip_bias_(scaled_bias(skip)),
+      phases_bias_(scaled_bias(phases)),
+      prediction_bias_(pred.bias) {
+  std::size_t bytes = buffer_values() * sizeof(float);
+  if (tiles) bytes = std::max(bytes, tiles_.emplace(skip, phases, size).buffer_bytes());
+  buffer_ = layout.add(bytes);
+}
+
+EVENTGAN_AVX512
+void NarrowLayers::head_row(const float* frames, int y, std::byte* block, float* pixels) const {
+  auto* rows = reinterpret_cast<float*>(block + buffer_);
+  if (y == 0) std::memset(rows, 0, buffer_values() * sizeof(float));
+  constexpr int kFrames = 2;
+  const auto planes_of = [&](int row) { return rows + row % 3 * kFrames * pitch_; };
+  for (int row = y == 0 ? 0 : y + 1; row < std::min(y + 2, size_.height); ++row) {
+    for (int frame = 0; frame < kFrames; ++frame) {
+      std::memcpy(planes_of(row) + frame * pitch_ + 1,
+                  frames + (static_cast<std::ptrdiff_t>(frame) * size_.height + row) * size_.width,
+                  size_.width * sizeof(float));
+    }
+  }
+  for (int x = 0; x < size_.width; x += kPixels) {
+    Lanes sums[kVectors][kOutputs];
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) {
+#pragma GCC unroll 8
+      for (int o = 0; o < kOutputs; ++o) sums[v][o] = Lanes{} + head_bias_[o];
+    }
+    for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
+      add_row(planes_of(row) + x, pitch_, kFrames, 3,
+              head_.data() + (row - y + 1) * kFrames * 3 * kOutputs, sums);
+    }
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) {
+#pragma GCC unroll 8
+      for (Lanes& sum : sums[v]) sum = leaky_relu(sum);
+      to_pixels(sums[v]);
+#pragma GCC unroll 8
+      for (int i = 0; i < kOutputs; ++i) {
+        store(sums[v][i], pixels + (x + v * kLanes) * kOutputs + i * kLanes);
+      }
+    }
+  }
+}
+
+template <class Stored>
+EVENTGAN_AVX512 void NarrowLayers::read_rows(const Stored* small, const Stored* skip, int y,
+                                             float* rows) const {
+  if (y == 0) std::memset(rows, 0, buffer_values() * sizeof(float));
+  for (int row = y == 0 ? 0 : y + 1; row < std::min(y + 2, size_.height); ++row) {
+    read_row<kChannels>(skip + static_cast<std::ptrdiff_t>(row) * size_.width * kChannels,
+                        size_.width, pitch_, skip_planes(rows, row));
+  }
+  const ImageSize small_size = half_size(size_);
+  const int p = (y + 1) / 2;
+  if ((y == 0 || y % 2 == 1) && p < small_size.height) {
+    read_row<2 * kChannels>(
+        small + static_cast<std::ptrdiff_t>(p) * small_size.width * 2 * kChannels, small_size.width,
+        small_pitch_, small_planes(rows, p));
+  }
+}
+
+/// The sums over the doubled picture: pixel x at 1 + x.
+EVENTGAN_AVX512
+void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const {
+  float* const sums_row = phase_planes(rows);
+  if (edges.whole_row) {
+    for (int x = 0; x < size_.width; ++x) {
+      for (int o = 0; o < kOutputs; ++o) {
+        sums_row[o * pitch_ + 1 + x] = edges.whole_row[x * kOutputs + o];
+      }
+    }
+    return;
+  }
+  constexpr int kRowWeights = 2 * kChannels * 2 * 2 * kOutputs;
+  const float* const bias = phases_bias_.data() + y % 2 * 2 * kOutputs;
+  for (int q = 0; q <= size_.width / 2; q += kLanes) {
+    Lanes sums[1][2 * kOutputs];
+#pragma GCC unroll 16
+    for (int o = 0; o < 2 * kOutputs; ++o) sums[0][o] = Lanes{} + bias[o];
+    for (int row = 0; row < 2; ++row) {
+      const int p = (y + 1) / 2 - 1 + row;
+      if (p < 0 || p >= half_size(size_).height) continue;
+      add_row(small_planes(rows, p) + q, small_pitch_, 2 * kChannels, 2,
+              phases_.data() + (y % 2 * 2 + row) * kRowWeights, sums);
+    }
+    // Column q of the phases holds pixels 2q - 1, which is of phase 1, and 2q.
+#pragma GCC unroll 8
+    for (int o = 0; o < kOutputs; ++o) {
+      float* const plane = sums_row + o * pitch_ + 2 * q;
+      store(first_in_turns(sums[0][kOutputs + o], sums[0][o]), plane);
+      store(last_in_turns(sums[0][kOutputs + o], sums[0][o]), plane + kLanes);
+    }
+  }
+  if (edges.last_pixel) {
+    for (int o = 0; o < kOutputs; ++o) sums_row[o * pitch_ + size_.width] = edges.last_pixel[o];
+  }
+}
+
+EVENTGAN_AVX512
+void NarrowLayers::predict_planes(int y, float* rows, float* volume) const {
+  const Prediction prediction{skip_bias_, prediction_, prediction_bias_, size_,
+                              volume + static_cast<std::ptrdiff_t>(y) * size_.width};
+  for (int x = 0; x < size_.width; x += kPixels) {
+    Lanes sums[kVectors][kOutputs];
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) {
+#pragma GCC unroll 8
+      for (int o = 0; o < kOutputs; ++o) {
+        sums[v][o] = load(phase_planes(rows) + o * pitch_ + 1 + x + v * kLanes);
+      }
+    }
+    for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
+      add_row(skip_planes(rows, row) + x, pitch_, kChannels, 3,
+              skip_.data() + (row - y + 1) * kChannels * 3 * kOutputs, sums);
+    }
+    predict(sums, x, prediction);
+  }
+}
+
+EVENTGAN_AVX512
+void NarrowLayers::predict_pixels(const float* pixels, int y, float* volume) const {
+  const Prediction prediction{skip_bias_, prediction_, prediction_bias_, size_,
+                              volume + static_cast<std::ptrdiff_t>(y) * size_.width};
+  for (int x = 0; x < size_.width; x += kPixels, pixels += kPixels * kOutputs) {
+    Lanes sums[kVectors][kOutputs];
+#pragma GCC unroll 2
+    for (int v = 0; v < kVectors; ++v) {
+#pragma GCC unroll 8
+      for (int i = 0; i < kOutputs; ++i) {
+        sums[v][i] = load(pixels + (v * kOutputs + i) * kLanes);
+      }
+      to_planes(sums[v]);
+    }
+    predict(sums, x, prediction);
+  }
+}
+
+template <class Stored>
+void NarrowLayers::compute_row(const Stored* small, const Stored* skip, const DecoderRow& edges,
+                               int y, std::byte* block, float* volume) const {
+  if constexpr (std::is_same_v<Stored, Bfloat16>) {
+    if (tiles_) {
+      const float* sums = tiles_->sum_row(small, skip, edges, y, block + buffer_);
+      predict_pixels(sums + kChannels, y, volume);
+      return;
+    }
+  }
+  auto* rows = reinterpret_cast<float*>(block + buffer_);
+  read_rows(small, skip, y, rows);
+  add_phases(edges, y, rows);
+  predict_planes(y, rows, volume);
+}
+
+void NarrowLayers::volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,
+                              std::byte* block, float* volume) const {
+  compute_row(small, skip, edges, y, block, volume);
+}
+
+void NarrowLayers::volume_row(const Bfloat16* small, const Bfloat16* skip, const DecoderRow& edges,
+                              int y, std::byte* block, float* volume) const {
+  compute_row(small, skip, edges, y, block, volume);
+}
+
+void NarrowLayers::volume_row(const std::uint8_t* small, const std::uint8_t* skip,
+                              const DecoderRow& edges, int y, std::byte* block,
+                              float* volume) const {
+  compute_row(small, skip, edges, y, block, volume);
+}
+
+}  // namespace eventgan
