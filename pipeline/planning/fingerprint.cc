@@ -96,13 +96,12 @@ std::string frames_hash(const JobManifest& manifest, const Plan& plan,
   return sha256_hex(hash + "\n" + decisions_hash(manifest, plan));
 }
 
-bool any_video(const JobManifest& manifest, const std::vector<PlannedShard>& shards) {
-  return std::ranges::any_of(shards, [&](const PlannedShard& shard) {
-    const SourceSpec& source = manifest.sources[static_cast<std::size_t>(shard.source)];
-    return !has_events(source.dataset) &&
-           std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
-             return sample.pair.previous.video_frame >= 0;
-           });
+bool any_video(const std::vector<PlannedShard>& shards) {
+  return std::ranges::any_of(shards, [](const PlannedShard& shard) {
+    return std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
+      const bool is_window = sample.pair.gap_frames == 0;  // of events: a recording's frames
+      return !is_window && sample.pair.previous.video_frame >= 0;
+    });
   });
 }
 
@@ -199,7 +198,7 @@ std::map<std::string, std::string> make_fingerprint(
       {"engine", engine},
       {"preprocessing", preprocessing_json(manifest.image)},
       {"cpu", instruction_sets()},
-      {"libraries", libraries(any_video(manifest, plan.shards))},
+      {"libraries", libraries(any_video(plan.shards))},
       {"program", program_version()}};
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;

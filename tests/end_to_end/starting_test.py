@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 import program
+from camera_files import random_events, write_dhp19, write_mvsec
 from moving_picture import texture
 from program import SHARED, SOURCE, run, shard_bytes, text
 from small_job import save_picture, small_job, write_cars, write_people
@@ -282,6 +283,10 @@ class Examples(program.InFolder):
         for k in range(202):
             save_picture(cls.tree / "drive" / "image_02" / "data" / f"{k:010d}.png", random)
         cls.write_raw()
+        write_mvsec(cls.tree / "drive.hdf5", random_events(2000, 0, 1, 7), [0, 0.25, 0.5, 0.75])
+        (cls.tree / "drive.csv").write_text("time_s,left,top,right,bottom,class,category\n"
+                                            + "".join(f"{0.25 * k},1,2,20,20,car,easy\n" for k in (1, 2, 3)))
+        write_dhp19(cls.tree / "dhp19")
         for example in EXAMPLES.glob("*.json"):
             shutil.copy(example, cls.tree)
 

@@ -190,6 +190,13 @@ class RecordingDataset final : public Dataset {
       default_labels_ = named.parent_path();
       return;
     }
+    const auto refuse = [&] {
+      throw InputError(
+          "expected a recording in the layout of MVSEC, ECD or EventGAN, or a folder of them, got "
+          "none, in " +
+          root.string());
+    };
+    if (fs::is_regular_file(root)) refuse();
     const SourceRoot folder(spec.root, base);
     folder.require_folder("");
     std::vector<std::string> left_out;
@@ -207,12 +214,7 @@ class RecordingDataset final : public Dataset {
         left_out.push_back(name.string());
       }
     }
-    if (recordings_.empty()) {
-      throw InputError(
-          "expected a recording in the layout of MVSEC, ECD or EventGAN, or a folder of them, got "
-          "none, in " +
-          root.string());
-    }
+    if (recordings_.empty()) refuse();
     if (!left_out.empty()) {
       notes_.push_back(counted(left_out, "files and folders left out in " + folder.written("")));
     }

@@ -17,7 +17,7 @@ struct RecordingLabels {
   std::vector<std::string> joint_names;
 };
 
-/// Reads labels of a recording; manifests/guides/datasets.md has both forms.
+/// Reads labels of a recording; manifests/guides/real_events.md has both forms.
 ///
 /// NAME.csv: a header line with time_s, left, top, right, bottom, class and perhaps category, in
 /// any order, then a line a box; a line with a time alone is a time without boxes. The original

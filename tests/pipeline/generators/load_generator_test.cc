@@ -318,6 +318,22 @@ TEST(LoadGenerator, SetsUpSimulators) {
   EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
 }
 
+TEST(LoadGenerator, OfACamerasEventsGeneratesNone) {
+  JobManifest manifest;
+  manifest.generator.kind = GeneratorKind::kEvents;
+  manifest.volume.bins = 3;
+  const LoadedGenerator loaded = load_generator(manifest);
+  EXPECT_EQ(loaded.generator->bins(), 3);
+  EXPECT_EQ(loaded.generator->description(), "events of a camera");
+  EXPECT_EQ(loaded.generator->training_gaps(), std::nullopt);
+  EXPECT_EQ(loaded.weights_hash, sha256_hex("events of a camera"));
+  // 6 channels of 4 pixels, sums in double.
+  EXPECT_EQ(loaded.generator->working_bytes({2, 2}), 6u * 4 * 8);
+  std::vector<float> frames(8), volume(24);
+  EXPECT_THROW(loaded.generator->generate(frames, {2, 2}, volume), std::logic_error);
+  EXPECT_TRUE(loaded.warnings.empty());
+}
+
 TEST(LoadGenerator, FindsTheShippedWeightsOrSaysThatThereAreNone) {
   JobManifest manifest;
   EXPECT_EQ(manifest.generator.weights, "shipped");

@@ -47,6 +47,31 @@ TEST(ChoosePairs, SideSaysWhereTheLabelledFrameLies) {
   }
 }
 
+TEST(ChoosePairs, AWindowOfEventsIsFromItsBeginToItsEnd) {
+  const FakeDataset dataset("root", 20);  // its neighbours -1 and 1 stand for the window's edges
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kRecording;
+  for (const auto& [place, position] :
+       {std::pair{LabelPlace::kEnd, 1.0}, {LabelPlace::kMiddle, 0.5}}) {
+    spec.window.label = place;
+    const auto result = choose(dataset, 10, spec);
+    ASSERT_EQ(result.samples.size(), 1u);
+    PlannedSample sample = result.samples[0];
+    EXPECT_EQ(sample.sample_id, "0010");
+    EXPECT_EQ(sample.pair.previous.index, 9);
+    EXPECT_EQ(sample.pair.next.index, 11);
+    EXPECT_EQ(sample.pair.gap_frames, 0);
+    EXPECT_EQ(sample.pair.label_index, 10);
+    EXPECT_EQ(sample.pair.label_position, position);
+    EXPECT_EQ(result.without_partner.size(), 0u);
+    // A frozen plan may hold no times.
+    const double begin_s = sample.pair.previous.time_s;
+    sample.pair.previous.time_s = 0;
+    renew_sample(dataset, dataset.labelled_frames()[10], spec, sample);
+    EXPECT_EQ(sample.pair.previous.time_s, begin_s);
+  }
+}
+
 TEST(ChoosePairs, AllGivesEachGapAnIdOfItsOwn) {
   const FakeDataset dataset("root", 20);
   const auto result = choose(dataset, 2, source({1, 2, 3}, PairSide::kBefore, PairChoice::kAll));

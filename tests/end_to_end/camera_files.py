@@ -1,0 +1,67 @@
+"""Recordings of event cameras in the layouts of their datasets, small and made up."""
+
+import h5py
+import numpy as np
+import scipy.io
+
+HEIGHT, WIDTH = 24, 32
+
+
+def random_events(count, begin, end, seed, height=HEIGHT, width=WIDTH):
+    """[count, 4] float64: x, y, t in seconds, p = -1 or +1; times ascend."""
+    random = np.random.default_rng(seed)
+    return np.stack([random.integers(0, width, count), random.integers(0, height, count), np.sort(random.uniform(begin, end, count)),
+                     random.choice([-1, 1], count)], axis=1).astype(np.float64)
+
+
+def write_mvsec(path, events, frame_times):
+    """MVSEC's layout, its left camera."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    frames = np.random.default_rng(1).integers(0, 256, (len(frame_times), HEIGHT, WIDTH), dtype=np.uint8)
+    with h5py.File(path, "w") as file:
+        file["davis/left/events"] = events
+        file["davis/left/image_raw"] = frames
+        file["davis/left/image_raw_ts"] = np.asarray(frame_times, np.float64)
+
+
+DHP19_JOINTS = ["head", "shoulderR", "shoulderL", "elbowR", "elbowL", "hipR", "hipL", "handR", "handL", "kneeR", "kneeL", "footR", "footL"]
+DHP19_MATRICES = {camera: np.array([[200.0 + camera, 0, 173, 346000], [0, 200, 130, 260000], [0, 0, 1, 2000]]) for camera in range(4)}
+
+
+def write_dhp19(root, recordings=("S1_1_1", "S13_2_3"), events=20000, seconds=1.0):
+    """Some recordings as the dataset has them, but events in HDF5; [T, 3] mm of each joint by recording and name."""
+    matrices = root / "P_matrices"
+    matrices.mkdir(parents=True)
+    for camera, name in enumerate(["P4", "P1", "P3", "P2"]):
+        np.save(matrices / f"{name}.npy", DHP19_MATRICES[camera])
+    poses = {}
+    for number, recording in enumerate(recordings):
+        subject, session, movement = recording.split("_")
+        folder = root / "DVS_movies" / subject / f"session{session}"
+        folder.mkdir(parents=True, exist_ok=True)
+        with h5py.File(folder / f"mov{movement}.h5", "w") as file:
+            for camera in range(4):
+                rows = random_events(events, 0, seconds * 1e6, 10 * number + camera, 260, 346)
+                rows[0, 2] = 0
+                for column, name in enumerate(["x", "y", "timeStamp"]):
+                    file[f"cam{camera}/{name}"] = rows[None, :, column].astype(np.int64)
+                file[f"cam{camera}/polarity"] = (rows[None, :, 3] > 0).astype(np.uint8)
+        random = np.random.default_rng(100 + number)
+        steps = int(seconds * 100)
+        poses[recording] = {joint: random.uniform(-600, 600, 3) + random.normal(0, 5, (steps, 3)).cumsum(0) for joint in DHP19_JOINTS}
+        (root / "Vicon_data").mkdir(exist_ok=True)
+        scipy.io.savemat(root / "Vicon_data" / f"{recording}.mat", {"XYZPOS": poses[recording]})
+    return poses
+
+
+def volume_of(events, bins=9, height=HEIGHT, width=WIDTH):
+    """[2 bins, height, width]: the volume of rows x, y, t, p as the published code has it, built here anew."""
+    volume = np.zeros((2 * bins, height, width))
+    if not len(events):
+        return volume
+    x, y, polarity = events[:, 0].astype(int), events[:, 1].astype(int), events[:, 3]
+    span = events[-1, 2] - events[0, 2]
+    times = (bins - 1) * (events[:, 2] - events[0, 2]) / (span or 1)
+    for k in range(bins):
+        np.add.at(volume, (np.where(polarity > 0, k, bins + k), y, x), np.maximum(0, 1 - abs(times - k)))
+    return volume
