@@ -222,9 +222,11 @@ class Dhp19Dataset final : public Dataset {
     return SampleFault{error.what()};
   }
 
-  std::string label_place(const std::string& label_key) const override {
+  std::string label_place(const std::string& label_key) const override try {
     return fmt::format("{} ({})", root_.written(recordings_.at(find(label_key).recording).poses),
                        label_key);
+  } catch (const InputError&) {  // a key that the source does not know any more
+    return label_key;
   }
 
  private:

@@ -9,13 +9,16 @@
 #include <cstdint>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
 #include <vector>
 
+#include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
 #include "stages/frames/source_folders.h"
 #include "stages/recordings/recording.h"
@@ -61,6 +64,16 @@ Span frame_window(const std::vector<double>& frames, double time_s, LabelPlace p
   const double length_s = last_s - before_s;
   if (place == LabelPlace::kMiddle) return {time_s - length_s / 2, time_s + length_s / 2};
   return {time_s == last_s ? before_s : time_s - length_s, time_s};
+}
+
+/// A manifest of this program may lie beside a recording under its name.
+bool is_manifest(const fs::path& file) try {
+  if (file.extension() != ".json") return false;
+  const nlohmann::ordered_json document =
+      parse_json_data(read_text_file(file), file.filename().string(), JsonComments::kPassedOver);
+  return document.is_object() && document.value("format", "") == "eventgan-manifest";
+} catch (const std::exception&) {  // who reads it as labels says why
+  return false;
 }
 
 class RecordingDataset final : public Dataset {
@@ -124,7 +137,7 @@ class RecordingDataset final : public Dataset {
     return SampleFault{error.what()};
   }
 
-  Outcome<Annotation> annotation(const std::string& label_key) const override {
+  Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const auto& [recorded, time_s] = find(label_key);
     if (recorded.label_file.empty()) return Annotation{};
     // The key has the time of the label, or of the frame that it was taken to.
@@ -133,12 +146,16 @@ class RecordingDataset final : public Dataset {
     if (label != labels.end() && label->first <= time_s + kSameTime_s) return label->second;
     return SampleFault{"expected labels of " + std::to_string(time_s) + " s, got none, in " +
                        recorded.label_file};
+  } catch (const InputError& error) {
+    return SampleFault{error.what()};
   }
 
-  std::string label_place(const std::string& label_key) const override {
+  std::string label_place(const std::string& label_key) const override try {
     const auto& [recorded, time_s] = find(label_key);
     return fmt::format("{} ({:.6f} s)",
                        recorded.label_file.empty() ? recorded.path : recorded.label_file, time_s);
+  } catch (const InputError&) {  // a key that the source does not know any more
+    return label_key;
   }
 
  private:
@@ -234,14 +251,14 @@ class RecordingDataset final : public Dataset {
     }
     const fs::path folder = spec.annotations ? named : default_labels_;
     for (auto& [name, recorded] : recordings_) {
-      const std::array files = {folder / (name + ".csv"), folder / (name + ".json")};
-      if (fs::exists(files[0]) && fs::exists(files[1])) {
+      std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json")};
+      std::erase_if(files,
+                    [](const fs::path& file) { return !fs::exists(file) || is_manifest(file); });
+      if (files.size() > 1) {
         throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
                          files[1].string());
       }
-      for (const fs::path& file : files) {
-        if (fs::exists(file)) read_labels(recorded, written(file, spec, base), file);
-      }
+      if (!files.empty()) read_labels(recorded, written(files[0], spec, base), files[0]);
     }
     if (annotation_files_.empty()) {
       if (!spec.annotations) return;

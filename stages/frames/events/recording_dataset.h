@@ -12,8 +12,9 @@ namespace eventgan {
 ///
 /// The root is a recording (an HDF5 file, an ECD folder) or a folder of recordings, named NAME as
 /// its file or folder. Labels are NAME.csv or NAME.json (read_recording_labels) beside it, or what
-/// the manifest's `annotations` names. A sample is a labelled time; of a source without labels the
-/// time of a frame. Of a source with labels, recordings without are left out, with a note.
+/// the manifest's `annotations` names; a manifest of this program that has such a name is left
+/// alone. A sample is a labelled time; of a source without labels the time of a frame. Of a source
+/// with labels, recordings without are left out, with a note.
 ///
 /// The window of a time t, which lies at its end (SourceSpec::window):
 ///   frames      (t - d, t], d the interval between the two frames around t, or next to it beyond

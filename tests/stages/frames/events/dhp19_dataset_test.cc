@@ -230,6 +230,15 @@ TEST_F(Dhp19Test, CorruptEventsAreTheFaultOfTheirWindow) {
               AllOf(HasSubstr("346"), HasSubstr("cam2, event 4")));
 }
 
+TEST_F(Dhp19Test, KeysThatItDoesNotKnowAreFaults) {
+  const auto dataset = open();
+  for (const std::string key : {"", "S1", "S9/1_1/2/000000", "S1/1_1/22/000000"}) {
+    EXPECT_TRUE(is_fault(dataset->events(key))) << key;
+    EXPECT_TRUE(is_fault(dataset->annotation(key))) << key;
+    EXPECT_EQ(dataset->label_place(key), key);
+  }
+}
+
 TEST_F(Dhp19Test, NamesWhatIsMissingOrOfAnotherShape) {
   const auto refuses = [&](const std::string& part) {
     EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr(part)));

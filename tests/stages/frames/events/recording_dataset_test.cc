@@ -217,6 +217,9 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
               ThrowsMessage<InputError>(HasSubstr("more than two microseconds apart")));
   label("1.75,a,2,3,4,car,\n");
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("drive.csv (line 2)")));
+  testing::write_file(folder_ / "drive.json", R"({"format": "eventgan-manifest"})");
+  label("1.75\n");
+  EXPECT_EQ(open()->labelled_frames().size(), 1u);  // a job beside it
   spec_.camera = "right";
   EXPECT_THROW(open(), InputError);
   spec_.root = "absent";
@@ -234,6 +237,8 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   EXPECT_THROW(dataset->sensor_size("drive/x"), InputError);
   EXPECT_TRUE(is_fault(dataset->events("other/1.75")));
   EXPECT_TRUE(is_fault(dataset->annotation("drive/1.5")));
+  EXPECT_TRUE(is_fault(dataset->annotation("other/1.75")));
+  EXPECT_EQ(dataset->label_place("other/1.75"), "other/1.75");
 }
 
 }  // namespace
