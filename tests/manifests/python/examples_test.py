@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from conftest import SOURCE
 
+from eventgan_shards import Shards
+
 torch = pytest.importorskip("torch")
 pytest.importorskip("torchvision")
 pytest.importorskip("cv2")
@@ -137,11 +139,34 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
     assert first.returncode == 0, first.stdout + first.stderr
     assert first.stdout.count("examples/train_") == 4 and "examples/train_" not in again.stdout  # done before
-    rows = json.loads((tmp_path / "out" / "scores.json").read_text())
+    rows = json.loads((tmp_path / "out" / f"{what}.json").read_text())
     assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
     assert all(name in again.stdout for name in names)
-    for name in ("camera", "frames") if what == "detection" else ("camera",):  # exchanged volumes are sound ones
-        subprocess.run([PROGRAM, "verify", tmp_path / "out" / "demo" / name], check=True, capture_output=True)
+    camera = tmp_path / "out" / "camera"
+    if what == "detection":
+        subprocess.run([PROGRAM, "verify", camera / "frames"], check=True, capture_output=True)  # exchanged volumes are sound ones
+        events, frames = Shards(camera / "events"), Shards(camera / "frames")
+        for i in range(len(frames)):
+            seen, drawn = events.labels(i), frames.labels(i)
+            assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
+            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)  # the camera's picture is whole pixels high
+            np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
+            np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
+    else:
+        events, drawn = Shards(camera / "events"), Shards(camera / "labelled")
+        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"] for sample in map(drawn.labels, range(len(drawn)))}
+        assert len(events) == len(drawn)
+        for sample in map(events.labels, range(len(events))):
+            np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]], atol=0.51)
+
+
+def test_the_trade_in_small(tmp_path):
+    trainer = need_trainer("yolov3", "matplotlib", "tqdm")
+    line = [sys.executable, EXAMPLES / "experiment.py", "trade", "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
+    done = subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD)
+    assert done.returncode == 0, done.stdout + done.stderr
+    errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
+    assert errors.pop("EventGAN") == [0] and all(0 < error < 1 for [error] in errors.values())
 
 
 def test_what_cannot_be_trained_with_is_named(data, tmp_path):
