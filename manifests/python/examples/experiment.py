@@ -5,7 +5,8 @@
     experiment.py trade --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
 
 detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny learns on each, and on the grey frames. The
-detectors of the three kinds of events are tested on the "camera's" events of other streets, that of the frames on their frames.
+detectors of the three kinds of events are tested on the "camera's" events of other streets, as they are and made as bright as those that were learnt,
+that of the frames on their frames.
 pose: pose_resnet learns on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as it is, and after its
 last layer has learnt on the camera's for 1 and for 5 epochs; and one that has learnt on the camera's alone.
 trade: as detection, of the network's volumes in several widths, precisions and scopes: what their errors mean to a detector.
@@ -108,7 +109,7 @@ def exchange_volumes(folder: pathlib.Path, volume_of: Callable[[Sample], np.ndar
     markers."""
     for path in sorted(folder.glob("*.h5")):
         with h5py.File(path, "r+") as file, Shards(path) as samples:
-            for sample in (samples.labels(i) for i in range(len(samples))):
+            for sample in (samples[i] for i in range(len(samples))):
                 slot, volume = sample["slot"], volume_of(sample).astype(np.float16).astype(float)
                 file["events/volume"][slot] = volume
                 positive, negative = volume.reshape(2, -1)
@@ -194,10 +195,32 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
         (recordings / f"{sample['pair']['sample_id']}.json").write_text(json.dumps(labels), encoding="utf-8")
 
 
-def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, test: pathlib.Path, seed: int, *options: Any) -> pathlib.Path:
-    """The folder of a network that has learnt on `data`, for --steps unless `options` have its epochs, with what it finds in `test`."""
+def as_bright(args: argparse.Namespace, real: pathlib.Path, learnt: pathlib.Path) -> pathlib.Path:
+    """The volumes of `real` times one number, cut to 1, so that their mean is that of the volumes to learn: one's 98th percentile leaves a camera's
+    fainter than generated ones, of which more are not 0."""
+    folder = args.out / "as-bright" / learnt.name
+    if not (folder / "dataset.json").exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        shutil.copytree(real, folder, ignore=shutil.ignore_patterns("dataset.*"))
+        factor = mean_of(Shards(learnt, split="train")) / mean_of(Shards(real))
+        print(f"the camera's volumes times {factor:.2f}, for {learnt.name}")
+        exchange_volumes(folder, lambda sample: np.minimum(factor * sample["volume"], 1))
+        run(args.program, "finalize", folder)
+    return folder
+
+
+def mean_of(samples: Shards) -> float:
+    return float(np.mean([samples[i]["volume"].mean() for i in range(len(samples))]))
+
+
+def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, test: pathlib.Path, seed: int, *options: Any,
+          learnt: pathlib.Path | None = None) -> pathlib.Path:
+    """The folder of a network that has learnt on `data`, for --steps unless `options` have its epochs, with what it finds in `test`; or of the network
+    of the folder `learnt`, which learns nothing more."""
     out = args.out / "runs" / f"{name}-{seed}".replace(",", "").replace(" ", "-")
     if not (out / "predictions.json").exists():
+        if learnt:
+            shutil.copytree(learnt, out, ignore=shutil.ignore_patterns("predictions.json"), dirs_exist_ok=True)
         limit = () if "--epochs" in options else ("--steps", args.steps)
         run(sys.executable, EXAMPLES / script, "--trainer", args.trainer, "--data", data, "--out", out, "--test", test, "--seed", seed, "--every", 1000,
             *limit, *options)
@@ -245,10 +268,15 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
         for name, folder in data.items():
+            scale = "--scale", 1.5  # cheaper than its default by half
             test = frames if name == "Frame" else real
-            out = train(args, "train_yolov3.py", name, folder, test, seed, "--scale", 1.5)  # cheaper than its default by half
-            result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
-            scores.setdefault(name, []).append(result["classes"]["Car"] | errors.get(name, {}))
+            tests = {name: (train(args, "train_yolov3.py", name, folder, test, seed, *scale), test)}
+            if name != "Frame":
+                bright, row = as_bright(args, real, folder), f"{name}, as bright"
+                tests[row] = train(args, "train_yolov3.py", row, folder, bright, seed, *scale, learnt=tests[name][0]), bright
+            for row, (out, test) in tests.items():
+                result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
+                scores.setdefault(row, []).append(result["classes"]["Car"] | errors.get(name, {}))
     return scores
 
 

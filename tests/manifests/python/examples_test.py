@@ -130,15 +130,18 @@ def test_yolov3_learns(data, tmp_path):
     assert "got Bus" in said and str(data) in said
 
 
+DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
+POSES = ["EventGAN", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"]
+
+
 @pytest.mark.parametrize(("what", "trainer", "score", "names"), [
-    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", ["EventGAN", "log difference", "ESIM", "Frame"]),
-    ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", ["EventGAN", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"])])
+    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", DETECTORS), ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", POSES)])
 def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     trainer = need_trainer(*trainer)
     line = [sys.executable, EXAMPLES / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
     first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
     assert first.returncode == 0, first.stdout + first.stderr
-    assert first.stdout.count("examples/train_") == 4 and "examples/train_" not in again.stdout  # done before
+    assert first.stdout.count("examples/train_") == len(names) and "examples/train_" not in again.stdout  # done before
     rows = json.loads((tmp_path / "out" / f"{what}.json").read_text())
     assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
     assert all(name in again.stdout for name in names)
@@ -146,6 +149,9 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     if what == "detection":
         subprocess.run([PROGRAM, "verify", camera / "frames"], check=True, capture_output=True)  # exchanged volumes are sound ones
         events, frames = Shards(camera / "events"), Shards(camera / "frames")
+        learnt, bright = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train"), Shards(tmp_path / "out" / "as-bright" / "ESIM")
+        factor = np.mean([s["volume"].mean() for s in learnt]) / np.mean([s["volume"].mean() for s in events])
+        np.testing.assert_allclose(bright[0]["volume"], np.minimum(factor * events[0]["volume"], 1), atol=1e-3)
         for i in range(len(frames)):
             seen, drawn = events.labels(i), frames.labels(i)
             assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
@@ -166,7 +172,7 @@ def test_the_trade_in_small(tmp_path):
     done = subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD)
     assert done.returncode == 0, done.stdout + done.stderr
     errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
-    assert errors.pop("EventGAN") == [0] and all(0 < error < 1 for [error] in errors.values())
+    assert errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and all(0 < error < 1 for [error] in errors.values())
 
 
 def test_what_cannot_be_trained_with_is_named(data, tmp_path):
