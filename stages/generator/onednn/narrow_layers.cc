@@ -1,7 +1,6 @@
 #include "stages/generator/onednn/narrow_layers.h"
 
 #include <algorithm>
-#include <bit>
 #include <cstring>
 #include <type_traits>
 
@@ -92,7 +91,7 @@ EVENTGAN_LANES_INLINE Lanes widened(const Bfloat16* values) {
   using Bits [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
   std::uint16_t upper __attribute__((vector_size(kLanes * sizeof(std::uint16_t))));
   std::memcpy(&upper, values, sizeof upper);
-  return std::bit_cast<Lanes>(__builtin_convertvector(upper, Bits) << 16);
+  return reinterpret_cast<Lanes>(__builtin_convertvector(upper, Bits) << 16);
 }
 
 EVENTGAN_LANES_INLINE Lanes widened(const std::uint8_t* values) {
