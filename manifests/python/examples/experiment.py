@@ -110,8 +110,10 @@ def exchange_volumes(folder: pathlib.Path, volume_of: Callable[[Sample], np.ndar
     for path in sorted(folder.glob("*.h5")):
         with h5py.File(path, "r+") as file, Shards(path) as samples:
             for sample in (samples[i] for i in range(len(samples))):
-                slot, volume = sample["slot"], volume_of(sample).astype(np.float16).astype(float)
-                file["events/volume"][slot] = volume
+                slot, volume, stored = sample["slot"], volume_of(sample).astype(np.float16).astype(float), file["events/volume"]
+                scale = (volume.max() or 1) / 255 if stored.dtype == np.uint8 else 1  # a --truth may have bytes
+                codes = np.round(volume / scale) if scale != 1 else volume
+                stored[slot], file["events/scale"][slot], volume = codes, scale, codes * scale
                 positive, negative = volume.reshape(2, -1)
                 file["events/eta98"][slot] = eta98(volume)
                 for name, value in {"nonzero_fraction": (volume > 0).mean(), "sum_positive": positive.sum(), "sum_negative": negative.sum(),
