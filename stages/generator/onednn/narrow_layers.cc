@@ -1,14 +1,19 @@
 #include "stages/generator/onednn/narrow_layers.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstring>
+#include <stdexcept>
 #include <type_traits>
 
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/weights.h"
 
 #if defined(__x86_64__)
-#define EVENTGAN_AVX512 __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,avx2,fma")))
+#include <immintrin.h>
+// Of BF16 and VNNI a compiler takes by itself nothing that is here: add_products does.
+#define EVENTGAN_AVX512 \
+  __attribute__((target("avx512f,avx512bw,avx512dq,avx512vl,avx512bf16,avx512vnni,avx2,fma")))
 #else
 #define EVENTGAN_AVX512
 #endif
@@ -20,6 +25,14 @@ namespace {
 constexpr int kLanes = 16;
 constexpr int kOutputs = NarrowLayers::kChannels;
 using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
+using WholeLanes = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+/// 32 bits of what a pixel holds: a channel in float32, two in bfloat16, four in bytes. What moves
+/// and shuffles lanes takes them as floats, whatever they are.
+using Word = NarrowLayers::Word;
+template <class Stored>
+constexpr int kWordChannels = sizeof(Word) / sizeof(Stored);
+template <class Stored>
+using Sums = std::conditional_t<std::is_same_v<Stored, std::uint8_t>, WholeLanes, Lanes>;
 /// Pixels that are computed at once.
 constexpr int kPixels = NarrowLayers::kPixels, kVectors = kPixels / kLanes;
 /// The same anywhere in memory.
@@ -85,54 +98,64 @@ EVENTGAN_LANES_INLINE void to_pixels(Lanes (&lanes)[kChannels]) {
   }
 }
 
-EVENTGAN_LANES_INLINE Lanes widened(const float* values) { return load(values); }
-
-EVENTGAN_LANES_INLINE Lanes widened(const Bfloat16* values) {
-  using Bits [[gnu::vector_size(kLanes * sizeof(std::uint32_t))]] = std::uint32_t;
-  std::uint16_t upper __attribute__((vector_size(kLanes * sizeof(std::uint16_t))));
-  std::memcpy(&upper, values, sizeof upper);
-  return reinterpret_cast<Lanes>(__builtin_convertvector(upper, Bits) << 16);
-}
-
-EVENTGAN_LANES_INLINE Lanes widened(const std::uint8_t* values) {
-  std::uint8_t whole __attribute__((vector_size(kLanes)));
-  std::memcpy(&whole, values, sizeof whole);
-  return __builtin_convertvector(whole, Lanes);
-}
-
-/// A row [x, channel] into planes: planes[channel * pitch + 1 + x].
-template <int kChannels, class Stored>
-EVENTGAN_LANES_INLINE void read_row(const Stored* pixels, int width, std::ptrdiff_t pitch,
+/// A row [x, word] into planes: planes[word * pitch + 1 + x].
+template <int kWords>
+EVENTGAN_LANES_INLINE void read_row(const float* pixels, int width, std::ptrdiff_t pitch,
                                     float* planes) {
-  int x = 0;
-  for (; x + kLanes <= width; x += kLanes) {
-    Lanes lanes[kChannels];
+  const auto read = [&](const float* from, int x) EVENTGAN_AVX512 {
+    Lanes lanes[kWords];
 #pragma GCC unroll 16
-    for (int i = 0; i < kChannels; ++i) lanes[i] = widened(pixels + x * kChannels + i * kLanes);
+    for (int i = 0; i < kWords; ++i) lanes[i] = load(from + i * kLanes);
     to_planes(lanes);
 #pragma GCC unroll 16
-    for (int c = 0; c < kChannels; ++c) store(lanes[c], planes + c * pitch + 1 + x);
-  }
+    for (int i = 0; i < kWords; ++i) store(lanes[i], planes + i * pitch + 1 + x);
+  };
+  int x = 0;
+  for (; x + kLanes <= width; x += kLanes) read(pixels + x * kWords, x);
   // What stands behind the row may be anything, but its neighbour here is zero.
   if (x < width) {
-    Stored rest[kChannels * kLanes] = {};
-    std::copy(pixels + x * kChannels, pixels + width * kChannels, rest);
-    Lanes lanes[kChannels];
-#pragma GCC unroll 16
-    for (int i = 0; i < kChannels; ++i) lanes[i] = widened(rest + i * kLanes);
-    to_planes(lanes);
-#pragma GCC unroll 16
-    for (int c = 0; c < kChannels; ++c) store(lanes[c], planes + c * pitch + 1 + x);
+    float rest[kWords * kLanes] = {};
+    std::memcpy(rest, pixels + x * kWords, (width - x) * kWords * sizeof(float));
+    read(rest, x);
   }
 }
 
-/// Adds what one row of a kernel makes of one row of `channels` planes, for kVectors x 16 pixels
+/// Adds to each sum what a word of a pixel makes with a word of weights.
+EVENTGAN_LANES_INLINE void add_products(float, Lanes words, Word weights, Lanes& sums) {
+  sums += words * std::bit_cast<float>(weights);
+}
+
+#if defined(__x86_64__)
+EVENTGAN_LANES_INLINE void add_products(Bfloat16, Lanes words, Word weights, Lanes& sums) {
+  sums = reinterpret_cast<Lanes>(
+      _mm512_dpbf16_ps(reinterpret_cast<__m512>(sums), reinterpret_cast<__m512bh>(words),
+                       reinterpret_cast<__m512bh>(_mm512_set1_epi32(static_cast<int>(weights)))));
+}
+
+EVENTGAN_LANES_INLINE void add_products(std::uint8_t, Lanes words, Word weights, WholeLanes& sums) {
+  sums = reinterpret_cast<WholeLanes>(
+      _mm512_dpbusd_epi32(reinterpret_cast<__m512i>(sums), reinterpret_cast<__m512i>(words),
+                          _mm512_set1_epi32(static_cast<int>(weights))));
+}
+#else
+template <class Stored, class Sum>
+void add_products(Stored, Lanes, Word, Sum&) {
+  throw std::logic_error("expected a processor with AVX-512");
+}
+#endif
+
+EVENTGAN_LANES_INLINE Lanes as_float(Lanes sums) { return sums; }
+EVENTGAN_LANES_INLINE Lanes as_float(WholeLanes sums) {
+  return __builtin_convertvector(sums, Lanes);
+}
+
+/// Adds what one row of a kernel makes of one row of planes of `words`, for kVectors x 16 pixels
 /// whose leftmost neighbours begin at `planes`.
-template <int kVectors, int kSums>
-EVENTGAN_LANES_INLINE void add_row(const float* planes, std::ptrdiff_t pitch, int channels,
-                                   int columns, const float* weights,
-                                   Lanes (&sums)[kVectors][kSums]) {
-  for (int c = 0; c < channels; ++c, planes += pitch) {
+template <class Stored, int kVectors, int kSums>
+EVENTGAN_LANES_INLINE void add_row(const float* planes, std::ptrdiff_t pitch, int words,
+                                   int columns, const Word* weights,
+                                   Sums<Stored> (&sums)[kVectors][kSums]) {
+  for (int i = 0; i < words; ++i, planes += pitch) {
     for (int column = 0; column < columns; ++column, weights += kSums) {
       Lanes input[kVectors];
 #pragma GCC unroll 2
@@ -140,7 +163,9 @@ EVENTGAN_LANES_INLINE void add_row(const float* planes, std::ptrdiff_t pitch, in
 #pragma GCC unroll 16
       for (int o = 0; o < kSums; ++o) {
 #pragma GCC unroll 2
-        for (int v = 0; v < kVectors; ++v) sums[v][o] += input[v] * weights[o];
+        for (int v = 0; v < kVectors; ++v) {
+          add_products(Stored{}, input[v], weights[o], sums[v][o]);
+        }
       }
     }
   }
@@ -198,20 +223,47 @@ std::ptrdiff_t rounded_up(std::ptrdiff_t values, std::ptrdiff_t step) {
 /// Of a number of cache lines that is odd, so that the planes lie in different parts of a cache.
 std::ptrdiff_t pitch_of(std::ptrdiff_t values) { return rounded_up(values, 2 * kLanes) + kLanes; }
 
-/// Weights [group out, in, row, column] in the order [group, row, in, column, out], and with what
-/// int8 multiplies the sums.
-std::vector<float> packed(const LayerNumbers& layer, int groups) {
+/// `channels` weights one behind the other, as the activations that they belong to are stored.
+Word packed_word(const float* weights, int channels) {
+  if (channels == 1) return std::bit_cast<Word>(*weights);
+  Word word = 0;
+  for (int i = channels; i-- > 0;) {
+    if (channels == 2) {
+      Bfloat16 rounded;
+      store_activations(weights + i, 1, &rounded);
+      word = word << 16 | rounded.bits;
+    } else {
+      word = word << 8 | static_cast<std::uint8_t>(static_cast<std::int8_t>(weights[i]));
+    }
+  }
+  return word;
+}
+
+/// Weights [group out, in, row, column] in the order [group, row, in / channels of a word, column,
+/// out, in % them].
+std::vector<Word> packed(const LayerNumbers& layer, int groups, int word_channels) {
   const int out = layer.out_channels / groups, in = layer.in_channels, side = layer.kernel;
-  std::vector<float> weights;
-  for (int i = 0; i < groups * side * in * side * out; ++i) {
-    const int o = i / (side * in * side * out) * out + i % out;
+  const int words = in / word_channels;
+  std::vector<Word> weights;
+  for (int i = 0; i < groups * side * words * side * out; ++i) {
+    const int o = i / (side * words * side * out) * out + i % out;
     const int column = i / out % side;
-    const int c = i / (out * side) % in;
-    const int row = i / (out * side * in) % side;
-    const float scale = layer.output_scales.empty() ? 1.0f : layer.output_scales[o];
-    weights.push_back(layer.weight[((o * in + c) * side + row) * side + column] * scale);
+    const int first = i / (out * side) % words * word_channels;
+    const int row = i / (out * side * words) % side;
+    float together[sizeof(Word)];
+    for (int j = 0; j < word_channels; ++j) {
+      together[j] = layer.weight[((o * in + first + j) * side + row) * side + column];
+    }
+    weights.push_back(packed_word(together, word_channels));
   }
   return weights;
+}
+
+/// What int8 multiplies the sums with; 1 elsewhere.
+std::vector<float> scales_of(const LayerNumbers& layer) {
+  std::vector<float> scales = layer.output_scales;
+  scales.resize(layer.out_channels, 1);
+  return scales;
 }
 
 std::vector<float> scaled_bias(const LayerNumbers& layer) {
@@ -223,24 +275,27 @@ std::vector<float> scaled_bias(const LayerNumbers& layer) {
 
 }  // namespace
 
-bool NarrowLayers::fit(int base_channels) {
+bool NarrowLayers::fit(int base_channels, Precision precision) {
   // Without AVX-512 there is no bfloat16.
-  return base_channels == kChannels && onednn_support(Precision::kBfloat16).able;
+  return base_channels == kChannels && onednn_support(Precision::kBfloat16).able &&
+         onednn_support(precision).native;
 }
 
 NarrowLayers::NarrowLayers(const LayerNumbers& head, const LayerNumbers& skip,
                            const LayerNumbers& phases, const LayerNumbers& pred, ImageSize size,
-                           bool tiles, BufferLayout& layout)
+                           int stored_bytes, bool tiles, BufferLayout& layout)
     : size_(size),
       pitch_(pitch_of(rounded_up(size.width, 2 * kLanes) + 2 * kLanes)),
       small_pitch_(pitch_of(rounded_up(size.width / 2 + 1, kLanes) + 2)),
-      head_(packed(head, 1)),
-      skip_(packed(skip, 1)),
-      phases_(packed(phases, 2)),
+      head_(packed(head, 1, 1)),
+      skip_(packed(skip, 1, sizeof(Word) / stored_bytes)),
+      phases_(packed(phases, 2, sizeof(Word) / stored_bytes)),
       prediction_(pred.weight),
       head_bias_(head.bias),
       skip_bias_(scaled_bias(skip)),
+      skip_scales_(scales_of(skip)),
       phases_bias_(scaled_bias(phases)),
+      phases_scales_(scales_of(phases)),
       prediction_bias_(pred.bias) {
   std::size_t bytes = buffer_values() * sizeof(float);
   if (tiles) bytes = std::max(bytes, tiles_.emplace(skip, phases, size).buffer_bytes());
@@ -268,8 +323,8 @@ void NarrowLayers::head_row(const float* frames, int y, std::byte* block, float*
       for (int o = 0; o < kOutputs; ++o) sums[v][o] = Lanes{} + head_bias_[o];
     }
     for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
-      add_row(planes_of(row) + x, pitch_, kFrames, 3,
-              head_.data() + (row - y + 1) * kFrames * 3 * kOutputs, sums);
+      add_row<float>(planes_of(row) + x, pitch_, kFrames, 3,
+                     head_.data() + (row - y + 1) * kFrames * 3 * kOutputs, sums);
     }
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {
@@ -288,22 +343,26 @@ template <class Stored>
 EVENTGAN_AVX512 void NarrowLayers::read_rows(const Stored* small, const Stored* skip, int y,
                                              float* rows) const {
   if (y == 0) std::memset(rows, 0, buffer_values() * sizeof(float));
+  constexpr int kWords = kChannels / kWordChannels<Stored>;
+  const auto words_at = [](const Stored* pixels, std::ptrdiff_t pixel, int words) {
+    return reinterpret_cast<const float*>(pixels) + pixel * words;
+  };
   for (int row = y == 0 ? 0 : y + 1; row < std::min(y + 2, size_.height); ++row) {
-    read_row<kChannels>(skip + static_cast<std::ptrdiff_t>(row) * size_.width * kChannels,
-                        size_.width, pitch_, skip_planes(rows, row));
+    read_row<kWords>(words_at(skip, static_cast<std::ptrdiff_t>(row) * size_.width, kWords),
+                     size_.width, pitch_, skip_planes(rows, row));
   }
   const ImageSize small_size = half_size(size_);
   const int p = (y + 1) / 2;
   if ((y == 0 || y % 2 == 1) && p < small_size.height) {
-    read_row<2 * kChannels>(
-        small + static_cast<std::ptrdiff_t>(p) * small_size.width * 2 * kChannels, small_size.width,
-        small_pitch_, small_planes(rows, p));
+    read_row<2 * kWords>(
+        words_at(small, static_cast<std::ptrdiff_t>(p) * small_size.width, 2 * kWords),
+        small_size.width, small_pitch_, small_planes(rows, p));
   }
 }
 
 /// The sums over the doubled picture: pixel x at 1 + x.
-EVENTGAN_AVX512
-void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const {
+template <class Stored>
+EVENTGAN_AVX512 void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const {
   float* const sums_row = phase_planes(rows);
   if (edges.whole_row) {
     for (int x = 0; x < size_.width; ++x) {
@@ -313,24 +372,27 @@ void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const
     }
     return;
   }
-  constexpr int kRowWeights = 2 * kChannels * 2 * 2 * kOutputs;
+  constexpr int kWords = 2 * kChannels / kWordChannels<Stored>;
+  constexpr int kRowWeights = kWords * 2 * 2 * kOutputs;
   const float* const bias = phases_bias_.data() + y % 2 * 2 * kOutputs;
+  const float* const scales = phases_scales_.data() + y % 2 * 2 * kOutputs;
   for (int q = 0; q <= size_.width / 2; q += kLanes) {
-    Lanes sums[1][2 * kOutputs];
-#pragma GCC unroll 16
-    for (int o = 0; o < 2 * kOutputs; ++o) sums[0][o] = Lanes{} + bias[o];
+    Sums<Stored> sums[1][2 * kOutputs] = {};
     for (int row = 0; row < 2; ++row) {
       const int p = (y + 1) / 2 - 1 + row;
       if (p < 0 || p >= half_size(size_).height) continue;
-      add_row(small_planes(rows, p) + q, small_pitch_, 2 * kChannels, 2,
-              phases_.data() + (y % 2 * 2 + row) * kRowWeights, sums);
+      add_row<Stored>(small_planes(rows, p) + q, small_pitch_, kWords, 2,
+                      phases_.data() + (y % 2 * 2 + row) * kRowWeights, sums);
     }
-    // Column q of the phases holds pixels 2q - 1, which is of phase 1, and 2q.
+    Lanes values[2 * kOutputs];
+#pragma GCC unroll 16
+    for (int o = 0; o < 2 * kOutputs; ++o) values[o] = as_float(sums[0][o]) * scales[o] + bias[o];
+      // Column q of the phases holds pixels 2q - 1, which is of phase 1, and 2q.
 #pragma GCC unroll 8
     for (int o = 0; o < kOutputs; ++o) {
       float* const plane = sums_row + o * pitch_ + 2 * q;
-      store(first_in_turns(sums[0][kOutputs + o], sums[0][o]), plane);
-      store(last_in_turns(sums[0][kOutputs + o], sums[0][o]), plane + kLanes);
+      store(first_in_turns(values[kOutputs + o], values[o]), plane);
+      store(last_in_turns(values[kOutputs + o], values[o]), plane + kLanes);
     }
   }
   if (edges.last_pixel) {
@@ -338,24 +400,27 @@ void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const
   }
 }
 
-EVENTGAN_AVX512
-void NarrowLayers::predict_planes(int y, float* rows, float* volume) const {
+template <class Stored>
+EVENTGAN_AVX512 void NarrowLayers::predict_planes(int y, float* rows, float* volume) const {
   const Prediction prediction{skip_bias_, prediction_, prediction_bias_, size_,
                               volume + static_cast<std::ptrdiff_t>(y) * size_.width};
   for (int x = 0; x < size_.width; x += kPixels) {
-    Lanes sums[kVectors][kOutputs];
+    constexpr int kWords = kChannels / kWordChannels<Stored>;
+    Sums<Stored> sums[kVectors][kOutputs] = {};
+    for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
+      add_row<Stored>(skip_planes(rows, row) + x, pitch_, kWords, 3,
+                      skip_.data() + (row - y + 1) * kWords * 3 * kOutputs, sums);
+    }
+    Lanes values[kVectors][kOutputs];
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {
 #pragma GCC unroll 8
       for (int o = 0; o < kOutputs; ++o) {
-        sums[v][o] = load(phase_planes(rows) + o * pitch_ + 1 + x + v * kLanes);
+        values[v][o] = as_float(sums[v][o]) * skip_scales_[o] +
+                       load(phase_planes(rows) + o * pitch_ + 1 + x + v * kLanes);
       }
     }
-    for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
-      add_row(skip_planes(rows, row) + x, pitch_, kChannels, 3,
-              skip_.data() + (row - y + 1) * kChannels * 3 * kOutputs, sums);
-    }
-    predict(sums, x, prediction);
+    predict(values, x, prediction);
   }
 }
 
@@ -389,8 +454,8 @@ void NarrowLayers::compute_row(const Stored* small, const Stored* skip, const De
   }
   auto* rows = reinterpret_cast<float*>(block + buffer_);
   read_rows(small, skip, y, rows);
-  add_phases(edges, y, rows);
-  predict_planes(y, rows, volume);
+  add_phases<Stored>(edges, y, rows);
+  predict_planes<Stored>(y, rows, volume);
 }
 
 void NarrowLayers::volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,

@@ -79,6 +79,7 @@ NetworkLayers::NetworkLayers(const Weights& weights, Precision precision,
     : engine_(engine),
       base_channels_(weights.base_channels),
       bins_(weights.bins),
+      precision_(precision),
       stored_type_(stored_type_of(precision)) {
   NetworkNumbers numbers = numbers_of(weights, precision);
   std::ranges::copy(numbers.residual_factors, residual_factors_.begin());

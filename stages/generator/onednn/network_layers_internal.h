@@ -47,6 +47,7 @@ class NetworkLayers {
   const dnnl::engine& engine() const { return engine_; }
   int base_channels() const { return base_channels_; }
   int bins() const { return bins_; }
+  Precision precision() const { return precision_; }
 
   /// What activations between layers are stored as.
   dnnl::memory::data_type stored_type() const { return stored_type_; }
@@ -56,6 +57,7 @@ class NetworkLayers {
   dnnl::engine engine_;
   int base_channels_;
   int bins_;
+  Precision precision_;
   dnnl::memory::data_type stored_type_;
   std::array<float, kResidualBlocks> residual_factors_;
   std::map<std::string, LayerWeights> layers_;

@@ -24,7 +24,7 @@ NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
       base_channels_(layers.base_channels()),
       bins_(layers.bins()),
       stored_type_(layers.stored_type()) {
-  const bool narrow = NarrowLayers::fit(base_channels_);
+  const bool narrow = NarrowLayers::fit(base_channels_, layers.precision());
   skips_[0] = add_activations(size_, base_channels_);
   if (narrow) {
     plan_narrow(layers);
@@ -60,9 +60,11 @@ void NetworkPlan::plan_narrow(NetworkLayers& layers) {
   const std::size_t pixels = size_.width + NarrowLayers::kPixels;
   head_rows_buffer_ = layout_.add(pixels * NarrowLayers::kChannels * sizeof(float));
   const auto numbers = [&](const std::string& name) { return layers.at(name).numbers(); };
-  const bool tiles = dnnl::get_effective_cpu_isa() == dnnl::cpu_isa::avx512_core_amx;
+  const bool tiles =
+      stored_type_ == Type::bf16 && dnnl::get_effective_cpu_isa() == dnnl::cpu_isa::avx512_core_amx;
+  const auto stored_bytes = static_cast<int>(dnnl::memory::data_type_size(stored_type_));
   narrow_.emplace(numbers("head"), numbers("decoders.3.skip"), numbers("decoders.3.phases"),
-                  numbers("pred"), size_, tiles, layout_);
+                  numbers("pred"), size_, stored_bytes, tiles, layout_);
 }
 
 void NetworkPlan::plan_head(NetworkLayers& layers) {

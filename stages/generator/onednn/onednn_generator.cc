@@ -99,8 +99,8 @@ std::string version_text() {
          std::to_string(version->patch);
 }
 
-std::string narrow_text(int base_channels) {
-  if (!NarrowLayers::fit(base_channels)) return "";
+std::string narrow_text(int base_channels, Precision precision) {
+  if (!NarrowLayers::fit(base_channels, precision)) return "";
   return ", narrow layers " + std::to_string(NarrowLayers::kVersion);
 }
 
@@ -124,7 +124,7 @@ class OnednnGenerator final : public Generator {
         precision_(precision),
         description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
                      version_text() + ", " + onednn_support(precision).instruction_set +
-                     narrow_text(weights.base_channels) + ", " +
+                     narrow_text(weights.base_channels, precision) + ", " +
                      describe_training_gaps(weights.training_gaps)),
         layers_(weights, precision, dnnl::engine(dnnl::engine::kind::cpu, 0)),
         plans_(layers_) {}
