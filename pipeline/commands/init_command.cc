@@ -26,9 +26,15 @@ struct InitArguments {
   std::string out = "manifest.json";
 };
 
+/// Of those that find_source knows: a camera's recordings are not looked for.
 DatasetKind read_dataset(const std::string& word) {
   std::string words;
   for (const Word<DatasetKind>& known : kDatasetWords) {
+    if (known.value == DatasetKind::kRecording || known.value == DatasetKind::kDhp19) {
+      if (known.word != word) continue;
+      throw UsageError("DATASET: expected frames with labels, got a camera's events, " + word +
+                       ", for which manifests/guides/real_events.md has a manifest");
+    }
     if (known.word == word) return known.value;
     words.append(words.empty() ? "" : ", ").append(known.word);
   }

@@ -175,6 +175,7 @@ class Init(program.InFolder):
         self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
         self.assertIn("expected PATH or DATASET PATH, got 3 arguments", self.init("kitti_object", empty, empty, expect=64))
         self.assertIn("DATASET: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
+        self.assertIn("real_events.md has a manifest", self.init("recording", empty, expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
         self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
         shutil.rmtree(self.folder / "k" / "image_2")
