@@ -41,8 +41,10 @@ def _memory_gb():
 def description(bench, command, libraries):
     """Markdown lines; `libraries` are the engines' own words."""
     here = flags()
-    version = subprocess.run([bench.program, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    version = subprocess.run([bench.program, "--version"], capture_output=True, text=True, check=True).stdout
+    engines = sorted(text for text in libraries if text not in version)
     yield f"- processor: {processor_name()}, {len(usable())} of {os.cpu_count()} cores, {_memory_gb():.0f} GB"
     yield f"- instructions: {', '.join(flag for flag in TELLING_FLAGS if flag in here) or 'none of the telling ones'}"
-    yield f"- program: {version}; {'; '.join(sorted(libraries))}"
+    yield f"- program: {'; '.join(version.splitlines()[:2])}"  # its engines and processor are told as they were used
+    yield f"- engines: {'; '.join(engines)}"
     yield f"- command: `{command}`"
