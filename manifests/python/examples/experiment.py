@@ -7,8 +7,8 @@
 detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny learns on each, and on the grey frames. The
 detectors of the three kinds of events are tested on the "camera's" events of other streets, as they are and made as bright as those that were learnt,
 that of the frames on their frames.
-pose: pose_resnet learns on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as they are, made as bright
-as those that were learnt, and after its last layer has learnt on the camera's for 1 and for 5 epochs; and one that has learnt on the camera's alone.
+pose: pose_resnet learns on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as they are, without
+those that stand alone, and after its last layer has learnt on the camera's for 1 and for 5 epochs; and one that has learnt on the camera's alone.
 trade: as detection, of the network's volumes in several widths, precisions and scopes: what their errors mean to a detector.
 
 The "camera" is the sensor model with noise, before which the scenes move as they do: drawn at 160 pictures a second. The same line again goes on where
@@ -18,6 +18,7 @@ it was.
 from __future__ import annotations
 
 import argparse
+import functools
 import hashlib
 import json
 import pathlib
@@ -195,18 +196,35 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
         (recordings / f"{sample['pair']['sample_id']}.json").write_text(json.dumps(labels), encoding="utf-8")
 
 
-def as_bright(args: argparse.Namespace, real: pathlib.Path, learnt: pathlib.Path) -> pathlib.Path:
-    """The volumes of `real` times one number, cut to 1, so that their mean is that of the volumes to learn: one's 98th percentile leaves a camera's
-    fainter than generated ones, of which more are not 0."""
-    folder = args.out / "as-bright" / learnt.name
+def changed(args: argparse.Namespace, real: pathlib.Path, name: str, volume_of: Callable[[Sample], np.ndarray]) -> pathlib.Path:
+    """OUT/NAME: the samples of `real` with other volumes."""
+    folder = args.out / name
     if not (folder / "dataset.json").exists():
         shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(real, folder, ignore=shutil.ignore_patterns("dataset.*"))
-        factor = mean_of(Shards(learnt, split="train")) / mean_of(Shards(real))
-        print(f"the camera's volumes times {factor:.2f}, for {learnt.name}")
-        exchange_volumes(folder, lambda sample: np.minimum(factor * sample["volume"], 1))
+        exchange_volumes(folder, volume_of)
         run(args.program, "finalize", folder)
     return folder
+
+
+def as_bright(args: argparse.Namespace, real: pathlib.Path, learnt: pathlib.Path) -> pathlib.Path:
+    """The volumes of `real` times one number, cut to 1, so that their mean is that of the volumes to learn: one's 98th percentile leaves a camera's
+    fainter than generated ones, of which more are not 0."""
+
+    @functools.cache
+    def factor() -> float:
+        ratio = mean_of(Shards(learnt, split="train")) / mean_of(Shards(real))
+        print(f"the camera's volumes times {ratio:.2f}, for {learnt.name}")
+        return ratio
+
+    return changed(args, real, f"as-bright/{learnt.name}", lambda sample: np.minimum(factor() * sample["volume"], 1))
+
+
+def without_noise(sample: Sample) -> np.ndarray:
+    """The volume without what stands alone: pixels with events that have fewer than two such neighbours."""
+    volume = sample["volume"]
+    there = (volume > 0).any(0).astype(np.float32)
+    return volume * (cv2.filter2D(there, -1, np.ones((3, 3), np.float32), borderType=cv2.BORDER_CONSTANT) > 2)
 
 
 def mean_of(samples: Shards) -> float:
@@ -293,12 +311,12 @@ def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     made = convert(args, scenes, "EventGAN", pairs_of("mpii", {"train": [2, 4], "val": [2]}), GENERATORS["EventGAN"])
     labelled = convert(args, seen, "labelled", pairs_of("mpii", {"train": [2]}), {"kind": "difference"})
     real = camera(args, seen, labelled, "mpii/between", {"window_s": 2 / FRAMES_PER_SECOND, "label_at": "middle"}, ["train", "val"])
+    quiet = changed(args, real, "without-noise", without_noise)
     of_camera = ("--dataset", next(iter(read_description(real)["counts"]["by_dataset"])))
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
-        learnt, bright = train(args, "train_pose.py", "EventGAN", made, real, seed), as_bright(args, real, made)
-        tests = {"EventGAN": (learnt, real),
-                 "EventGAN, as bright": (train(args, "train_pose.py", "EventGAN, as bright", made, bright, seed, learnt=learnt), bright)}
+        learnt, row = train(args, "train_pose.py", "EventGAN", made, real, seed), "EventGAN, without noise"
+        tests = {"EventGAN": (learnt, real), row: (train(args, "train_pose.py", row, made, quiet, seed, learnt=learnt), quiet)}
         for epochs, name in ((1, "1 epoch"), (5, "5 epochs")):
             tuned = "--pretrained", learnt / "weights.pt", "--last-layer", "--epochs", epochs
             tests[f"EventGAN, last layer {name}"] = train(args, "train_pose.py", f"tuned-{epochs}", real, real, seed, *tuned, *of_camera), real

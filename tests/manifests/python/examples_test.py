@@ -131,7 +131,7 @@ def test_yolov3_learns(data, tmp_path):
 
 
 DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
-POSES = ["EventGAN", "EventGAN, as bright", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"]
+POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"]
 
 
 @pytest.mark.parametrize(("what", "trainer", "score", "names"), [
