@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <csignal>
 #include <opencv2/core/utility.hpp>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 
 int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails then, and is told as any other
   eventgan::keep_big_buffers();
   eventgan::silence_decoders();
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism

@@ -67,5 +67,4 @@ done
 finalize=$(submit --dependency="afterany$(printf ':%s' "${jobs[@]}")" --cpus-per-task=1 --time=01:00:00 \
   --output="$log/finalize-%j.log" "$here/finalize.sbatch" "$output")
 echo "finalize $finalize: after all of them"
-echo "logs: $logs"
-echo "look: $EVENTGAN status $output"
+printf 'logs: %q\nlook: %q status %q\n' "$logs" "$EVENTGAN" "$output"

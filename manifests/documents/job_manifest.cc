@@ -192,7 +192,7 @@ struct Preset {
   int blur;
 };
 
-// DESIGN section 4: the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
+// As the published scripts for KITTI, for MPII and Human3.6M, and for the demo.
 constexpr Preset kKitti{"kitti", GreyOrder::kBeforeResize, 3};
 constexpr Preset kMpii{"mpii", GreyOrder::kBeforeResize, 0};
 constexpr Preset kDemo{"demo", GreyOrder::kAfterResize, 0};

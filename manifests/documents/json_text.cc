@@ -15,6 +15,38 @@
 
 namespace eventgan {
 
+namespace {
+
+std::string hex(unsigned char byte) {
+  constexpr char kDigits[] = "0123456789abcdef";
+  return {kDigits[byte >> 4], kDigits[byte & 15]};
+}
+
+}  // namespace
+
+std::string escape_controls(std::string_view text) {
+  std::string shown;
+  while (true) {
+    const std::size_t sound = std::min(utf8::find_invalid(text), text.size());
+    for (auto at = text.begin(), end = at + static_cast<std::ptrdiff_t>(sound); at != end;) {
+      const auto begin = at;
+      const auto character = utf8::unchecked::next(at);
+      if (character == '\n') {
+        shown += "\\n";
+      } else if (character == '\t') {
+        shown += "\\t";
+      } else if (character < 0x20 || (character >= 0x7f && character < 0xa0)) {
+        shown += "\\u00" + hex(static_cast<unsigned char>(character));
+      } else {
+        shown.append(begin, at);
+      }
+    }
+    if (sound == text.size()) return shown;
+    shown += "\\x" + hex(static_cast<unsigned char>(text[sound]));
+    text.remove_prefix(sound + 1);
+  }
+}
+
 std::string json_path(std::string_view parent, std::string_view key) {
   const bool is_word = !key.empty() && std::all_of(key.begin(), key.end(), [](unsigned char c) {
     return c < 0x80 && (std::isalnum(c) || c == '_');
@@ -200,10 +232,8 @@ class Builder : public nlohmann::json_sax<Json> {
 template <class Json>
 std::optional<Json> parse_text(std::string_view text, FaultList& faults, bool ignore_comments) {
   if (const std::size_t at = first_unsound_byte(text); at < text.size()) {
-    constexpr char kHex[] = "0123456789abcdef";
-    const auto byte = static_cast<unsigned char>(text[at]);
     faults.add_at(text, at, "UTF-8 text",
-                  std::string("the byte 0x") + kHex[byte >> 4] + kHex[byte & 15]);
+                  "the byte 0x" + hex(static_cast<unsigned char>(text[at])));
     return std::nullopt;
   }
   Builder<Json> builder(text, faults);

@@ -9,6 +9,12 @@
 
 namespace eventgan {
 
+/// Text that comes from data or names of files, as it may stand in a line for a person: control
+/// characters (U+0000..1F, 7F..9F) as \n, \t or \u001b, bytes that are no UTF-8 as \xff, all else
+/// as it is. It can neither steer a terminal nor begin another line then. What it leaves unchanged
+/// has none of these.
+std::string escape_controls(std::string_view text);
+
 // JSON paths as messages write them: `$` is the document, `$.sources[0].pairs.gaps[2]` a place in
 // it.
 

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/manifest_file_internal.h"
 #include "manifests/documents/strict_json_internal.h"
 
 namespace eventgan {
@@ -15,8 +16,20 @@ constexpr int kMarkerVersion = 2;
 constexpr int kMostGap = 6;
 constexpr double kMostSeconds = 1e12;
 
-bool is_shard_name(std::string_view name) {
-  return name.size() > 3 && name.ends_with(".h5") && name.find('/') == name.npos;
+/// Cuts `ending` off the end of `text`; false if it has another.
+bool take_end(std::string_view& text, std::string_view ending) {
+  if (!text.ends_with(ending)) return false;
+  text.remove_suffix(ending.size());
+  return true;
+}
+
+/// Cuts a number off the end of `text`, as a plan writes it; false if there is none.
+bool take_number(std::string_view& text) {
+  constexpr std::size_t kFewestDigits = 5;
+  const std::size_t rest = text.find_last_not_of("0123456789") + 1;  // 0 if it is digits alone
+  const bool is_long = text.size() - rest >= kFewestDigits;
+  text = text.substr(0, rest);
+  return is_long;
 }
 
 std::string read_hash(const StrictValue& value) {
@@ -95,7 +108,7 @@ ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
   ShardMarker marker;
   StrictObject object = StrictValue(document, faults).object();
   if (!object.has_format(kMarkerFormat, kMarkerVersion)) return marker;
-  marker.shard = object.at("shard").text("a file name ending in .h5", is_shard_name);
+  marker.shard = object.at("shard").text(kShardNameForm, is_shard_name);
   marker.plan_hash = read_hash(object.at("plan_hash"));
   marker.sha256 = read_hash(object.at("sha256"));
   marker.size_bytes = object.at("size_bytes").integer<std::int64_t>(0, INT64_MAX);
@@ -172,8 +185,23 @@ ShardMarker parse_marker(std::string_view text, const std::string& name) {
   return marker;
 }
 
+bool is_shard_name(std::string_view name) {
+  if (!take_end(name, ".h5") || !take_number(name) || !take_end(name, "-of-") ||
+      !take_number(name) || !take_end(name, "-")) {
+    return false;
+  }
+  // The job's name and the split's; both may have hyphens.
+  for (std::size_t hyphen = name.find('-'); hyphen != name.npos;
+       hyphen = name.find('-', hyphen + 1)) {
+    if (is_name(name.substr(0, hyphen)) && is_name(name.substr(hyphen + 1))) return true;
+  }
+  return false;
+}
+
 std::string marker_name(const std::string& shard_name) {
-  if (!is_shard_name(shard_name)) {
+  // Of a shard that somebody has renamed too.
+  if (shard_name.size() <= 3 || !shard_name.ends_with(".h5") ||
+      shard_name.find('/') != shard_name.npos) {
     throw std::invalid_argument("expected a shard name ending in .h5, got \"" + shard_name + "\"");
   }
   return shard_name.substr(0, shard_name.size() - 3) + ".json";

@@ -15,6 +15,11 @@ std::string to_json(const ShardMarker& marker);
 /// manifests are.
 ShardMarker parse_marker(std::string_view text, const std::string& name);
 
+/// Whether it is a shard's name as a plan gives it, NAME-SPLIT-00012-of-01024.h5: a file in the
+/// document's own folder, and never one that is somebody else's.
+bool is_shard_name(std::string_view name);
+inline constexpr char kShardNameForm[] = "a shard's name, such as job-train-00012-of-01024.h5";
+
 /// Name of the marker that belongs to a shard file: the same name with ".h5" replaced by ".json".
 std::string marker_name(const std::string& shard_name);
 

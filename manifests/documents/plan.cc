@@ -30,7 +30,7 @@ std::string notes_text(const std::vector<std::string>& notes) {
   std::string text =
       std::to_string(notes.size()) + (notes.size() == 1 ? " note" : " notes") + " on the inputs:\n";
   for (std::size_t i = 0; i < std::min(notes.size(), kListed); ++i) {
-    text += "  note: " + notes[i] + "\n";
+    text += "  note: " + escape_controls(notes[i]) + "\n";
   }
   if (notes.size() > kListed) {
     text += "  ... and " + std::to_string(notes.size() - kListed) + " more (in plan.json)\n";

@@ -54,7 +54,7 @@ std::vector<std::string> notes_of(const std::vector<SourceSummary>& sources);
 /// Empty if there are none.
 std::string notes_text(const std::vector<std::string>& notes);
 
-/// The frozen plan (DESIGN section 6): which pair becomes which slot of which shard, and the
+/// The frozen plan: which pair becomes which slot of which shard, and the
 /// fingerprint of everything that changes bytes. The same manifest and inputs give the same plan on
 /// every machine with one kind of processor and one set of libraries.
 struct Plan {

@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/marker.h"
 #include "manifests/documents/plan_lines_internal.h"
 
 namespace eventgan {
@@ -201,9 +202,7 @@ std::vector<SourceSummary> read_sources(const StrictValue& value) {
 ShardOutline read_shard_outline(const StrictValue& value) {
   ShardOutline shard;
   StrictObject object = value.object();
-  shard.name = object.at("name").text("a file name ending in .h5", [](std::string_view name) {
-    return name.size() > 3 && name.ends_with(".h5") && name.find('/') == name.npos;
-  });
+  shard.name = object.at("name").text(kShardNameForm, is_shard_name);
   shard.source = object.at("source").integer(0, INT32_MAX);
   shard.volume_size.height = object.at("height").integer(1, kLargestPlannedSide);
   shard.volume_size.width = object.at("width").integer(1, kLargestPlannedSide);

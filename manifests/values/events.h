@@ -61,8 +61,8 @@ enum VolumeFlag : std::uint32_t {
 
 /// Numbers about one volume as generated, before it is quantised for storage.
 struct VolumeStatistics {
-  float eta98 = 0;  ///< 98th percentile of the non-zero values (DESIGN section 5); 0 if empty
-  float max = 0;    ///< largest value
+  float eta98 = 0;             ///< 98th percentile of the non-zero values; 0 if empty
+  float max = 0;               ///< largest value
   float nonzero_fraction = 0;  ///< share of values that are not zero, 0..1
   double sum_positive = 0;     ///< sum over the positive-polarity channels
   double sum_negative = 0;     ///< sum over the negative-polarity channels

@@ -64,7 +64,7 @@ constexpr bool has_events(DatasetKind dataset) {
   return dataset == DatasetKind::kRecording || dataset == DatasetKind::kDhp19;
 }
 
-/// How the Human3.6M source is laid out on disk (DESIGN section 8).
+/// How the Human3.6M source is laid out on disk (manifests/guides/datasets.md).
 enum class Human36mLayout { kFetch, kExtracted, kOfficial };
 
 /// Where the labelled frame lies in its pair: at the end, at the start, or in the middle.
@@ -128,7 +128,7 @@ enum class ImageFit { kStretch, kLetterbox, kCrop };
 /// Whether the picture is made grey before or after it is resized.
 enum class GreyOrder { kBeforeResize, kAfterResize };
 
-/// How a frame becomes the network's input. Presets (DESIGN section 4): kitti = grey before
+/// How a frame becomes the network's input. Presets: kitti = grey before
 /// resizing and a 3x3 blur; mpii = grey before resizing, no blur; demo = grey after resizing, no
 /// blur. A manifest names one, gives both `grey` and `blur`, or takes that of its datasets.
 struct ImageSpec {

@@ -20,6 +20,10 @@ struct Point {
 /// What the datasets write where a point is not known; such a point is never moved by geometry.
 inline constexpr Point kMissingPoint{-1, -1};
 
+/// No label lies farther from the picture's corner, and no camera has a longer focal length: no
+/// picture has such pixels, so what is beyond is a slip.
+inline constexpr double kFarthest_px = 1e6;
+
 /// An upright rectangle given by its edges in pixels: an edge at x lies *between* the centres of
 /// the pixels x-1 and x, so a whole picture is {0, 0, width, height}.
 struct Rectangle {

@@ -11,7 +11,7 @@ namespace eventgan {
 /// left corner at (`offset_y`, `offset_x`) of a volume of size `volume`. Offsets are positive with
 /// borders (letterbox) and negative where the picture is cut (crop).
 ///
-/// Both axes scale by exact ratios, s = scaled / source, so that (DESIGN section 7)
+/// Both axes scale by exact ratios, s = scaled / source, so that
 ///   a point (pixel centres are integers) maps as x' = (x + 0.5) s - 0.5 + offset,
 ///   an edge maps as                              x' = x s + offset.
 struct Placement {

@@ -93,7 +93,7 @@ struct ShardContents {
 };
 
 /// The file SHARD.json beside a shard: written after the shard is whole and in place, so its
-/// existence is what says "done" (DESIGN section 6). A shard is done if its marker parses, names
+/// existence is what says "done". A shard is done if its marker parses, names
 /// the plan, and the shard has the marker's size.
 struct ShardMarker {
   std::string shard;      ///< the shard's file name

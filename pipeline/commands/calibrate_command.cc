@@ -59,7 +59,7 @@ CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobM
 }
 
 int run(const CalibrateArguments& arguments) {
-  const StopSignal signal;
+  const StopSignal signal(stopping_line("the pair under way is finished"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   if (manifest.generator.kind != GeneratorKind::kNetwork) {
     throw UsageError(

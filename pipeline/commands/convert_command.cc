@@ -54,7 +54,9 @@ int convert_and_report(const JobOptions& job, const JobManifest& manifest,
     const TraceSpan span(options.trace, "load generator", "job");
     return load_generator(manifest);
   }();
-  tell_generator(loaded);
+  // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on.
+  if (!loaded.choice.empty()) tell(loaded.choice);
+  for (const std::string& warning : loaded.warnings) tell_warning(warning);
   const ConversionReport report =
       convert(manifest, *loaded.generator, loaded.weights_hash, options);
   std::cout << (job.as_json() ? to_json(report) : to_text(report));
@@ -71,7 +73,7 @@ fs::path trial_folder(fs::path output, std::int64_t limit) {
 
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
-  const StopSignal signal;
+  const StopSignal signal(shard_stopping_line(arguments.grace_s));
   const JobManifest manifest = read_job_manifest(job.manifest);
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
@@ -103,7 +105,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
       "under way or drops it, and exits with 75");
   const auto arguments = std::make_shared<ConvertArguments>();
   add_job_options(*command, arguments->job, "The job (manifests/examples has some)",
-                  "Discard what an earlier run left in the folder");
+                  "Discard what an earlier run of the same job left in the folder");
   command
       ->add_option("--shards", arguments->shards,
                    "This worker's part of the plan: I/N (0 <= I < N) or all; default: what "

@@ -11,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/commands/usage_internal.h"
 #include "pipeline/exports/export_job.h"
 #include "pipeline/runtime/errors.h"
@@ -69,7 +70,7 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   if (command.count("--classes") > 0) options.classes = arguments.classes;
   if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;
   if (arguments.is_float32) options.dtype = StoredType::kFloat32;
-  const StopSignal signal;
+  const StopSignal signal(stopping_line("the samples under way are finished"));
   options.stop = [&] { return signal.requested(); };
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"samples", /*has_bytes=*/false});

@@ -17,7 +17,7 @@ namespace {
 
 /// The published checkpoint's name for the generator.
 constexpr char kGenerator[] = "gen";
-/// What the authors' training draws gaps from (DESIGN section 4), whatever it is configured for.
+/// What the authors' training draws gaps from, though it is configured for 6.
 constexpr GapRange kAuthorsGaps{1, 5};
 
 struct ImportArguments {

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
@@ -24,6 +25,7 @@ namespace fs = std::filesystem;
 struct InitArguments {
   std::vector<std::string> where;  ///< PATH, or DATASET PATH
   std::string out = "manifest.json";
+  bool has_out = false;  ///< --out was given
 };
 
 /// Of those that find_source knows: a camera's recordings are not looked for.
@@ -41,9 +43,10 @@ DatasetKind read_dataset(const std::string& word) {
   throw UsageError("DATASET: expected one of " + words + ", got " + word);
 }
 
-void refuse_to_overwrite(const fs::path& file) {
-  throw UsageError("--out: expected the name of a new file, got one that is there, in " +
-                   file.string());
+void refuse_to_overwrite(const InitArguments& arguments) {
+  const std::string got = "got one that is there, in " + arguments.out;
+  if (arguments.has_out) throw UsageError("--out: expected the name of a new file, " + got);
+  throw UsageError("expected no manifest yet, " + got + " (--out FILE writes to another)");
 }
 
 int run(const InitArguments& arguments) {
@@ -55,7 +58,7 @@ int run(const InitArguments& arguments) {
   const fs::path out = arguments.out;
   if (path.empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
-  if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(out);
+  if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
   const auto dataset = arguments.where.size() == 2
                            ? std::optional(read_dataset(arguments.where.front()))
                            : std::nullopt;
@@ -63,10 +66,11 @@ int run(const InitArguments& arguments) {
   const fs::path folder = fs::absolute(out).lexically_normal().parent_path();
   const ManifestDraft draft = draft_manifest(found, folder, path.is_relative());
   const bool is_new = create_file_atomically(out, [&](const TextSink& sink) { sink(draft.text); });
-  if (!is_new) refuse_to_overwrite(out);
+  if (!is_new) refuse_to_overwrite(arguments);
 
-  for (const std::string& line : draft.findings) std::cout << line << "\n";
-  for (const std::string& note : draft.notes) std::cout << "note: " << note << "\n";
+  for (const std::string& line : draft.findings) std::cout << escape_controls(line) << "\n";
+  for (const std::string& note : draft.notes)
+    std::cout << "note: " << escape_controls(note) << "\n";
   std::cout << "the manifest is in " << out.string() << "\n"
             << (draft.has_pairs ? "next:  "
                                 : "no pairs can be made of this; once that is mended:  ")
@@ -88,9 +92,13 @@ void add_init_command(CLI::App& app, int& exit_code) {
       ->required()
       ->expected(-1)
       ->option_text("[DATASET] PATH");
-  command->add_option("--out", arguments->out, "The manifest, a new file; default: manifest.json")
-      ->option_text("FILE");
-  command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
+  auto* out = command->add_option("--out", arguments->out,
+                                  "The manifest, a new file; default: manifest.json");
+  out->option_text("FILE");
+  command->callback([arguments, out, &exit_code] {
+    arguments->has_out = out->count() > 0;
+    exit_code = run(*arguments);
+  });
 }
 
 }  // namespace eventgan

@@ -1,10 +1,16 @@
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/shard_guard.h"
+#include "pipeline/folder/shown_samples.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
@@ -13,22 +19,45 @@ namespace eventgan {
 namespace {
 
 struct InspectArguments {
-  std::string shard;
-  int sample = -1;
+  std::filesystem::path where;
+  std::optional<std::string> sample;
   bool json = false;
 };
 
-int run(const InspectArguments& arguments) {
-  const ShardReader reader(arguments.shard);
-  const int count = reader.header().sample_count;
-  if (arguments.sample >= count) {
-    throw UsageError("--sample: expected a slot in 0.." + std::to_string(count - 1) + ", got " +
-                     std::to_string(arguments.sample));
+void tell_folder(const InspectArguments& arguments) {
+  const DatasetParts parts = read_dataset_parts(folder_of_shards(arguments.where));
+  std::cout << (arguments.json ? describe_dataset(parts) : dataset_text(parts));
+}
+
+void tell_shard(const InspectArguments& arguments) {
+  const ShardReader reader(arguments.where);
+  std::cout << (arguments.json ? shard_json : describe_shard)(reader);
+}
+
+void tell_sample(const InspectArguments& arguments) {
+  const ShownShards shards = find_shown_shards(arguments.where);
+  const std::vector<ShownSample> found = find_samples(shards, {*arguments.sample});
+  if (found.size() > 1) {
+    std::string files;
+    for (const ShownSample& sample : found) {
+      files += (files.empty() ? "" : ", ") + shards.files[sample.shard].string();
+    }
+    throw UsageError("--sample: expected the id of one sample, got \"" + *arguments.sample +
+                     "\", which " + std::to_string(found.size()) + " have: in " + files +
+                     " (give one of these shards)");
   }
-  if (arguments.sample < 0) {
-    std::cout << (arguments.json ? shard_json(reader) : describe_shard(reader));
+  renew_time_limit();
+  const ShardReader reader(shards.files[found[0].shard]);
+  std::cout << (arguments.json ? sample_json : describe_sample)(reader, found[0].slot);
+}
+
+int run(const InspectArguments& arguments) {
+  if (arguments.sample) {
+    tell_sample(arguments);
+  } else if (means_folder(arguments.where)) {
+    tell_folder(arguments);
   } else {
-    std::cout << (arguments.json ? sample_json : describe_sample)(reader, arguments.sample);
+    tell_shard(arguments);
   }
   std::cout << std::flush;
   return kComplete;
@@ -37,15 +66,20 @@ int run(const InspectArguments& arguments) {
 }  // namespace
 
 void add_inspect_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("inspect", "Tells what is in a shard, or in one of its samples");
+  auto* command = app.add_subcommand(
+      "inspect", "Tells what is in a folder of shards, in a shard, or in one sample");
   const auto arguments = std::make_shared<InspectArguments>();
-  command->add_option("SHARD", arguments->shard, "A shard")->required();
-  command->add_option("--sample", arguments->sample, "A slot, counted from 0")
-      ->check(CLI::NonNegativeNumber);
+  command
+      ->add_option("OUT", arguments->where,
+                   "A folder that convert has written, its dataset.h5, or a shard of one")
+      ->required();
+  command
+      ->add_option("--sample", arguments->sample, std::string("Only this sample, ") + kSampleRule)
+      ->option_text("SAMPLE");
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &exit_code] {
-    exit_code = read_guarded(arguments->shard, [&] { return run(*arguments); });
+    exit_code = (means_folder(arguments->where) ? read_apart : read_guarded)(
+        arguments->where, [&] { return run(*arguments); });
   });
 }
 

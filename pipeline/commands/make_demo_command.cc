@@ -4,7 +4,9 @@
 #include <memory>
 
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/options.h"
 #include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/stopping.h"
 #include "stages/scenes/demo_dataset.h"
 
 namespace eventgan {
@@ -15,11 +17,20 @@ struct DemoOptions {
   std::uint64_t seed = 7;
   int scenes = 0;
   int between = 0;
+  ProgressStyle progress = ProgressStyle::kAuto;
 };
 
 int run(const DemoOptions& options) {
   const std::string& folder = options.folder;
-  write_demo_dataset(folder, options.seed, options.scenes, options.between);
+  {
+    Phase phase(show_phases(options.progress), {"images", /*has_bytes=*/false, "drawing:"},
+                demo_image_count(options.scenes));
+    const StopSignal signal;
+    write_demo_dataset(folder, options.seed, options.scenes, options.between, [&] {
+      phase.advance();
+      if (signal.requested()) throw Stopped("stopped; nothing is left of the dataset");
+    });
+  }
   std::cout << "a small KITTI, MPII and Human3.6M dataset is in " << folder
             << "\nnext:  eventgan convert "
             << (std::filesystem::path(folder) / "manifest.json").string() << std::endl;
@@ -49,6 +60,7 @@ void add_make_demo_command(CLI::App& app, int& exit_code) {
           "the frame after it: what a camera of events sees, for eventgan simulate")
       ->check(CLI::Range(1, 1000))
       ->needs(scenes);
+  add_progress_option(*command, options->progress);
   command->callback([options, &exit_code] { exit_code = run(*options); });
 }
 

@@ -1,5 +1,7 @@
 #include "pipeline/commands/options.h"
 
+#include <fmt/core.h>
+
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <exception>
@@ -113,9 +115,8 @@ int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRe
   return exit_code;
 }
 
-void tell_generator(const LoadedGenerator& loaded) {
-  if (!loaded.choice.empty()) tell(loaded.choice);
-  for (const std::string& warning : loaded.warnings) tell_warning(warning);
+std::string shard_stopping_line(double grace_s) {
+  return stopping_line(fmt::format("this shard is finished if {:g} s are enough", grace_s));
 }
 
 }  // namespace eventgan

@@ -7,7 +7,6 @@
 #include <optional>
 #include <string>
 
-#include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/progress.h"
 #include "pipeline/runtime/trace.h"
 
@@ -63,7 +62,7 @@ struct ProfiledCommand {
 /// else: the exit code stays. Throws UsageError before the work if the file cannot be.
 int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRecorder*)>& work);
 
-/// Tells on the standard error stream which engine was chosen, and the warnings.
-void tell_generator(const LoadedGenerator& loaded);
+/// stopping_line of a run that makes shards, which get so many seconds after a request to stop.
+std::string shard_stopping_line(double grace_s);
 
 }  // namespace eventgan

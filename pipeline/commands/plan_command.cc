@@ -10,6 +10,7 @@
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/plan_summary.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/generators/load_generator.h"
@@ -51,7 +52,8 @@ int freeze(const PlanArguments& arguments, const JobManifest& manifest, Plan pla
                                            ? std::filesystem::path(*arguments.output)
                                            : resolve(manifest, manifest.output.directory);
   std::filesystem::create_directories(folder);
-  const FrozenPlan frozen = freeze_plan(folder, std::move(plan), show_phases(arguments.progress));
+  const FrozenPlan frozen =
+      freeze_plan(folder, std::move(plan), show_phases(arguments.progress), manifest.directory);
   record_manifest_folder(folder, manifest);
   print_frozen(folder, frozen, arguments.json);
   return kComplete;
@@ -60,9 +62,9 @@ int freeze(const PlanArguments& arguments, const JobManifest& manifest, Plan pla
 int run(const PlanArguments& arguments) {
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   const LoadedGenerator loaded = load_generator(manifest);
-  tell_generator(loaded);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
                              {.show_phase = show_phases(arguments.progress)});
+  for (const std::string& warning : job.warnings) tell_warning(warning);
   if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
   const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;

@@ -2,12 +2,14 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
+#include <string>
 
+#include "manifests/documents/json_text_internal.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/preview.h"
 #include "pipeline/folder/shard_guard.h"
+#include "pipeline/folder/shown_samples.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {
@@ -21,7 +23,7 @@ struct PreviewArguments {
 int run(const PreviewArguments& arguments) {
   std::vector<std::string> warnings;
   for (const auto& picture : preview(arguments.where, arguments.options, warnings)) {
-    std::cout << picture.string() << "\n";
+    std::cout << escape_controls(picture.string()) << "\n";
   }
   std::cout << std::flush;
   for (const std::string& warning : warnings) tell_warning(warning);
@@ -30,11 +32,8 @@ int run(const PreviewArguments& arguments) {
 
 /// A single shard is compared with its marker; of many, parts are read.
 int run_guarded(const PreviewArguments& arguments) {
-  const std::filesystem::path& where = arguments.where;
-  std::error_code unknown;
-  const bool is_one =
-      !std::filesystem::is_directory(where, unknown) && where.filename() != kViewName;
-  return (is_one ? read_guarded : read_apart)(where, [&] { return run(arguments); });
+  return (means_folder(arguments.where) ? read_apart : read_guarded)(
+      arguments.where, [&] { return run(arguments); });
 }
 
 }  // namespace
@@ -46,16 +45,19 @@ void add_preview_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<PreviewArguments>();
   PreviewOptions& options = arguments->options;
   command
-      ->add_option("OUT", arguments->where, "A folder that convert has written, or a shard of one")
+      ->add_option("OUT", arguments->where,
+                   "A folder that convert has written, its dataset.h5, or a shard of one")
       ->required();
   command->add_option("--out", options.out, "Folder for the pictures")->required();
   auto* slots = command->add_option("--samples", options.slots, "Of a shard: slots such as 0,3-5")
                     ->option_text("SLOTS");
-  auto* ids =
-      command->add_option("--sample", options.sample_ids, "The sample of this id; may be repeated")
-          ->option_text("ID")
-          ->expected(1)
-          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  auto* ids = command
+                  ->add_option("--sample", options.samples,
+                               std::string("A sample, ") + kSampleRule + ". May be repeated")
+                  ->option_text("SAMPLE")
+                  ->excludes(slots)
+                  ->expected(1)
+                  ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("--class", options.class_name, "Only samples with a box of this class")
       ->option_text("NAME")
       ->excludes(slots, ids);

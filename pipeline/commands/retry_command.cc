@@ -59,7 +59,6 @@ int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder
     const TraceSpan span(trace, "load generator", "job");
     return load_generator(manifest);
   }();
-  tell_generator(loaded);
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total);
   };
@@ -91,7 +90,7 @@ void add_retry_command(CLI::App& app, int& exit_code) {
   add_progress_option(*command, arguments->progress);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] {
-    const StopSignal signal;
+    const StopSignal signal(shard_stopping_line(arguments->grace_s));
     exit_code = run_profiled({arguments->profile, "retry", arguments->folder},
                              [&](TraceRecorder* trace) { return run(*arguments, signal, trace); });
   });

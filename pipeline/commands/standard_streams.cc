@@ -4,13 +4,16 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <streambuf>
 #include <string_view>
+#include <utility>
 
+#include "manifests/documents/json_text_internal.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/progress.h"
 
@@ -62,13 +65,38 @@ void look_at_terminal() {
   has_colours = can_redraw && variable("NO_COLOR").empty();
 }
 
-/// In one piece: a bar may be drawn by another thread meanwhile.
-void write_line(const std::string& line) {
-  std::cerr << (can_redraw && !is_json ? kWipeRow : "") + line + "\n" << std::flush;
+/// Whether a line has characters that steer a terminal: U+0000..1F but tabs, and 7F..9F.
+bool has_controls(std::string_view line) {
+  unsigned char before = 0;
+  return std::ranges::any_of(line, [&](char c) {
+    const auto byte = static_cast<unsigned char>(c);
+    const bool is_upper = std::exchange(before, byte) == 0xc2 && byte >= 0x80 && byte < 0xa0;
+    return (byte < 0x20 && byte != '\t') || byte == 0x7f || is_upper;
+  });
 }
 
+/// The lines with control characters escaped where there are any: names of files, classes and
+/// samples may hold them.
+std::string without_controls(std::string_view lines) {
+  std::string shown;
+  while (true) {
+    const std::size_t end = std::min(lines.find('\n'), lines.size());
+    const std::string_view line = lines.substr(0, end);
+    shown += has_controls(line) ? escape_controls(line) : std::string(line);
+    if (end == lines.size()) return shown;
+    shown += '\n';
+    lines.remove_prefix(end + 1);
+  }
+}
+
+std::string line_of(const std::string& event, const std::string& start, const std::string& text) {
+  if (is_json) return message_json(event, text) + "\n";
+  return (can_redraw ? kWipeRow : "") + start + without_controls(text) + "\n";
+}
+
+/// In one piece: a bar may be drawn by another thread meanwhile.
 void tell(const std::string& event, const std::string& start, const std::string& text) {
-  write_line(is_json ? message_json(event, text) : start + text);
+  std::cerr << line_of(event, start, text) << std::flush;
 }
 
 /// `start` in a colour of ECMA-48's SGR sequences: "31" red, "33" yellow; "1;" bold.
@@ -111,10 +139,44 @@ class StandardStreams::JsonLines final : public std::streambuf {
 
 thread_local std::string StandardStreams::JsonLines::line_;
 
+/// Stands in std::cout's place before the buffer that was there.
+class StandardStreams::PrintableLines final : public std::streambuf {
+ public:
+  PrintableLines() : target_(std::cout.rdbuf(this)) {}
+
+  ~PrintableLines() override {
+    PrintableLines::sync();
+    std::cout.rdbuf(target_);
+  }
+  PrintableLines(const PrintableLines&) = delete;
+  PrintableLines& operator=(const PrintableLines&) = delete;
+
+ protected:
+  int_type overflow(int_type character) override {
+    if (character == traits_type::eof()) return traits_type::not_eof(character);
+    line_ += traits_type::to_char_type(character);
+    return character != '\n' || pass_on() ? character : traits_type::eof();
+  }
+
+  int sync() override { return pass_on() ? target_->pubsync() : -1; }
+
+ private:
+  bool pass_on() {
+    const std::string text = without_controls(line_);
+    line_.clear();
+    const auto size = static_cast<std::streamsize>(text.size());
+    return target_->sputn(text.data(), size) == size;
+  }
+
+  std::string line_;  ///< what has been written of a line so far
+  std::streambuf* target_;
+};
+
 StandardStreams::StandardStreams(int argc, const char* const* argv) {
   open_closed_streams();
   is_json = asks_for_json(argc, argv);
   look_at_terminal();
+  printable_lines_ = std::make_unique<PrintableLines>();
   if (is_json) json_lines_ = std::make_unique<JsonLines>();
 }
 
@@ -136,6 +198,10 @@ void tell_warning(const std::string& text) { tell("warning", coloured("warning: 
 void tell_note(const std::string& text) { tell("note", "note: ", text); }
 
 void tell(const std::string& text) { tell("note", "", text); }
+
+std::string stopping_line(const std::string& what) {
+  return line_of("note", "", "stopping: " + what + "; Ctrl-C again quits at once");
+}
 
 ProgressDisplay::Columns terminal_columns() {
   if (!can_redraw) return {};

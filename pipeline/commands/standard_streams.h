@@ -15,6 +15,8 @@ namespace eventgan {
 ///    ...}. On a terminal a message stands in a row of its own, above the bar if there is one, and
 ///    its first word is coloured if it is "error" or "warning", unless NO_COLOR is set.
 /// 3. What could not be written to the standard output is not passed over (finish()).
+/// 4. No control character of a name steers a terminal: in a line of the standard output, and in a
+///    message, they are escaped (escape_controls). A line without any goes out as it is.
 ///
 /// For one object in the program, made before there are other threads.
 class StandardStreams {
@@ -31,6 +33,8 @@ class StandardStreams {
 
  private:
   class JsonLines;
+  class PrintableLines;
+  std::unique_ptr<PrintableLines> printable_lines_;
   std::unique_ptr<JsonLines> json_lines_;  ///< null: lines are for people
 };
 
@@ -41,6 +45,10 @@ void tell_error(const std::string& text);
 void tell_warning(const std::string& text);
 void tell_note(const std::string& text);
 void tell(const std::string& text);
+
+/// What a StopSignal tells at Ctrl-C, as tell() would write it: what is done before the end, and
+/// what another Ctrl-C does.
+std::string stopping_line(const std::string& what);
 
 /// How wide the terminal on the standard error stream is, asked anew at each call; none where that
 /// stream is no terminal, or one that cannot redraw a line (TERM unset or "dumb").

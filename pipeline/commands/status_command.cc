@@ -1,18 +1,44 @@
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
+#include <system_error>
 
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/folder/folder_status.h"
+#include "pipeline/folder/shown_samples.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {
 namespace {
 
+namespace fs = std::filesystem;
+
 struct StatusArguments {
-  std::string folder;
+  fs::path where;
   bool json = false;
 };
+
+/// The folder that is meant: itself, that of its dataset.h5, or the one that a manifest's job
+/// writes to.
+fs::path output_folder_of(const fs::path& where) {
+  std::error_code unknown;
+  if (means_folder(where)) return folder_of_shards(where);
+  if (!fs::is_regular_file(where, unknown)) return where;
+  const JobManifest manifest = read_job_manifest(where);
+  fs::path folder = resolve(manifest, manifest.output.directory).lexically_normal();
+  if (!folder.has_filename()) folder = folder.parent_path();  // "out/"
+  if (!fs::exists(folder / "plan.json", unknown)) {
+    throw InputError("expected a job that eventgan convert has begun, got no " +
+                     (folder / "plan.json").string() + ", of " + where.string() +
+                     " (a trial is in " + folder.string() +
+                     "-trial-N; for a folder given by --output, name that folder)");
+  }
+  return folder;
+}
 
 }  // namespace
 
@@ -22,10 +48,13 @@ void add_status_command(CLI::App& app, int& exit_code) {
       "What stands in an output folder, from its files alone and on any machine: shards done, "
       "running, missing and damaged, quarantined samples, rate, time left");
   const auto arguments = std::make_shared<StatusArguments>();
-  command->add_option("DIR", arguments->folder, "A folder that convert writes")->required();
+  command
+      ->add_option("DIR", arguments->where,
+                   "A folder that convert writes; or a manifest, for the folder that it names")
+      ->required();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &exit_code] {
-    const FolderStatus status = folder_status(arguments->folder);
+    const FolderStatus status = folder_status(output_folder_of(arguments->where));
     std::cout << (arguments->json ? status_json(status) : status_text(status)) << std::flush;
     exit_code = kComplete;
   });

@@ -14,6 +14,7 @@
 #include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
+#include "pipeline/commands/standard_streams.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/tradeoff/tradeoff.h"
@@ -110,7 +111,7 @@ Computation reference_of(const std::string& text) {
 }
 
 int run(TradeoffArguments& arguments) {
-  const StopSignal signal;
+  const StopSignal signal(stopping_line("the pair under way is finished"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   if (manifest.generator.kind == GeneratorKind::kEvents) {
     throw UsageError(
@@ -127,11 +128,13 @@ int run(TradeoffArguments& arguments) {
   options.out = arguments.out ? std::filesystem::path(*arguments.out)
                               : manifest.directory / (manifest.name + "-tradeoff");
   for (const std::string& real : arguments.real) {
-    options.real.push_back(open_recording(real, std::filesystem::is_directory(real)
-                                                    ? RecordingFormat::kEcd
-                                                    : RecordingFormat::kMvsec));
+    const bool is_folder = std::filesystem::is_directory(real);
+    options.real.push_back(open_recording(
+        real, find_recording_format(real).value_or(is_folder ? RecordingFormat::kEcd
+                                                             : RecordingFormat::kMvsec)));
   }
   options.stop_requested = [&] { return signal.requested(); };
+  if (arguments.progress != ProgressStyle::kNone) options.tell = tell_note;
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
   };
@@ -143,7 +146,8 @@ int run(TradeoffArguments& arguments) {
   if (arguments.progress == ProgressStyle::kJson) {
     std::cout << json << std::flush;
   } else {
-    std::cout << to_text(report, arguments.demand) << options.out.string() << std::endl;
+    std::cout << to_text(report, arguments.demand) << "\nAll that was measured: tradeoff.md, "
+              << "tradeoff.json and tradeoff.png in " << options.out.string() << std::endl;
   }
   return kComplete;
 }
@@ -163,19 +167,22 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
       ->option_text("PRECISION,...");
   command
       .add_option("--sizes", arguments.sizes,
-                  "Of the volume's sides, 1 as in the manifest, 0.05..4; default: 1,0.75,0.5")
+                  "Of the volume's sides, 1 as in the manifest, 0.05..4; default: 1")
       ->delimiter(',')
       ->check(CLI::Range(0.05, 4.0))
       ->option_text("SIZE,...");
   command
       .add_option("--scopes", arguments.scopes,
-                  "Of whole,motion,labels,labels_only; default: the first three")
+                  "Of whole,motion,labels,labels_only; default: the manifest's")
       ->delimiter(',')
       ->option_text("SCOPE,...");
-  command.add_option("--methods", arguments.methods, "Of network,difference,esim; default: all")
+  command
+      .add_option("--methods", arguments.methods,
+                  "Of network,difference,esim; default: network, and the manifest's")
       ->delimiter(',')
       ->option_text("METHOD,...");
-  command.add_option("--dtypes", arguments.dtypes, "Of float32,float16,uint8; default: all")
+  command
+      .add_option("--dtypes", arguments.dtypes, "Of float32,float16,uint8; default: the manifest's")
       ->delimiter(',')
       ->option_text("TYPE,...");
   command
@@ -190,9 +197,10 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
 void add_tradeoff_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "tradeoff",
-      "Measures on pairs of a job what weights, precision, size, method and stored type cost, and "
-      "what they lose against a reference (manifests/guides/tradeoff.md); run again, it does what "
-      "is left");
+      "Measures on pairs of a job what weights, precision, size, scope, method and stored type "
+      "cost, and what they lose against a reference; recommends, with the lines for the manifest "
+      "(manifests/guides/tradeoff.md). At most ten configurations unless told more; run again, it "
+      "does what is left");
   const auto arguments = std::make_shared<TradeoffArguments>();
   command->add_option("MANIFEST", arguments->manifest, "The job")->required();
   add_axes(*command, *arguments);
@@ -212,12 +220,12 @@ void add_tradeoff_command(CLI::App& app, int& exit_code) {
       ->check(CLI::Range(1, 1000));
   command
       ->add_option("--at-most-error", arguments->demand.at_most_error,
-                   "Print the manifest's lines for the fastest with this error (relative L2)")
+                   "Print the manifest's lines for the fastest with this error (relative L2), too")
       ->check(CLI::NonNegativeNumber)
       ->option_text("ERROR");
   command
       ->add_option("--at-least-speed", arguments->demand.at_least_speed,
-                   "Print the manifest's lines for the nearest with so many pairs a second")
+                   "Print the manifest's lines for the nearest with so many pairs a second, too")
       ->check(CLI::NonNegativeNumber)
       ->option_text("SPEED");
   command

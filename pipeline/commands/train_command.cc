@@ -20,7 +20,7 @@ struct TrainArguments {
 
 int run(const TrainArguments& arguments) {
   const TrainingManifest manifest = read_training_manifest(arguments.job.manifest);
-  const StopSignal signal;
+  const StopSignal signal(stopping_line("after this step the state is saved"));
   TrainingOptions options;
   options.output = arguments.job.output_folder();
   options.threads = arguments.job.threads;
@@ -49,7 +49,7 @@ void add_train_command(CLI::App& app, int& exit_code) {
       "by SIGINT, SIGTERM or SIGUSR1 it saves its state; run again, it goes on from there");
   const auto arguments = std::make_shared<TrainArguments>();
   add_job_options(*command, arguments->job, "The training (manifests/examples has one)",
-                  "Discard what an earlier run left in the folder");
+                  "Discard what an earlier run of the same training left in the folder");
   command->add_option("--device", arguments->device, "cpu or cuda; default: cpu")
       ->check(CLI::IsMember({"cpu", "cuda"}));
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

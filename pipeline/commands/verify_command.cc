@@ -40,8 +40,10 @@ void add_verify_command(CLI::App& app, int& exit_code) {
       "each shard, exit code 1 and a line for each fault");
   const auto arguments = std::make_shared<VerifyArguments>();
   command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
-  command->add_flag("--deep", arguments->deep,
-                    "Compare the labels with the sources, too, where these are there");
+  command->add_flag(
+      "--deep", arguments->deep,
+      "Compare pairs and labels, column by column, with the plan and the sources, too, "
+      "where these are there");
   command
       ->add_option("--manifest", arguments->manifest,
                    "With --deep: the job, where its folder has moved; default: as recorded in DIR")

@@ -67,7 +67,9 @@ std::string to_text(const ConversionReport& report) {
     text += " (listed in plan.json)";
   }
   const std::size_t listed = std::min(report.quarantined.size(), kListedFaults);
-  for (std::size_t i = 0; i < listed; ++i) text += "\nquarantined: " + report.quarantined[i].reason;
+  for (std::size_t i = 0; i < listed; ++i) {
+    text += "\nquarantined: " + escape_controls(report.quarantined[i].reason);
+  }
   if (listed < report.quarantined.size()) {
     text += fmt::format("\n... and {} more (in the shards' markers)",
                         report.quarantined.size() - listed);

@@ -118,7 +118,7 @@ struct ConversionBodies {
 };
 
 /// Runs every sample of the shards that `next_shard` gives, until it gives nullptr, through the
-/// flow graph of DESIGN section 3,
+/// graph
 ///   source → limiter → read → generate → finish → sequencer → write → limiter's decrement.
 /// The limiter spans source to writer, since a queueing graph in front of a slow serial writer
 /// holds every message alive. Failures of samples travel as values; an exception that leaves a body

@@ -57,8 +57,8 @@ FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, P
   if (error) {
     throw std::runtime_error("cannot create " + folder.string() + ": " + error.message());
   }
-  if (options.overwrite) discard_output(folder);
-  FrozenPlan frozen = freeze_plan(folder, std::move(plan), options.show_phase);
+  if (options.overwrite) discard_output(folder, plan.fingerprint, manifest.directory);
+  FrozenPlan frozen = freeze_plan(folder, std::move(plan), options.show_phase, manifest.directory);
   restore_shards(folder, {outline_of(frozen.plan), frozen.hash});
   record_place(folder, manifest, options);
   return frozen;
@@ -158,6 +158,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                                   .trace = options.trace,
                                   .show_phase = options.show_phase,
                                   .limit = options.limit});
+  for (const std::string& warning : planned.warnings) tell(options.warn, warning);
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;
   FrozenPlan frozen = prepare_folder(folder, manifest, std::move(planned.plan), options);

@@ -15,7 +15,7 @@ namespace eventgan {
 
 struct ConversionOptions : RunOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
-  bool overwrite = false;                       ///< discard what an earlier run left in the folder
+  bool overwrite = false;                       ///< discard what an earlier run of this job left
   WorkerPart part;                              ///< this worker's shards
   std::optional<std::int64_t> limit;            ///< a trial of so many pairs (PlanningOptions)
   /// Told what goes on: which part this is, where the manifest is now. None: silent.

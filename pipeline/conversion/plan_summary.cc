@@ -37,6 +37,7 @@ std::vector<Place> first_of_each_source(const Plan& plan, int most) {
 
 /// What some pairs cost together.
 struct Cost {
+  int pairs = 0;
   double seconds = 0;
   double bytes = 0;
   double pixels = 0;
@@ -57,23 +58,26 @@ SampleMessage run(const SampleStages& stages, const Place& place) {
 TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
                             const Generator& generator, int threads, int most) {
   const SampleStages stages(manifest, job.datasets, generator, 1);
-  TrialEstimate estimate;
-  std::map<int, Cost> costs;  // by source
+  std::map<int, Cost> costs, first_costs;  // by source
   int warm_source = -1;
   for (const Place& place : first_of_each_source(job.plan, most)) {
     const SampleMessage message = run(stages, place);
-    // The first pair of a source is not measured: libraries prepare, a video is opened.
-    if (std::exchange(warm_source, place.shard->source) != place.shard->source) continue;
+    // In the first pair of a source libraries prepare, a video is opened.
+    const int source = place.shard->source;
+    const bool is_first = std::exchange(warm_source, source) != source;
     if (message.failed()) continue;
-    ++estimate.pairs_measured;
-    Cost& cost = costs[place.shard->source];
+    Cost& cost = (is_first ? first_costs : costs)[source];
+    ++cost.pairs;
     cost.seconds += std::accumulate(message.seconds.begin(), message.seconds.end(), 0.0);
     cost.bytes += static_cast<double>(message.chunk.size());
     cost.pixels += static_cast<double>(place.shard->volume_size.pixel_count());
   }
-  if (estimate.pairs_measured == 0) return estimate;
+  costs.merge(first_costs);  // of sources no other pair of which could be tried
+  TrialEstimate estimate;
+  if (costs.empty()) return estimate;
   Cost all;
   for (const auto& [source, cost] : costs) {
+    estimate.pairs_measured += cost.pairs;
     all.seconds += cost.seconds;
     all.bytes += cost.bytes;
     all.pixels += cost.pixels;
@@ -129,14 +133,17 @@ std::string without_partner_text(const SourceSpec& spec, const SourceSummary& su
   text += fmt::format(
       "  {:<15}  {} of {} labelled frames  ({}", draws ? "no pair at all" : "lacking a gap",
       ids.size(), summary.labelled_frames,
-      fmt::join(ids.begin(), ids.begin() + std::min<std::ptrdiff_t>(kListedIds, std::ssize(ids)),
-                ", "));
+      escape_controls(fmt::format(
+          "{}",
+          fmt::join(ids.begin(),
+                    ids.begin() + std::min<std::ptrdiff_t>(kListedIds, std::ssize(ids)), ", "))));
   return text + (std::ssize(ids) > kListedIds ? ", ...)\n" : ")\n");
 }
 
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
                         const std::map<int, std::int64_t>& without_partner, std::int64_t shards) {
-  std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset), spec.root, spec.split);
+  std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset),
+                                 escape_controls(spec.root), escape_controls(spec.split));
   if (has_events(spec.dataset)) {
     text += fmt::format("  windows          {}\n", pairs_of(summary));
   } else {
@@ -150,7 +157,7 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
         "  to quarantine    {}  (a frame is missing inside the sequence, or a note says why)\n",
         summary.faults);
   }
-  for (const std::string& note : summary.notes) text += "  note: " + note + "\n";
+  for (const std::string& note : summary.notes) text += "  note: " + escape_controls(note) + "\n";
   return text + fmt::format("  shards           {}\n", shards);
 }
 

@@ -18,8 +18,8 @@ struct TrialEstimate {
 };
 
 /// Runs up to `most` pairs from the start of each source through reading, generating and encoding
-/// on the calling thread (after one more that is not measured), and scales by source and picture
-/// size. Pairs that fail are left out.
+/// on the calling thread (after one more, which counts only where no other could be tried), and
+/// scales by source and picture size. Pairs that fail are left out.
 TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
                             const Generator& generator, int threads, int most = 4);
 

@@ -9,6 +9,7 @@
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -23,6 +24,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace.h"
+#include "stages/base/files/file_lock.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -131,6 +133,9 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
       report.quarantined += std::ssize(shard.marker.quarantined);
     }
   }
+  // What was made anew since the first look may have no quarantined sample any more.
+  std::erase_if(earlier.done,
+                [](const CommittedShard& shard) { return shard.marker.quarantined.empty(); });
   return std::move(earlier.done);
 }
 
@@ -138,13 +143,15 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
 /// gets tried, mended, failed, shards_rewritten and what is quarantined still.
 class RetrySink final : public SampleSink {
  public:
-  /// Takes what plan_retry made of `shards`, in their order. All must outlive the sink.
+  /// Takes what plan_retry made of `shards`. All must outlive the sink.
   RetrySink(const fs::path& folder, const std::vector<CommittedShard>& shards, RetryReport& report,
             TraceRecorder* trace)
-      : folder_(folder), next_(shards.begin()), report_(report), trace_(trace) {}
+      : folder_(folder), shards_(shards), report_(report), trace_(trace) {}
 
   void open(const PlannedShard& shard) override {
-    marker_ = &(next_++)->marker;
+    const auto committed = std::ranges::find_if(
+        shards_, [&](const CommittedShard& one) { return one.marker.shard == shard.name; });
+    marker_ = &committed->marker;
     rewrite_ = std::make_unique<ShardRewrite>(
         folder_, *marker_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
   }
@@ -181,7 +188,7 @@ class RetrySink final : public SampleSink {
 
  private:
   const fs::path& folder_;
-  std::vector<CommittedShard>::const_iterator next_;
+  const std::vector<CommittedShard>& shards_;
   const ShardMarker* marker_ = nullptr;    // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
   std::vector<QuarantinedSlot> failed_;    // of the shard under way
@@ -213,6 +220,14 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
                   const std::string& weights_hash, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   FrozenPlan frozen = read_frozen_plan(folder);
+  // Of two that write one shard anew, the one that is through last would put back what the other
+  // has mended.
+  const FileLock lock(folder / "plan.json", FileLock::IfTaken::kGiveUp);
+  if (lock.is_taken()) {
+    throw std::runtime_error(
+        "expected a folder that no other retry works on, got one at work, in " + folder.string() +
+        ": run it again once that is through");
+  }
   const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
   restore_shards(folder, outline);
   const QuarantinedSamples found = find_quarantined(folder, outline);
@@ -282,7 +297,7 @@ std::string to_text(const RetryReport& report) {
   }
   const std::size_t listed = std::min(report.failed.size(), kListedSamples);
   for (std::size_t i = 0; i < listed; ++i) {
-    text += "quarantined: " + report.failed[i].reason + "\n";
+    text += "quarantined: " + escape_controls(report.failed[i].reason) + "\n";
   }
   if (listed < report.failed.size()) {
     text +=

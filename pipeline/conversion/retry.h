@@ -76,8 +76,10 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
 ///
 /// The job must be the frozen one in all but its inputs: where the fingerprint differs in fields
 /// that may change, that is recorded first (amendments.json), so that later runs accept the folder.
-/// Throws UsageError listing the other fields that differ, InputError, Stopped on a request to stop
-/// while it plans, or std::runtime_error when the disk or the generator fails; whole shards stay.
+/// One retry at a time: it holds the lock of plan.json (FileLock). Throws UsageError listing the
+/// other fields that differ, InputError, Stopped on a request to stop while it plans, or
+/// std::runtime_error when another retry is at work, another process has put a shard in place
+/// meanwhile, or the disk or the generator fails; whole shards stay.
 RetryReport retry(const std::filesystem::path& folder, const JobManifest& manifest,
                   const Generator& generator, const std::string& weights_hash,
                   const RunOptions& options);

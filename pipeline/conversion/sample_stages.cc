@@ -39,6 +39,12 @@ std::string size_text(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
+/// `values = {}` would keep it.
+template <class T>
+void free_memory(std::vector<T>& values) {
+  values = std::vector<T>();
+}
+
 /// Rethrows the current exception as one that says at which sample it was.
 [[noreturn]] void name_sample(const SampleMessage& message, const char* work) {
   const PlannedSample& planned = message.planned();
@@ -55,9 +61,9 @@ void SampleMessage::fail(std::string reason) {
   if (!reason.ends_with(id)) reason += id;
   sample.fault = std::move(reason);
   prepared = {};
-  events = {};
-  volume = {};
-  chunk = {};
+  free_memory(events);
+  free_memory(volume);
+  free_memory(chunk);
 }
 
 SampleStages::SampleStages(const JobManifest& manifest,
@@ -128,6 +134,10 @@ void SampleStages::read_events(SampleMessage& message, const Dataset& dataset) c
   prepared.content_x = part.volume_x;
   prepared.content_y = part.volume_y;
   message.events = std::move(window.events);
+  // The window's, whatever a crop leaves of it.
+  if (!message.events.empty()) {
+    message.event_times_s = {message.events.front().t_s, message.events.back().t_s};
+  }
   place_events(prepared.placement, message.events);
   for (Event& event : message.events) {
     event.x -= part.volume_x;
@@ -173,7 +183,9 @@ std::vector<float> SampleStages::take_volume(std::size_t value_count) const {
   std::vector<float> volume;
   {
     const std::lock_guard lock(spare_volumes_mutex_);
-    if (!spare_volumes_.empty()) {
+    if (spare_volumes_.empty()) {
+      ++volumes_made_;
+    } else {
       volume = std::move(spare_volumes_.back());
       spare_volumes_.pop_back();
     }
@@ -187,8 +199,9 @@ void SampleStages::generate(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
   if (manifest_.generator.kind == GeneratorKind::kEvents) {
-    message.volume = event_volume(message.events, {generator_.bins(), prepared.content});
-    message.events = {};
+    message.volume =
+        event_volume(message.events, {generator_.bins(), prepared.content}, message.event_times_s);
+    free_memory(message.events);
     return;
   }
   message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
@@ -203,7 +216,7 @@ void SampleStages::generate(SampleMessage& message) const try {
         tiles_of_volume(wanted, prepared.content_y, prepared.content_x, prepared.placement.volume);
     message.notes = generator_.generate_tiles(prepared.input, wanted, message.volume);
   }
-  message.prepared.input = {};
+  free_memory(message.prepared.input);
 } catch (const std::exception&) {
   name_sample(message, "generate the volume of");
 }
@@ -240,9 +253,9 @@ void SampleStages::finish(SampleMessage& message) const try {
   message.chunk = std::move(encoded.chunk);
   {
     const std::lock_guard lock(spare_volumes_mutex_);
-    spare_volumes_.push_back(std::move(message.volume));
+    if (spare_volumes_.size() < volumes_made_) spare_volumes_.push_back(std::move(message.volume));
   }
-  message.volume = {};
+  free_memory(message.volume);
   message.prepared = {};
 } catch (const std::bad_alloc&) {
   name_sample(message, "store the volume of");

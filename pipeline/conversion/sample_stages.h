@@ -37,6 +37,9 @@ struct SampleMessage {
   ShardSample sample;         ///< read: everything but statistics
   PreparedPair prepared;      ///< read → generate; of events without `input`
   std::vector<Event> events;  ///< read → generate: of datasets of events, in pixels of the content
+  /// With `events`: times of the window's first and last event, whether a crop has left them or
+  /// not.
+  std::array<double, 2> event_times_s{};
   std::vector<float> volume;     ///< generate → finish: [2 bins, H, W] of the content
   GenerationNotes notes;         ///< generate → write
   std::vector<std::byte> chunk;  ///< finish → write
@@ -87,7 +90,9 @@ class SampleStages {
   PairReader reader_;
   VolumeCodec codec_;
   mutable std::mutex spare_volumes_mutex_;
-  mutable std::vector<std::vector<float>> spare_volumes_;  ///< as many as were under way at once
+  /// No more than take_volume has made, whoever made the volumes that come to `finish`.
+  mutable std::vector<std::vector<float>> spare_volumes_;
+  mutable std::size_t volumes_made_ = 0;
 };
 
 }  // namespace eventgan

@@ -30,15 +30,17 @@ bool is_ours(const TemporaryName& name) {
 }  // namespace
 
 SharedFolder::SharedFolder(std::filesystem::path folder, std::string plan_hash,
-                           std::map<std::string, std::string> distrusted)
+                           std::map<std::string, std::string> distrusted,
+                           std::chrono::steady_clock::duration tell_interval)
     : folder_(std::move(folder)),
       plan_hash_(std::move(plan_hash)),
       distrusted_(std::move(distrusted)),
+      tell_interval_(tell_interval),
+      next_tell_(std::chrono::steady_clock::now() + tell_interval),
       next_listing_(std::chrono::steady_clock::now()) {}
 
 SharedFolder::~SharedFolder() {
-  std::error_code ignored;  // the next run cleans up what stays
-  for (const auto& [shard, file] : claims_) std::filesystem::remove(file, ignored);
+  for (const auto& [shard, claim] : claims_) end(claim);
 }
 
 ShardActivity SharedFolder::look_at(const PlannedShard& shard) {
@@ -49,13 +51,29 @@ ShardActivity SharedFolder::look_at(const PlannedShard& shard) {
   return ShardActivity::kFree;
 }
 
-void SharedFolder::opened(const PlannedShard& shard) {
+void SharedFolder::tell(const PlannedShard& shard, int samples) {
+  const std::lock_guard lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  const auto claim = claims_.find(shard.name);
+  if (now < next_tell_ || claim == claims_.end()) return;
+  next_tell_ = now + tell_interval_;
+  const std::string text = std::to_string(samples);  // which only grows
+  // A run does not end for a number that only `status` reads.
+  (void)!::pwrite(claim->second.descriptor, text.data(), text.size(), 0);
+}
+
+void SharedFolder::release(const PlannedShard& shard) {
   const std::lock_guard lock(mutex_);
   const auto claim = claims_.find(shard.name);
   if (claim == claims_.end()) return;
-  std::error_code ignored;
-  std::filesystem::remove(claim->second, ignored);
+  end(claim->second);
   claims_.erase(claim);
+}
+
+void SharedFolder::end(const Claim& claim) {
+  ::close(claim.descriptor);
+  std::error_code ignored;  // the next run cleans up what stays
+  std::filesystem::remove(claim.file, ignored);
 }
 
 bool SharedFolder::is_done(const PlannedShard& shard) const {
@@ -86,8 +104,7 @@ void SharedFolder::claim(const PlannedShard& shard) {
   if (descriptor < 0) {
     throw std::runtime_error("cannot create " + file.string() + ": " + std::strerror(errno));
   }
-  ::close(descriptor);
-  claims_[shard.name] = file;
+  claims_[shard.name] = {file, descriptor};
 }
 
 ShardQueue::ShardQueue(std::vector<const PlannedShard*> shards, Look look)

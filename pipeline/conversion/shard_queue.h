@@ -22,15 +22,18 @@ enum class ShardActivity {
 };
 
 /// The output folder as several workers share it, who know of each other by files alone. A shard
-/// that this worker takes is claimed at once by an empty temporary file, since the samples of the
-/// shard before may keep its writer from opening it for long; else two workers side by side would
-/// make the same shards for ever. Thread safe.
+/// that this worker takes is claimed at once by a temporary file, since the samples of the shard
+/// before may keep its writer from opening it for long; else two workers side by side would make
+/// the same shards for ever. While the shard is written, the file says in decimal how many samples
+/// it has, every two seconds, for `status`: a job that is done sooner writes nothing else. Thread
+/// safe.
 class SharedFolder {
  public:
   /// The shards named in `distrusted` (see EarlierShards) count as done only after their bytes were
   /// hashed, and with another marker if it was that.
   SharedFolder(std::filesystem::path folder, std::string plan_hash,
-               std::map<std::string, std::string> distrusted);
+               std::map<std::string, std::string> distrusted,
+               std::chrono::steady_clock::duration tell_interval = std::chrono::seconds(2));
 
   /// Takes its claims back.
   ~SharedFolder();
@@ -44,19 +47,30 @@ class SharedFolder {
   /// Whether the shard is committed.
   bool is_done(const PlannedShard& shard) const;
 
-  /// The shard's own temporary is there: the claim is not needed any more.
-  void opened(const PlannedShard& shard);
+  /// So many samples of the shard are written.
+  void tell(const PlannedShard& shard, int samples);
+
+  /// The shard is committed, or given up: its claim goes.
+  void release(const PlannedShard& shard);
 
  private:
+  struct Claim {
+    std::filesystem::path file;
+    int descriptor = -1;  // kept: a name could lead elsewhere by now
+  };
+
   bool is_busy(const PlannedShard& shard);
   void claim(const PlannedShard& shard);
+  static void end(const Claim& claim);
 
   std::filesystem::path folder_;
   std::string plan_hash_;
   std::map<std::string, std::string> distrusted_;  // with the text of a marker that is wrong
   std::mutex mutex_;
-  std::map<std::string, std::filesystem::path> claims_;  // by shard
-  std::set<std::string> busy_;                           // what others write, when last listed
+  std::map<std::string, Claim> claims_;  // by shard
+  std::chrono::steady_clock::duration tell_interval_;
+  std::chrono::steady_clock::time_point next_tell_;
+  std::set<std::string> busy_;  // what others write, when last listed
   std::chrono::steady_clock::time_point next_listing_;
 };
 

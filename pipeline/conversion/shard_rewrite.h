@@ -31,8 +31,9 @@ class ShardRewrite {
   void redo(int slot, const SampleMessage& message);
 
   /// Copies the rest, publishes the shard and then its marker; does nothing, and gives false, if
-  /// nothing differs. Between the two names the folder holds a shard that is not its marker's: an
-  /// error just there puts the shard back, after a kill restore_shards does. Once.
+  /// nothing differs. Throws std::runtime_error if another process has put another shard in its
+  /// place meanwhile, or the disk fails. Between the two names the folder holds a shard that is not
+  /// its marker's: an error just there puts the shard back, after a kill restore_shards does. Once.
   bool commit();
 
  private:

@@ -76,7 +76,6 @@ void ShardSink::open(const PlannedShard& shard) {
   span.note("shard", shard.name);
   const std::int64_t start_ns = thread_processor_ns();
   writer_ = std::make_unique<ShardWriter>(job_.folder, header_of(shard, job_));
-  shared_.opened(shard);
   shard_ = &shard;
   marker_ = {};
   marker_.shard = shard.name;
@@ -99,6 +98,7 @@ void ShardSink::add(const SampleMessage& message) {
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
     marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
+  shared_.tell(*shard_, marker_.samples);
   add_write_seconds(start_ns, marker_);
 }
 
@@ -128,10 +128,16 @@ bool ShardSink::commit() {
     const TraceSpan file(job_.options.trace, "write marker", "shard");
     write_file_atomically(job_.folder / marker_name(shard_->name), to_json(marker_));
   }
+  shared_.release(*shard_);
   committed_at_ = std::chrono::steady_clock::now();
   quarantined_ += std::ssize(marker_.quarantined);
   committed_.push_back({shard_, std::move(marker_)});
   return true;
+}
+
+void ShardSink::abandon() {
+  if (writer_) shared_.release(*shard_);
+  writer_.reset();
 }
 
 }  // namespace eventgan

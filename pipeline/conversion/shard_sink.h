@@ -28,7 +28,7 @@ class ShardSink final : public SampleSink {
   /// False if the file under way was lost, but another worker has committed the shard. The marker
   /// is in place on return.
   bool commit() override;
-  void abandon() override { writer_.reset(); }
+  void abandon() override;
   bool closed() const override;
 
   const std::vector<CommittedShard>& committed() const { return committed_; }

@@ -49,9 +49,14 @@ struct PersonColumns {
   }
 };
 
-/// KITTI's image id, "000012" or "000012@before2", as a number.
+/// KITTI's image id, of "000012" or "000012@before2".
+std::string kitti_image(const std::string& sample_id) {
+  return sample_id.substr(0, sample_id.find('@'));
+}
+
+/// The same as a number.
 std::size_t kitti_row(const std::string& sample_id) {
-  const std::string digits = sample_id.substr(0, sample_id.find('@'));
+  const std::string digits = kitti_image(sample_id);
   std::size_t row = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), row);
   if (error != std::errc() || end != digits.data() + digits.size()) {
@@ -75,7 +80,7 @@ std::size_t add_row(RowIds& ids, const ExportSource& source, const std::string& 
   return row;
 }
 
-/// SET.hdf5, and beside it SET.npz for persons, else SET.txt.
+/// SET.hdf5, and beside it SET.npz for persons, else SET.txt, a line for each sample.
 class DavisExporter : public Exporter {
  public:
   explicit DavisExporter(const ExportOptions& options) : dtype_(options.dtype) {}
@@ -155,7 +160,10 @@ class DavisExporter : public Exporter {
       layout.row_count = std::max(layout.row_count, row + 1);
     });
     layout.list_name = set.name + ".txt";
-    for (const auto& [row, id] : ids) layout.list += id + "\n";
+    // Of KITTI object it is the detector's list of ids: the row is the line as a number, and a row
+    // without a sample must have none.
+    const bool has_images = source.dataset == "kitti_object";
+    for (const auto& [row, id] : ids) layout.list += (has_images ? kitti_image(id) : id) + "\n";
     return layout;
   }
 

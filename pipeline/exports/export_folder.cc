@@ -1,11 +1,14 @@
 #include "pipeline/exports/export_folder.h"
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <stdexcept>
 #include <system_error>
+#include <vector>
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
@@ -22,7 +25,36 @@ constexpr char kReceipts[] = ".export";
 constexpr char kIdentity[] = "export.txt";
 constexpr char kBegun[] = ".begun";
 
-/// A receipt that parses; else null.
+/// Whether an export has files of this name: the exporters say which.
+bool is_export_name(std::string_view name) {
+  static constexpr std::array<std::string_view, 5> kFolders{"annot", "events", "images", "labels",
+                                                            "volumes"};
+  static constexpr std::array<std::string_view, 9> kEndings{
+      ".hdf5", ".json", ".mat", ".npy", ".npz", ".png", ".tar", ".txt", ".yaml"};
+  constexpr std::size_t kMostParts = 3;
+  const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
+  if (!std::ranges::all_of(name, is_plain)) return false;
+  std::vector<std::string_view> parts;
+  for (std::size_t begin = 0, end = 0; end != name.npos; begin = end + 1) {
+    end = name.find('/', begin);
+    parts.push_back(name.substr(begin, end == name.npos ? end : end - begin));
+    if (parts.back().empty() || parts.back().starts_with('.')) return false;
+  }
+  if (parts.size() > kMostParts) return false;
+  if (parts.size() > 1 && std::ranges::find(kFolders, parts[0]) == kFolders.end()) return false;
+  return std::ranges::any_of(kEndings,
+                             [&](std::string_view ending) { return name.ends_with(ending); });
+}
+
+/// `record`: the file that the name stands in, or the folder that it is for.
+void require_export_name(const std::string& name, const fs::path& record) {
+  if (is_export_name(name)) return;
+  throw std::runtime_error("expected the name of a file that an export writes, got " +
+                           dump_json(nlohmann::json(name), JsonLayout::kAsciiLine) + ", in " +
+                           record.string());
+}
+
+/// A receipt that parses; else null. Throws std::runtime_error for a name that is not believed.
 nlohmann::json read_receipt(const fs::path& file) {
   std::string reason;
   const auto text = try_read_file(file, reason);
@@ -30,7 +62,11 @@ nlohmann::json read_receipt(const fs::path& file) {
   const auto json = text ? parse_json_text(*text, faults) : std::nullopt;
   const bool is_sound = json && json->is_object() && json->contains("input") &&
                         json->contains("files") && json->at("files").is_object();
-  return is_sound ? *json : nlohmann::json();
+  if (!is_sound) return {};
+  for (const auto& [relative, size] : json->at("files").items()) {
+    require_export_name(relative, file);
+  }
+  return *json;
 }
 
 /// The files that a receipt lists; none if it does not parse.
@@ -43,14 +79,16 @@ std::set<std::string> files_of(const fs::path& receipt) {
 }
 
 /// The files that a journal names, in quotes and each with a line end before it: one that was
-/// broken off is none, and does not spoil the next one.
+/// broken off is none, and does not spoil the next one. Throws as read_receipt does.
 std::set<std::string> read_journal(const fs::path& file) {
   std::string reason;
   std::istringstream lines(try_read_file(file, reason).value_or(""));
   std::set<std::string> names;
   for (std::string line; std::getline(lines, line);) {
     const auto name = nlohmann::json::parse(line, nullptr, /*allow_exceptions=*/false);
-    if (name.is_string()) names.insert(name.get<std::string>());
+    if (!name.is_string()) continue;
+    require_export_name(name, file);
+    names.insert(name.get<std::string>());
   }
   return names;
 }
@@ -60,8 +98,16 @@ void append_to_journal(const fs::path& file, const std::set<std::string>& names)
   for (const std::string& name : names) text += "\n" + dump_json(nlohmann::json(name));
   std::ofstream journal(file, std::ios::app);
   if (!(journal << text).flush()) {
-    throw std::system_error(errno, std::generic_category(), "cannot write " + file.string());
+    throw_system_error("cannot write " + file.string(), errno);
   }
+}
+
+/// The line of an identity that says whose shards were exported; empty if it has none.
+std::string_view job_of(std::string_view identity) {
+  constexpr std::string_view kJob = "\njob ";
+  const std::size_t at = identity.find(kJob);
+  if (at == identity.npos) return {};
+  return identity.substr(at + 1, identity.find('\n', at + 1) - at - 1);
 }
 
 }  // namespace
@@ -73,11 +119,18 @@ bool ExportFolder::is_of(const fs::path& folder, const std::string& identity) {
 
 ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool overwrite)
     : folder_(std::move(folder)) {
+  require_no_link(folder_, kReceipts);
   const fs::path file = folder_ / kReceipts / kIdentity;
   std::string reason;
   const auto found = try_read_file(file, reason);
   const bool is_same = found && *found == identity;
   if (found && !is_same) {
+    if (job_of(*found) != job_of(identity)) {
+      throw UsageError(
+          "expected a new folder, or one of this job's exports, got that of another, " +
+          folder_.string() + " (choose another --out, or remove that one yourself):\n" + *found +
+          "instead of\n" + identity);
+    }
     if (!overwrite) {
       throw UsageError("expected a new folder, or one of the same export, got that of another, " +
                        folder_.string() + " (--overwrite starts again):\n" + *found +
@@ -108,7 +161,9 @@ fs::path ExportFolder::receipt(const std::string& step) const {
 }
 
 fs::path ExportFolder::journal(const std::string& step) const {
-  return folder_ / kReceipts / (step + kBegun);
+  const fs::path file = folder_ / kReceipts / (step + kBegun);
+  require_no_link(file.parent_path(), file.filename());  // unlike a receipt it is written in place
+  return file;
 }
 
 void ExportFolder::make_folder(const fs::path& folder) {
@@ -128,13 +183,14 @@ void ExportFolder::discard() {
     files.insert(named.begin(), named.end());
   }
   std::set<fs::path> folders{""};
-  std::error_code kept;  // somebody else's file keeps a folder
   for (const fs::path& relative : files) {
-    fs::remove(folder_ / relative, kept);
     for (fs::path above = relative; above.has_parent_path();) {
       folders.insert(above = above.parent_path());
     }
   }
+  for (const fs::path& below : folders) require_no_link(folder_, below);
+  std::error_code kept;  // somebody else's file keeps a folder
+  for (const fs::path& relative : files) fs::remove(folder_ / relative, kept);
   for (auto below = folders.rbegin(); below != folders.rend(); ++below) {
     const fs::path folder = folder_ / *below;
     if (!fs::is_directory(folder)) continue;
@@ -149,12 +205,19 @@ ExportFolder::Step::Step(ExportFolder& folder, std::string name, std::string inp
 
 bool ExportFolder::Step::is_done() const {
   const nlohmann::json json = read_receipt(folder_.receipt(name_));
-  if (json.is_null() || json.at("input") != input_ || fs::exists(folder_.journal(name_))) {
-    return false;
-  }
+  const fs::path journal = folder_.journal(name_);
+  read_journal(journal);  // names that are not believed, before the step is done again
+  if (json.is_null() || json.at("input") != input_ || fs::exists(journal)) return false;
+  fs::path folder;  // of the file before
   return std::ranges::all_of(json.at("files").items(), [&](const auto& file) {
+    const fs::path relative = file.key();
+    if (relative.parent_path() != folder) {
+      require_no_link(folder_.folder_, folder = relative.parent_path());
+    }
     std::error_code missing;
-    const auto size = fs::file_size(folder_.folder_ / file.key(), missing);
+    const fs::path path = folder_.folder_ / relative;
+    if (!fs::is_regular_file(fs::symlink_status(path, missing))) return false;
+    const auto size = fs::file_size(path, missing);
     return !missing && file.value() == size;
   });
 }
@@ -167,6 +230,8 @@ void ExportFolder::begin(const std::string& step) {
 }
 
 fs::path ExportFolder::Step::file(const std::string& relative) {
+  require_export_name(relative, folder_.folder_);
+  require_no_link(folder_.folder_, fs::path(relative).parent_path());
   folder_.begin(name_);
   const fs::path path = folder_.folder_ / relative;
   {
@@ -194,7 +259,9 @@ void ExportFolder::Step::finish() {
                         dump_json(nlohmann::json{{"input", input_}, {"files", files}}) + "\n");
   const fs::path journal = folder_.journal(name_);
   for (const std::string& relative : read_journal(journal)) {
-    if (!files_.contains(relative)) fs::remove(folder_.folder_ / relative);
+    if (files_.contains(relative)) continue;
+    require_no_link(folder_.folder_, fs::path(relative).parent_path());
+    fs::remove(folder_.folder_ / relative);
   }
   fs::remove(journal);
 }

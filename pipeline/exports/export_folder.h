@@ -18,15 +18,20 @@ inline constexpr char kExportDescription[] = "export.json";
 /// with their sizes. A step is done if its receipt is of the same input and each of its files has
 /// its size; else it is done again, and export.json, a step of its own, goes before anything else
 /// is written. .export/STEP.begun, a journal, names each file of a step under way before it is
-/// written, so that a killed run's can be found. Thread safe.
+/// written, so that a killed run's can be found.
+///
+/// A name that a receipt or a journal has is believed if it is one that an export writes:
+/// [FOLDER/[SPLIT/]]NAME.ENDING, FOLDER and ENDING of those in use, no part hidden. Any other is a
+/// std::runtime_error that names it and its record; so is a symbolic link on the way to a file, as
+/// require_no_link says. Both come before anything is removed. Thread safe.
 class ExportFolder {
  public:
   /// Whether the folder is that of the export already.
   static bool is_of(const std::filesystem::path& folder, const std::string& identity);
 
-  /// Begins, or goes on with, the export that `identity` describes, a line for each of its
-  /// settings. Throws UsageError if the folder holds another one or other files; with `overwrite`
-  /// another export's files go first, those of a run that was killed too.
+  /// Begins or resumes the export that `identity` describes, a line for each of its settings.
+  /// Throws UsageError if the folder holds another one or other files. With `overwrite` another
+  /// export of the same job (its "job" line) is removed first, also that of a run that was killed.
   ExportFolder(std::filesystem::path folder, const std::string& identity, bool overwrite);
 
   /// Files that are made together, and their receipt.
@@ -38,7 +43,8 @@ class ExportFolder {
     bool is_done() const;
 
     /// Where to write the file `relative`, whose folder is there afterwards. The file counts as
-    /// this step's, and must be under its name at `finish`. Thread safe, as is `write`.
+    /// this step's, and must be under its name at `finish`. Throws std::runtime_error for a name
+    /// that would not be believed. Thread safe, as is `write`.
     std::filesystem::path file(const std::string& relative);
     void write(const std::string& relative, std::string_view bytes);
 

@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/dataset_description.h"
@@ -85,13 +86,27 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
                      frozen.hash + ", in " + (folder_ / "plan.json").string() + kWayOut);
   }
   missing_ = json.at("missing");
-  for (const auto& source : json.at("sources")) {
+  const JobManifest manifest =
+      parse_job_manifest(frozen.plan.manifest_text, folder_, (folder_ / "plan.json").string());
+  Sha256 sources;
+  for (const SourceSpec& spec : manifest.sources) {
+    sources.update(fmt::format("{}\n{}\n{}\n", to_string(spec.dataset), spec.root, spec.split));
     ExportSource& known = sources_.emplace_back();
-    known.dataset = source.at("dataset");
-    known.split = source.at("split");
+    known.dataset = to_string(spec.dataset);
+    known.split = spec.split;
+    const auto& source = json.at("sources").at(sources_.size() - 1);
+    if (source.at("dataset") != known.dataset || source.at("split") != known.split) {
+      throw InputError(fmt::format(
+          "expected {}, split {}, as source {} of the plan, got {}, split "
+          "{}, in {}{}",
+          known.dataset, known.split, sources_.size() - 1,
+          dump_json(source.at("dataset"), JsonLayout::kAsciiLine),
+          dump_json(source.at("split"), JsonLayout::kAsciiLine), file.string(), kWayOut));
+    }
     if (source.at("class_names").is_array()) known.class_names = source.at("class_names");
     if (source.at("joint_names").is_array()) known.joint_names = source.at("joint_names");
   }
+  sources_hash_ = sources.hex();
   std::vector<std::string> there;
   for (const ExportSource& source : sources_) {
     if (std::ranges::find(there, source.split) == there.end()) there.push_back(source.split);

@@ -15,8 +15,8 @@ namespace eventgan {
 
 /// A source of the manifest, as far as an export asks.
 struct ExportSource {
-  std::string dataset;  ///< "kitti_object"
-  std::string split;
+  std::string dataset;  ///< "kitti_object"; as the frozen manifest has it, like the split:
+  std::string split;    ///< files are named after both
   /// What the names of its samples' files begin with: nothing, unless its split has other sources:
   /// then DATASET and '+', from the second of one kind on DATASET-2 and '+'.
   std::string name_prefix;
@@ -49,13 +49,15 @@ struct ExportSet {
 /// A finalized folder, to be exported. Thread safe.
 class ExportInput {
  public:
-  /// `splits`: none means all. Throws InputError if the folder is not finalized, its plan is
-  /// another than that of dataset.json, or a shard is missing or another one by now; UsageError for
-  /// a split that it does not have.
+  /// `splits`: none means all. Throws InputError if the folder is not finalized, its plan or its
+  /// sources are others than those of dataset.json, or a shard is missing or another one by now;
+  /// UsageError for a split that it does not have.
   ExportInput(const std::filesystem::path& folder, const std::vector<std::string>& splits);
 
   const std::string& name() const { return name_; }
   const std::string& plan_hash() const { return plan_hash_; }
+  /// What tells this job from others of its name: a hash of its sources as the manifest names them.
+  const std::string& sources_hash() const { return sources_hash_; }
   const std::vector<std::string>& splits() const { return splits_; }  ///< chosen, plan's order
   const std::vector<ExportSource>& sources() const { return sources_; }
   const std::vector<ExportShard>& shards() const { return shards_; }    ///< in plan order
@@ -81,7 +83,7 @@ class ExportInput {
   void name_sources();
 
   std::filesystem::path folder_;
-  std::string name_, plan_hash_;
+  std::string name_, plan_hash_, sources_hash_;
   std::vector<std::string> splits_, missing_;
   std::vector<ExportSource> sources_;
   std::vector<ExportShard> shards_;

@@ -189,8 +189,9 @@ std::unique_ptr<Exporter> make_exporter(const ExportInput& input, const ExportOp
 
 std::string identity_text(const ExportInput& input, const ExportOptions& options,
                           const Exporter& exporter) {
-  std::string text = fmt::format("eventgan export, version 1\nto {}\nplan {}\nsplits",
-                                 word_of(options.to), input.plan_hash());
+  std::string text =
+      fmt::format("eventgan export, version 1\njob {}, sources {:.16}\nto {}\nplan {}\nsplits",
+                  input.name(), input.sources_hash(), word_of(options.to), input.plan_hash());
   for (const std::string& split : input.splits()) text += " " + split;
   return text + "\n" + exporter.settings();
 }

@@ -1,11 +1,5 @@
 #include "pipeline/folder/amendments.h"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
-#include <cerrno>
-#include <cstring>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
@@ -13,6 +7,7 @@
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/strict_json_internal.h"
 #include "stages/base/files/atomic_file.h"
+#include "stages/base/files/file_lock.h"
 #include "stages/base/files/input_file.h"
 
 namespace eventgan {
@@ -27,28 +22,6 @@ constexpr int kVersion = 1;
 struct Document {
   std::string plan_hash;
   std::vector<Amendment> amendments;
-};
-
-/// While it lives, nobody else reads amendments in order to add one: of two that did, the one that
-/// wrote last would drop the other's. Held by flock on the folder itself, so that it leaves no
-/// file, and ends with the process however that ends; others wait. Where the file system has no
-/// flock for folders (NFS) it holds nobody off.
-class AmendmentLock {
- public:
-  explicit AmendmentLock(const fs::path& folder)
-      : descriptor_(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC)) {
-    if (descriptor_ < 0) {
-      throw std::runtime_error("cannot open " + folder.string() + ": " + std::strerror(errno));
-    }
-    while (::flock(descriptor_, LOCK_EX) != 0 && errno == EINTR) {
-    }
-  }
-  ~AmendmentLock() { ::close(descriptor_); }
-  AmendmentLock(const AmendmentLock&) = delete;
-  AmendmentLock& operator=(const AmendmentLock&) = delete;
-
- private:
-  int descriptor_;
 };
 
 Amendment read_amendment(const StrictValue& value) {
@@ -103,7 +76,9 @@ void record_amendment(const fs::path& folder, const std::string& plan_hash,
   for (const auto& [field, value] : amendment.fields) {
     if (!is_amendable(field)) throw std::invalid_argument("this field may not change: " + field);
   }
-  const AmendmentLock lock(folder);
+  // Of two that read amendments in order to add one, the one that wrote last would drop the
+  // other's.
+  const FileLock lock(folder, FileLock::IfTaken::kWait);
   std::vector<Amendment> all = read_amendments(folder, plan_hash);
   if (!all.empty() && all.back() == amendment) return;  // by another who found the same
   all.push_back(amendment);

@@ -1,15 +1,21 @@
 #include "pipeline/folder/dataset_description.h"
 
+#include <fmt/core.h>
+#include <fmt/ranges.h>
+
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <set>
 #include <stdexcept>
+#include <string_view>
 #include <utility>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
+#include "pipeline/folder/shard_guard.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -67,6 +73,19 @@ DatasetParts read_dataset_parts(const fs::path& folder, FrozenOutline frozen,
       outline.volume_size = {};
     }
     parts.done.push_back(std::move(shard));
+  }
+  return parts;
+}
+
+DatasetParts read_dataset_parts(const fs::path& folder) {
+  lift_time_limit();  // plan and commit records of a large job take long, and are no HDF5
+  FrozenOutline frozen = read_frozen_outline(folder);
+  std::vector<ShardState> shards = scan_shards(folder, frozen.plan.shards, frozen.hash);
+  renew_time_limit();
+  DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
+  lift_time_limit();
+  if (parts.done.empty()) {
+    throw InputError("expected shards that are done, got none, in " + folder.string());
   }
   return parts;
 }
@@ -250,10 +269,8 @@ Json settings(const std::string& manifest_text) {
   return Json::parse(manifest_text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
 }
 
-}  // namespace
-
-std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
-                             const ViewReceipt& receipt) {
+/// dataset.json but for its view.
+Json description(const DatasetParts& parts) {
   const ShardHeader& header = parts.headers.begin()->second;
   Json json = {{"format", kDatasetFormat},
                {"version", kDatasetVersion},
@@ -277,14 +294,93 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
     json["shards"].push_back(shard_entry(parts, shard));
   }
   json["quarantined"] = quarantined_json(parts);
+  if (!parts.amendments.empty()) json["amendments"] = amendments_json(parts.amendments);
+  return json;
+}
+
+/// A reason may quote a path, and paths need not be UTF-8, but JSON must be.
+std::string text_of(const Json& json) { return dump_json(json, JsonLayout::kIndented) + "\n"; }
+
+}  // namespace
+
+std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
+                             const ViewReceipt& receipt) {
+  Json json = description(parts);
   json["view"] = {{"name", kViewName},
                   {"sha256", receipt.sha256},
                   {"size_bytes", receipt.size_bytes},
                   {"views", Json::array()}};
   for (const DatasetView& view : views) json["view"]["views"].push_back(view_entry(view));
-  if (!parts.amendments.empty()) json["amendments"] = amendments_json(parts.amendments);
-  // A reason may quote a path, and paths need not be UTF-8, but JSON must be.
-  return dump_json(json, JsonLayout::kIndented) + "\n";
+  return text_of(json);
+}
+
+std::string describe_dataset(const DatasetParts& parts) { return text_of(description(parts)); }
+
+namespace {
+
+template <class Key>
+std::string joined(const std::map<Key, std::int64_t>& counts) {
+  std::string all;
+  for (const auto& [key, count] : counts) {
+    all += fmt::format("{}{}: {}", all.empty() ? "" : ", ", key, count);
+  }
+  return all;
+}
+
+std::string counts_text(const DatasetCounts& counts) {
+  return fmt::format("{}, {} of them quarantined, {} boxes, {} persons", counts.samples,
+                     counts.quarantined(), counts.boxes, counts.persons);
+}
+
+}  // namespace
+
+std::string dataset_text(const DatasetParts& parts) {
+  constexpr std::size_t kListed = 20;
+  DatasetCounts total;
+  std::map<int, DatasetCounts> sources;
+  std::set<std::string> sizes;
+  for (const ShardState& shard : parts.done) {
+    const ImageSize& size = shard.outline.volume_size;
+    add(*shard.marker, total);
+    add(*shard.marker, sources[shard.outline.source]);
+    sizes.insert(fmt::format("{} x {}", size.height, size.width));
+  }
+  const ShardHeader& header = parts.headers.begin()->second;
+  const std::vector<std::string> few(sizes.begin(), sizes.end());
+  const std::size_t shown = std::min(few.size(), kListed);
+
+  std::string text = parts.frozen.plan.name + "\n";
+  const auto line = [&](std::string_view name, const std::string& value) {
+    text += fmt::format("  {:14} {}\n", name, escape_controls(value));
+  };
+  line("shards", fmt::format("{} of {} done", total.shards, parts.frozen.plan.shards.size()));
+  line("samples", counts_text(total));
+  for (const auto& [source, counts] : sources) {
+    const SourceSpec& spec = parts.manifest.sources.at(static_cast<std::size_t>(source));
+    line("source", fmt::format("{} {}, split {}: samples {}", to_string(spec.dataset), spec.root,
+                               spec.split, counts_text(counts)));
+  }
+  line("volumes",
+       fmt::format("2 polarities x {} bins, {}{} (height x width), {}, normalization {}",
+                   header.volume.bins,
+                   fmt::join(few.begin(), few.begin() + std::ptrdiff_t(shown), ", "),
+                   shown < few.size() ? fmt::format(" and {} more", few.size() - shown) : "",
+                   to_string(header.dtype), to_string(header.normalization)));
+  line("gaps", joined(total.gaps) + " (frames: samples)");
+  if (total.boxes > 0) line("boxes", joined(total.classes));
+  line("generator", header.generator);
+  line("weights",
+       header.weights.empty() ? header.weights_hash : header.weights + ", " + header.weights_hash);
+  line("plan", parts.frozen.hash);
+  for (std::size_t i = 0; i < std::min(parts.done.size(), kListed); ++i) {
+    const ShardMarker& marker = *parts.done[i].marker;
+    line(i == 0 ? "done" : "", fmt::format("{}, samples {}, {} of them quarantined", marker.shard,
+                                           marker.samples, marker.samples - marker.valid));
+  }
+  if (parts.done.size() > kListed) {
+    line("", fmt::format("... and {} more (--json lists them)", parts.done.size() - kListed));
+  }
+  return text;
 }
 
 }  // namespace eventgan

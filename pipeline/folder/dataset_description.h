@@ -41,6 +41,11 @@ struct DatasetParts {
 DatasetParts read_dataset_parts(const std::filesystem::path& folder, FrozenOutline frozen,
                                 std::vector<ShardState> shards);
 
+/// The same of what stands there, by the markers alone, for a look at it: no shard is hashed, so
+/// this must run where a damaged one may be opened (read_apart). Throws InputError too, if there is
+/// no plan or no shard that is done.
+DatasetParts read_dataset_parts(const std::filesystem::path& folder);
+
 /// The shards that are done, those that are alike together: of one kind of dataset, one size of
 /// volumes, one schema of labels. Views come in the order of their first shard. A single one stands
 /// at the file's root; of several each has a group named after dataset and size,
@@ -72,5 +77,12 @@ void add(const ShardMarker& marker, DatasetCounts& counts);
 /// done; `receipt` is the view file's. Throws std::runtime_error if the frozen manifest is no JSON.
 std::string describe_dataset(const DatasetParts& parts, const std::vector<DatasetView>& views,
                              const ViewReceipt& receipt);
+
+/// The same before there is a view: without "view".
+std::string describe_dataset(const DatasetParts& parts);
+
+/// What is in a folder, for a person: how much of it is done, counts by source, volumes, labels by
+/// class, gaps, and its shards, of very many the first. Lines, each ended. `parts` as above.
+std::string dataset_text(const DatasetParts& parts);
 
 }  // namespace eventgan

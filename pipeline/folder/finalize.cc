@@ -58,7 +58,8 @@ std::string to_text(const FinalizationReport& report) {
   for (std::size_t i = 0; i < listed; ++i) {
     const ShardState& shard = report.missing[i];
     // What is wrong with a shard names its file.
-    text += (shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard) + "\n";
+    text += escape_controls((shard.faults.empty() ? shard.outline.name + ": " : "") + why(shard)) +
+            "\n";
   }
   if (listed < report.missing.size()) {
     text += fmt::format("... and {} more (all: --json)\n", report.missing.size() - listed);

@@ -3,7 +3,11 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <chrono>
+#include <cmath>
+#include <fstream>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -41,6 +45,18 @@ void add_running(std::vector<ShardAtWork>& running, ShardAtWork work) {
   running.push_back(std::move(work));
 }
 
+/// How many samples of a shard are written, where the temporary is a claim that says so (see
+/// SharedFolder); else 0.
+int samples_told(const UnfinishedFile& file) {
+  std::array<char, 10> text{};
+  std::ifstream stream(file.path, std::ios::binary);
+  stream.read(text.data(), text.size());
+  int samples = 0;
+  const char* const end = text.data() + stream.gcount();
+  const auto [stop, error] = std::from_chars(text.data(), end, samples);
+  return error == std::errc() && stop == end && samples > 0 ? samples : 0;
+}
+
 /// A folder being written to.
 class Observer {
  public:
@@ -71,6 +87,8 @@ class Observer {
         add_done(shard, status, commits);
       } else if (at_work_.contains(shard.outline.name)) {
         ++status.shards_running;
+        status.samples_under_way +=
+            std::min(at_work_.at(shard.outline.name), shard.outline.samples);
       } else {
         status.damaged.insert(status.damaged.end(), shard.faults.begin(), shard.faults.end());
       }
@@ -87,7 +105,9 @@ class Observer {
     at_work_.clear();
     for (const UnfinishedFile& file : files_) {
       const auto target = shard_of_target_.find(file.name.target);
-      if (target != shard_of_target_.end() && !is_stale(file)) at_work_.insert(target->second);
+      if (target == shard_of_target_.end() || is_stale(file)) continue;
+      int& samples = at_work_[target->second];
+      samples = std::max(samples, samples_told(file));
     }
   }
 
@@ -129,7 +149,7 @@ class Observer {
   std::map<std::string, std::string> shard_of_target_;  // by the names of shards and markers
   std::vector<ShardState> shards_;
   std::vector<UnfinishedFile> files_;
-  std::set<std::string> at_work_;  // shards
+  std::map<std::string, int> at_work_;  // shards, with their samples so far
 };
 
 }  // namespace
@@ -143,8 +163,8 @@ std::optional<double> FolderStatus::seconds_left() const {
   if (complete()) return 0.0;
   const std::optional<double> rate = pairs_per_second();
   if (!rate || !(*rate > 0)) return std::nullopt;
-  const auto left =
-      samples_planned - samples_written - static_cast<std::int64_t>(quarantined.size());
+  const auto left = samples_planned - samples_written - samples_under_way -
+                    static_cast<std::int64_t>(quarantined.size());
   return static_cast<double>(left) / *rate;
 }
 
@@ -183,10 +203,11 @@ namespace {
 constexpr std::size_t kListed = 20;
 
 /// Rows of cells, the columns aligned, each row indented; cut after kListed rows.
-std::string table(const std::vector<std::vector<std::string>>& rows) {
+std::string table(std::vector<std::vector<std::string>> rows) {
   const std::size_t shown = std::min(rows.size(), kListed);
   std::vector<std::size_t> widths;
   for (std::size_t i = 0; i < shown; ++i) {
+    for (std::string& cell : rows[i]) cell = escape_controls(cell);
     widths.resize(std::max(widths.size(), rows[i].size()));
     for (std::size_t j = 0; j < rows[i].size(); ++j) {
       widths[j] = std::max(widths[j], rows[i][j].size());
@@ -211,7 +232,8 @@ std::string section(const std::string& title, const std::vector<std::vector<std:
 }
 
 std::string age_text(const UnfinishedFile& file) {
-  return "last wrote " + duration_text(file.silent_s, "dhms") + " ago";
+  const std::string span = duration_text(std::abs(file.silent_s), "dhms");
+  return file.silent_s < 0 ? "dated " + span + " ahead" : "last wrote " + span + " ago";
 }
 
 std::vector<std::vector<std::string>> running_rows(const FolderStatus& status) {
@@ -280,14 +302,21 @@ std::string work_text(const FolderStatus& status) {
                      duration_text(*left, "dhms"));
 }
 
+/// Written, quarantined and these together are what the bar of one worker counts.
+std::string under_way_text(const FolderStatus& status) {
+  return status.shards_running == 0
+             ? ""
+             : fmt::format("{} more in shards under way, ", status.samples_under_way);
+}
+
 }  // namespace
 
 std::string status_text(const FolderStatus& status) {
   return fmt::format("folder   {}\n", status.folder.string()) +
          fmt::format("plan     {:.16}\n", status.plan_hash) +
          fmt::format("shards   {}\n", shards_text(status)) +
-         fmt::format("samples  {} of {} written, {} quarantined\n", status.samples_written,
-                     status.samples_planned, status.quarantined.size()) +
+         fmt::format("samples  {} of {} written, {}{} quarantined\n", status.samples_written,
+                     status.samples_planned, under_way_text(status), status.quarantined.size()) +
          fmt::format("work     {}\n", work_text(status)) +
          section("running", running_rows(status)) +
          section("left over by dead writers (deleted by the next convert)",
@@ -356,6 +385,7 @@ std::string status_json(const FolderStatus& status) {
                          {"samples",
                           {{"planned", status.samples_planned},
                            {"written", status.samples_written},
+                           {"under_way", status.samples_under_way},
                            {"quarantined", status.quarantined.size()}}},
                          {"running", running_json(status)},
                          {"left_over", left_over_json(status)},

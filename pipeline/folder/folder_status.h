@@ -26,6 +26,7 @@ struct FolderStatus {
   int shards_running = 0;  ///< not done, and someone who seems alive is writing them
   std::int64_t samples_planned = 0;
   std::int64_t samples_written = 0;       ///< valid ones of committed shards
+  std::int64_t samples_under_way = 0;     ///< of the shards that are running, as their writers tell
   std::vector<ShardAtWork> running;       ///< an entry a writer; a shard can have two
   std::vector<UnfinishedFile> left_over;  ///< temporaries of dead writers
   std::vector<std::string> damaged;       ///< a line for each shard that is there and not done

@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstdio>
 #include <fstream>
@@ -22,6 +23,7 @@
 #include "manifests/documents/plan_lines_internal.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
+#include "pipeline/planning/make_plan.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
@@ -141,10 +143,109 @@ std::string hash_of(const Plan& plan, const ShowPhase& show_phase) {
   return hash.hex();
 }
 
+using Fingerprint = std::map<std::string, std::string>;
+
+/// The fingerprint that the first line of FOLDER/plan.json states, also where the plan is damaged
+/// further on; empty if that line is.
+Fingerprint stated_fingerprint(const fs::path& folder) {
+  const fs::path file = folder / kPlanName;
+  std::error_code unknown;
+  if (!fs::is_regular_file(file, unknown)) return {};
+  std::ifstream stream(file, std::ios::binary);
+  std::string line;
+  std::getline(stream, line);
+  if (line.ends_with(',')) line.back() = '}';
+  FaultList faults(file.string());
+  const auto document = parse_json_text(line, faults);
+  if (!document || !document->is_object() || !document->contains("fingerprint")) return {};
+  try {
+    return document->at("fingerprint").get<Fingerprint>();
+  } catch (const nlohmann::json::type_error&) {
+    return {};
+  }
+}
+
+/// Whether a field of the fingerprint tells which labelled frames are whose: the job's name, and of
+/// each source all but what says how pairs are made of its frames.
+bool tells_the_job(std::string_view field) {
+  constexpr std::string_view kSource = "manifest $.sources[";
+  if (field == "manifest $.name") return true;
+  if (!field.starts_with(kSource)) return false;
+  const std::string_view key = field.substr(std::min(field.find("].") + 2, field.size()));
+  return std::ranges::none_of(
+      std::array{"pairs", "window_s", "window_events", "label_at", "every", "frames_per_second",
+                 "raw_root", "devkit", "sequences"},
+      [&](std::string_view how) { return key.substr(0, key.find('.')) == how; });
+}
+
+bool is_same_place(const fs::path& a, const fs::path& b) {
+  std::error_code unknown;
+  return a.lexically_normal() == b.lexically_normal() || fs::equivalent(a, b, unknown);
+}
+
+/// A line for each field by which the job that has frozen its plan in FOLDER is another than that
+/// of `now`; none if it is the same, or the plan does not tell. `discards`: where places cannot be
+/// compared, what lies there must be the same.
+std::vector<std::string> job_differences(const fs::path& folder, const Fingerprint& frozen,
+                                         const Fingerprint& now, const fs::path& manifest_folder,
+                                         bool discards) {
+  if (frozen.empty()) return {};
+  Fingerprint frozen_job, job;
+  const auto of_the_job = [](const auto& field) { return tells_the_job(field.first); };
+  std::ranges::copy_if(frozen, std::inserter(frozen_job, frozen_job.end()), of_the_job);
+  std::ranges::copy_if(now, std::inserter(job, job.end()), of_the_job);
+  const auto frozen_folder = recorded_manifest_folder(folder);
+  const bool has_folders = frozen_folder && !manifest_folder.empty();
+  bool may_have_moved = !has_folders;
+  for (auto& [field, value] : frozen_job) {
+    const bool is_path = field.ends_with("].root") || field.ends_with("].annotations");
+    const auto other = job.find(field);
+    if (!is_path || other == job.end() || !has_folders) continue;
+    const auto on_disk = [](const fs::path& start, const std::string& text) {
+      const auto path = nlohmann::json::parse(text, nullptr, /*allow_exceptions=*/false);
+      return start / (path.is_string() ? path.get<std::string>() : text);
+    };
+    const fs::path was = on_disk(*frozen_folder, value);
+    const fs::path is = on_disk(manifest_folder, other->second);
+    std::error_code unknown;
+    if (is_same_place(was, is)) {
+      other->second = value;
+    } else if (value == other->second) {
+      may_have_moved |= !fs::exists(was, unknown);
+      if (may_have_moved) continue;
+      value = was.string();
+      other->second = is.string();
+    }
+  }
+  // Inputs that are not where they were have moved, or belong to a job whose disk is not there.
+  for (const char* content : {"annotations", "frames"}) {
+    if (!discards || !may_have_moved || !frozen.contains(content) || !now.contains(content)) {
+      continue;
+    }
+    frozen_job[content] = frozen.at(content);
+    job[content] = now.at(content);
+  }
+  if (limit_of(now) && !limit_of(frozen)) job["limit"] = std::to_string(*limit_of(now));
+  return fingerprint_differences(frozen_job, job);
+}
+
+void refuse_another_job(const fs::path& folder, const Fingerprint& now,
+                        const fs::path& manifest_folder, bool discards) {
+  const Fingerprint frozen = stated_fingerprint(folder);
+  const auto differences = job_differences(folder, frozen, now, manifest_folder, discards);
+  if (differences.empty()) return;
+  const auto name = frozen.find("manifest $.name");
+  std::string message = "expected the folder of this job, got that of another" +
+                        (name == frozen.end() ? "" : ", " + name->second) + ", in " +
+                        folder.string() +
+                        " (choose another output folder, or remove that one yourself):";
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
 /// What to do about a fingerprint that differs: inputs that were mended ask for no new start, which
 /// would throw away what all other shards took.
-const char* way_out(const std::map<std::string, std::string>& frozen,
-                    std::map<std::string, std::string> now) {
+const char* way_out(const Fingerprint& frozen, Fingerprint now) {
   for (const auto& [field, value] : frozen) {
     if (is_amendable(field)) now[field] = value;
   }
@@ -154,12 +255,12 @@ const char* way_out(const std::map<std::string, std::string>& frozen,
 }
 
 /// Throws UsageError with a line for each field that differs.
-void require_same_fingerprint(const fs::path& plan_file,
-                              const std::map<std::string, std::string>& frozen,
-                              const std::map<std::string, std::string>& now) {
+void require_same_fingerprint(const fs::path& folder, const Fingerprint& frozen,
+                              const Fingerprint& now, const fs::path& manifest_folder) {
   const auto differences = fingerprint_differences(frozen, now);
   if (differences.empty()) return;
-  std::string message = plan_file.string() +
+  refuse_another_job(folder, now, manifest_folder, /*discards=*/false);
+  std::string message = (folder / kPlanName).string() +
                         " was frozen by a run that would have written other bytes" +
                         way_out(frozen, now);
   for (const std::string& difference : differences) message += "\n  " + difference;
@@ -176,7 +277,8 @@ FrozenOutline read_frozen_outline(const fs::path& folder) {
   return read_plan_file<FrozenOutline>(folder, &read_plan_outline);
 }
 
-FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_phase) {
+FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_phase,
+                       const fs::path& manifest_folder) {
   const fs::path file = folder / kPlanName;
   std::string hash;
   const bool is_first = create_file_atomically(file, [&](const TextSink& sink) {
@@ -197,7 +299,8 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_
   if (amendments.empty() && hash == frozen_hash) return {std::move(plan), hash};
 
   FrozenOutline frozen = read_frozen_outline(folder);
-  require_same_fingerprint(file, amended(frozen.plan.fingerprint, amendments), plan.fingerprint);
+  require_same_fingerprint(folder, amended(frozen.plan.fingerprint, amendments), plan.fingerprint,
+                           manifest_folder);
   // Inputs that were mended since then may give other samples now (a hole that was filled): those
   // that were frozen stay.
   if (!amendments.empty()) {
@@ -216,8 +319,10 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_
       file.string() + " (--overwrite starts again)");
 }
 
-void discard_output(const fs::path& folder) {
+void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
+                    const fs::path& manifest_folder) {
   if (!fs::exists(folder / kPlanName)) return;
+  refuse_another_job(folder, fingerprint, manifest_folder, /*discards=*/true);
   std::vector<ShardOutline> shards;
   try {
     shards = read_frozen_outline(folder).plan.shards;
@@ -248,6 +353,17 @@ void record_manifest_folder(const fs::path& folder, const JobManifest& manifest)
   write_file_atomically(folder / kRunName, text + "\n");
 }
 
+namespace {
+
+/// What run.json may say: a program's working folder says nothing of where the inputs are, and the
+/// file system would cut a path at a NUL.
+std::optional<fs::path> as_manifest_folder(const std::string& path) {
+  const bool is_sound = path.starts_with('/') && path.find('\0') == path.npos;
+  return is_sound ? std::optional<fs::path>(path) : std::nullopt;
+}
+
+}  // namespace
+
 std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
   std::string text;
   try {
@@ -259,10 +375,10 @@ std::optional<fs::path> recorded_manifest_folder(const fs::path& folder) {
   const auto json = parse_json_text(text, faults);
   if (!json || !json->is_object()) return std::nullopt;
   try {
-    if (json->contains(kManifestFolder)) return json->at(kManifestFolder).get<std::string>();
+    if (json->contains(kManifestFolder)) return as_manifest_folder(json->at(kManifestFolder));
     if (!json->contains(kManifestFolderBytes)) return std::nullopt;
     const auto bytes = json->at(kManifestFolderBytes).get<std::vector<unsigned char>>();
-    return std::string(bytes.begin(), bytes.end());
+    return as_manifest_folder({bytes.begin(), bytes.end()});
   } catch (const nlohmann::json::type_error&) {  // other values
     return std::nullopt;
   }
@@ -273,7 +389,7 @@ JobManifest recorded_manifest(const fs::path& folder, const PlanOutline& plan,
   if (file) return read_job_manifest(*file);
   const auto inputs = recorded_manifest_folder(folder);
   if (!inputs) {
-    throw UsageError("expected the manifest's folder, got none, in " +
+    throw UsageError("expected the manifest's folder, an absolute path, got none, in " +
                      (folder / "run.json").string() + " (--manifest FILE says where it is)");
   }
   return parse_job_manifest(plan.manifest_text, *inputs, (folder / "plan.json").string());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -28,20 +29,29 @@ struct FrozenOutline {
 /// the same. Throws UsageError listing the fields that differ otherwise, or if the same fingerprint
 /// has another plan; std::runtime_error if the one that is there is damaged, or on an error of
 /// writing, after which there is no plan.json. Safe in several processes and threads at once.
+/// `manifest_folder` is where the plan's relative paths start: it decides nothing but the advice.
 FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan,
-                       const ShowPhase& show_phase = {});
+                       const ShowPhase& show_phase = {},
+                       const std::filesystem::path& manifest_folder = {});
 
 /// The plan of an output folder. Throws InputError if there is none, std::runtime_error if it is
 /// damaged.
 FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
 FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
 
-/// Deletes plan.json, every shard and marker it names, and what was made from these
-/// (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None without a plan.
-void discard_output(const std::filesystem::path& folder);
+/// Makes room for the job that has this fingerprint, its relative paths starting at
+/// `manifest_folder`: deletes plan.json, every shard and marker it names, and what was made from
+/// these (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None without a
+/// plan. Throws UsageError, and deletes nothing, if the plan is of another job, whose shards this
+/// one would not make anew: of another name, or of other labelled frames (another source, folder,
+/// annotation, split or selection); or if it is of a whole job, and this one is a trial.
+void discard_output(const std::filesystem::path& folder,
+                    const std::map<std::string, std::string>& fingerprint,
+                    const std::filesystem::path& manifest_folder);
 
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a
-/// convenience, not part of the plan.
+/// convenience, not part of the plan. One that is damaged, or has another than an absolute path, is
+/// as none.
 void record_manifest_folder(const std::filesystem::path& folder, const JobManifest& manifest);
 std::optional<std::filesystem::path> recorded_manifest_folder(const std::filesystem::path& folder);
 

@@ -12,10 +12,9 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/placement.h"
-#include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
-#include "pipeline/folder/shard_scan.h"
+#include "pipeline/folder/shown_samples.h"
 #include "stages/events/pictures/picture_output.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
@@ -32,17 +31,20 @@ std::string picture_name(const fs::path& shard, int slot) {
   return shard.stem().string() + "_" + number + ".png";
 }
 
-/// The frame of a recording of events; a fault names its file.
-Outcome<ColourFrame> decode_recorded(const fs::path& folder, const JobManifest& manifest,
+/// The frame of a recording of events; a fault names its file. `source`: that of the sample, if
+/// known. A path alone does not lead to it: two sources can be the two cameras of one file.
+Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* source,
                                      const FrameRef& frame) try {
-  const auto source = std::ranges::find_if(manifest.sources, [&](const SourceSpec& spec) {
-    return spec.dataset == DatasetKind::kRecording && frame.path.starts_with(spec.root);
-  });
-  const std::string camera = source == manifest.sources.end() ? "left" : source->camera;
   fs::path path = folder / frame.path;
+  if (source == nullptr) {
+    return SampleFault{
+        "expected the shard's plan beside it, since its manifest has several such "
+        "sources, got none, for a frame in " +
+        path.string()};
+  }
   if (path.filename() == "events.txt") path = path.parent_path();
-  const auto format = find_recording_format(path, camera).value_or(RecordingFormat::kMvsec);
-  const GreyImage grey = open_recording(path, format, camera)->frame(frame.video_frame);
+  const auto format = find_recording_format(path, source->camera).value_or(RecordingFormat::kMvsec);
+  const GreyImage grey = open_recording(path, format, source->camera)->frame(frame.video_frame);
   ColourFrame colour{grey.size, {}};
   for (const std::uint8_t pixel : grey.pixels) colour.bgr.insert(colour.bgr.end(), 3, pixel);
   return colour;
@@ -74,10 +76,14 @@ struct PreviewReader::State {
   fs::path frames;
   std::vector<std::string>& warnings;
   FrameDecoder decoder;
-  fs::path shard;  ///< that `reader` has open
-  std::optional<ShardReader> reader;
-  JobManifest manifest;
+  fs::path shard{};  ///< that `reader` has open
+  std::optional<ShardReader> reader{};
+  JobManifest manifest{};
   bool has_events = false;  ///< is made of a camera's events
+  /// Of events: the source that `shard` is of; null if nothing tells.
+  const SourceSpec* source = nullptr;
+  fs::path planned{};                     ///< the folder whose plan was asked for
+  std::optional<FrozenOutline> frozen{};  ///< if it has a sound one
 
   void open(const fs::path& file) {
     if (reader && shard == file) return;
@@ -88,11 +94,45 @@ struct PreviewReader::State {
     manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
     has_events = manifest.generator.kind == GeneratorKind::kEvents;
     shard = file;
+    if (has_events) find_source();
+  }
+
+  /// The plan beside the shard says which source it is of; without it the manifest does, if it has
+  /// only one that can be meant.
+  void find_source() {
+    const ShardHeader& header = reader->header();
+    read_plan(fs::absolute(shard).parent_path());
+    source = nullptr;
+    if (frozen && frozen->hash == header.plan_hash) {
+      for (const ShardOutline& outline : frozen->plan.shards) {
+        if (outline.name != header.name) continue;
+        source = &manifest.sources.at(static_cast<std::size_t>(outline.source));
+        return;
+      }
+    }
+    for (const SourceSpec& spec : manifest.sources) {
+      if (to_string(spec.dataset) != header.dataset || spec.split != header.split) continue;
+      if (source != nullptr) {
+        source = nullptr;
+        return;
+      }
+      source = &spec;
+    }
+  }
+
+  void read_plan(const fs::path& folder) {
+    if (planned == folder) return;
+    planned = folder;
+    frozen.reset();
+    try {
+      frozen = read_frozen_outline(folder);
+    } catch (const std::runtime_error&) {  // a shard can have been taken elsewhere on its own
+    }
   }
 };
 
 PreviewReader::PreviewReader(fs::path frames, std::vector<std::string>& warnings)
-    : state_(new State{frames, warnings, FrameDecoder(frames), {}, std::nullopt, {}, {}}) {}
+    : state_(new State{frames, warnings, FrameDecoder(frames)}) {}
 PreviewReader::~PreviewReader() = default;
 PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;
 
@@ -112,7 +152,7 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
       return std::vector<std::uint8_t>();
     }
     return frame_picture(state_->has_events
-                             ? decode_recorded(state_->frames, state_->manifest, which)
+                             ? decode_recorded(state_->frames, state_->source, which)
                              : state_->decoder.decode(which, sample.pair.video_stride()),
                          which, sample, state_->manifest.image, state_->warnings);
   };
@@ -137,46 +177,7 @@ namespace {
                    " such as 0,3-5, got \"" + text + "\"");
 }
 
-/// What is looked at.
-struct Shards {
-  fs::path folder;
-  std::vector<fs::path> files;
-  std::vector<int> samples;  ///< of each
-  std::vector<int> sources;  ///< of each: the manifest's source
-  bool is_folder = false;
-};
-
-Shards find_shards(const fs::path& where) {
-  if (!fs::is_directory(where) && where.filename() != kViewName) {
-    renew_time_limit();
-    const int samples = ShardReader(where).header().sample_count;
-    lift_time_limit();
-    return {fs::absolute(where).parent_path(), {where}, {samples}, {0}};
-  }
-  Shards shards;
-  shards.is_folder = true;
-  shards.folder = fs::is_directory(where) ? where : fs::absolute(where).parent_path();
-  const FrozenOutline frozen = read_frozen_outline(shards.folder);
-  for (const ShardState& shard : scan_shards(shards.folder, frozen.plan.shards, frozen.hash)) {
-    if (!shard.done()) continue;
-    shards.files.push_back(shards.folder / shard.outline.name);
-    shards.samples.push_back(shard.outline.samples);
-    shards.sources.push_back(shard.outline.source);
-  }
-  if (shards.files.empty()) {
-    throw InputError("expected shards that are done, got none, in " + shards.folder.string());
-  }
-  return shards;
-}
-
-/// A sample by its shard's place in Shards.
-struct Chosen {
-  std::size_t shard = 0;
-  int slot = 0;
-  auto operator<=>(const Chosen&) const = default;
-};
-
-ShardOverview overview_of(const Shards& shards, std::size_t shard) {
+ShardOverview overview_of(const ShownShards& shards, std::size_t shard) {
   renew_time_limit();
   ShardOverview overview = read_overview(shards.files[shard]);
   lift_time_limit();
@@ -197,7 +198,7 @@ bool has_box_of(const std::string& class_name, const ShardOverview& shard, int s
 
 /// Calls visit(place, overview) for every sample that `options` leaves to choose from.
 template <class Visit>
-void visit_samples(const Shards& shards, const PreviewOptions& options, Visit&& visit) {
+void visit_samples(const ShownShards& shards, const PreviewOptions& options, Visit&& visit) {
   std::set<std::string> known;
   bool any = false;
   for (std::size_t i = 0; i < shards.files.size(); ++i) {
@@ -207,7 +208,7 @@ void visit_samples(const Shards& shards, const PreviewOptions& options, Visit&& 
     for (int slot = 0; slot < overview.header.sample_count; ++slot) {
       if (!options.class_name.empty() && !has_box_of(options.class_name, overview, slot)) continue;
       any = true;
-      visit(Chosen{i, slot}, overview);
+      visit(ShownSample{i, slot}, overview);
     }
   }
   if (any || options.class_name.empty()) return;
@@ -218,9 +219,9 @@ void visit_samples(const Shards& shards, const PreviewOptions& options, Visit&& 
                    options.class_name + "\"");
 }
 
-std::vector<Chosen> worst_samples(const Shards& shards, const PreviewOptions& options) {
-  std::map<Extreme, std::set<std::pair<double, Chosen>>> best;  // the least extreme first
-  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
+std::vector<ShownSample> worst_samples(const ShownShards& shards, const PreviewOptions& options) {
+  std::map<Extreme, std::set<std::pair<double, ShownSample>>> best;  // the least extreme first
+  visit_samples(shards, options, [&](ShownSample place, const ShardOverview& overview) {
     for (const Extreme extreme : {Extreme::kEmptiest, Extreme::kFullest, Extreme::kExtrapolated}) {
       const auto ranked = rank(extreme, overview, place.slot);
       if (!ranked) continue;
@@ -228,7 +229,7 @@ std::vector<Chosen> worst_samples(const Shards& shards, const PreviewOptions& op
       if (std::ssize(best[extreme]) > options.worst) best[extreme].erase(best[extreme].begin());
     }
   });
-  std::vector<Chosen> chosen;
+  std::vector<ShownSample> chosen;
   for (const auto& [extreme, samples] : best) {
     for (auto sample = samples.rbegin(); sample != samples.rend(); ++sample) {
       if (std::ranges::find(chosen, sample->second) == chosen.end()) {
@@ -239,46 +240,31 @@ std::vector<Chosen> worst_samples(const Shards& shards, const PreviewOptions& op
   return chosen;
 }
 
-std::vector<Chosen> named_samples(const Shards& shards, const PreviewOptions& options) {
-  std::vector<Chosen> chosen;
-  std::set<std::string> missing(options.sample_ids.begin(), options.sample_ids.end());
-  const std::set<std::string> wanted = missing;
-  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
-    const std::string& id = overview.tables.pairs.sample_id[static_cast<std::size_t>(place.slot)];
-    if (!wanted.contains(id)) return;
-    missing.erase(id);
-    chosen.push_back(place);
-  });
-  if (missing.empty()) return chosen;
-  throw UsageError("--sample: expected the id of a sample, got \"" + *missing.begin() + "\", in " +
-                   shards.folder.string());
-}
-
-std::vector<Chosen> choose(const Shards& shards, const PreviewOptions& options) {
+std::vector<ShownSample> choose(const ShownShards& shards, const PreviewOptions& options) {
   if (!options.slots.empty()) {
     if (shards.is_folder) {
       throw UsageError("--samples: expected a shard to have these slots, got the folder " +
                        shards.folder.string() + " (--sample ID)");
     }
-    std::vector<Chosen> chosen;
+    std::vector<ShownSample> chosen;
     for (const int slot : parse_slots(options.slots, shards.samples[0])) {
       chosen.push_back({0, slot});
     }
     return chosen;
   }
-  if (!options.sample_ids.empty()) return named_samples(shards, options);
+  if (!options.samples.empty()) return find_samples(shards, options.samples);
   if (options.worst > 0) return worst_samples(shards, options);
   constexpr int kPictures = 8, kTiles = 24;
   const int count = options.count.value_or(options.sheet ? kTiles : kPictures);
-  std::vector<Chosen> all;
+  std::vector<ShownSample> all;
   if (!options.class_name.empty()) {
-    visit_samples(shards, options, [&](Chosen place, const auto&) { all.push_back(place); });
+    visit_samples(shards, options, [&](ShownSample place, const auto&) { all.push_back(place); });
   } else {
     for (std::size_t i = 0; i < shards.files.size(); ++i) {
       for (int slot = 0; slot < shards.samples[i]; ++slot) all.push_back({i, slot});
     }
   }
-  std::vector<Chosen> chosen;
+  std::vector<ShownSample> chosen;
   for (const std::int64_t at : spread(count, std::ssize(all))) {
     chosen.push_back(all[static_cast<std::size_t>(at)]);
   }
@@ -288,34 +274,35 @@ std::vector<Chosen> choose(const Shards& shards, const PreviewOptions& options) 
 /// The sequence's samples in order, and how fast they go.
 struct Sequence {
   std::string name;
-  std::vector<Chosen> samples;
+  std::vector<ShownSample> samples;
   double frames_per_second = 10;  ///< where the dataset tells no times
 };
 
 /// Source and name.
 using SequenceKey = std::pair<int, std::string>;
 
-SequenceKey sequence_of(const Shards& shards, Chosen place, const ShardOverview& overview) {
+SequenceKey sequence_of(const ShownShards& shards, ShownSample place,
+                        const ShardOverview& overview) {
   return {shards.sources[place.shard],
           overview.tables.pairs.sequence[static_cast<std::size_t>(place.slot)]};
 }
 
-SequenceKey wanted_sequence(const Shards& shards, const PreviewOptions& options) {
-  if (!options.slots.empty() || !options.sample_ids.empty()) {
-    const Chosen first = choose(shards, options).front();
+SequenceKey wanted_sequence(const ShownShards& shards, const PreviewOptions& options) {
+  if (!options.slots.empty() || !options.samples.empty()) {
+    const ShownSample first = choose(shards, options).front();
     return sequence_of(shards, first, overview_of(shards, first.shard));
   }
   std::map<SequenceKey, int> lengths;
-  visit_samples(shards, options, [&](Chosen place, const ShardOverview& overview) {
+  visit_samples(shards, options, [&](ShownSample place, const ShardOverview& overview) {
     ++lengths[sequence_of(shards, place, overview)];
   });
   return std::ranges::max_element(lengths, {}, [](const auto& entry) { return entry.second; })
       ->first;
 }
 
-Sequence read_sequence(const Shards& shards, const PreviewOptions& options) {
+Sequence read_sequence(const ShownShards& shards, const PreviewOptions& options) {
   struct Frame {
-    Chosen place;
+    ShownSample place;
     int gap = 0;
     double seconds_a_frame = 0;
   };
@@ -376,13 +363,12 @@ std::optional<double> rank(Extreme extreme, const ShardOverview& shard, int slot
 
 std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& options,
                               std::vector<std::string>& warnings) {
-  lift_time_limit();
-  const Shards shards = find_shards(where);
+  const ShownShards shards = find_shown_shards(where);
   const fs::path frames = !options.frames.empty()
                               ? fs::absolute(options.frames)
                               : recorded_manifest_folder(shards.folder).value_or(shards.folder);
   PreviewReader reader(frames, warnings);
-  const auto content = [&](Chosen place) {
+  const auto content = [&](ShownSample place) {
     return reader.content(shards.files[place.shard], place.slot);
   };
   if (options.video) {
@@ -396,7 +382,7 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
     });
     return {video};
   }
-  const std::vector<Chosen> chosen = choose(shards, options);
+  const std::vector<ShownSample> chosen = choose(shards, options);
   if (chosen.empty()) {
     throw InputError("expected a valid sample, got none, in " + where.string());
   }
@@ -405,12 +391,12 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
   if (options.sheet) {
     constexpr int kColumns = 3, kTileWidth = 400;
     std::vector<ColourFrame> tiles;
-    for (const Chosen& place : chosen) tiles.push_back(draw_tile(content(place), kTileWidth));
+    for (const ShownSample& place : chosen) tiles.push_back(draw_tile(content(place), kTileWidth));
     pictures.push_back(options.out / "sheet.png");
     write_png(draw_sheet(tiles, kColumns), pictures.back());
     return pictures;
   }
-  for (const Chosen& place : chosen) {
+  for (const ShownSample& place : chosen) {
     pictures.push_back(options.out / picture_name(shards.files[place.shard], place.slot));
     write_png(draw_preview(content(place)), pictures.back());
   }

@@ -14,11 +14,12 @@ namespace eventgan {
 
 struct PreviewOptions {
   std::filesystem::path out;  ///< folder for the pictures, created if absent
-  /// Which samples, the first of these that is given: slots such as "0,3-5", of a single shard; all
-  /// pairs of some sample_ids; of those that are valid the `worst` emptiest, fullest and farthest
-  /// beyond the gaps that the generator was trained on; `count` spread over all.
+  /// Which samples, the first of these that is given: slots such as "0,3-5", of a single shard;
+  /// those with some names, as find_samples has them; of those that are valid the `worst` emptiest,
+  /// fullest and farthest beyond the gaps that the generator was trained on; `count` spread over
+  /// all.
   std::string slots;
-  std::vector<std::string> sample_ids;
+  std::vector<std::string> samples;
   int worst = 0;
   std::optional<int> count;  ///< none: 8, of a sheet 24
   std::string class_name;    ///< only samples with a box of it; empty: any
@@ -37,7 +38,7 @@ struct PreviewOptions {
 ///
 /// Of a folder every shard that is done counts, and of those that no sample is chosen from only the
 /// overview is read. Throws InputError if there is no shard or no valid sample to choose from,
-/// UsageError for slots, ids or a class that none has; what ShardReader throws.
+/// UsageError for slots, names or a class that none has; what ShardReader throws.
 std::vector<std::filesystem::path> preview(const std::filesystem::path& where,
                                            const PreviewOptions& options,
                                            std::vector<std::string>& warnings);

@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <csignal>
@@ -18,6 +19,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/marker.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
@@ -31,6 +33,9 @@ namespace fs = std::filesystem;
 
 /// Of the processor, for one step: the columns of a shard, or one sample.
 constexpr int kLimit_s = 10;
+
+/// Signals of what HDF5 may do with a damaged file; any other comes from outside.
+constexpr std::array kCrashes{SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL};
 
 bool is_limited = false;  // this process is a child
 
@@ -79,7 +84,7 @@ void tell_of_memory(const fs::path& shard) {
   std::cerr
       << "error: expected a whole shard, got a damaged one (it asks for more memory than there "
          "is), in "
-      << shard.string() << std::endl;
+      << escape_controls(shard.string()) << std::endl;
 }
 
 /// 0: none.
@@ -94,7 +99,7 @@ void set_time_limit(int seconds) {
   ::dup2(errors, STDERR_FILENO);
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   // Whoever handles crashes (a sanitizer, a library) would turn them into ends of another kind.
-  for (const int crash : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL}) std::signal(crash, SIG_DFL);
+  for (const int crash : kCrashes) std::signal(crash, SIG_DFL);
   is_limited = true;
   const rlimit no_core{0, 0};
   ::setrlimit(RLIMIT_CORE, &no_core);
@@ -110,7 +115,7 @@ void set_time_limit(int seconds) {
   } catch (const std::length_error&) {
     tell_of_memory(shard);
   } catch (const std::exception& error) {
-    std::cerr << "error: " << error_line(error) << std::endl;
+    std::cerr << "error: " << escape_controls(error_line(error)) << std::endl;
     code = exit_code_of(error);
   }
   ::_exit(code);  // what the parent has to do at its end is the parent's
@@ -153,7 +158,10 @@ int in_child(const fs::path& shard, const std::function<int()>& read) {
   if (signal == SIGPROF) {
     fail(shard, "HDF5 did not come to an end in " + std::to_string(kLimit_s) + " s");
   }
-  fail(shard, std::string("HDF5 ended with ") + ::strsignal(signal));
+  const std::string name = ::strsignal(signal);
+  if (std::ranges::find(kCrashes, signal) != kCrashes.end()) fail(shard, "HDF5 ended with " + name);
+  throw std::runtime_error("expected to read " + shard.string() +
+                           " to its end, got stopped from outside (" + name + ")");
 }
 
 }  // namespace

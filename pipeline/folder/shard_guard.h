@@ -15,8 +15,8 @@ namespace eventgan {
 /// process starts threads (a thread's locks stay locked in the child), and before it uses HDF5.
 ///
 /// Returns what `read` returns, or in the child the exit code of what it throws, after its message.
-/// Throws std::runtime_error naming the file if it is damaged; what `read` throws where there was
-/// no need of a child.
+/// Throws std::runtime_error naming the file if it is damaged, or if a signal from outside ends the
+/// child; what `read` throws where there was no need of a child.
 int read_guarded(const std::filesystem::path& shard, const std::function<int()>& read);
 
 /// The same for what reads parts of many shards, which to hash would take hours: always in such a

@@ -48,7 +48,7 @@ struct ShardState {
 /// How far a look at a shard goes; each goes on where the one before has found the shard done.
 /// HDF5 opens a shard only if its bytes are the marker's: it does not promise to survive others.
 enum class ScanDepth {
-  kMarker,   ///< names, sizes and the marker alone (DESIGN section 6)
+  kMarker,   ///< names, sizes and the marker alone: what says "done"
   kBytes,    ///< and the shard is hashed: may find kOtherBytes
   kRows,     ///< and what the marker says of the rows is compared: may find kOtherCounts
   kContents  ///< as kMarker, and then all that check_shard finds: faults of a shard that is done

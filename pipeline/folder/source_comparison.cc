@@ -1,9 +1,17 @@
 #include "pipeline/folder/source_comparison.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <exception>
+#include <functional>
+#include <limits>
+#include <numeric>
+#include <string_view>
+#include <type_traits>
 #include <utility>
 #include <variant>
 
@@ -14,82 +22,69 @@
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "stages/labels/label_mapping.h"
+#include "stages/shards/shard_rows.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 namespace {
 
-constexpr double kTolerance_px = 1e-6;
-
-// Far away from the picture another compiler's rounding alone is more than the tolerance.
-bool near(double a, double b) {  // false for NaN
-  return std::abs(a - b) <= kTolerance_px + 1e-12 * std::abs(b);
+// Another compiler's last bits: of a place in the volume, whose terms may cancel, and of what is
+// far away from the picture.
+bool same(double a, double b) {
+  return std::abs(a - b) <= 1e-9 + 1e-14 * std::abs(b) || (std::isnan(a) && std::isnan(b));
+}
+bool same(float a, float b) { return a == b || (std::isnan(a) && std::isnan(b)); }
+template <class Element>
+bool same(const Element& a, const Element& b) {
+  return a == b;
 }
 
-bool near(const Point& a, const Point& b) { return near(a.x, b.x) && near(a.y, b.y); }
-
-bool near(const Rectangle& a, const Rectangle& b) {
-  return near(a.left, b.left) && near(a.top, b.top) && near(a.right, b.right) &&
-         near(a.bottom, b.bottom);
+std::string value_text(const std::string& text) { return '"' + text + '"'; }
+std::string value_text(const std::vector<char>& bytes) {
+  return fmt::format("{} bytes", bytes.size());
+}
+template <class Number>
+std::string value_text(Number number) {
+  return fmt::format("{}", +number);  // of 8 bits: a number, no letter
 }
 
-bool near(const Intrinsics& a, const Intrinsics& b) {
-  return near(a.focal_x, b.focal_x) && near(a.focal_y, b.focal_y) && near(a.centre_x, b.centre_x) &&
-         near(a.centre_y, b.centre_y);
+/// What an optional column has where a row has no value.
+template <class Element>
+Element no_value() {
+  if constexpr (std::is_floating_point_v<Element>) return std::numeric_limits<Element>::quiet_NaN();
+  if constexpr (std::is_integral_v<Element>) return -1;
+  return Element();
 }
 
-template <class Value>
-bool near(const std::optional<Value>& a, const std::optional<Value>& b) {
-  return a.has_value() == b.has_value() && (!a || near(*a, *b));
-}
-
-bool near(const VolumeBox& a, const VolumeBox& b) {
-  return near(a.clipped, b.clipped) && near(a.unclipped, b.unclipped) && a.ignore == b.ignore;
-}
-
-bool near(const VolumePerson& a, const VolumePerson& b) {
-  return std::ranges::equal(a.joints, b.joints,
-                            [](const Point& p, const Point& q) { return near(p, q); }) &&
-         near(a.center, b.center) && near(a.scale, b.scale) && near(a.head_box, b.head_box) &&
-         near(a.camera, b.camera);
-}
-
-/// Compares what is annotated and where it lies: boxes, or persons.
-template <class Annotated, class Mapped>
-void compare(const std::string& what, const std::string& place,
-             const std::vector<Annotated>& stored, const std::vector<Annotated>& source,
-             const std::vector<Mapped>& stored_places, const std::vector<Mapped>& places,
-             std::vector<std::string>& differences) {
-  if (stored.size() != source.size() || stored_places.size() != places.size()) {
-    differences.push_back("expected as many of kind " + what + " as in " + place + ", " +
-                          std::to_string(source.size()) + ", got " + std::to_string(stored.size()));
-    return;
-  }
-  for (std::size_t i = 0; i < stored.size(); ++i) {
-    const std::string number = what + " " + std::to_string(i);
-    if (!(stored[i] == source[i])) {
-      differences.push_back("expected " + number + " as annotated in " + place + ", got another");
-    } else if (!near(stored_places[i], places[i])) {
-      differences.push_back("expected " + number + " where " + place +
-                            " puts it in the volume, got another place");
-    }
-  }
+/// Of a window of so many events these tell when it begins and ends.
+void take_times(const EventWindow& window, FramePair& pair) {
+  if (window.events.empty()) return;
+  pair.previous.time_s = window.events.front().t_s;
+  pair.next.time_s = window.events.back().t_s;
 }
 
 std::string size_text(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-/// Frames are the same if they are the same files and places in them; times are not stored.
-bool same_frames(const FramePair& a, const FramePair& b) {
-  const auto same = [](const FrameRef& x, const FrameRef& y) {
-    return x.path == y.path && x.index == y.index && x.video_frame == y.video_frame;
+/// What the stored numbers of classes and joints mean by today's source, which may have gained
+/// classes.
+std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSchema& source) {
+  using Names = std::vector<std::string>;
+  std::vector<std::string> faults;
+  const auto expect = [&](const char* what, const Names& expected, const Names& got) {
+    if (expected == got) return;
+    faults.push_back(fmt::format("expected the {} of the source, {}, got {}", what,
+                                 fmt::join(expected, ", "), fmt::join(got, ", ")));
   };
-  return same(a.previous, b.previous) && same(a.next, b.next) && a.label_index == b.label_index;
-}
-
-bool near(const std::array<double, 6>& a, const std::array<double, 6>& b) {
-  constexpr double kTolerance = 1e-9;
-  return std::ranges::equal(a, b, [](double x, double y) { return std::abs(x - y) <= kTolerance; });
+  Names classes = source.class_names;
+  classes.resize(std::min(classes.size(), stored.class_names.size()));
+  expect("class_names", classes, stored.class_names);
+  expect("joint_names", source.joint_names, stored.joint_names);
+  if (!stored.joint_aliases.empty()) {  // a shard from before there were any has none
+    expect("joint_aliases", source.joint_aliases, stored.joint_aliases);
+  }
+  return faults;
 }
 
 /// The annotation, or what is wrong with it.
@@ -120,14 +115,14 @@ void SourceComparison::renew_samples(Plan& plan) const {
 
 std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,
                                                   const ShardReader& reader) {
-  std::vector<std::string> faults;
   const auto& dataset = datasets_.at(static_cast<std::size_t>(planned.source));
-  if (!dataset) return faults;
+  if (!dataset) return {};
+  std::vector<std::string> faults =
+      schema_faults(reader.header().label_schema, dataset->label_schema());
+  if (!faults.empty()) return faults;  // numbers of other names are others
   for (int slot = 0; slot < reader.header().sample_count; ++slot) {
     const ShardSample stored = reader.sample(slot);
-    const PlannedSample& sample = planned.samples.at(static_cast<std::size_t>(slot));
-    for (const std::string& fault :
-         sample_faults(*dataset, sample, stored, reader.header().volume.size)) {
+    for (const std::string& fault : sample_faults(planned, slot, stored, reader)) {
       faults.push_back(fault + " (sample " + std::to_string(slot) + ", " + stored.sample_id + ")");
     }
     compared_ += stored.valid;
@@ -135,21 +130,24 @@ std::vector<std::string> SourceComparison::faults(const PlannedShard& planned,
   return faults;
 }
 
-std::vector<std::string> SourceComparison::sample_faults(const Dataset& dataset,
-                                                         const PlannedSample& planned,
+std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& shard, int slot,
                                                          const ShardSample& stored,
-                                                         ImageSize volume_size) {
+                                                         const ShardReader& reader) {
+  const auto source = static_cast<std::size_t>(shard.source);
+  const Dataset& dataset = *datasets_[source];
+  const DatasetKind kind = manifest_.sources[source].dataset;
+  const PlannedSample& planned = shard.samples.at(static_cast<std::size_t>(slot));
   if (stored.sample_id != planned.sample_id) {
     return {"expected the planned sample " + planned.sample_id + ", got another"};
   }
   // A hole that was filled since the plan was frozen: its frames were not known then.
-  if (planned.fault.empty() && !same_frames(stored.pair, planned.pair)) {
-    return {"expected the frames of the plan, " + planned.pair.previous.path + " and " +
-            planned.pair.next.path + ", got " + stored.pair.previous.path + " and " +
-            stored.pair.next.path};
+  const FramePair& pair = planned.fault.empty() ? planned.pair : stored.pair;
+  if (stored.pair.previous != pair.previous || stored.pair.next != pair.next) {
+    return {"expected the frames of the plan, " + pair.previous.path + " and " + pair.next.path +
+            ", got " + stored.pair.previous.path + " and " + stored.pair.next.path};
   }
   const std::string place = dataset.label_place(planned.label_key);
-  const Outcome<Annotation> read = read_annotation(dataset, planned.label_key);
+  Outcome<Annotation> read = read_annotation(dataset, planned.label_key);
   if (!stored.valid) {
     // What could not be read then may have been mended meanwhile; what was kept must be right.
     if (is_fault(read) || stored.annotation.original.empty() ||
@@ -162,7 +160,7 @@ std::vector<std::string> SourceComparison::sample_faults(const Dataset& dataset,
     return {"expected the annotation that the shard holds, got none: " +
             std::get<SampleFault>(read).reason};
   }
-  const std::optional<ImageSize> size = manifest_.generator.kind == GeneratorKind::kEvents
+  const std::optional<ImageSize> size = has_events(kind)
                                             ? std::optional(dataset.sensor_size(planned.label_key))
                                             : picture_size(stored.pair.next.path);
   if (size && *size != stored.source_size) {
@@ -173,18 +171,40 @@ std::vector<std::string> SourceComparison::sample_faults(const Dataset& dataset,
     return {"expected a source size, got " + size_text(stored.source_size)};
   }
   const Placement placement = eventgan::place(stored.source_size, manifest_.image);
-  if (placement.volume != volume_size ||
-      !near(placement.source_to_volume(), stored.source_to_volume)) {
+  const std::array<double, 6> map = placement.source_to_volume();
+  if (placement.volume != reader.header().volume.size ||
+      !std::ranges::equal(map, stored.source_to_volume,
+                          [](double a, double b) { return same(a, b); })) {
     return {"expected source_to_volume of a picture of " + size_text(stored.source_size) +
             ", got another map"};
   }
-  const auto& annotation = std::get<Annotation>(read);
-  const Outcome<VolumeLabels> mapped = map_labels(annotation, placement, place);
+  auto& annotation = std::get<Annotation>(read);
+  Outcome<VolumeLabels> mapped = map_labels(annotation, placement, place);
   if (is_fault(mapped)) {
     return {"expected the annotation that the shard holds, got an unsound one: " +
             std::get<SampleFault>(mapped).reason};
   }
-  return label_differences(stored, annotation, std::get<VolumeLabels>(mapped), place);
+  ShardSample expected;
+  expected.sample_id = planned.sample_id;
+  expected.sequence = planned.sequence;
+  expected.origin = frame_origin(kind, planned.sequence);
+  expected.pair = pair;
+  if (has_events(kind) && std::isnan(pair.previous.time_s)) {  // its events tell
+    const Outcome<EventWindow> read_window = dataset.events(planned.label_key);
+    if (is_fault(read_window)) {
+      return {"expected the events that the shard was made of, got none: " +
+              std::get<SampleFault>(read_window).reason};
+    }
+    take_times(std::get<EventWindow>(read_window), expected.pair);
+  }
+  expected.source_size = placement.source;
+  expected.source_to_volume = map;
+  expected.tiles = stored.tiles;
+  expected.annotation = std::move(annotation);
+  expected.labels = std::move(std::get<VolumeLabels>(mapped));
+  ShardHeader header = reader.header();
+  header.dataset = to_string(kind);
+  return row_differences(header, reader.tables(), slot, expected, place);
 }
 
 std::optional<ImageSize> SourceComparison::picture_size(const std::string& path) {
@@ -196,16 +216,70 @@ std::optional<ImageSize> SourceComparison::picture_size(const std::string& path)
   return entry->second;
 }
 
-std::vector<std::string> label_differences(const ShardSample& stored, const Annotation& source,
-                                           const VolumeLabels& mapped, const std::string& place) {
-  if (stored.annotation.original != source.original) {
+std::vector<std::string> row_differences(const ShardHeader& header, const ShardTables& stored,
+                                         int slot, const ShardSample& expected,
+                                         const std::string& place) {
+  const auto row = static_cast<std::size_t>(slot);
+  if (!std::ranges::equal(stored.original[row], expected.annotation.original)) {
     return {"expected the annotation as it stands in " + place + ", got other bytes"};
   }
+  ShardTables wanted;
+  append_row(header, expected, wanted);
   std::vector<std::string> differences;
-  compare("box", place, stored.annotation.boxes, source.boxes, stored.labels.boxes, mapped.boxes,
-          differences);
-  compare("person", place, stored.annotation.persons, source.persons, stored.labels.persons,
-          mapped.persons, differences);
+  const auto rows_of = [&](const std::vector<std::int64_t>& offsets) {
+    return static_cast<std::size_t>(offsets[row + 1] - offsets[row]);
+  };
+  const auto expect_rows = [&](const char* what, std::size_t count, std::size_t got) {
+    if (count == got) return;
+    differences.push_back(fmt::format("expected {} {}, as in {}, got {}", count, what, place, got));
+  };
+  const std::size_t boxes = expected.labels.boxes.size();
+  const std::size_t persons = expected.labels.persons.size();
+  expect_rows("boxes", boxes, rows_of(stored.boxes.offsets));
+  expect_rows("persons", persons, rows_of(stored.poses.offsets));
+  if (!differences.empty()) return differences;
+
+  std::vector<const void*> columns;  // of `wanted`; the walk below takes them in the same order
+  visit_columns(wanted, header,
+                [&](const ColumnSpec&, const auto& column) { columns.push_back(&column); });
+  auto next = columns.begin();
+  visit_columns(stored, header, [&](const ColumnSpec& spec, const auto& column) {
+    using Column = std::remove_cvref_t<decltype(column)>;
+    const auto& expected_column = *static_cast<const Column*>(*next++);
+    const std::string_view path = spec.path;
+    const bool is_generated = path.starts_with("/events/");
+    const bool is_of_pair = path.starts_with("/pairs/");
+    const bool is_absent = spec.optional && column.empty();  // a shard from before it was kept
+    if (is_generated || is_absent || spec.rows == Rows::kOffsets) return;
+    std::size_t first = row;
+    std::size_t count = 1;
+    const char* kind = nullptr;
+    if (spec.rows == Rows::kBoxes) {
+      first = static_cast<std::size_t>(stored.boxes.offsets[row]);
+      count = boxes;
+      kind = "box";
+    } else if (spec.rows == Rows::kPersons) {
+      first = static_cast<std::size_t>(stored.poses.offsets[row]);
+      count = persons;
+      kind = "person";
+    }
+    const std::size_t width =
+        std::accumulate(spec.inner.begin(), spec.inner.end(), std::size_t{1}, std::multiplies());
+    for (std::size_t k = 0; k < count; ++k) {
+      for (std::size_t i = 0; i < width; ++i) {
+        using Element = typename Column::value_type;
+        const Element& got = column[(first + k) * width + i];
+        const Element want =
+            expected_column.empty() ? no_value<Element>() : expected_column[k * width + i];
+        if (same(want, got)) continue;
+        differences.push_back(fmt::format("expected {} in {}{} by {}, got {}", value_text(want),
+                                          spec.path,
+                                          kind == nullptr ? "" : fmt::format(" of {} {}", kind, k),
+                                          is_of_pair ? "the plan" : place, value_text(got)));
+        break;  // one number of a row tells enough
+      }
+    }
+  });
   return differences;
 }
 

@@ -12,6 +12,7 @@
 #include "manifests/values/shard.h"
 #include "stages/frames/dataset.h"
 #include "stages/shards/shard_reader.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 
@@ -29,19 +30,20 @@ class SourceComparison {
   /// Why labels of some sources are not compared; a line each.
   const std::vector<std::string>& notes() const { return notes_; }
 
-  /// Compares every valid sample: that it is the planned one, that its labels are those of its
-  /// annotation read anew and mapped by the placement of its source size, that its picture, where
-  /// it can be read, has that size. Of a quarantined sample the original annotation is compared, if
-  /// the shard has one and it can be read. Texts "expected X, got Y (sample SLOT, ID)" without the
-  /// file's name; none for a source that is not there.
+  /// Compares every valid sample: that it is the planned one, that its columns of `/pairs` and
+  /// `/labels` are those of the plan and of its annotation read anew and mapped by the placement of
+  /// its source size, that its picture, where it can be read, has that size, that classes and
+  /// joints have the source's names. Of a quarantined sample the original annotation is compared,
+  /// if the shard has one and it can be read. Texts "expected X, got Y (sample SLOT, ID)" without
+  /// the file's name; none for a source that is not there.
   std::vector<std::string> faults(const PlannedShard& planned, const ShardReader& reader);
 
   /// Valid samples that were compared.
   long long compared() const { return compared_; }
 
  private:
-  std::vector<std::string> sample_faults(const Dataset& dataset, const PlannedSample& planned,
-                                         const ShardSample& stored, ImageSize volume_size);
+  std::vector<std::string> sample_faults(const PlannedShard& shard, int slot,
+                                         const ShardSample& stored, const ShardReader& reader);
   std::optional<ImageSize> picture_size(const std::string& path);
 
   JobManifest manifest_;
@@ -51,11 +53,16 @@ class SourceComparison {
   long long compared_ = 0;
 };
 
-/// What a shard's sample holds that its source does not: the annotation's bytes, its boxes and
-/// persons exactly; their places in the volume, `mapped`, to a millionth of a pixel, since the last
-/// bits may depend on the compiler. Texts "expected X, got Y" in which `place` names the
-/// annotation; where the bytes differ, that alone. Empty if all is the same.
-std::vector<std::string> label_differences(const ShardSample& stored, const Annotation& source,
-                                           const VolumeLabels& mapped, const std::string& place);
+/// What slot `slot` of `stored` holds that `expected`, the sample made anew from its source (its
+/// `tiles` as stored), would not: every column of the format but those of `/events`, which the
+/// generator makes, is compared, so that a new one cannot be forgotten. Numbers of 64 bits may
+/// differ by 1e-9, since their last bits may depend on the compiler; all else is the same exactly.
+/// A column that shards of today may have and this one has not is left out. Texts "expected X in
+/// COLUMN by PLACE, got Y" in which `place` names the annotation, one for each box,
+/// person or sample and column; where the annotation's bytes or the numbers of labels differ, that
+/// alone. Empty if all is the same. Throws std::logic_error as append_row does.
+std::vector<std::string> row_differences(const ShardHeader& header, const ShardTables& stored,
+                                         int slot, const ShardSample& expected,
+                                         const std::string& place);
 
 }  // namespace eventgan

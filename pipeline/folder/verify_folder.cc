@@ -288,9 +288,9 @@ std::string line_of(const ShardCheck& shard, bool deep) {
 
 std::string to_text(const FolderCheck& check, bool deep) {
   std::string text;
-  for (const std::string& note : check.notes) text += "note: " + note + "\n";
+  for (const std::string& note : check.notes) text += "note: " + escape_controls(note) + "\n";
   for (const ShardCheck& shard : check.by_shard) text += line_of(shard, deep) + "\n";
-  for (const std::string& fault : check.faults) text += fault + "\n";
+  for (const std::string& fault : check.faults) text += escape_controls(fault) + "\n";
   if (deep)
     text += fmt::format("labels of {} samples compared with their sources\n", check.compared);
   if (!check.sound()) {

@@ -84,8 +84,6 @@ std::string lack(Engine engine, Precision precision, const EngineSupport& suppor
          ")";
 }
 
-EngineChoice chosen(Engine engine, std::string reason) { return {engine, std::move(reason), ""}; }
-
 [[noreturn]] void refuse_precision(Precision precision, const EngineSupport& support) {
   throw UsageError("$.generator.precision: expected \"float32\", got " +
                    quoted(to_string(precision)) + ": " + lack(Engine::kOnednn, precision, support) +
@@ -94,7 +92,7 @@ EngineChoice chosen(Engine engine, std::string reason) { return {engine, std::mo
 
 EngineChoice asked(Engine engine, Precision precision, const EngineSupport& support) {
   const std::string missing = lack(engine, precision, support);
-  if (missing.empty()) return chosen(engine, "as the manifest says");
+  if (missing.empty()) return {engine, "", ""};
   const Engine other = engine == Engine::kTorch ? Engine::kOnednn : Engine::kTorch;
   if (!lack(other, precision, support).empty()) refuse_precision(precision, support);
   throw UsageError("$.generator.engine: expected \"auto\" or " + quoted(to_string(other)) +
@@ -104,12 +102,9 @@ EngineChoice asked(Engine engine, Precision precision, const EngineSupport& supp
 
 EngineChoice fastest(Precision precision, const EngineSupport& support) {
   const std::string missing = lack(Engine::kOnednn, precision, support);
-  if (missing.empty()) {
-    return chosen(Engine::kOnednn, "auto: the fastest engine for " +
-                                       std::string(to_string(precision)) + " on this processor");
-  }
+  if (missing.empty()) return {Engine::kOnednn, "", ""};
   if (!lack(Engine::kTorch, precision, support).empty()) refuse_precision(precision, support);
-  return chosen(Engine::kTorch, "auto: " + missing);
+  return {Engine::kTorch, missing, ""};
 }
 
 EngineChoice on_cuda(const EngineRequest& request, const EngineSupport& support) {
@@ -130,8 +125,7 @@ EngineChoice on_cuda(const EngineRequest& request, const EngineSupport& support)
     throw UsageError("$.generator.precision: expected \"float32\", got " +
                      quoted(to_string(request.precision)) + ": " + support.cuda_lack);
   }
-  return chosen(Engine::kTorch,
-                request.engine ? "as the manifest says" : "auto: the engine of device cuda");
+  return {Engine::kTorch, "", ""};
 }
 
 /// Why a precision is a bad bargain on this processor; empty if it is none.

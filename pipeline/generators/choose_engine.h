@@ -31,7 +31,7 @@ struct EngineSupport {
 
 struct EngineChoice {
   Engine engine = Engine::kTorch;
-  std::string reason;   ///< "auto: the fastest engine for float32 on this processor"
+  std::string reason;   ///< why "auto" is not the fastest one; empty where nothing needs a reason
   std::string warning;  ///< not empty: why the precision is a bad bargain on this processor
 };
 

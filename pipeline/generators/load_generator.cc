@@ -105,9 +105,9 @@ std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,
                         const EngineSupport& support, const std::optional<GapRange>& gaps) {
   std::string text = "generator: ";
   text.append(to_string(choice.engine)).append(" ").append(to_string(spec.precision));
-  text += " on " + (spec.device == Device::kCuda ? support.cuda : support.processor) + " (" +
-          choice.reason + "), " + describe_training_gaps(gaps);
-  return gaps ? text : text + ", so none is marked as extrapolated";
+  text += " on " + (spec.device == Device::kCuda ? support.cuda : support.processor);
+  if (!choice.reason.empty()) text += " (" + choice.reason + ")";
+  return text + ", " + describe_training_gaps(gaps);
 }
 
 /// Weights that the engine refuses are an input that cannot be used.

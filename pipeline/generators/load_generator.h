@@ -28,8 +28,8 @@ struct LoadedGenerator {
   /// SHA-256 of the weights file (untrained: of what the file would be; a simulator, which has
   /// none: of its description).
   std::string weights_hash;
-  /// The engine that was chosen and why, for people: "generator: onednn float32 on avx2 (auto:
-  /// ...), trained on gaps 1-6"; empty for a simulator.
+  /// The engine that was chosen, for people: "generator: onednn float32 on avx2, trained on gaps
+  /// 1-6"; empty for a simulator.
   std::string choice;
   std::vector<std::string> warnings;  ///< what the user must know before trusting the volumes
 };

@@ -8,9 +8,7 @@
 namespace eventgan {
 
 std::string untrained_warning(const std::string& name) {
-  return "the generator is UNTRAINED (" + name +
-         "): its volumes are random patterns, not events. Fit for trying the program, for nothing "
-         "else.";
+  return "the generator is UNTRAINED (" + name + "): random patterns, not events";
 }
 
 std::string weights_warning(const JobManifest& manifest) {
@@ -19,9 +17,8 @@ std::string weights_warning(const JobManifest& manifest) {
   if (manifest.generator.kind != GeneratorKind::kNetwork || !name) return "";
   if (name->origin == WeightsOrigin::kUntrained) return untrained_warning(weights);
   if (name->origin == WeightsOrigin::kFile) return "";
-  return "the weights are those that come with the program (" + shipped_weights_name(weights) +
-         "), trained on four seconds of recordings: fit to try things with. For results import or "
-         "train weights (README, \"The generator's weights\").";
+  return shipped_weights_name(weights) +
+         " are stand-in weights; for results, import or train your own";
 }
 
 }  // namespace eventgan

@@ -11,14 +11,14 @@
 
 namespace eventgan {
 
-/// Everything that changes a shard's bytes (DESIGN section 6), field by field: each
-/// setting of the manifest (see manifest_fields), annotations, frames, weights, engine,
-/// preprocessing, cpu, libraries, program. Annotation files are hashed by content; frames by path
-/// and size only, since their content would mean reading everything twice, and by what the plan
-/// takes from the inputs: samples, times, sizes, faults, counts. Libraries are those that are
-/// loaded (FFmpeg where frames come from videos), not those compiled against. `before_file` is
-/// called for each mention of a file, of which the first has it looked at: `annotation_files`, and
-/// two frames a pair; what it throws is passed on.
+/// Everything that changes a shard's bytes, field by field: each setting of the manifest (see
+/// manifest_fields), annotations, frames, weights, engine, preprocessing, cpu, libraries, program,
+/// the time axis of cropped events, and the tiles that persons get. Annotation files are hashed by
+/// content; frames by path and size only, since their content would mean reading everything twice,
+/// and by what the plan takes from the inputs: samples, times, sizes, faults, counts. Libraries are
+/// those that are loaded (FFmpeg where frames come from videos), not those compiled against.
+/// `before_file` is called for each mention of a file, of which the first has it looked at:
+/// `annotation_files`, and two frames a pair; what it throws is passed on.
 std::map<std::string, std::string> make_fingerprint(
     const JobManifest& manifest, const Plan& plan, const std::vector<std::string>& annotation_files,
     const std::string& weights_hash, const std::string& engine,

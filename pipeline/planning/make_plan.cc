@@ -416,6 +416,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
     left -= planned.pairs;
     job.plan.sources.push_back(std::move(planned.summary));
     job.without_partner_by_gap.push_back(std::move(planned.without_partner_by_gap));
+    std::ranges::move(dataset.warnings(), std::back_inserter(job.warnings));
     const auto files = dataset.annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
     if (const auto& ids = manifest.sources[i].selection.ids) annotation_files.push_back(*ids);

@@ -26,7 +26,7 @@ struct PairChoiceResult {
   std::vector<int> without_partner;
 };
 
-/// Chooses the frame pairs of a labelled frame (DESIGN section 3).
+/// Chooses the frame pairs of a labelled frame.
 ///
 /// choose = one: one of the gaps whose frames exist, drawn by (seed, dataset, sample id), so that
 /// no other source, sample or order of files changes the draw. choose = all: each gap; the gap and
@@ -97,6 +97,7 @@ struct PlannedJob {
   /// Of each source, how many labelled frames have no partner at a gap.
   std::vector<std::map<int, std::int64_t>> without_partner_by_gap;
   std::vector<std::unique_ptr<Dataset>> datasets;  ///< one for each source of the manifest
+  std::vector<std::string> warnings;               ///< Dataset::warnings() of all sources
 };
 
 struct PlanningOptions {

@@ -93,8 +93,9 @@ std::string cell(const std::string& key, std::int64_t number) {
 std::string text_cell(const std::string& html) { return "<td>" + html + "</td>"; }
 std::string right_cell(const std::string& html) { return "<td class=n>" + html + "</td>"; }
 
-/// A table that scrolls by itself where the page is too narrow. `columns`: headings; those that
-/// begin with '#' are of numbers. At most `kMostRows` rows.
+/// A table that scrolls by itself where the page is too narrow; a glow at an edge says that there
+/// is more beyond it. `columns`: headings; those that begin with '#' are of numbers. At most
+/// `kMostRows` rows.
 constexpr std::size_t kMostRows = 60;
 
 std::string table(const std::vector<std::string>& columns, const std::vector<std::string>& rows) {
@@ -142,7 +143,10 @@ double tick_step(double most) {
 }
 
 std::string draw(const BarChart& chart) {
-  constexpr double kWidth = 460, kHeight = 260, kLeft = 58, kRight = 10, kTop = 12, kBottom = 46;
+  // A tick label is a number of up to seven characters of 8: half of the last one is to the right
+  // of the bars, and the vertical axis has its title to the left of them.
+  constexpr double kWidth = 460, kHeight = 260, kLeft = 80, kRight = 28, kTop = 12, kBottom = 46;
+  constexpr std::size_t kMostLabel = 14;
   constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - kTop - kBottom;
   const std::size_t bars = chart.series.empty() ? 0 : chart.series.front().values.size();
   double most = 0;
@@ -193,11 +197,15 @@ std::string draw(const BarChart& chart) {
   html += fmt::format("<path class=axis d=\"M{:.1f} {:.1f}H{:.1f}\"/>", kLeft, y_of(0),
                       kWidth - kRight);
   const bool at_edges = chart.labels.size() > bars;
-  const std::size_t every = (chart.labels.size() + 7) / 8;
+  std::size_t longest = 1;
+  for (const std::string& label : chart.labels) longest = std::max(longest, label.size());
+  const auto fitting =
+      static_cast<std::size_t>(kPlotWidth / (8.0 * std::min(longest, kMostLabel) + 8));
+  const std::size_t every = (chart.labels.size() + fitting - 1) / fitting;
   for (std::size_t i = 0; i < chart.labels.size(); i += every) {
     const double x = kLeft + slot * (static_cast<double>(i) + (at_edges ? 0 : 0.5));
     html += fmt::format("<text class=t x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=middle>{}</text>", x,
-                        kTop + kPlotHeight + 16, escaped(chart.labels[i], 14));
+                        kTop + kPlotHeight + 16, escaped(chart.labels[i], kMostLabel));
   }
   html += fmt::format(
       "<text class=a x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=middle>{}</text><text class=a "
@@ -298,6 +306,14 @@ std::string head(const Survey& survey, const PageContext& context) {
   if (!context.warning.empty()) {
     html += "<p class=warning data-key=warning>Warning: " + escaped(context.warning, 1000) + "</p>";
   }
+  for (std::size_t i = 0; i < std::min(survey.sources.size(), kMostRows); ++i) {
+    const SourceSurvey& source = survey.sources[i];
+    if (source.counts.valid == 0 || source.events_per_pixel.zeros < source.counts.valid) continue;
+    html += fmt::format(
+        "<p class=warning data-key=source.{}.warning>Warning: all {} volumes of {} are without any "
+        "event.</p>",
+        i, grouped(source.counts.valid), escaped(source_name(survey, i)));
+  }
   const DatasetCounts& counts = survey.counts;
   html += "<div class=tiles>" + tile("samples", counts.samples, "samples") +
           tile("quarantined", counts.quarantined(), "of them in quarantine") +
@@ -389,15 +405,17 @@ std::string counts(const Survey& survey) {
   std::vector<std::string> rows;
   for (std::size_t i = 0; i < survey.sources.size(); ++i) {
     const SourceSummary& summary = survey.parts.frozen.plan.sources.at(i);
-    rows.push_back(text_cell(escaped(source_name(survey, i))) +
-                   cell(fmt::format("source.{}.labelled_frames", i), summary.labelled_frames) +
-                   cell(fmt::format("source.{}.without_partner", i), summary.without_partner) +
-                   counts_cells(fmt::format("source.{}", i), survey.sources[i].counts));
+    rows.push_back(
+        text_cell(escaped(source_name(survey, i))) +
+        cell(fmt::format("source.{}.labelled_frames", i), summary.labelled_frames) +
+        cell(fmt::format("source.{}.without_partner", i), summary.without_partner) +
+        cell(fmt::format("source.{}.empty", i), survey.sources[i].events_per_pixel.zeros) +
+        counts_cells(fmt::format("source.{}", i), survey.sources[i].counts));
   }
-  html += "<h3>By source</h3>" +
-          table({"source", "#labelled frames", "#pairs without a partner", "#samples",
-                 "#in quarantine", "#boxes", "#persons", "#shards", "#size"},
-                rows);
+  html += "<h3>By source</h3>" + table({"source", "#labelled frames", "#pairs without a partner",
+                                        "#volumes without events", "#samples", "#in quarantine",
+                                        "#boxes", "#persons", "#shards", "#size"},
+                                       rows);
   if (survey.datasets.size() > 1) html += counts_of(survey.datasets, "dataset");
   if (survey.splits.size() > 1) html += counts_of(survey.splits, "split");
 
@@ -654,9 +672,9 @@ std::string shards(const Survey& survey, const PageContext& context) {
 
 constexpr char kStyle[] = R"css(
 :root{color-scheme:light dark;--paper:#fbfaf8;--card:#fff;--ink:#1d2327;--soft:#5c666d;--line:#dcdfe1;--bad:#b3261e;--bad-paper:#fdecea;
---link:#0b5fa5;--s0:#2b6cb0;--s1:#d97706;--s2:#2f855a;--s3:#9f3a8b;--s4:#6b7280;--s5:#b7791f}
+--link:#0b5fa5;--more:#0b5fa566;--s0:#2b6cb0;--s1:#d97706;--s2:#2f855a;--s3:#9f3a8b;--s4:#6b7280;--s5:#b7791f}
 @media (prefers-color-scheme:dark){:root{--paper:#14181b;--card:#1c2226;--ink:#e6e9eb;--soft:#9aa5ac;--line:#343c42;--bad:#ffb4ab;
---bad-paper:#4a1410;--link:#8cc4ff;--s0:#6aa9e9;--s1:#f0a04b;--s2:#68c48c;--s3:#d58ac6;--s4:#a0a8af;--s5:#e3c158}}
+--bad-paper:#4a1410;--link:#8cc4ff;--more:#8cc4ff66;--s0:#6aa9e9;--s1:#f0a04b;--s2:#68c48c;--s3:#d58ac6;--s4:#a0a8af;--s5:#e3c158}}
 *{box-sizing:border-box}
 body{margin:0 auto;padding:1.5rem clamp(.75rem,3vw,2.5rem) 4rem;max-width:1240px;background:var(--paper);color:var(--ink);
 font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;overflow-wrap:anywhere}
@@ -669,8 +687,15 @@ pre{background:var(--card);border:1px solid var(--line);border-radius:8px;paddin
 .tiles{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,9rem),1fr));gap:.75rem}
 .tile{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:.7rem 1rem;color:var(--soft);font-size:.9rem}
 .tile b{display:block;font-size:1.5rem;line-height:1.25;color:var(--ink);font-variant-numeric:tabular-nums}
-.scroll{overflow-x:auto;background:var(--card);border:1px solid var(--line);border-radius:8px;width:fit-content;max-width:100%}
-.tall .scroll{max-height:28rem;overflow:auto}.tall thead{position:sticky;top:0;background:var(--card)}
+.scroll{overflow-x:auto;border:1px solid var(--line);border-radius:8px;width:fit-content;max-width:100%;background:
+linear-gradient(90deg,var(--card) 50%,transparent) 0 0/3rem 100% no-repeat local,
+linear-gradient(270deg,var(--card) 50%,transparent) 100% 0/3rem 100% no-repeat local,
+linear-gradient(90deg,var(--more),transparent) 0 0/1.25rem 100% no-repeat,
+linear-gradient(270deg,var(--more),transparent) 100% 0/1.25rem 100% no-repeat,
+linear-gradient(0deg,var(--card) 50%,transparent) 0 100%/100% 3rem no-repeat local,
+linear-gradient(0deg,var(--more),transparent) 0 100%/100% 1.25rem no-repeat var(--card)}
+.tall{margin-bottom:.75rem}.tall .scroll{max-height:28rem;overflow:auto}.tall thead{position:sticky;top:0;background:var(--card)}
+@media (max-width:36rem){.scroll table:not(.facts){font-size:.8rem}.scroll table:not(.facts) :is(th,td){padding:.35rem .5rem;min-width:0}}
 table{border-collapse:collapse;font-size:.9rem}th,td{padding:.4rem .8rem;text-align:left;vertical-align:top;overflow-wrap:normal}
 td{min-width:4rem}thead th{color:var(--soft);font-weight:600;vertical-align:bottom}tbody tr,.facts tr+tr{border-top:1px solid var(--line)}
 .facts{width:100%}.facts th{color:var(--soft);font-weight:600;white-space:nowrap}.facts td,td code{overflow-wrap:anywhere}

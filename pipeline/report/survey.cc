@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "manifests/values/counter_random.h"
-#include "manifests/values/faults.h"
 #include "pipeline/folder/folder_status.h"
 #include "pipeline/folder/preview.h"
 #include "pipeline/folder/shard_guard.h"
@@ -249,15 +248,7 @@ class Surveyor {
 }  // namespace
 
 Survey survey_folder(const fs::path& folder) {
-  FrozenOutline frozen = read_frozen_outline(folder);
-  std::vector<ShardState> shards = scan_shards(folder, frozen.plan.shards, frozen.hash);
-  renew_time_limit();
-  DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
-  lift_time_limit();
-  if (parts.done.empty()) {
-    throw InputError("expected shards that are done, got none, in " + folder.string());
-  }
-  return Surveyor(folder, std::move(parts)).run();
+  return Surveyor(folder, read_dataset_parts(folder)).run();
 }
 
 }  // namespace eventgan

@@ -5,7 +5,7 @@
 
 namespace eventgan {
 
-/// What the process tells its caller (DESIGN section 6); a contract with job schedulers.
+/// What the process tells its caller; a contract with job schedulers.
 enum ExitCode : int {
   kComplete = 0,
   kFailed = 1,

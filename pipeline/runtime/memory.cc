@@ -9,34 +9,11 @@
 #include <string>
 #include <string_view>
 
+#include "pipeline/runtime/control_groups.h"
+
 namespace eventgan {
-namespace {
 
-namespace fs = std::filesystem;
-
-/// The process's control group of version 2 ("0::/PATH"), or the root where there is none.
-fs::path own_group() {
-  std::ifstream groups("/proc/self/cgroup");
-  for (std::string line; std::getline(groups, line);) {
-    if (line.starts_with("0::/")) return line.substr(4);
-  }
-  return {};
-}
-
-}  // namespace
-
-std::size_t group_memory_limit_bytes(const fs::path& root, const fs::path& group,
-                                     std::size_t most) {
-  std::size_t least = most;
-  for (fs::path place = group.relative_path();; place = place.parent_path()) {
-    std::ifstream file(root / place / "memory.max");
-    std::size_t limit = 0;
-    if (file >> limit) least = std::min(least, limit);  // "max" is no number
-    if (place.empty()) return least;
-  }
-}
-
-std::size_t memory_limit_bytes() {
+std::size_t memory_limit_bytes(const std::filesystem::path& root) {
   const auto pages = static_cast<std::size_t>(std::max(sysconf(_SC_PHYS_PAGES), 1L));
   const auto page_bytes = static_cast<std::size_t>(std::max(sysconf(_SC_PAGESIZE), 1L));
   std::size_t most = pages * page_bytes;
@@ -44,7 +21,7 @@ std::size_t memory_limit_bytes() {
   if (getrlimit(RLIMIT_AS, &address_space) == 0) {
     most = std::min<std::size_t>(most, address_space.rlim_cur);  // RLIM_INFINITY is the largest
   }
-  return group_memory_limit_bytes("/sys/fs/cgroup", own_group(), most);
+  return std::min<std::size_t>(most, control_group_limits(root).memory_bytes);
 }
 
 bool restart_peak_memory() {

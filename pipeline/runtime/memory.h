@@ -5,15 +5,10 @@
 
 namespace eventgan {
 
-/// Memory that this process may use, in bytes: the machine's, or what its control group of version
-/// 2 (a container, a batch job) or its own limit of address space (ulimit -v) grants if that is
+/// Memory that this process may use, in bytes: the machine's, or what its control groups
+/// (control_group_limits of `root`) or its own limit of address space (ulimit -v) grant if that is
 /// less. Thread safe.
-std::size_t memory_limit_bytes();
-
-/// The least limit among a control group of version 2 and those above it: `group`, a path below
-/// `root`, each with a file memory.max of a number or "max". `most` if none says less. Thread safe.
-std::size_t group_memory_limit_bytes(const std::filesystem::path& root,
-                                     const std::filesystem::path& group, std::size_t most);
+std::size_t memory_limit_bytes(const std::filesystem::path& root = "/");
 
 /// Gives freed memory back to the system and lets peak_memory_bytes begin anew. False where the
 /// kernel does not allow that: then the peak is that of the process's whole life. Thread safe.

@@ -1,9 +1,11 @@
 #include "pipeline/runtime/stopping.h"
 
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
+#include <cerrno>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
@@ -106,6 +108,7 @@ namespace {
 constexpr std::array kSignals{SIGINT, SIGTERM, SIGUSR1};
 constexpr std::int64_t kNever = -1;
 
+std::string told_at_interrupt;  // changes only while no handler is there that reads it
 std::atomic<std::int64_t> requested_at_ns{kNever};
 static_assert(std::atomic<std::int64_t>::is_always_lock_free, "a signal handler sets it");
 
@@ -116,15 +119,21 @@ std::int64_t monotonic_ns() {
   return std::int64_t{1'000'000'000} * now.tv_sec + now.tv_nsec;
 }
 
-void request_stop(int) {
+void request_stop(int signal) {
   std::int64_t never = kNever;
   requested_at_ns.compare_exchange_strong(never, monotonic_ns());
+  if (signal != SIGINT) return;
+  const int error = errno;
+  [[maybe_unused]] const ssize_t written =
+      ::write(STDERR_FILENO, told_at_interrupt.data(), told_at_interrupt.size());
+  errno = error;
 }
 
 }  // namespace
 
-StopSignal::StopSignal() {
+StopSignal::StopSignal(std::string told) {
   requested_at_ns = kNever;
+  told_at_interrupt = std::move(told);
   for (std::size_t i = 0; i < kSignals.size(); ++i) {
     struct sigaction action {};
     action.sa_handler = request_stop;

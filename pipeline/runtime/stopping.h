@@ -8,6 +8,7 @@
 #include <functional>
 #include <mutex>
 #include <optional>
+#include <string>
 #include <thread>
 
 namespace eventgan {
@@ -102,7 +103,9 @@ class StopMonitor {
 /// change nothing, since schedulers repeat them. At most one at a time.
 class StopSignal {
  public:
-  StopSignal();
+  /// `told`: what the first SIGINT writes to the standard error stream at once, before anybody has
+  /// looked at the request.
+  explicit StopSignal(std::string told = "");
   ~StopSignal();
   StopSignal(const StopSignal&) = delete;
   StopSignal& operator=(const StopSignal&) = delete;

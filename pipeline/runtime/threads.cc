@@ -1,19 +1,23 @@
 #include "pipeline/runtime/threads.h"
 
 #include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <cmath>
 #include <ctime>
-#include <thread>
+
+#include "pipeline/runtime/control_groups.h"
 
 namespace eventgan {
 
-int thread_count(int requested) {
+int thread_count(int requested, const std::filesystem::path& root) {
   if (requested > 0) return requested;
-  // The system may not know, and says 0 then.
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  const int cores = oneapi::tbb::info::default_concurrency();  // minds the affinity
+  return static_cast<int>(std::clamp(std::ceil(control_group_limits(root).processors), 1.0,
+                                     std::max(1.0, cores * 1.0)));
 }
 
 void for_each_index(std::size_t count, int threads, const std::function<void(std::size_t)>& work) {

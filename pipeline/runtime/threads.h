@@ -2,12 +2,15 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 
 namespace eventgan {
 
-/// Number of threads to use for a request (`--threads`): itself, or all cores for 0.
-int thread_count(int requested);
+/// Number of threads to use for a request (`--threads`): itself, or for 0 one for each core that
+/// this process may use, by its affinity (taskset, a cpuset) and by its control groups' processor
+/// time (control_group_limits of `root`), of which a started one counts as a core. Thread safe.
+int thread_count(int requested, const std::filesystem::path& root = "/");
 
 /// Calls `work` with each of 0 .. count - 1 on up to `threads` threads, the calling one included,
 /// which may be more than there are cores: many waits for a network file system fit side by side.

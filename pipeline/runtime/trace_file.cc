@@ -70,8 +70,7 @@ void TraceFile::write(std::string_view text) {
   try {
     file_.write(text);
   } catch (const std::system_error& error) {
-    throw std::runtime_error("cannot write " + file_.target().string() + ": " +
-                             error.code().message());
+    throw_system_error("cannot write " + file_.target().string(), error.code().value());
   }
 }
 

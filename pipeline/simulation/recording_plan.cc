@@ -60,13 +60,28 @@ std::optional<std::string> settings_on_disk(const std::filesystem::path& file) {
     std::throw_with_nested(
         InputError("expected no file, or a recording that eventgan simulate has written, got "
                    "another file, in " +
-                   file.string() + " (--overwrite makes it anew)"));
+                   file.string() + " (choose another output folder, or remove it yourself)"));
   }
+}
+
+void check_same_clip(const std::filesystem::path& file, const std::string& found,
+                     const std::string& expected) {
+  const auto clip = [](const std::string& settings) {
+    auto fields = manifest_fields(settings);
+    std::erase_if(fields, [](const auto& field) { return field.first != "$.source.path"; });
+    return fields;
+  };
+  const auto differences = fingerprint_differences(clip(found), clip(expected));
+  if (differences.empty()) return;
+  throw UsageError(
+      "expected a recording of this clip, got one of another, in " + file.string() +
+      " (choose another output folder, or remove it yourself): " + differences.front());
 }
 
 void check_same_settings(const std::filesystem::path& file, const std::string& found,
                          const std::string& expected) {
   if (found == expected) return;
+  check_same_clip(file, found, expected);
   std::string message =
       file.string() +
       " was made by a run that would have written other events (--overwrite makes it anew):";

@@ -25,6 +25,11 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
 /// InputError if it is no recording of a simulation. Thread safe.
 std::optional<std::string> settings_on_disk(const std::filesystem::path& file);
 
+/// Throws UsageError if the recording with the settings `found` was made of another clip than one
+/// with `expected` would be: it is somebody else's.
+void check_same_clip(const std::filesystem::path& file, const std::string& found,
+                     const std::string& expected);
+
 /// Throws UsageError telling field by field how `found` differs from `expected`, if it does.
 void check_same_settings(const std::filesystem::path& file, const std::string& found,
                          const std::string& expected);

@@ -93,15 +93,17 @@ struct SourceWork {
   std::vector<RecordingSummary> made;
 };
 
-/// Opens every source's clip and leaves out the recordings that are there.
+/// Opens every source's clip and leaves out the recordings that are there, or with `overwrite`
+/// makes sure that they are of this clip.
 std::vector<SourceWork> plan_work(const SimulationManifest& manifest, const fs::path& folder,
                                   bool overwrite, std::vector<std::string>& kept) {
   std::vector<SourceWork> works;
   for (const SimulationSource& source : manifest.sources) {
     SourceWork work{&source, std::make_unique<ClipFrames>(source, manifest), {}, {}};
     for (PlannedRecording& recording : plan_recordings(manifest, source, *work.clip, folder)) {
-      const auto found = overwrite ? std::nullopt : settings_on_disk(recording.file);
-      if (!found) {
+      const auto found = settings_on_disk(recording.file);
+      if (found && overwrite) check_same_clip(recording.file, *found, recording.settings);
+      if (!found || overwrite) {
         work.to_do.push_back(std::move(recording));
         continue;
       }

@@ -10,6 +10,7 @@
 #include "pipeline/realism/realism_report.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {
@@ -29,6 +30,8 @@ constexpr std::array<std::pair<const char*, double RoundCost::*>, 6> kCostFields
      {"pairs_per_s", &RoundCost::pairs_per_s},
      {"peak_bytes", &RoundCost::peak_bytes},
      {"stored_bytes", &RoundCost::stored_bytes}}};
+
+constexpr char kHashKey[] = "sha256";  ///< of the line without it
 
 nlohmann::json json_of(const PairLoss& loss) {
   nlohmann::json json;
@@ -87,6 +90,7 @@ std::filesystem::path file_of(const std::filesystem::path& folder, const std::st
 }  // namespace
 
 KeptTrials::KeptTrials(const std::filesystem::path& folder) : folder_(folder / "kept") {
+  require_no_link(folder, "kept");
   std::filesystem::create_directories(folder_);
 }
 
@@ -95,14 +99,19 @@ void KeptTrials::load(Trial& trial, const std::string& key) {
   std::string reason;
   const auto text = try_read_file(file_of(folder_, key), reason);
   if (!text) return;
+  FaultList damage("kept");
+  std::optional<nlohmann::json> parsed = parse_json_text(*text, damage);
+  if (!parsed || !damage.empty()) return;
+  nlohmann::json& json = *parsed;
   try {
-    const nlohmann::json json = nlohmann::json::parse(*text);
-    if (json.at("key") != key) return;
+    const auto hash = json.at(kHashKey).get<std::string>();
+    json.erase(kHashKey);
+    if (json.at("key") != key || sha256_hex(dump_json(json)) != hash) return;
     Trial kept = trial;
     for (const nlohmann::json& loss : json.at("losses")) kept.losses.push_back(loss_of(loss));
     for (const nlohmann::json& cost : json.at("rounds")) kept.rounds.push_back(cost_of(cost));
-    for (const auto& [recording, scores] : json.at("real").items()) {
-      kept.real[recording] = scores_of(scores);
+    for (const auto& [content, scores] : json.at("real").items()) {
+      kept.real[content] = scores_of(scores);
     }
     kept.quarantined = json.at("quarantined").get<std::int64_t>();
     trial = std::move(kept);
@@ -121,7 +130,8 @@ void KeptTrials::save(const Trial& trial) const {
                          {"real", nlohmann::json::object()}};
   for (const PairLoss& loss : trial.losses) json["losses"].push_back(json_of(loss));
   for (const RoundCost& cost : trial.rounds) json["rounds"].push_back(json_of(cost));
-  for (const auto& [recording, scores] : trial.real) json["real"][recording] = json_of(scores);
+  for (const auto& [content, scores] : trial.real) json["real"][content] = json_of(scores);
+  json[kHashKey] = sha256_hex(dump_json(json));
   write_file_atomically(file_of(folder_, key), dump_json(json) + "\n");
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "pipeline/generators/calibrate.h"
+#include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
 namespace {
@@ -77,38 +78,21 @@ std::vector<float> on_grid(std::vector<float> values, int channels, const Placem
 
 namespace {
 
-constexpr double kJointShare = 0.1;
-constexpr double kLeastJointRadius_px = 4;
-
 /// Marks the pixels whose centre `contains` holds, of those between the edges of `around`.
 template <class Contains>
 void mark(std::vector<std::uint8_t>& pixels, ImageSize size, const Rectangle& around,
           Contains contains) {
-  const int top = std::clamp(static_cast<int>(std::floor(around.top)), 0, size.height);
-  const int left = std::clamp(static_cast<int>(std::floor(around.left)), 0, size.width);
+  const auto first = [](double edge, int end) {  // an edge may lie anywhere
+    return static_cast<int>(std::clamp(std::floor(edge), 0.0, static_cast<double>(end)));
+  };
+  const int top = first(around.top, size.height);
+  const int left = first(around.left, size.width);
   for (int y = top; y < size.height && y < around.bottom; ++y) {
     for (int x = left; x < size.width && x < around.right; ++x) {
       if (!contains(x, y)) continue;
       pixels[static_cast<std::size_t>(y) * static_cast<std::size_t>(size.width) +
              static_cast<std::size_t>(x)] = 1;
     }
-  }
-}
-
-void mark_joints(std::vector<std::uint8_t>& pixels, ImageSize size,
-                 const std::vector<Point>& joints) {
-  std::vector<Point> known;
-  std::ranges::copy_if(joints, std::back_inserter(known),
-                       [](const Point& joint) { return joint != kMissingPoint; });
-  if (known.empty()) return;
-  const auto [left, right] = std::ranges::minmax(known, {}, &Point::x);
-  const auto [top, bottom] = std::ranges::minmax(known, {}, &Point::y);
-  const double radius =
-      std::max(kLeastJointRadius_px, kJointShare * std::max(right.x - left.x, bottom.y - top.y));
-  for (const Point& joint : known) {
-    mark(pixels, size,
-         {joint.x - radius, joint.y - radius, joint.x + radius + 1, joint.y + radius + 1},
-         [&](int x, int y) { return std::hypot(x - joint.x, y - joint.y) <= radius; });
   }
 }
 
@@ -124,7 +108,12 @@ std::vector<std::uint8_t> labelled_pixels(const VolumeLabels& labels, ImageSize 
              y + 0.5 <= edges.bottom;
     });
   }
-  for (const VolumePerson& person : labels.persons) mark_joints(pixels, size, person.joints);
+  for (const VolumePerson& person : labels.persons) {
+    const Rectangle crop = pose_crop(person);  // its edges are points
+    mark(pixels, size, {crop.left, crop.top, crop.right + 1, crop.bottom + 1}, [&](int x, int y) {
+      return x >= crop.left && x <= crop.right && y >= crop.top && y <= crop.bottom;
+    });
+  }
   return pixels;
 }
 

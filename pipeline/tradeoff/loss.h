@@ -25,8 +25,7 @@ std::vector<float> on_grid(std::vector<float> values, int channels, const Placem
                            const Placement& to);
 
 /// Which pixels of a volume matter to a trainer, [y, x], 1 or 0: those whose centre lies in a box
-/// that is not to be ignored, or near a joint: within a tenth of the larger side of the rectangle
-/// around the person's joints, 4 pixels at least. Joints that were not annotated do not count.
+/// that is not to be ignored, or in what a pose trainer may cut out around a person (pose_crop).
 /// Pure.
 std::vector<std::uint8_t> labelled_pixels(const VolumeLabels& labels, ImageSize size);
 

@@ -9,26 +9,26 @@
 #include <mutex>
 #include <numeric>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/conversion/conversion_run.h"
+#include "pipeline/conversion/plan_summary.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/generators/calibrate.h"
 #include "pipeline/generators/choose_engine.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/generators/simulated_generator.h"
 #include "pipeline/planning/make_plan.h"
-#include "pipeline/realism/real_interval.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/tradeoff/kept_trials.h"
+#include "pipeline/tradeoff/real_scores.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/volume_statistics.h"
-#include "stages/frames/decoding/prepared_frame.h"
 #include "stages/generator/shipped_weights.h"
-#include "stages/generator/wanted_tiles.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
 
@@ -36,19 +36,21 @@ namespace eventgan {
 
 TradeoffAxes default_axes(const JobManifest& manifest) {
   TradeoffAxes axes;
-  axes.methods = {GeneratorKind::kNetwork, GeneratorKind::kDifference, GeneratorKind::kEsim};
+  const GeneratorSpec& generator = manifest.generator;
+  axes.methods = {GeneratorKind::kNetwork};
+  if (generator.kind != GeneratorKind::kNetwork) axes.methods.push_back(generator.kind);
   for (const int width : shipped_widths()) {
     axes.weights.push_back("shipped:" + std::to_string(width));
   }
-  const std::string own = shipped_weights_name(manifest.generator.weights);
-  if (manifest.generator.kind == GeneratorKind::kNetwork &&
+  const std::string own = shipped_weights_name(generator.weights);
+  if (generator.kind == GeneratorKind::kNetwork &&
       std::ranges::find(axes.weights, own) == axes.weights.end()) {
     axes.weights.push_back(own);
   }
   axes.precisions = {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8};
-  axes.sizes = {1, 0.75, 0.5};
-  axes.scopes = {Scope::kWhole, Scope::kMotion, Scope::kLabels};
-  axes.dtypes = {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8};
+  axes.sizes = {1};
+  axes.scopes = {generator.scope.scope};
+  axes.dtypes = {manifest.output.dtype};
   return axes;
 }
 
@@ -152,16 +154,6 @@ std::unique_ptr<Generator> reading_generator(const JobManifest& manifest) {
   return make_simulated_generator(spec, manifest.volume.bins, manifest.seed);
 }
 
-/// A recording's frames at another size of their sides.
-GreyImage resized(const GreyImage& image, ImageSize size) {
-  if (image.size == size) return image;
-  std::vector<std::uint8_t> bgr;
-  for (const std::uint8_t value : image.pixels) bgr.insert(bgr.end(), 3, value);
-  ImageSpec spec;
-  spec.size = size;
-  return {size, prepare_frame({image.size, bgr.data()}, spec).grey};
-}
-
 class Comparison {
  public:
   Comparison(const JobManifest& manifest, const TradeoffOptions& options)
@@ -197,15 +189,27 @@ class Comparison {
 
   SizedPairs read_pairs(double size) const;
   const SizedPairs& pairs_of(double size);
-  /// The trials, by index, of one computation that still lack something.
+  /// Trials, by index, of one computation.
+  using Group = std::vector<std::size_t>;
+  /// Those that still lack something.
   template <class Lacks>
-  std::vector<std::vector<std::size_t>> groups(Lacks lacks) const;
+  std::vector<Group> groups(Lacks lacks) const;
+  /// What is not measured yet.
+  struct Work {
+    std::vector<Group> losses;
+    std::vector<std::vector<Group>> rounds;  ///< by round; some are empty
+    std::vector<std::vector<Group>> real;    ///< by recording
+  };
+  Work work_left() const;
+  double pair_s(const Computation& computation) const;
+  double scoring_s() const;
+  void announce(const Work& work);
 
-  void find_losses(const std::vector<std::size_t>& group);
+  void find_losses(const Group& group);
   std::vector<RoundCost> take_turn(const Computation& computation,
                                    const std::vector<StoredType>& dtypes);
-  void run_round(std::size_t round, const std::vector<std::vector<std::size_t>>& lacking);
-  void find_real(const std::vector<std::size_t>& group, const Recording& recording);
+  void run_round(std::size_t round, const std::vector<Group>& lacking);
+  void find_real(const Group& group, const RealPart& part);
   void advance() {
     const std::lock_guard lock(telling_);
     if (progress_) progress_->advance(false, 0);
@@ -221,6 +225,7 @@ class Comparison {
   TradeoffReport report_;
   SizedPairs reference_pairs_;
   SizedPairs other_pairs_;  ///< of the size at work, if that is another
+  std::vector<RealPart> real_;
   std::unique_ptr<KeptTrials> kept_;
   std::unique_ptr<Progress> progress_;
   std::mutex telling_;
@@ -270,7 +275,6 @@ Computation Comparison::choose_reference() const {
 }
 
 void Comparison::choose_trials() {
-  report_.reference = choose_reference();
   const Able reference = look_at(report_.reference);
   if (!reference.reason.empty()) {
     throw UsageError("--reference: expected a configuration that can be run, got " +
@@ -280,6 +284,10 @@ void Comparison::choose_trials() {
       fmt::format("{}\n{}\n{} threads\n{} pairs\nagainst {} {}\n", processor_text(), kKeptVersion,
                   threads_, options_.pairs, name_of(report_.reference), reference.description);
   for (const auto& [field, value] : job_.plan.fingerprint) common += field + "=" + value + "\n";
+  // The fingerprint has frames by name and size.
+  for (const SampleMessage& pair : reference_pairs_.pairs) {
+    common += sha256_hex(std::as_bytes(std::span(pair.prepared.input))) + "\n";
+  }
   for (const Computation& computation : computations(options_.axes)) {
     const Able able = look_at(computation);
     if (!able.reason.empty()) {
@@ -354,8 +362,8 @@ const SizedPairs& Comparison::pairs_of(double size) {
 }
 
 template <class Lacks>
-std::vector<std::vector<std::size_t>> Comparison::groups(Lacks lacks) const {
-  std::vector<std::vector<std::size_t>> all;
+std::vector<Comparison::Group> Comparison::groups(Lacks lacks) const {
+  std::vector<Group> all;
   const auto computation = [&](std::size_t i) -> const Computation& {
     return report_.trials[i].configuration.computation;
   };
@@ -365,14 +373,13 @@ std::vector<std::vector<std::size_t>> Comparison::groups(Lacks lacks) const {
     all.back().push_back(i);
   }
   // Sizes together, so that the pairs of each are read once.
-  std::ranges::stable_sort(all, std::ranges::greater(), [&](const std::vector<std::size_t>& group) {
-    return computation(group.front()).size;
-  });
+  std::ranges::stable_sort(all, std::ranges::greater(),
+                           [&](const Group& group) { return computation(group.front()).size; });
   return all;
 }
 
 /// Loss of the trials of one computation, pairs in parallel.
-void Comparison::find_losses(const std::vector<std::size_t>& group) {
+void Comparison::find_losses(const Group& group) {
   const Computation& computation = report_.trials[group.front()].configuration.computation;
   const SizedPairs& sized = pairs_of(computation.size);
   const LoadedGenerator reference = load_generator(job_of(report_.reference, StoredType::kFloat32));
@@ -510,8 +517,7 @@ std::vector<RoundCost> Comparison::take_turn(const Computation& computation,
 }
 
 /// The reference first, with every stored type as the others have them: that costs a turn the same.
-void Comparison::run_round(std::size_t round,
-                           const std::vector<std::vector<std::size_t>>& lacking) {
+void Comparison::run_round(std::size_t round, const std::vector<Group>& lacking) {
   std::vector<StoredType> types = options_.axes.dtypes;
   if (std::ranges::find(types, manifest_.output.dtype) == types.end()) {
     types.push_back(manifest_.output.dtype);
@@ -520,7 +526,7 @@ void Comparison::run_round(std::size_t round,
     return costs.at(static_cast<std::size_t>(std::ranges::find(types, type) - types.begin()));
   };
   const std::vector<RoundCost> reference = take_turn(report_.reference, types);
-  for (const std::vector<std::size_t>& group : lacking) {
+  for (const Group& group : lacking) {
     const Computation& computation = report_.trials[group.front()].configuration.computation;
     const std::vector<RoundCost> costs =
         computation == report_.reference ? reference : take_turn(computation, types);
@@ -534,63 +540,103 @@ void Comparison::run_round(std::size_t round,
   }
 }
 
-/// Intervals between neighbouring frames of a recording, at most so many, spread evenly.
-std::vector<FrameInterval> some_intervals(const Recording& recording, int most) {
-  const std::vector<FrameInterval> all = choose_intervals(recording, 0, std::nullopt, {1});
-  const std::size_t count = std::min(static_cast<std::size_t>(most), all.size());
-  std::vector<FrameInterval> some;
-  for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
-  return some;
-}
-
-void Comparison::find_real(const std::vector<std::size_t>& group, const Recording& recording) {
+void Comparison::find_real(const Group& group, const RealPart& part) {
   const Computation& computation = report_.trials[group.front()].configuration.computation;
-  const JobManifest job = job_of(computation, StoredType::kFloat32);
-  const LoadedGenerator loaded = load_generator(job);
-  const std::vector<FrameInterval> intervals = some_intervals(recording, options_.pairs);
-  const ImageSize whole = recording.size();
-  ImageSpec smaller;
-  smaller.size = {static_cast<int>(std::lround(whole.height * computation.size)),
-                  static_cast<int>(std::lround(whole.width * computation.size))};
-  const Placement from = place(whole, smaller);
-  const Placement to = place(whole, {});
-  const VolumeShape shape{manifest_.volume.bins, whole};
-  const VolumeShape own_shape{manifest_.volume.bins, *smaller.size};
-  std::vector<std::vector<RealismScores>> scores(group.size(),
-                                                 std::vector<RealismScores>(intervals.size()));
-  for_each_index(intervals.size(), threads_, [&](std::size_t i) {
-    check_stop();
-    const RealInterval real = read_interval(recording, intervals[i], shape.bins);
-    IntervalFrames frames = real.frames;
-    frames.previous = resized(frames.previous, own_shape.size);
-    frames.next = resized(frames.next, own_shape.size);
-    std::vector<float> generated(own_shape.value_count());
-    const std::vector<float> input = network_input(frames);
-    if (job.generator.scope.scope == Scope::kWhole) {
-      loaded.generator->generate(input, own_shape.size, generated);
-    } else {  // a recording has no labels
-      loaded.generator->generate_tiles(
-          input, wanted_tiles(job.generator.scope, input, own_shape.size, 0, 0, {}), generated);
-    }
-    for (std::size_t k = 0; k < group.size(); ++k) {
-      const StoredType type = report_.trials[group[k]].configuration.dtype;
-      const EncodedVolume stored = VolumeCodec(type, 0).encode(generated);
-      const auto bytes =
-          decode_chunk(stored.chunk, type, 0, own_shape.value_count() * stored_size(type));
-      const std::vector<float> volume =
-          on_grid(comparable(dequantize(bytes.value(), type, stored.scale),
-                             computation.method != GeneratorKind::kNetwork),
-                  shape.channels(), from, to);
-      scores[k][i] =
-          realism_scores(volume, real.volume, shape, real.frames.previous, real.frames.next);
-    }
-    advance();
-  });
+  std::vector<StoredType> dtypes;
+  for (const std::size_t i : group) dtypes.push_back(report_.trials[i].configuration.dtype);
+  const std::vector<RealismScores> scores = real_scores(part, job_of(computation, dtypes.front()),
+                                                        computation.size, dtypes, threads_, [&] {
+                                                          check_stop();
+                                                          advance();
+                                                        });
   for (std::size_t k = 0; k < group.size(); ++k) {
     Trial& trial = report_.trials[group[k]];
-    trial.real[recording.name()] = mean_scores(scores[k]);
+    trial.real[part.content] = scores[k];
     kept_->save(trial);
   }
+}
+
+Comparison::Work Comparison::work_left() const {
+  Work work;
+  work.losses =
+      groups([](const Trial& trial) { return trial.losses.empty() && trial.quarantined == 0; });
+  for (int round = 0; round < options_.rounds; ++round) {
+    work.rounds.push_back(
+        groups([&](const Trial& trial) { return std::ssize(trial.rounds) <= round; }));
+  }
+  for (const RealPart& part : real_) {
+    work.real.push_back(
+        groups([&](const Trial& trial) { return !trial.real.contains(part.content); }));
+  }
+  return work;
+}
+
+/// Processor time of a pair with a computation, tried on one or two; 0 if none can be.
+double Comparison::pair_s(const Computation& computation) const {
+  check_stop();
+  Computation whole = computation;  // as large as the plan's shards say
+  whole.size = 1;
+  const JobManifest job = job_of(whole, manifest_.output.dtype);
+  return measure_trial(job, job_, *load_generator(job).generator, 1, 1).seconds_per_pair *
+         computation.size * computation.size;
+}
+
+/// The same of comparing a volume with the reference's.
+double Comparison::scoring_s() const {
+  const PlannedShard& shard = reference_pairs_.shards.front();
+  const VolumeShape shape{manifest_.volume.bins, shard.volume_size};
+  const std::vector<float> volume(shape.value_count(), 0.5f);
+  const std::vector<std::uint8_t> nowhere(shape.size.pixel_count());
+  const std::int64_t start_ns = thread_processor_ns();
+  pair_loss(volume, volume, shape, nowhere);
+  return 1e-9 * static_cast<double>(thread_processor_ns() - start_ns);
+}
+
+/// Tells how much there is to do, and begins to show how it goes on.
+void Comparison::announce(const Work& work) {
+  std::map<std::string, double> tried_s;
+  const auto pair_of = [&](const Computation& computation) {
+    const auto [tried, is_new] = tried_s.try_emplace(name_of(computation));
+    if (is_new) tried->second = pair_s(computation);
+    return tried->second;
+  };
+  const auto of = [&](const Group& group) -> const Computation& {
+    return report_.trials[group.front()].configuration.computation;
+  };
+  std::int64_t steps = 0;
+  double processor_s = 0;
+  const auto add = [&](std::int64_t pairs, double seconds) {
+    steps += pairs;
+    processor_s += static_cast<double>(pairs + 1) * seconds;  // one warms up
+  };
+  const double score_s = scoring_s();
+  for (const Group& group : work.losses) {
+    add(report_.pairs, pair_of(report_.reference) + pair_of(of(group)) +
+                           static_cast<double>(group.size()) * score_s);
+  }
+  for (const std::vector<Group>& round : work.rounds) {
+    if (!round.empty()) add(report_.pairs, pair_of(report_.reference));
+    for (const Group& group : round) {
+      if (of(group) != report_.reference) add(report_.pairs, pair_of(of(group)));
+    }
+  }
+  for (std::size_t i = 0; i < real_.size(); ++i) {
+    for (const Group& group : work.real[i]) {
+      add(std::ssize(real_[i].intervals),
+          pair_of(of(group)) + static_cast<double>(group.size()) * score_s);
+    }
+  }
+  if (options_.tell) {
+    const auto counted = [](std::int64_t count, const char* noun) {
+      return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+    };
+    options_.tell(fmt::format(
+        "{}, {}, {}: {}", counted(std::ssize(report_.trials), "configuration"),
+        counted(report_.pairs, "pair"), counted(options_.rounds, "round"),
+        steps == 0 ? "all measured before"
+                   : "about " + duration_text(std::max(processor_s / threads_, 1.0), "hms")));
+  }
+  if (options_.make_progress && steps > 0) progress_ = options_.make_progress(steps);
 }
 
 TradeoffReport Comparison::run() {
@@ -598,10 +644,10 @@ TradeoffReport Comparison::run() {
     throw InputError("expected pairs to compare, got none, in " + manifest_.name);
   }
   kept_ = std::make_unique<KeptTrials>(options_.out);
-  choose_trials();
   report_.job = manifest_.name;
   report_.processor = processor_text();
   report_.threads = threads_;
+  report_.reference = choose_reference();
   report_.reference_dtype = manifest_.output.dtype;
 
   reference_pairs_ = read_pairs(report_.reference.size);
@@ -617,41 +663,26 @@ TradeoffReport Comparison::run() {
                     "{}\n  {}",
                     samples_.size(), manifest_.name, report_.skipped.front()));
   }
-
-  const auto without_loss =
-      groups([](const Trial& trial) { return trial.losses.empty() && trial.quarantined == 0; });
-  std::vector<std::vector<std::vector<std::size_t>>> rounds;
-  std::int64_t steps = std::ssize(without_loss) * report_.pairs;
-  for (int round = 0; round < options_.rounds; ++round) {
-    rounds.push_back(groups([&](const Trial& trial) { return std::ssize(trial.rounds) <= round; }));
-    if (rounds.back().empty()) continue;
-    const auto others = std::ranges::count_if(rounds.back(), [&](const auto& group) {
-      return report_.trials[group.front()].configuration.computation != report_.reference;
-    });
-    steps += (1 + others) * report_.pairs;
-  }
-  std::vector<std::vector<std::vector<std::size_t>>> without_real;
+  choose_trials();
   for (const auto& recording : options_.real) {
-    without_real.push_back(
-        groups([&](const Trial& trial) { return !trial.real.contains(recording->name()); }));
-    steps +=
-        std::ssize(without_real.back()) * std::ssize(some_intervals(*recording, options_.pairs));
+    real_.push_back(part_of(*recording, options_.pairs, manifest_.volume.bins, threads_));
   }
-  if (options_.make_progress && steps > 0) progress_ = options_.make_progress(steps);
-  for (const auto& group : without_loss) find_losses(group);
-  for (std::size_t i = 0; i < without_real.size(); ++i) {
-    for (const auto& group : without_real[i]) find_real(group, *options_.real[i]);
+
+  const Work work = work_left();
+  announce(work);
+  for (const Group& group : work.losses) find_losses(group);
+  for (std::size_t i = 0; i < real_.size(); ++i) {
+    for (const Group& group : work.real[i]) find_real(group, real_[i]);
   }
-  for (std::size_t round = 0; round < rounds.size(); ++round) {
-    if (!rounds[round].empty()) run_round(round, rounds[round]);
+  for (std::size_t round = 0; round < work.rounds.size(); ++round) {
+    if (!work.rounds[round].empty()) run_round(round, work.rounds[round]);
   }
   if (progress_) progress_->finish();
   for (Trial& trial : report_.trials) {  // an earlier run may have had more
     trial.rounds.resize(static_cast<std::size_t>(options_.rounds));
-    std::erase_if(trial.real, [&](const auto& kept) {
-      return std::ranges::none_of(
-          options_.real, [&](const auto& recording) { return recording->name() == kept.first; });
-    });
+    std::map<std::string, RealismScores> by_name;
+    for (const RealPart& part : real_) by_name[part.recording.name()] = trial.real.at(part.content);
+    trial.real = std::move(by_name);
   }
   return std::move(report_);
 }

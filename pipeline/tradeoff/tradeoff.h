@@ -31,6 +31,9 @@ struct TradeoffOptions {
   std::filesystem::path out;  ///< folder for what is kept between runs; made if absent
   std::vector<std::unique_ptr<Recording>> real;  ///< to score the configurations by, too
   std::function<bool()> stop_requested;          ///< none: nobody asks
+  /// Told before the first pair how many configurations there are and how long it will take. None:
+  /// silent.
+  std::function<void(const std::string&)> tell;
   /// Called with the number of pairs to work through; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
 };
@@ -52,7 +55,9 @@ struct Trial {
   std::vector<PairLoss> losses;    ///< of each pair that can be compared
   std::int64_t quarantined = 0;    ///< pairs whose volume, or the reference's, is not sound
   std::vector<RoundCost> rounds;
-  std::map<std::string, RealismScores> real;  ///< means over its intervals, by recording
+  /// Means over its intervals, by recording; while it is measured, by the SHA-256 of what is scored
+  /// of the recording.
+  std::map<std::string, RealismScores> real;
 };
 
 struct RefusedComputation {
@@ -72,8 +77,9 @@ struct TradeoffReport {
   std::vector<RefusedComputation> refused;
 };
 
-/// The axes where the user names none: all methods, the shipped weights and the manifest's own, all
-/// precisions, sizes 1, 0.75 and 0.5, all stored types.
+/// The axes where the user names none: the network with the shipped weights and the manifest's own
+/// in all precisions, and the manifest's simulator if it has one; all else as the manifest says.
+/// Not more than ten configurations.
 TradeoffAxes default_axes(const JobManifest& manifest);
 
 /// Takes pairs of a job, spread evenly over its plan, through every configuration of the axes.
@@ -88,7 +94,8 @@ TradeoffAxes default_axes(const JobManifest& manifest);
 /// in the plan, since neighbours share frames; one turn of a computation serves all stored types.
 ///
 /// What is measured is kept in OUT/kept after each turn, a file a configuration, named by a hash of
-/// all it depends on, and not measured again. Work goes on where a run was stopped.
+/// all it depends on (of the pairs and the recordings' intervals: their content), and not measured
+/// again. Work goes on where a run was stopped.
 ///
 /// Throws UsageError if no configuration or not the reference can be run, InputError if weights or
 /// inputs cannot be read or no pair can, Stopped on a request to stop.

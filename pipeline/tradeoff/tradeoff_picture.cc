@@ -84,7 +84,8 @@ struct Plot {
     cv::rectangle(canvas, cv::Rect(kLeft, kTop, kPlotWidth, kPlotHeight), kInk);
     write_text(canvas, "times the reference's speed (processor time of a pair)",
                {kLeft + 140, kTop + kPlotHeight + 40}, kInk);
-    write_text(canvas, "error: relative L2 from the reference", {6, kTop - 10}, kInk);
+    write_text(canvas, "error: distance to the reference's volumes (relative L2), not to a camera",
+               {6, kTop - 10}, kInk);
   }
 };
 

@@ -1,12 +1,13 @@
 #include "pipeline/tradeoff/tradeoff_report.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <utility>
 
 #include "manifests/documents/json_text_internal.h"
@@ -73,7 +74,8 @@ std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
     const double speed = trials[i].speedup.median;
     // A NaN serves no demand.
     if (!(error <= demand.at_most_error.value_or(std::numeric_limits<double>::infinity())) ||
-        !(trials[i].pairs_per_s.median >= demand.at_least_speed.value_or(0))) {
+        !(trials[i].pairs_per_s.median >= demand.at_least_speed.value_or(0)) ||
+        !(speed >= demand.at_least_times.value_or(0))) {
       continue;
     }
     const auto rank = demand.at_most_error ? std::pair(speed, -error) : std::pair(-error, speed);
@@ -93,6 +95,10 @@ struct Digest {
     front = pareto_front(trials);
   }
   bool on_front(std::size_t trial) const { return std::ranges::count(front, trial) > 0; }
+  bool has_real() const {
+    return std::ranges::any_of(trials,
+                               [](const TrialSummary& trial) { return trial.real.has_value(); });
+  }
 
   std::vector<TrialSummary> trials;
   std::vector<std::size_t> front;
@@ -105,8 +111,8 @@ constexpr const char* kNotes[] = {
     "whole program; MB stored: a pair's volume, compressed. Medians over the rounds, (the middle "
     "half).",
     "error: ‖V - R‖ / ‖R‖, R the reference's volume, median over the pairs; F1 and times: as "
-    "realism has them, means over the pairs; lost: share of R's events in labelled boxes and near "
-    "labelled joints that V does not have.",
+    "realism has them, means over the pairs; lost: share of R's events in labelled boxes and in "
+    "persons' crops that V does not have.",
     "Volumes of another size are laid on the reference's grid: each pixel takes the mean, by area, "
     "of those it covers. That keeps the events per pixel of every part of the picture, and so its "
     "events times the area of a pixel. A simulator's counts are divided by their 98th percentile "
@@ -118,19 +124,20 @@ std::string with_spread(const Spread& spread, double factor, int digits) {
                      factor * spread.low, digits, factor * spread.high, digits);
 }
 
-/// `text` for a number, "-" without meaning.
-std::string score(double value) { return std::isnan(value) ? "-" : fmt::format("{:.3f}", value); }
+/// A number as text, "-" without meaning.
+std::string fixed(double value, int digits) {
+  return std::isnan(value) ? "-" : fmt::format("{:.{}f}", value, digits);
+}
+std::string score(double value) { return fixed(value, 3); }
 std::string small(double value) { return std::isnan(value) ? "-" : fmt::format("{:.2g}", value); }
 
 using Row = std::vector<std::string>;
 
 std::vector<Row> table_of(const Digest& digest) {
-  const bool has_real = std::ranges::any_of(
-      digest.trials, [](const TrialSummary& trial) { return trial.real.has_value(); });
   std::vector<Row> rows{{"", "configuration", "pairs/s", "times", "ms a pair", "generator",
                          "MB peak", "MB stored", "error", "largest", "F1 voxels", "F1 over time",
                          "times corr.", "lost"}};
-  if (has_real) {
+  if (digest.has_real()) {
     const Row more{"camera: F1 voxels", "F1 over time", "times corr."};
     rows.front().insert(rows.front().end(), more.begin(), more.end());
   }
@@ -151,7 +158,7 @@ std::vector<Row> table_of(const Digest& digest) {
            score(trial.loss.f1_time),
            score(trial.loss.time_correlation),
            score(lost_share(trial.loss))};
-    if (!has_real) continue;
+    if (!digest.has_real()) continue;
     const RealismScores real = trial.real.value_or(mean_scores({}));
     row.insert(row.end(), {score(real.f1_raw), score(real.f1_time), score(real.time_correlation)});
   }
@@ -161,7 +168,7 @@ std::vector<Row> table_of(const Digest& digest) {
 std::string head(const TradeoffReport& report) {
   std::size_t rounds = 0;
   for (const Trial& trial : report.trials) rounds = std::max(rounds, trial.rounds.size());
-  return fmt::format("{}: {} pairs, {} rounds, {} threads, {}\nreference: {}, its cost with {}\n",
+  return fmt::format("{}: {} pairs, {} rounds, {} threads\n{}\nreference: {}, its cost with {}\n",
                      report.job, report.pairs, rounds, report.threads, report.processor,
                      name_of(report.reference), to_string(report.reference_dtype));
 }
@@ -192,49 +199,109 @@ std::string demand_text(const TradeoffDemand& demand) {
          fmt::format("{}{:g} pairs/s or more", text.empty() ? "" : " and ", *demand.at_least_speed);
 }
 
-/// The answer to a demand, and its lines for the manifest.
-std::vector<std::string> answer(const TradeoffReport& report, const Digest& digest,
-                                const TradeoffDemand& demand) {
-  if (!demand.at_most_error && !demand.at_least_speed) return {};
-  const auto best = best_trial(digest.trials, demand);
-  if (!best) return {"no configuration has " + demand_text(demand)};
-  const TrialSummary& trial = digest.trials[*best];
-  std::vector<std::string> lines{fmt::format(
-      "With {}, {}: {} ({:.1f} pairs/s, error {:.2g}). For the manifest:", demand_text(demand),
-      demand.at_most_error ? "the fastest" : "the nearest", trial.name, trial.pairs_per_s.median,
-      trial.loss.relative_l2)};
-  const std::vector<std::string>& keys = report.trials[*best].lines;
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    lines.push_back("    " + keys[i] + (i + 1 < keys.size() ? "," : ""));
+/// A question that a user has, and the trial that answers it.
+struct Answer {
+  std::string question;  ///< "The fastest within 3 % of the reference"
+  std::optional<std::size_t> trial;
+};
+
+std::vector<Answer> recommendations(const Digest& digest) {
+  const auto best = [&](const TradeoffDemand& demand) { return best_trial(digest.trials, demand); };
+  constexpr double kNear = 0.03, kFast = 2;
+  std::vector<Answer> answers{
+      {"The fastest within 3 % of the reference", best({.at_most_error = kNear})},
+      {"The nearest to the reference at twice its speed", best({.at_least_times = kFast})}};
+  if (!answers[0].trial) {
+    answers[0] = {"None is within 3 % of the reference; the nearest", best({})};
   }
-  return lines;
+  if (!answers[1].trial) {
+    answers[1] = {"None is twice as fast as the reference; the fastest",
+                  best({.at_most_error = std::numeric_limits<double>::infinity()})};
+  }
+  return answers;
+}
+
+/// What is recommended, and what the user asked for.
+std::vector<Answer> answers_of(const Digest& digest, const TradeoffDemand& demand) {
+  std::vector<Answer> answers = recommendations(digest);
+  if (demand.at_most_error || demand.at_least_speed) {
+    answers.push_back(
+        {(demand.at_most_error ? "The fastest with " : "The nearest with ") + demand_text(demand),
+         best_trial(digest.trials, demand)});
+  }
+  return answers;
+}
+
+/// Answers with their lines for the manifest; `gap` stands between question and answer.
+std::string answers_text(const TradeoffReport& report, const Digest& digest,
+                         const TradeoffDemand& demand, const char* gap) {
+  const std::vector<Answer> answers = answers_of(digest, demand);
+  std::string text;
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const std::optional<std::size_t> best = answers[i].trial;
+    const bool goes_on = i > 0 && best == answers[i - 1].trial;  // two questions, one answer
+    text += (goes_on ? "" : "\n") + answers[i].question + ":\n";
+    if (i + 1 < answers.size() && best == answers[i + 1].trial) continue;
+    text += gap;
+    if (!best) {
+      text += "    no configuration\n";
+      continue;
+    }
+    const TrialSummary& trial = digest.trials[*best];
+    text += fmt::format("    {}\n    {:.2f} times its speed, {:.1f} pairs/s, error {:.2g}\n",
+                        trial.name, trial.speedup.median, trial.pairs_per_s.median,
+                        trial.loss.relative_l2);
+    text += fmt::format("        {}\n", fmt::join(report.trials[*best].lines, ",\n        "));
+  }
+  return text;
 }
 
 }  // namespace
 
 std::string to_text(const TradeoffReport& report, const TradeoffDemand& demand) {
   const Digest digest(report);
-  const std::vector<Row> rows = table_of(digest);
+  const bool has_labels = std::ranges::any_of(
+      digest.trials, [](const TrialSummary& trial) { return trial.loss.labelled_events > 0; });
+  std::vector<Row> rows{{"", "configuration", "times", "pairs/s", "error", "MB"}};
+  if (has_labels) rows.front().push_back("lost");
+  if (digest.has_real()) rows.front().push_back("camera");
+  for (std::size_t i = 0; i < digest.trials.size(); ++i) {
+    const TrialSummary& trial = digest.trials[i];
+    Row& row = rows.emplace_back();
+    row = {digest.on_front(i) ? "*" : "",  trial.name,
+           fixed(trial.speedup.median, 2), fixed(trial.pairs_per_s.median, 1),
+           small(trial.loss.relative_l2),  fixed(1e-6 * trial.stored_bytes, 3)};
+    if (has_labels) row.push_back(fixed(lost_share(trial.loss), 3));
+    if (digest.has_real()) row.push_back(trial.real ? fixed(trial.real->f1_time, 3) : "-");
+  }
   std::vector<std::size_t> widths(rows.front().size());
   for (const Row& row : rows) {
     for (std::size_t i = 0; i < row.size(); ++i) widths[i] = std::max(widths[i], row[i].size());
   }
+  // A longer name has a line for itself.
+  constexpr std::size_t kColumns = 80;
+  const std::size_t others =
+      std::accumulate(widths.begin() + 2, widths.end(), widths[0] + 2) + 2 * (widths.size() - 2);
+  widths[1] = std::min(widths[1], kColumns - others);
   std::string text = head(report) + "\n";
-  for (const Row& row : rows) {
-    for (std::size_t i = 0; i < row.size(); ++i) {
-      text += i <= 1 ? fmt::format("{:{}}  ", row[i], widths[i])
-                     : fmt::format("{:>{}}  ", row[i], widths[i]);
+  for (Row& row : rows) {
+    if (row[1].size() > widths[1]) {
+      text += fmt::format("{:{}}  {}\n", row[0], widths[0], row[1]);
+      row[0].clear();
+      row[1].clear();
     }
-    text.resize(text.find_last_not_of(' ') + 1);
+    text += fmt::format("{:{}}  {:{}}", row[0], widths[0], row[1], widths[1]);
+    for (std::size_t i = 2; i < row.size(); ++i) text += fmt::format("  {:>{}}", row[i], widths[i]);
     text += "\n";
   }
   text +=
-      "\n* on the Pareto front: nothing measured is as fast and nearer to the reference (by 1 % of "
-      "its error)\n";
-  for (const char* note : kNotes) text += std::string(note) + "\n";
+      "\n* Pareto front: nothing measured is as fast and nearer to the reference.\n"
+      "times: the speed, in the reference's. error: ‖V - R‖ / ‖R‖, the distance to the\n"
+      "reference's volumes R, not to a camera. MB: a pair's volume, compressed.\n";
+  if (has_labels) text += "lost: the share of R's events at labels that V does not have.\n";
+  if (digest.has_real()) text += "camera: F1 over time, against the camera's events.\n";
   for (const std::string& line : left_out(report)) text += line + "\n";
-  for (const std::string& line : answer(report, digest, demand)) text += line + "\n";
-  return text;
+  return text + answers_text(report, digest, demand, "");
 }
 
 std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& demand) {
@@ -258,9 +325,7 @@ std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& dema
       "% of its error).\n";
   for (const char* note : kNotes) text += "\n" + std::string(note) + "\n";
   for (const std::string& line : left_out(report)) text += "\n" + line + "\n";
-  const std::vector<std::string> lines = answer(report, digest, demand);
-  for (std::size_t i = 0; i < lines.size(); ++i) text += (i < 2 ? "\n" : "") + lines[i] + "\n";
-  return text;
+  return text + answers_text(report, digest, demand, "\n");
 }
 
 namespace {
@@ -323,6 +388,7 @@ std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand) 
                          {"configurations", nlohmann::json::array()},
                          {"front", nlohmann::json::array()},
                          {"not_run", nlohmann::json::array()},
+                         {"recommended", nlohmann::json::array()},
                          {"answer", nullptr}};
   for (std::size_t i = 0; i < report.trials.size(); ++i) {
     json["configurations"].push_back(
@@ -332,11 +398,17 @@ std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand) 
   for (const RefusedComputation& refused : report.refused) {
     json["not_run"].push_back({{"name", name_of(refused.computation)}, {"reason", refused.reason}});
   }
+  const auto configuration = [&](std::size_t trial) {
+    return nlohmann::json{{"name", digest.trials[trial].name},
+                          {"manifest", report.trials[trial].lines}};
+  };
+  for (const Answer& answer : recommendations(digest)) {
+    if (!answer.trial) continue;
+    json["recommended"].push_back(configuration(*answer.trial));
+    json["recommended"].back()["reason"] = answer.question;
+  }
   if (demand.at_most_error || demand.at_least_speed) {
-    if (const auto best = best_trial(digest.trials, demand)) {
-      json["answer"] = {{"name", digest.trials[*best].name},
-                        {"manifest", report.trials[*best].lines}};
-    }
+    if (const auto best = best_trial(digest.trials, demand)) json["answer"] = configuration(*best);
   }
   return dump_json(json, JsonLayout::kIndented) + "\n";
 }

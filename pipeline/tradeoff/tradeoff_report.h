@@ -32,27 +32,31 @@ std::vector<std::size_t> pareto_front(const std::vector<TrialSummary>& trials);
 
 /// What a user asks of a configuration.
 struct TradeoffDemand {
-  std::optional<double> at_most_error;   ///< relative_l2
-  std::optional<double> at_least_speed;  ///< pairs_per_s
+  std::optional<double> at_most_error = {};   ///< relative_l2
+  std::optional<double> at_least_speed = {};  ///< pairs_per_s
+  std::optional<double> at_least_times = {};  ///< speedup
 };
 
 /// The fastest (speedup) that is near enough; without `at_most_error` the nearest that is fast
-/// enough. None if no trial is. Pure.
+/// enough. None if no trial is, or none has both loss and cost. Pure.
 std::optional<std::size_t> best_trial(const std::vector<TrialSummary>& trials,
                                       const TradeoffDemand& demand);
 
-/// A table for a person, the front marked, what could not be run with the reasons, and the lines
-/// for the manifest that serve the demand. UTF-8.
+/// A table for a person, not wider than 80 columns, the front marked; what could not be run with
+/// the reasons; and with their lines for the manifest: the fastest within 3 % of the reference
+/// (else the nearest), the nearest at twice its speed (else the fastest), and what serves the
+/// demand. UTF-8.
 std::string to_text(const TradeoffReport& report, const TradeoffDemand& demand);
 
-/// The same as Markdown.
+/// The same as Markdown, with all that was measured.
 std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& demand);
 
 /// JSON, indented, with the spreads; null for what is no finite number.
 std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand);
 
 /// Draws speed (in the reference's) against error, both logarithmic, a point for each trial, the
-/// front as a line with numbers, and beside it their names. Writes a PNG. Throws std::runtime_error
+/// front as a line with numbers, and beside it their names. It says that the error is the distance
+/// to the reference, not to a camera. Writes a PNG. Throws std::runtime_error
 /// naming the path if it cannot be written.
 void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::path& path);
 

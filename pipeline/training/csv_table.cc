@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -61,12 +62,12 @@ CsvTable::CsvTable(const std::filesystem::path& file, const Row& columns,
 
 void CsvTable::add(const Row& row) {
   stream_ << joined(row);
-  if (!stream_) throw std::runtime_error("cannot write " + file_.string());
+  if (!stream_) throw_system_error("cannot write " + file_.string(), errno);
 }
 
 void CsvTable::flush() {
   stream_.flush();
-  if (!stream_) throw std::runtime_error("cannot write " + file_.string());
+  if (!stream_) throw_system_error("cannot write " + file_.string(), errno);
 }
 
 std::string csv_number(double value) {

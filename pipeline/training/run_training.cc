@@ -65,6 +65,7 @@ class TrainingRun {
   StepLosses take_step(const std::vector<TrainingSample>& batch);
   void keep_records(const std::vector<TrainingSample>& batch);
   void save();
+  void discard();
   void resume();
   void warn(const std::string& text) const;
   bool asked_to_stop() const;
@@ -144,7 +145,7 @@ TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions
       if (options_.note) options_.note(note);
     }
   }
-  if (options.overwrite) folder_.discard();
+  if (options.overwrite) discard();
   folder_.prepare();
   resume();
   losses_.emplace(folder_.losses(), position_);
@@ -154,6 +155,17 @@ TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions
 
 void TrainingRun::warn(const std::string& text) const {
   if (options_.warn) options_.warn(text);
+}
+
+/// Also where the checkpoints are damaged and tell nobody whose they are.
+void TrainingRun::discard() {
+  std::optional<TrainingCheckpoint> checkpoint;
+  try {
+    checkpoint = load_checkpoint(folder_.checkpoints(), [](const std::string&) {});
+  } catch (const std::runtime_error&) {
+  }
+  if (checkpoint) check_same_training(checkpoint->settings, settings_);
+  folder_.discard();
 }
 
 void TrainingRun::resume() {
@@ -231,12 +243,14 @@ StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
         "the training broke down in phase " + std::string(to_string(position_.phase)) + ", step " +
         std::to_string(position_.step) +
         "; last good checkpoint: " + (good.empty() ? "none" : good.string()) +
-        " (a lower learning rate, or other recordings, and --overwrite start again)"));
+        " (a lower learning rate and --overwrite start again; so do other recordings in another "
+        "folder)"));
   }
 }
 
 void TrainingRun::keep_records(const std::vector<TrainingSample>& batch) {
-  if (has_generator() && passed(pictured_, manifest_.picture_minutes)) {
+  const bool is_last = position_.step == steps_of(manifest_.steps, position_.phase);
+  if (has_generator() && (is_last || passed(pictured_, manifest_.picture_minutes))) {
     generator_records_.draw(trainer_.generator_state(), position_, batch);
     use_training_threads(threads_);
     pictured_ = Clock::now();

@@ -54,7 +54,7 @@ struct TrainingOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
   int threads = 0;                              ///< of LibTorch; 0: all cores
   std::string device = "cpu";                   ///< "cpu" or "cuda"
-  bool overwrite = false;                       ///< discard what an earlier run left in the folder
+  bool overwrite = false;                       ///< discard what an earlier run of this one left
   /// Asked before every step; true ends the run with a checkpoint. None: never.
   std::function<bool()> stop;
   std::optional<std::int64_t> max_steps;  ///< stop after so many steps of this run; for tests
@@ -85,8 +85,9 @@ struct TrainingReport {
 /// - training.csv, curves.png: the losses;
 /// - validation.csv: realism of the validation pairs, with each checkpoint of the generator phase;
 /// - training.lock: see TrainingLock;
-/// - pictures/generator-STEP.png: every picture_minutes of the generator phase; frames, generated,
-///   real, of four validation pairs, or of the batch where there is no validation.
+/// - pictures/generator-STEP.png: every picture_minutes of the generator phase, and after its last
+///   step; frames, generated, real, of four validation pairs, or of the batch where there is no
+///   validation.
 ///
 /// The weights are the same however often the training was stopped, with one number of threads, one
 /// kind of processor and one set of libraries. Throws UsageError (settings that do not fit the

@@ -65,6 +65,25 @@ std::map<std::string, std::string> training_environment(const std::string& devic
           {"program", program_version()}};
 }
 
+void check_same_training(const std::map<std::string, std::string>& before,
+                         const std::map<std::string, std::string>& now) {
+  const auto told = [](std::map<std::string, std::string> settings) {
+    std::erase_if(settings, [](const auto& setting) {
+      const std::string& field = setting.first;
+      return field != "manifest $.name" &&
+             !(field.starts_with("manifest $.recordings[") && field.ends_with("].path"));
+    });
+    return settings;
+  };
+  const auto differences = fingerprint_differences(told(before), told(now));
+  if (differences.empty()) return;
+  std::string message =
+      "expected the folder of this training, got that of another (choose another output folder, or "
+      "remove that one yourself):";
+  for (const std::string& difference : differences) message += "\n  " + difference;
+  throw UsageError(message);
+}
+
 void check_resumable(std::map<std::string, std::string> before,
                      std::map<std::string, std::string> now, const TrainingPosition& position,
                      const TrainingManifest& manifest) {
@@ -80,6 +99,7 @@ void check_resumable(std::map<std::string, std::string> before,
       now.erase(field);
     }
   }
+  check_same_training(before, now);
   const auto differences = fingerprint_differences(before, now);
   if (differences.empty()) return;
   std::string message =

@@ -40,6 +40,10 @@ std::map<std::string, std::string> training_settings(const TrainingManifest& man
 /// LibTorch, program.
 std::map<std::string, std::string> training_environment(const std::string& device);
 
+/// Throws UsageError if the settings are those of two trainings: another name, or other recordings.
+void check_same_training(const std::map<std::string, std::string>& before,
+                         const std::map<std::string, std::string>& now);
+
 /// Throws UsageError listing the fields that differ, unless a training that began with `before` may
 /// go on with `now` from `position`. Free to change are the steps of phases that are not reached
 /// yet, and of the one in progress if its learning rates are constant: nothing done so far depends

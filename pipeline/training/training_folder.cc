@@ -9,14 +9,35 @@
 #include <cstring>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
+#include "stages/base/files/atomic_file.h"
 #include "stages/base/files/unfinished_files.h"
 
 namespace eventgan {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+void require_own_folders(const TrainingFolder& folder) {
+  for (const fs::path& below : {folder.checkpoints(), folder.pictures()}) {
+    require_no_link(folder.root, below.filename());
+  }
+}
+
+/// generator-12000.png, as TrainingFolder::picture names them.
+bool is_picture(std::string_view name) {
+  constexpr std::string_view kBegin = "generator-", kEnd = ".png";
+  if (!name.starts_with(kBegin) || !name.ends_with(kEnd)) return false;
+  name = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
+  return !name.empty() && name.find_first_not_of("0123456789") == name.npos;
+}
+
+}  // namespace
+
 void TrainingFolder::prepare() const {
+  require_own_folders(*this);
   for (const fs::path& folder : {root, checkpoints(), pictures()}) {
     fs::create_directories(folder);
     remove_stale_temporaries(folder);
@@ -24,6 +45,7 @@ void TrainingFolder::prepare() const {
 }
 
 void TrainingFolder::discard() const {
+  require_own_folders(*this);
   // The checkpoints first: without them nothing goes on from the rest.
   for (const fs::path& file :
        {checkpoints() / "latest.safetensors", checkpoints() / "previous.safetensors",
@@ -33,8 +55,7 @@ void TrainingFolder::discard() const {
   }
   if (!fs::is_directory(pictures())) return;
   for (const auto& entry : fs::directory_iterator(pictures())) {
-    const std::string name = entry.path().filename().string();
-    if (name.starts_with("generator-") && name.ends_with(".png")) fs::remove(entry.path());
+    if (is_picture(entry.path().filename().string())) fs::remove(entry.path());
   }
 }
 
@@ -58,6 +79,7 @@ void write_holder(int descriptor) {
 TrainingLock::TrainingLock(const fs::path& folder) {
   fs::create_directories(folder);
   const fs::path file = folder / "training.lock";
+  require_no_link(folder, file.filename());
   descriptor_ = ::open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (descriptor_ < 0) {
     throw std::runtime_error("cannot create " + file.string() + ": " + std::strerror(errno));

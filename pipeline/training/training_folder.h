@@ -23,10 +23,12 @@ struct TrainingFolder {
            (std::string(to_string(position.phase)) + "-" + std::to_string(position.step) + ".png");
   }
 
-  /// Makes the folders, and clears away what writers left that are no longer alive.
+  /// Makes the folders, and clears away what writers left that are no longer alive. Throws
+  /// std::runtime_error if one of them below `root` is a symbolic link (require_no_link).
   void prepare() const;
 
-  /// Deletes all of the above that is there; other files are left alone.
+  /// Deletes all of the above that is there; other files are left alone. Throws as `prepare` does,
+  /// before anything is deleted.
   void discard() const;
 };
 
@@ -37,7 +39,7 @@ struct TrainingFolder {
 class TrainingLock {
  public:
   /// Makes the folder if it is not there. Throws std::runtime_error naming the holder if there is
-  /// one, or the file if it cannot be made.
+  /// one, or the file if it cannot be made or is a symbolic link.
   explicit TrainingLock(const std::filesystem::path& folder);
   ~TrainingLock();
   TrainingLock(const TrainingLock&) = delete;

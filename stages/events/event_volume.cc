@@ -22,7 +22,8 @@ void check_event(const Event& event, std::size_t number, const VolumeShape& shap
   }
 }
 
-void check_times(std::span<const Event> events, int last_bin) {
+void check_times(std::span<const Event> events, const std::array<double, 2>& times_s,
+                 int last_bin) {
   const auto unsorted = std::ranges::is_sorted_until(events, {}, &Event::t_s);
   if (unsorted != events.end()) {
     throw std::invalid_argument(
@@ -30,27 +31,33 @@ void check_times(std::span<const Event> events, int last_bin) {
         " after t=" + std::to_string(std::prev(unsorted)->t_s) + " as event " +
         std::to_string(unsorted - events.begin()));
   }
+  if (!(times_s[0] <= events.front().t_s && events.back().t_s <= times_s[1])) {
+    throw std::invalid_argument("expected events from t=" + std::to_string(times_s[0]) + " to " +
+                                std::to_string(times_s[1]) +
+                                ", got t=" + std::to_string(events.front().t_s) + " to " +
+                                std::to_string(events.back().t_s));
+  }
   // Beyond it the scaled times below are infinite.
-  if (!std::isfinite(last_bin * (events.back().t_s - events.front().t_s))) {
-    throw std::invalid_argument(
-        "expected times whose differences are finite, got t=" + std::to_string(events.front().t_s) +
-        " to " + std::to_string(events.back().t_s));
+  if (!std::isfinite(last_bin * (times_s[1] - times_s[0]))) {
+    throw std::invalid_argument("expected times whose differences are finite, got t=" +
+                                std::to_string(times_s[0]) + " to " + std::to_string(times_s[1]));
   }
 }
 
 }  // namespace
 
-std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape) {
+std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
+                                std::optional<std::array<double, 2>> times_s) {
   // In double: a sum of ones in float32 stays at 2^24.
   std::vector<double> volume(shape.value_count(), 0.0);
   if (events.empty()) return {volume.begin(), volume.end()};
 
   const std::size_t plane = shape.size.pixel_count();
-  const double first = events.front().t_s;
-  const double duration = events.back().t_s - first;
+  const auto [first, last] = times_s.value_or(std::array{events.front().t_s, events.back().t_s});
+  const double duration = last - first;
   const int last_bin = shape.bins - 1;
   for (std::size_t i = 0; i < events.size(); ++i) check_event(events[i], i, shape);
-  check_times(events, last_bin);
+  check_times(events, {first, last}, last_bin);
   for (const Event& event : events) {
     const double star =
         duration > 0 ? std::clamp(last_bin * (event.t_s - first) / duration, 0.0, double(last_bin))

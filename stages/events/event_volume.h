@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -8,12 +10,14 @@
 
 namespace eventgan {
 
-/// V(x,y,b) = Σ_i max(0, 1 - |b - t*_i|), t*_i = (B-1)(t_i - t_1)/(t_N - t_1), per polarity (DESIGN
-/// section 5); [2 bins, H, W] float32, C order; sums are formed in double. No events → zeros; t_N =
-/// t_1 → t* = 0. Throws std::invalid_argument for an event outside the picture, a time that is not
-/// finite, events that are not in time order, or a first and last one so far apart (1e307) that
+/// V(x,y,b) = Σ_i max(0, 1 - |b - t*_i|), t*_i = (B-1)(t_i - t_1)/(t_N - t_1), per polarity, as
+/// EventGAN has it; [2 bins, H, W] float32, C order; sums are formed in double. t_1 and t_N are
+/// `times_s`, or without them the times of the first and the last event. No events → zeros; t_N =
+/// t_1 → t* = 0. Throws std::invalid_argument for an event outside the picture or the times, a time
+/// that is not finite, events that are not in time order, or times so far apart (1e307) that
 /// (B-1)(t_N - t_1) is not finite. Thread safe.
-std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape);
+std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
+                                std::optional<std::array<double, 2>> times_s = std::nullopt);
 
 /// Takes events of a picture into the volume that it is placed in: an event comes to the pixel that
 /// the centre of its own falls in, x' = floor((x + 0.5) s) + offset, whatever `s`; none is added or

@@ -34,9 +34,9 @@ ValueScan scan_values(std::span<const float> values);
 /// largest. Thread safe.
 float kth_largest(std::span<const ValueScan> scans, std::size_t k);
 
-/// η98 (DESIGN section 5): of the n non-zero values of the volume in ascending order the k-th,
-/// k = max(int(0.98 n), 1); 0 if there is none. Throws std::invalid_argument for values that are
-/// not finite or are below zero. Thread safe.
+/// η98, as the published code takes it: of the n non-zero values of the volume in ascending order
+/// the k-th, k = max(int(0.98 n), 1); 0 if there is none. Throws std::invalid_argument for values
+/// that are not finite or are below zero. Thread safe.
 float eta98(std::span<const float> volume);
 
 /// Statistics of a volume of shape `whole`, of which `content` [2 bins, h, w] are the values of a

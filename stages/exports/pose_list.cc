@@ -202,7 +202,7 @@ void PckhTruth::write(const std::filesystem::path& file) const {
                has_numbers(mat.get(), "headboxes_src", head_boxes_);
   }
   if (!is_whole) {
-    throw std::runtime_error("cannot write " + file.string() + " (is the disk full?)");
+    throw std::runtime_error("cannot write " + file.string() + unsaid_reason(output.temporary()));
   }
   output.publish();
 }

@@ -2,6 +2,8 @@
 
 #include <stdexcept>
 
+#include "manifests/documents/json_text_internal.h"
+#include "manifests/values/faults.h"
 #include "stages/frames/events/dhp19_dataset.h"
 #include "stages/frames/events/recording_dataset.h"
 #include "stages/frames/human36m/human36m_dataset.h"
@@ -22,7 +24,9 @@ Outcome<EventWindow> Dataset::events(const std::string& label_key) const {
   throw std::logic_error("expected a dataset of events, got one of frames (" + label_key + ")");
 }
 
-std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesystem::path& base) {
+namespace {
+
+std::unique_ptr<Dataset> open_unchecked(const SourceSpec& spec, const std::filesystem::path& base) {
   switch (spec.dataset) {
     case DatasetKind::kKittiObject:
       return open_kitti_object_dataset(spec, base);
@@ -44,6 +48,20 @@ std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesys
       return open_dhp19_dataset(spec, base);
   }
   throw std::logic_error("open_dataset: not a kind of dataset");
+}
+
+}  // namespace
+
+std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesystem::path& base) {
+  std::unique_ptr<Dataset> dataset = open_unchecked(spec, base);
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    for (const std::string* name : {&frame.sample_id, &frame.sequence, &frame.frame.path}) {
+      if (name->find('\0') == std::string::npos) continue;
+      throw InputError("expected names of frames without NUL, got \"" + escape_controls(*name) +
+                       "\", in " + escape_controls(dataset->label_place(frame.label_key)));
+    }
+  }
+  return dataset;
 }
 
 namespace {

@@ -88,6 +88,10 @@ class Dataset {
   /// What the user should know about the source and no sample tells ("3 pictures without labels in
   /// kitti/training/image_2"); one line each.
   virtual std::vector<std::string> notes() const { return {}; }
+
+  /// Those of the notes that had better be read before anything is converted: what was found makes
+  /// the source of little use, though no sample is at fault.
+  virtual std::vector<std::string> warnings() const { return {}; }
 };
 
 /// What the name of a sequence of such a dataset tells: Human3.6M's "S1/Directions-1/54138969" or
@@ -95,7 +99,8 @@ class Dataset {
 FrameOrigin frame_origin(DatasetKind dataset, const std::string& sequence);
 
 /// Opens the source described by `spec`; relative paths start at `base`, the manifest's folder.
-/// Throws InputError if the source's root or an annotation file is missing or unreadable,
+/// Throws InputError if the source's root or an annotation file is missing or unreadable, or a
+/// frame's name has a NUL, at which a shard's and a file system's names end;
 /// UsageError if the manifest's keys do not fit what is there.
 std::unique_ptr<Dataset> open_dataset(const SourceSpec& spec, const std::filesystem::path& base);
 

@@ -232,6 +232,31 @@ std::optional<Place> look_around(const fs::path& path, std::optional<DatasetKind
                    ", in " + path.string());
 }
 
+/// Says so where what was taken as frames is a part of a dataset, whose labels and pairs it does
+/// not have alone: KITTI's image_2 holds images of scenes that have nothing to do with each other.
+void note_dataset_above(FoundSource& found) {
+  constexpr int kLevels = 4;  // S1/Walking-1/imageSequence/54138969
+  fs::path part = found.root;
+  for (int level = 0; level < kLevels; ++level, part = part.parent_path()) {
+    const std::string name = part.filename().string();
+    const bool may_be_part = name.starts_with("image") || name.starts_with("prev_") ||
+                             name == "sequences" || is_kitti_date(name) ||
+                             (name.size() > 1 && name[0] == 'S' && is_digit(name[1]));
+    if (!may_be_part) continue;
+    const fs::path above = part.parent_path();
+    const auto whole = look_at(above, std::nullopt, /*frames_too=*/false);
+    if (!whole) continue;
+    std::string remark = "warning: a part of " + std::string(whole->layout->title) +
+                         ", whose labels and pairs it does not have alone: eventgan init \"" +
+                         above.string() + "\"";
+    if (whole->layout->dataset == DatasetKind::kKittiObject && !has_folder(above / "image_2")) {
+      remark += " takes them, once the images are in image_2";
+    }
+    found.remarks.insert(found.remarks.begin(), remark);
+    return;
+  }
+}
+
 }  // namespace
 
 FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset) {
@@ -259,6 +284,7 @@ FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset
   found.title = place->layout->title;
   found.root = place->root;
   place->layout->complete(found);
+  if (found.dataset == DatasetKind::kFrames) note_dataset_above(found);
   return found;
 }
 

@@ -29,8 +29,8 @@ struct GenerationNotes {
 /// has the errors that come with it.
 inline constexpr double kMostSaturated = 5e-4;
 
-/// The EventGAN generator (DESIGN section 4), ready to run; the seam between the pipeline and the
-/// inference engines, and where tests put a fake.
+/// The EventGAN generator (weights.h has its network), ready to run; the seam between the pipeline
+/// and the inference engines, and where tests put a fake.
 ///
 /// Thread safety: `generate` may be called from several threads at once; the engine keeps no state
 /// between calls, so a volume depends on its two frames alone, on CUDA but for its last bits.

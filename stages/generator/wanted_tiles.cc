@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
+#include <numbers>
 
 namespace eventgan {
 namespace {
@@ -47,23 +47,6 @@ void want_motion(TileMask& mask, std::span<const float> frames, double threshold
   }
 }
 
-Rectangle crop_of(const VolumePerson& person) {
-  if (person.center != kMissingPoint && person.scale > 0) {
-    constexpr double kHalfSide = 1.25 * 200 / 2;
-    const double half = kHalfSide * person.scale;
-    return {person.center.x - half, person.center.y - half, person.center.x + half,
-            person.center.y + half};
-  }
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  Rectangle box{kFar, kFar, -kFar, -kFar};
-  for (const Point joint : person.joints) {
-    if (joint == kMissingPoint) continue;
-    box = {std::min(box.left, joint.x), std::min(box.top, joint.y), std::max(box.right, joint.x),
-           std::max(box.bottom, joint.y)};
-  }
-  return box;
-}
-
 /// The pixels of a rectangle, which may lie anywhere, and of its surroundings.
 TileMask::Pixels around(const Rectangle& box, int margin, ImageSize volume_up_to) {
   const auto pixel = [](double edge, int most) {
@@ -76,6 +59,42 @@ TileMask::Pixels around(const Rectangle& box, int margin, ImageSize volume_up_to
 }
 
 }  // namespace
+
+Rectangle pose_crop(const VolumePerson& person) {
+  // The loaders of MPII move the centre down and enlarge the scale before they vary it.
+  constexpr double kMoved_px = 15;
+  constexpr double kSide_px = 200;
+  constexpr double kEnlarged = 1.25;
+  constexpr double kLargestVariation = 1.25;
+  constexpr double kTurned = std::numbers::sqrt2;  // a square turned by 45 degrees
+  constexpr double kReach_px = kSide_px / 2 * kEnlarged * kLargestVariation * kTurned;
+  if (person.center != kMissingPoint && person.scale > 0) {
+    const double reach = kReach_px * person.scale;
+    const double y = person.center.y + kMoved_px * person.scale;
+    return {person.center.x - reach, y - reach, person.center.x + reach, y + reach};
+  }
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Rectangle box{kFar, kFar, -kFar, -kFar};
+  for (const Point joint : person.joints) {
+    if (joint == kMissingPoint) continue;
+    box = {std::min(box.left, joint.x), std::min(box.top, joint.y), std::max(box.right, joint.x),
+           std::max(box.bottom, joint.y)};
+  }
+  if (box.left > box.right) return box;
+  // The scale is that of the longer side, the centre the middle, of the joints that a trainer
+  // takes. If they are all that lie at one side, the crop reaches beyond it by as much as the other
+  // axis asks for; if they span the axis, half of it lies between the middle and the side.
+  const double width = box.right - box.left;
+  const double height = box.bottom - box.top;
+  const auto beyond = [](double along, double across) {
+    constexpr double kReach = kReach_px / kSide_px;
+    return std::max(kReach * std::max(across, 1.0),
+                    kReach * std::max({along, across, 1.0}) - along / 2);
+  };
+  const double x = beyond(width, height);
+  const double y = beyond(height, width);
+  return {box.left - x, box.top - y, box.right + x, box.bottom + y};
+}
 
 TileMask wanted_tiles(const ScopeSpec& scope, std::span<const float> frames, ImageSize content,
                       int content_y, int content_x, const VolumeLabels& labels) {
@@ -95,7 +114,7 @@ TileMask wanted_tiles(const ScopeSpec& scope, std::span<const float> frames, Ima
   for (const VolumeBox& box : labels.boxes) {
     if (!box.ignore) want_around(box.clipped);
   }
-  for (const VolumePerson& person : labels.persons) want_around(crop_of(person));
+  for (const VolumePerson& person : labels.persons) want_around(pose_crop(person));
   return mask;
 }
 

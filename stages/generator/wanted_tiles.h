@@ -10,15 +10,25 @@
 
 namespace eventgan {
 
+/// The smallest rectangle that holds every square that a pose trainer cuts out around a person by
+/// default, in volume pixels: PoseDataset of the Python package, and Microsoft's Simple Baselines.
+/// Their side is 200 x scale, for MPII's persons (there for all) with the scale enlarged by 1.25
+/// and the centre moved down by 15 x scale. Augmentation enlarges the side by up to 1.25 and turns
+/// the square by up to 60 degrees, so that it reaches 100 x 1.25 x 1.25 x sqrt(2) x scale from the
+/// moved centre, to all four sides. A person without centre or scale has those of the bounding box
+/// of its joints, enlarged by 1.25; then the rectangle holds the squares of all joints and of any
+/// part of them. Edges are points, the outermost that are sampled; left > right if nothing is
+/// annotated. Pure.
+Rectangle pose_crop(const VolumePerson& person);
+
 /// Which tiles of a volume a scope wants, not kWhole. `frames` [2, y, x] in [-1, 1] are the
 /// `content` of a volume, whose first pixel stands at (content_y, content_x); the tiles lie on the
 /// volume's grid, `labels` are in its pixels.
 ///
 /// Motion: pixels whose two values differ by more than `motion_threshold` grey levels (127.5 |x_1 -
 /// x_0|), or are not finite, and what lies within `motion_margin_px` rows and columns of them.
-/// Labels: boxes that are not to be ignored, and of persons the square of 1.25 x 200 x scale about
-/// their centre, as pose trainers cut them out, or where there is no such thing their joints'
-/// bounding box; each with `label_margin_px` around it. Pure.
+/// Labels: boxes that are not to be ignored, and of persons all that pose trainers may cut out
+/// (pose_crop); each with `label_margin_px` around it. Pure.
 TileMask wanted_tiles(const ScopeSpec& scope, std::span<const float> frames, ImageSize content,
                       int content_y, int content_x, const VolumeLabels& labels);
 

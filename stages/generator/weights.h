@@ -13,7 +13,7 @@
 
 namespace eventgan {
 
-// What of the network's shape (DESIGN section 4) does not depend on the weights.
+// What of the network's shape (see Weights) does not depend on the weights.
 
 inline constexpr int kNetworkLevels = 4;  ///< encoders, and as many decoders
 inline constexpr int kResidualBlocks = 2;
@@ -40,8 +40,14 @@ constexpr int kMostWeightBins = 64;      ///< of Weights::bins
 
 struct Calibration;  // calibration.h
 
-/// The generator's network (DESIGN section 4), spectral and batch norm folded into the
-/// convolutions.
+/// The generator's network, spectral and batch norm folded into the convolutions, which all have a
+/// bias, with the base width b:
+///   head        3x3, 2 → b, LeakyReLU
+///   4 encoders  3x3, stride 2, b → 2b → 4b → 8b → 16b, LeakyReLU
+///   2 resblocks 3x3, ReLU, 3x3 at 16b; the block's input is added, ReLU
+///   4 decoders  doubled to the size of the matching encoder's input (nearest), then 3x3 over
+///               [that, this input] to 8b, 4b, 2b, b, LeakyReLU
+///   pred        1x1, b → 2 bins, ReLU
 struct Weights {
   int base_channels = 0;
   int bins = 0;                                 ///< per polarity; the last layer has 2 bins outputs

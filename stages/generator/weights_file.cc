@@ -1,16 +1,20 @@
 #include "stages/generator/weights_file.h"
 
+#include <algorithm>
 #include <charconv>
+#include <cstddef>
 #include <exception>
 #include <limits>
 #include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/generator/calibration.h"
 #include "stages/generator/safetensors.h"
 
@@ -184,7 +188,32 @@ std::string serialize_weights(const Weights& weights) {
   return serialize_safetensors(tensors, metadata);
 }
 
+namespace {
+
+/// What PyTorch writes: a zip archive, or before version 1.6 a pickle. In safetensors these bytes
+/// are the header's length, of which the upper half is 0.
+bool is_pytorch_checkpoint(const std::filesystem::path& file) {
+  constexpr std::size_t kLengthBytes = 8;
+  const FileBytes bytes(file);
+  if (bytes.size_bytes() < kLengthBytes) return false;
+  const std::vector<std::byte> start = bytes.read(0, kLengthBytes);
+  const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
+  const bool has_length = text.ends_with(std::string_view("\0\0\0\0", 4));
+  return !has_length && (text.starts_with("PK\3\4") || text.starts_with('\x80'));
+}
+
+}  // namespace
+
 Weights read_weights(const std::filesystem::path& file) try {
+  if (is_pytorch_checkpoint(file)) {
+    std::filesystem::path converted = file;
+    converted.replace_extension(".safetensors");
+    if (converted == file) converted.replace_extension("imported.safetensors");
+    throw std::runtime_error(
+        "expected weights in safetensors, got a PyTorch checkpoint: run "
+        "`eventgan import-weights \"" +
+        file.string() + "\" \"" + converted.string() + "\"`");
+  }
   return checked_weights(read_safetensors(file), file.string());
 } catch (const std::runtime_error&) {
   std::throw_with_nested(InputError("cannot use the weights in " + file.string()));

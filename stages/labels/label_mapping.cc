@@ -94,17 +94,17 @@ bool all_finite(const Numbers& numbers) {
   return std::ranges::all_of(numbers, [](double x) { return std::isfinite(x); });
 }
 
-bool is_finite(double number) { return std::isfinite(number); }
-
-bool is_finite(Point point) { return std::isfinite(point.x) && std::isfinite(point.y); }
-
-bool is_finite(const Rectangle& box) {
-  return all_finite(std::initializer_list<double>{box.left, box.top, box.right, box.bottom});
+/// Numbers up to here stay finite in any volume. False of NaN.
+bool all_near(std::initializer_list<double> numbers) {
+  return std::ranges::all_of(numbers, [](double x) { return std::abs(x) <= kFarthest_px; });
 }
 
-bool is_finite(const Intrinsics& camera) {
-  return all_finite(std::initializer_list<double>{camera.focal_x, camera.focal_y, camera.centre_x,
-                                                  camera.centre_y});
+bool is_near(Point point) { return all_near({point.x, point.y}); }
+
+bool is_near(const Rectangle& box) { return all_near({box.left, box.top, box.right, box.bottom}); }
+
+bool is_near(const Intrinsics& camera) {
+  return all_near({camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y});
 }
 
 bool is_finite(const LensDistortion& lens) {
@@ -151,7 +151,7 @@ std::string text(const Parts&... parts) {
 }
 
 Complaint check(const Box& box, ImageSize picture) {
-  if (!is_finite(box.xyxy)) return text("expected finite edges, got ", box.xyxy);
+  if (!is_near(box.xyxy)) return text("expected edges within 1e6 pixels, got ", box.xyxy);
   // A number beyond 3.4e38 is infinite in the 32 bits that these have.
   if (!std::isfinite(box.truncation))
     return text("expected a finite truncation, got ", box.truncation);
@@ -173,7 +173,7 @@ Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
   bool any_inside = false;
   for (const Joint& joint : joints) {
     if (joint.at == kMissingPoint) continue;
-    if (!is_finite(joint.at)) return text("expected finite joints, got ", joint.at);
+    if (!is_near(joint.at)) return text("expected joints within 1e6 pixels, got ", joint.at);
     if (contains(picture, joint.at)) {
       any_inside = true;
     } else if (!outside) {
@@ -186,18 +186,22 @@ Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
 }
 
 Complaint check(const Person& person, ImageSize picture) {
-  if (!is_finite(person.center)) return text("expected a finite centre, got ", person.center);
-  if (!std::isfinite(person.scale)) return text("expected a finite scale, got ", person.scale);
-  if (person.head_box && !is_finite(*person.head_box)) {
-    return text("expected a finite head box, got ", *person.head_box);
+  if (!is_near(person.center)) {
+    return text("expected a centre within 1e6 pixels, got ", person.center);
+  }
+  if (!all_near({person.scale})) {
+    return text("expected a scale of at most 1e6, got ", person.scale);
+  }
+  if (person.head_box && !is_near(*person.head_box)) {
+    return text("expected a head box within 1e6 pixels, got ", *person.head_box);
   }
   for (const auto& joint : person.joints3d_mm) {
     if (!joint || all_finite(*joint)) continue;
     return text("expected finite joints in 3-D, got (", (*joint)[0], ", ", (*joint)[1], ", ",
                 (*joint)[2], ") mm");
   }
-  if (person.camera && !is_finite(*person.camera)) {
-    return text("expected a finite camera, got ", *person.camera);
+  if (person.camera && !is_near(*person.camera)) {
+    return text("expected a camera within 1e6 pixels, got ", *person.camera);
   }
   if (person.distortion && !is_finite(*person.distortion)) {
     return text("expected a finite lens distortion, got ", *person.distortion);
@@ -232,35 +236,6 @@ VolumePerson map(const Person& person, const Placement& placement) {
   return mapped;
 }
 
-/// A number that is finite as annotated may not be so after scaling.
-template <class Label>
-Complaint check_mapped(const char* expected, const Label& mapped, const Label& annotated) {
-  if (is_finite(mapped)) return std::nullopt;
-  return text("expected ", expected, " in the volume, got ", mapped, " from ", annotated);
-}
-
-Complaint check(const VolumeBox& mapped, const Box& box) {
-  return check_mapped("finite edges", mapped.unclipped, box.xyxy);
-}
-
-Complaint check(const VolumePerson& mapped, const Person& person) {
-  Complaint complaint = check_mapped("a finite centre", mapped.center, person.center);
-  if (!complaint) complaint = check_mapped("a finite scale", mapped.scale, person.scale);
-  for (std::size_t j = 0; j < mapped.joints.size() && !complaint; ++j) {
-    complaint = check_mapped("finite joints", mapped.joints[j], person.joints[j].at);
-  }
-  if (mapped.head_box && !complaint) {
-    complaint = check_mapped("a finite head box", *mapped.head_box, *person.head_box);
-  }
-  if (mapped.box && !complaint) {
-    complaint = check_mapped("a finite box", *mapped.box, *person.box);
-  }
-  if (mapped.camera && !complaint) {
-    complaint = check_mapped("a finite camera", *mapped.camera, *person.camera);
-  }
-  return complaint;
-}
-
 /// Checks and maps one kind of label; "box 2 of 8" says which one is at fault.
 template <class Label, class Mapped>
 std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char* kind,
@@ -268,15 +243,11 @@ std::optional<SampleFault> map_all(const std::vector<Label>& labels, const char*
                                    std::vector<Mapped>& mapped) {
   mapped.reserve(labels.size());
   for (const Label& label : labels) {
-    Complaint complaint = check(label, placement.source);
-    if (!complaint) {
-      mapped.push_back(map(label, placement));
-      complaint = check(mapped.back(), label);
-    }
-    if (complaint) {
+    if (const Complaint complaint = check(label, placement.source)) {
       return SampleFault{text(*complaint, ", in ", kind, " ", &label - labels.data() + 1, " of ",
                               labels.size(), ", in ", where)};
     }
+    mapped.push_back(map(label, placement));
   }
   return std::nullopt;
 }

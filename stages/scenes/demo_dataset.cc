@@ -1,7 +1,12 @@
 #include "stages/scenes/demo_dataset.h"
 
-#include <system_error>
+#include <fmt/core.h>
 
+#include <algorithm>
+#include <system_error>
+#include <vector>
+
+#include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "stages/scenes/layouts/human36m_layout_writer.h"
 #include "stages/scenes/layouts/kitti_layout_writer.h"
@@ -26,22 +31,50 @@ constexpr char kSources[] =
     { "dataset": "human36m", "root": "h36m", "layout": "fetch",
       "pairs": { "gaps": [1, 2], "side": "after", "choose": "one" } })";
 
-/// Each scene is either for training or for validation, by its name and the seed.
+/// Each scene is either for training or for validation, by its name and the seed; for {} stands
+/// what demo_manifest puts there.
 constexpr char kSplitSources[] =
     R"(    // Cars; four fifths of the scenes are to train on, the others to validate.
-    { "dataset": "kitti_object", "root": "kitti/training", "fraction": [0, 0.8],
-      "pairs": { "gaps": [1, 2, 3], "side": "before", "choose": "one" } },
-    { "dataset": "kitti_object", "root": "kitti/training", "fraction": [0.8, 1], "split": "val",
-      "pairs": { "gaps": [1, 2, 3], "side": "before", "choose": "one" } },
-
+{}
     // Persons, likewise.
-    { "dataset": "mpii", "root": "mpii", "fraction": [0, 0.8],
-      "pairs": { "gaps": [2, 4], "side": "around", "choose": "one" } },
-    { "dataset": "mpii", "root": "mpii", "fraction": [0.8, 1], "split": "val",
-      "pairs": { "gaps": [2, 4], "side": "around", "choose": "one" } },
+{}
+    {{ "dataset": "human36m", "root": "h36m", "layout": "fetch",
+      "pairs": {{ "gaps": [1, 2], "side": "after", "choose": "one" }} }})";
 
-    { "dataset": "human36m", "root": "h36m", "layout": "fetch",
-      "pairs": { "gaps": [1, 2], "side": "after", "choose": "one" } })";
+/// Where between 0 and 1 the numbers that `fraction` gives the frames of these names are to be
+/// parted, so that some are to train on and some to validate: at 0.8, unless so few frames all lie
+/// on one side of it. 1 if there is one frame only.
+double parting(const std::vector<std::string>& names, std::uint64_t seed) {
+  constexpr double kUsual = 0.8;
+  std::vector<double> places;  // as select_frames has them
+  for (const std::string& name : names) {
+    places.push_back(CounterRandom(seed).keyed("fraction").keyed(name).uniform(0));
+  }
+  std::ranges::sort(places);
+  if (places.size() < 2) return 1;
+  if (places.front() < kUsual && places.back() >= kUsual) return kUsual;
+  const auto first_to_validate = places.end() - std::max<std::ptrdiff_t>(1, std::ssize(places) / 5);
+  return (*first_to_validate + *(first_to_validate - 1)) / 2;
+}
+
+/// The lines of a source to train on, and of one to validate.
+std::string split_source(const std::string& keys, const std::string& pairs, double parting) {
+  const std::string start = "    { " + keys;
+  const std::string end = ",\n      \"pairs\": { " + pairs + ", \"choose\": \"one\" } },\n";
+  if (parting == 1) return start + end;
+  return start + fmt::format(", \"fraction\": [0, {}]", parting) + end + start +
+         fmt::format(", \"fraction\": [{}, 1], \"split\": \"val\"", parting) + end;
+}
+
+std::string split_sources(std::uint64_t seed, int scenes) {
+  return fmt::format(
+      kSplitSources,
+      split_source(R"("dataset": "kitti_object", "root": "kitti/training")",
+                   R"("gaps": [1, 2, 3], "side": "before")",
+                   parting(kitti_layout_names(scenes), seed)),
+      split_source(R"("dataset": "mpii", "root": "mpii")", R"("gaps": [2, 4], "side": "around")",
+                   parting(mpii_layout_names(scenes), seed)));
+}
 
 }  // namespace
 
@@ -58,7 +91,7 @@ std::string demo_manifest(std::uint64_t seed, int scenes) {
          R"(,
 
   "sources": [
-)" + (scenes > 0 ? kSplitSources : kSources) +
+)" + (scenes > 0 ? split_sources(seed, scenes) : kSources) +
          R"(
   ],
 
@@ -95,13 +128,29 @@ void require_new_or_empty(const std::filesystem::path& folder) {
 }  // namespace
 
 void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes,
-                        int between) {
+                        int between, const std::function<void()>& on_image) {
   require_new_or_empty(folder);
-  write_kitti_layout(folder / "kitti" / "training", seed, scenes, between);
-  write_mpii_layout(folder / "mpii", seed, scenes, between);
-  write_human36m_layout(folder / "h36m", seed);
-  // Last: where there is a manifest, all it speaks of is there.
-  write_text(folder / "manifest.json", demo_manifest(seed, scenes));
+  const bool is_new = !std::filesystem::exists(folder);
+  try {
+    write_kitti_layout(folder / "kitti" / "training", seed, scenes, between, on_image);
+    write_mpii_layout(folder / "mpii", seed, scenes, between, on_image);
+    write_human36m_layout(folder / "h36m", seed);
+    // Last: where there is a manifest, all it speaks of is there.
+    write_text(folder / "manifest.json", demo_manifest(seed, scenes));
+  } catch (...) {  // else the next try would find a folder with files in it
+    std::error_code unknown;
+    for (const char* name : {"kitti", "mpii", "h36m", "manifest.json"}) {
+      std::filesystem::remove_all(folder / name, unknown);
+    }
+    if (is_new) std::filesystem::remove(folder, unknown);
+    throw;
+  }
+}
+
+int demo_image_count(int scenes) {
+  constexpr int kTestImages = 1;  // of MPII
+  return static_cast<int>(kitti_layout_names(scenes).size() + mpii_layout_names(scenes).size()) +
+         kTestImages;
 }
 
 }  // namespace eventgan

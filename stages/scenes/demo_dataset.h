@@ -2,13 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 
 namespace eventgan {
 
 /// The text of the manifest that converts the demo dataset beside it, with comments for a reader
-/// who wants to write one of his own.
-/// With `scenes` a fifth of KITTI's and MPII's is for validation.
+/// who wants to write one of his own. With `scenes` about a fifth of KITTI's and MPII's is for
+/// validation, of two at least one of each; a single street is to train on.
 std::string demo_manifest(std::uint64_t seed, int scenes = 0);
 
 /// Writes a small synthetic dataset with exact labels into `folder`, in the layouts of KITTI object
@@ -18,10 +19,15 @@ std::string demo_manifest(std::uint64_t seed, int scenes = 0);
 /// Human3.6M. Every label is computed from the scene's geometry, not from pixels. `scenes` > 0: so
 /// many streets and, if that is more than seven, so many figures, each of its own seed, to train
 /// on. `between` > 0: beside each labelled frame so many moments between the frames, for
-/// `eventgan simulate` (see the layouts' writers). The same arguments give the same bytes. Throws
-/// std::runtime_error naming the path if something cannot be written; UsageError if `folder` exists
-/// and is not empty.
-void write_demo_dataset(const std::filesystem::path& folder, std::uint64_t seed, int scenes = 0,
-                        int between = 0);
+/// `eventgan simulate` (see the layouts' writers). The same arguments give the same bytes.
+/// `on_image` is called demo_image_count(scenes) times as it goes. Throws std::runtime_error naming
+/// the path if something cannot be written, and what `on_image` throws, and then leaves nothing of
+/// it; UsageError if `folder` exists and is not empty.
+void write_demo_dataset(
+    const std::filesystem::path& folder, std::uint64_t seed, int scenes = 0, int between = 0,
+    const std::function<void()>& on_image = [] {});
+
+/// The labelled images of KITTI and MPII that write_demo_dataset makes.
+int demo_image_count(int scenes);
 
 }  // namespace eventgan

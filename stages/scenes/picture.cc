@@ -5,6 +5,9 @@
 #include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+#include <vector>
+
+#include "stages/scenes/layouts/output_files.h"
 
 namespace eventgan {
 namespace {
@@ -17,13 +20,14 @@ void write(const Picture& picture, const std::filesystem::path& path,
            const std::vector<int>& parameters) {
   const cv::Mat view(picture.size.height, picture.size.width, CV_8UC3,
                      const_cast<std::uint8_t*>(picture.bgr.data()));
-  bool written = false;
+  // cv::imwrite tells of no write that fails.
+  std::vector<std::uint8_t> bytes;
   try {
-    written = cv::imwrite(path.string(), view, parameters);
+    cv::imencode(path.extension().string(), view, bytes, parameters);
   } catch (const cv::Exception& exception) {
     throw std::runtime_error("cannot write " + path.string() + ": " + exception.err);
   }
-  if (!written) throw std::runtime_error("cannot write " + path.string());
+  write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace

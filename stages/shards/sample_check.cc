@@ -20,11 +20,23 @@ bool near(double a, double b) {  // false for NaN
   return std::abs(a - b) <= kTolerance_px + 1e-12 * std::abs(b);
 }
 
-bool near(const Point& a, const Point& b) { return near(a.x, b.x) && near(a.y, b.y); }
+std::array<double, 2> numbers(const Point& p) { return {p.x, p.y}; }
+std::array<double, 4> numbers(const Rectangle& r) { return {r.left, r.top, r.right, r.bottom}; }
+std::array<double, 4> numbers(const Intrinsics& camera) {
+  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
+}
+std::array<double, 5> numbers(const LensDistortion& lens) {
+  return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2};
+}
+std::array<double, 1> numbers(double x) { return {x}; }
+template <class Number, std::size_t kCount>
+std::array<Number, kCount> numbers(const std::array<Number, kCount>& all) {
+  return all;
+}
 
-bool near(const Rectangle& a, const Rectangle& b) {
-  return near(a.left, b.left) && near(a.top, b.top) && near(a.right, b.right) &&
-         near(a.bottom, b.bottom);
+template <class Label>
+bool near(const Label& a, const Label& b) {
+  return std::ranges::equal(numbers(a), numbers(b), [](double x, double y) { return near(x, y); });
 }
 
 /// `/pairs/source_to_volume` as a map of points and of edges (manifests/values/placement.h has the
@@ -36,6 +48,29 @@ class SourceToVolume {
   Point operator()(const Point& p) const {
     if (p == kMissingPoint) return p;
     return {m_[0] * p.x + m_[1] * p.y + m_[2], m_[3] * p.x + m_[4] * p.y + m_[5]};
+  }
+
+  /// The geometric mean of both axes' scales: one number for a person.
+  double scaled(double scale) const { return scale < 0 ? scale : scale * std::sqrt(m_[0] * m_[4]); }
+
+  /// Focal lengths scale.
+  Intrinsics operator()(const Intrinsics& camera) const {
+    const Point centre = (*this)(Point{camera.centre_x, camera.centre_y});
+    return {camera.focal_x * m_[0], camera.focal_y * m_[4], centre.x, centre.y};
+  }
+
+  /// P' = M P: its rows are combined as points' x, y and 1 are.
+  std::array<double, 12> operator()(const std::array<double, 12>& projection) const {
+    std::array<double, 12> mapped = projection;
+    for (std::size_t i = 0; i < 4; ++i) {
+      const auto row = [&](std::size_t first) {
+        return m_[first] * projection[i] + m_[first + 1] * projection[4 + i] +
+               m_[first + 2] * projection[8 + i];
+      };
+      mapped[i] = row(0);
+      mapped[4 + i] = row(3);
+    }
+    return mapped;
   }
 
   /// An edge lies half a pixel before the centre of the pixel with its number, here and there.
@@ -56,20 +91,6 @@ Rectangle cut(const Rectangle& box, const ImageSize& size) {
           std::clamp(box.right, 0.0, width), std::clamp(box.bottom, 0.0, height)};
 }
 
-std::array<double, 2> numbers(const Point& p) { return {p.x, p.y}; }
-std::array<double, 4> numbers(const Rectangle& r) { return {r.left, r.top, r.right, r.bottom}; }
-std::array<double, 4> numbers(const Intrinsics& camera) {
-  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
-}
-std::array<double, 5> numbers(const LensDistortion& lens) {
-  return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2};
-}
-std::array<double, 1> numbers(double x) { return {x}; }
-template <class Number, std::size_t kCount>
-std::array<Number, kCount> numbers(const std::array<Number, kCount>& all) {
-  return all;
-}
-
 /// Columns in which a number is not finite.
 std::vector<std::string> not_finite(const ShardSample& sample) {
   std::vector<std::string> faults;
@@ -85,6 +106,10 @@ std::vector<std::string> not_finite(const ShardSample& sample) {
   const auto expect_finite_if_any = [&](const char* column, const auto& value) {
     if (value) expect_finite(column, *value);
   };
+  if (sample.valid) {  // of a quarantined one the source's alone may be there, as it is
+    expect_finite_if_any("projection_source", sample.annotation.projection);
+    expect_finite_if_any("projection", sample.labels.projection);
+  }
   for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
     whose = " of box " + std::to_string(i);
     const Box& source = sample.annotation.boxes[i];
@@ -107,6 +132,8 @@ std::vector<std::string> not_finite(const ShardSample& sample) {
     expect_finite("scale_volume", person.scale);
     expect_finite_if_any("head_box_source", source.head_box);
     expect_finite_if_any("head_box", person.head_box);
+    expect_finite_if_any("box_source", source.box);
+    expect_finite_if_any("box", person.box);
     for (const auto& joint : source.joints3d_mm) expect_finite_if_any("joints3d_mm", joint);
     expect_finite_if_any("camera_source", source.camera);
     expect_finite_if_any("camera", person.camera);
@@ -124,6 +151,12 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
     if (!holds) faults.push_back("expected " + what + ", got another place");
   };
   const SourceToVolume map(sample.source_to_volume);
+  const auto expect_mapped = [&](const std::string& name, const std::string& of, const auto& mapped,
+                                 const auto& source) {
+    expect(mapped.has_value() == source.has_value(), name + " if there is " + of);
+    if (!mapped || !source) return;
+    expect(near(*mapped, map(*source)), name + " where source_to_volume puts " + of);
+  };
 
   for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
     const VolumeBox& box = sample.labels.boxes[i];
@@ -149,12 +182,15 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
     }
     expect(near(person.center, map(source.center)),
            "center" + name + " where source_to_volume puts center_source");
-    if (person.head_box && source.head_box) {
-      expect(near(*person.head_box, map(*source.head_box)),
-             "head_box" + name + " where source_to_volume puts head_box_source");
-    }
-    expect(person.head_box.has_value() == source.head_box.has_value(),
-           "head_box" + name + " if there is head_box_source");
+    expect(near(person.scale, map.scaled(source.scale)),
+           "scale_volume" + name + " as source_to_volume makes it of scale");
+    expect_mapped("head_box" + name, "head_box_source", person.head_box, source.head_box);
+    expect_mapped("box" + name, "box_source", person.box, source.box);
+    expect_mapped("camera" + name, "camera_source", person.camera, source.camera);
+  }
+  if (sample.valid) {
+    expect_mapped("projection", "projection_source", sample.labels.projection,
+                  sample.annotation.projection);
   }
   return faults;
 }

@@ -160,6 +160,12 @@ class Check {
     } catch (const std::runtime_error& error) {  // checksum
       faults_.push_back(error.what() + where);
     }
+    const std::vector<float>& fractions = reader.tables().events.generated_fraction;
+    if (!fractions.empty()) {
+      const double fraction = sample.valid ? generated_fraction(sample) : 0;
+      expect("generated_fraction" + where, static_cast<float>(fraction),
+             fractions[static_cast<std::size_t>(slot)]);
+    }
     for (const std::string& found : label_faults(reader.header(), sample)) fault(found + where);
   }
 

@@ -241,6 +241,8 @@ ShardReader::ShardReader(ShardReader&&) noexcept = default;
 
 const ShardHeader& ShardReader::header() const { return state_->shard.header; }
 
+const ShardTables& ShardReader::tables() const { return state_->shard.tables; }
+
 ShardContents ShardReader::contents() const { return contents_of(state_->shard.tables, header()); }
 
 ShardSample ShardReader::sample(int slot) const {

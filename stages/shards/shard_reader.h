@@ -24,11 +24,15 @@ class ShardReader {
 
   const ShardHeader& header() const;
 
+  /// Every column as it is stored; consistent, as visit_columns says.
+  const ShardTables& tables() const;
+
   /// The rows of the shard, counted.
   ShardContents contents() const;
 
   /// Everything about slot `slot` but its volume. `fault` is empty, since it stands in the marker;
-  /// frame times are relative to the previous frame. Throws std::out_of_range.
+  /// in a shard from before frame times were kept they are relative to the previous frame. Throws
+  /// std::out_of_range.
   ShardSample sample(int slot) const;
 
   /// The volume of slot `slot`, decoded to float32 [2 bins, H, W], C order.

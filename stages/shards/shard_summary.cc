@@ -49,13 +49,14 @@ std::vector<std::string> flag_names(std::uint32_t flags) {
 
 namespace {
 
-/// Lines "  name         value", values below each other.
+/// Lines "  name         value", values below each other. They are a file's, which may be
+/// anybody's.
 class Lines {
  public:
-  explicit Lines(const std::string& title) : text_(title + "\n") {}
+  explicit Lines(const std::string& title) : text_(escape_controls(title) + "\n") {}
 
   void add(std::string_view name, std::string_view value) {
-    text_ += fmt::format("  {:14} {}\n", name, value);
+    text_ += fmt::format("  {:14} {}\n", name, escape_controls(value));
   }
 
   template <class... Values>
@@ -136,8 +137,7 @@ std::string describe_shard(const ShardReader& reader) {
   const ShardHeader& header = reader.header();
   const ShardCounts counts = count_shard(reader);
   Lines line(header.name);
-  line("format", "{} {}, written by eventgan {}", kShardFormat, kShardFormatVersion,
-       header.program_version);
+  line("format", "{} {}, written by {}", kShardFormat, kShardFormatVersion, header.program_version);
   line("dataset", "{}, split {}", header.dataset, header.split);
   line("samples", "{}, valid {}, without any event {}", header.sample_count, counts.valid,
        counts.empty_volumes);

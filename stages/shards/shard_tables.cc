@@ -34,8 +34,10 @@ ShardContents contents_of(const ShardTables& tables, const ShardHeader& header) 
   ShardContents contents;
   contents.boxes = rows_by_slot(tables.boxes.offsets);
   contents.persons = rows_by_slot(tables.poses.offsets);
+  const std::vector<std::string>& names = header.label_schema.class_names;
   for (const std::int32_t id : tables.boxes.class_id) {
-    ++contents.classes[header.label_schema.class_names.at(static_cast<std::size_t>(id))];
+    if (id < 0 || static_cast<std::size_t>(id) >= names.size()) continue;
+    ++contents.classes[names[static_cast<std::size_t>(id)]];
   }
   for (const std::int32_t gap : tables.pairs.gap_frames) ++contents.gaps[gap];
   visit_columns(tables, header, [&](const ColumnSpec& spec, const auto& column) {

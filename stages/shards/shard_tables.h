@@ -182,7 +182,7 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/valid", Rows::kSamples, {}}, tables.valid);
 }
 
-/// Counts the rows of consistent tables.
+/// Counts the rows of consistent tables; a box whose class has no name is of no class.
 ShardContents contents_of(const ShardTables& tables, const ShardHeader& header);
 
 }  // namespace eventgan

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What all engines are compared with: the generator (DESIGN section 4) as a plain PyTorch program, float32, eager, one thread.
+"""What all engines are compared with: the generator (stages/generator/weights.h) as a plain PyTorch program, float32, eager, one thread.
 
 The modules are those of the published code: a convolution, its batch normalisation and its activation run one after the
 other, in PyTorch's own layout. Spectral norm is folded, as it is after a checkpoint's first forward pass.

@@ -3,6 +3,7 @@
 import json
 import pathlib
 import re
+import shlex
 import shutil
 import sys
 import tempfile
@@ -34,8 +35,11 @@ def slow_job(folder):
 
 
 def submit(*arguments):
-    """Sends a job through submit.sh; the ids of its arrays and of finalize."""
+    """Sends a job through submit.sh; the ids of its arrays and of finalize. The line that it advises must run as it stands."""
     out = command(SLURM / "submit.sh", *arguments, EVENTGAN=program.PROGRAM)
+    advised = shlex.split(re.search(r"^look: (.+)$", out, re.MULTILINE)[1])
+    assert advised[:2] == [program.PROGRAM, "status"] and len(advised) == 3, out
+    assert (pathlib.Path(advised[2]) / "plan.json").is_file(), out
     return re.findall(r"^array (\d+):", out, re.MULTILINE), re.search(r"^finalize (\d+):", out, re.MULTILINE)[1]
 
 

@@ -93,7 +93,7 @@ class Benchmarks(program.InFolder):
 
 
 def folded(state):
-    """The state with each spectral norm's weight divided by sigma, as its first forward pass does (DESIGN section 4)."""
+    """The state with each spectral norm's weight divided by sigma, as its first forward pass does."""
     def unit(vector):
         return vector / (vector.norm() + SPECTRAL_EPSILON)
 

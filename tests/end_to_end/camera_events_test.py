@@ -5,6 +5,7 @@ import pathlib
 import shutil
 import sys
 
+import cv2
 import h5py
 import numpy as np
 
@@ -97,6 +98,52 @@ class Recordings(program.InFolder):
         self.assertEqual((car["truths"], car["easy"], car["hard"]), (4, 2, 2))
         self.assertEqual((car["recall_easy"], car["recall_hard"], car["precision"]), (0.5, 0.5, 1.0))  # what is on "dont_care" counts nothing
 
+    def greys_shown(self, *where):
+        """How many pixels of each picture that preview draws of `where` have the one grey of some recordings."""
+        pictures = self.folder / "pictures"
+        shutil.rmtree(pictures, ignore_errors=True)
+        told, warned = run("preview", *where, "--out", pictures, "--frames", self.folder)
+        drawn = [cv2.imread(line) for line in told.splitlines()]
+        return [[int((picture == grey).all(-1).sum()) for grey in (91, 155, 203)] for picture in drawn], warned
+
+    def test_a_sample_leads_to_the_frames_of_its_own_source(self):
+        # Two cameras of one file; and a folder whose name begins as the file's, in which the time of each frame is another.
+        (self.folder / "drive.csv").unlink()
+        with h5py.File(self.folder / "drive.hdf5", "r+") as file:
+            for camera, grey in {"left": 91, "right": 203}.items():
+                file.require_group(f"davis/{camera}")
+                for name, values in {"events": self.events, "image_raw_ts": np.array(FRAMES),
+                                     "image_raw": np.full((len(FRAMES), HEIGHT, WIDTH), grey, np.uint8)}.items():
+                    file.pop(f"davis/{camera}/{name}", None)
+                    file[f"davis/{camera}/{name}"] = values
+        images = self.folder / "driv" / "images"
+        images.mkdir(parents=True)
+        for k in range(len(FRAMES)):
+            cv2.imwrite(str(images / f"{k}.png"), np.full((HEIGHT, WIDTH), 155, np.uint8))
+        (self.folder / "driv" / "images.txt").write_text("".join(f"{t} images/{k}.png\n" for k, t in enumerate(FRAMES)))
+        np.savetxt(self.folder / "driv" / "events.txt", self.events[:, [2, 0, 1, 3]].clip(0), fmt=["%.9f", "%d", "%d", "%d"])
+        sources = [{"dataset": "recording", "root": "driv"}] + [
+            {"dataset": "recording", "root": "drive.hdf5", "camera": camera} for camera in ("left", "right")]
+        run("convert", self.write_manifest({**events_manifest({}, output={"directory": "out", "samples_per_shard": 9}),
+                                            "sources": sources}))
+        shards = sorted(self.out.glob("*.h5"))
+        self.assertEqual(len(shards), 3)
+        frame = HEIGHT * WIDTH
+        for shard, own in zip(shards, (1, 0, 2)):  # the place of the source's grey
+            for count in self.greys_shown(shard, "--count", "2")[0]:
+                self.assertGreater(count[own], frame)
+                self.assertLess(sum(count) - count[own], 50)  # the edges of letters have some
+        counts, warned = self.greys_shown(self.out, "--count", "24")
+        self.assertEqual([int(np.argmax(count)) for count in counts], 8 * [1] + 8 * [0] + 8 * [2])
+        self.assertEqual(warned, "")
+        lone = self.folder / "elsewhere" / shards[2].name  # without its plan: no frame rather than another's
+        lone.parent.mkdir()
+        shutil.copy(shards[2], lone)
+        counts, warned = self.greys_shown(lone, "--sample", "3")
+        self.assertLess(max(counts[0]), 50)
+        self.assertIn("expected the shard's plan beside it", warned)
+        self.assertIn("drive/0000000010.200000", warned)
+
     def test_windows_of_other_kinds_and_labels_in_their_middle(self):
         run("convert", self.manifest({"window_s": 0.02, "label_at": "middle"}))
         for sample, time in zip(rows(self.out).values(), [10.1, 10.17, 10.3, 10.35]):
@@ -162,6 +209,27 @@ class Recordings(program.InFolder):
         (self.folder / "drive.csv").write_text(LABELS)
         write_mvsec(self.folder / "drive.hdf5", self.events[:-100], FRAMES)
         self.assertIn("frames", run("convert", manifest, expect=64)[1])
+
+    def test_clocks_that_do_not_meet_are_a_warning_and_counted_in_the_report(self):
+        (self.folder / "drive.csv").unlink()
+        write_mvsec(self.folder / "drive.hdf5", self.events, [time + 1e9 for time in FRAMES])
+        manifest = self.manifest()
+        for command in ("plan", "convert"):
+            stdout, stderr = run(command, manifest)
+            self.assertIn("warning: expected windows within the times of the events, 10.", stderr)
+            self.assertIn("got 8 of 8 outside them", stderr)
+            self.assertIn("note: expected windows within the times of the events", stdout)
+        run("report", self.out)
+        page = (self.out / "report.html").read_text()
+        self.assertIn('data-key="source.0.empty" data-value="8"', page)
+        self.assertIn("all 8 volumes of", page)
+
+    def test_names_of_classes_with_control_characters_are_refused(self):
+        # In a shard both would be "ca".
+        (self.folder / "drive.csv").write_text(HEADER + "10.1,1,2,3,4,ca\0r,\n10.17,1,2,3,4,ca\0t,\n")
+        error = run("convert", self.manifest(), expect=66)[1]
+        self.assertIn(f'got "ca\\u0000r", in {self.folder / "drive.csv"} (line 2)', error)
+        self.assertIn('got "ca\\u0000t"', error)
 
     def test_without_labels_each_frame_is_a_sample_and_a_limit_makes_a_trial(self):
         (self.folder / "drive.csv").unlink()

@@ -88,6 +88,27 @@ class CommandLine(program.InFolder):
         self.assertEqual(last, f"next, once the inputs are mended:  eventgan retry {path.parent / 'out'}")
         run(*last.split("eventgan ")[1].split())  # which runs
 
+    def test_no_name_steers_the_terminal(self):
+        """Escape sequences in names of folders, images and labels, on both streams and of all kinds of commands."""
+        folder = self.folder / "a\x1b]0;title\x07\x9bb\x7f"
+        path = small_job(folder, errors=LENIENT)
+        cars = folder / "cars"
+        cars.rename(folder / "cars\x1b[31m")
+        path.write_text(path.read_text().replace('"cars"', '"cars\\u001b[31m"'))
+        (folder / "cars\x1b[31m" / "image_2" / "000000.png").write_bytes(b"no picture")
+        out = folder / "out"
+        run("convert", path)
+        shards = sorted(out.glob("*.h5"))
+        shown = [*run("convert", path), *run("status", out), *run("verify", out), *run("finalize", out), *run("report", out),
+                 *run("plan", path), *run("preview", out, "--out", folder / "p", "--count", 1),
+                 *run("init", folder / "cars\x1b[31m", "--out", folder / "new.json"),
+                 *run("init", folder / "none", expect=66), *run("inspect", shards[0], "--sample", 0)]
+        shards[0].unlink()
+        shown += [*run("verify", out, expect=1), *run("finalize", out, expect=1)]
+        for text in shown:
+            self.assertNotRegex(text, "[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+        self.assertIn("\\u001b]0;title\\u0007\\u009bb\\u007f/out", shown[0])
+
     def test_verify_tells_of_each_shard(self):
         path = small_job(self.folder / "small", errors=LENIENT)
         (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
@@ -251,6 +272,20 @@ class CommandLine(program.InFolder):
         (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
         self.assertEqual(events("convert", path, "--progress", "json", expect=65)[-1]["event"], "error")
         self.assertEqual(events("retry", path.parent / "out", "--progress", "json", expect=65)[-1]["event"], "error")
+
+    def test_status_of_a_manifest_is_that_of_its_output(self):
+        path = small_job(self.folder / "small", output={"directory": "shards/"})
+        _, err = run("status", path, expect=66)  # nothing has begun
+        self.assertIn("a trial is in " + str(path.parent / "shards") + "-trial-N", err)
+        run("convert", path)
+        run("finalize", path.parent / "shards")
+        told = run("status", path.parent / "shards")
+        self.assertIn("and every shard is done", told[0])
+        for where in (path, path.parent / "shards" / "dataset.h5"):
+            self.assertEqual(run("status", where), told)
+        self.assertTrue(json.loads(run("status", path, "--json")[0])["complete"])
+        path.write_text("{}")
+        self.assertIn(f"{path}: $", run("status", path, expect=64)[1])
 
     def run_with_output_to(self, redirection, *arguments):
         command = shlex.join(map(str, (program.PROGRAM, *arguments)))

@@ -1,5 +1,6 @@
 """kill -9 at every step: whatever stands in the folder then, the next run ends with the bytes of an undisturbed one."""
 
+import json
 import random
 import shutil
 
@@ -77,7 +78,8 @@ class Crash(program.InFolder):
         """Of the folder's two plans one is in force, and no shard of the other counts."""
         self.undisturbed(cars=2, people=1)
         earlier = self.folder / "earlier"
-        manifest = small_job(self.folder / "earlier-job", cars=2, people=1, seed=8)
+        manifest = self.folder / "job" / "earlier.json"
+        manifest.write_text(json.dumps({**json.loads(self.manifest.read_text()), "seed": 8}))
         run("convert", manifest, "--output", earlier)
         run("finalize", earlier)
         command = ("convert", self.manifest, "--overwrite", "--threads", "1", "--progress", "none", "--output")

@@ -1,16 +1,22 @@
 """Damage in an output folder is found and named by `verify` and mended by the next `convert`, never trusted, never deleted."""
 
+import hashlib
 import json
 import pathlib
+import pickle
+import re
 import shutil
 import subprocess
 import tempfile
+
+import h5py
+import numpy as np
 
 import failing_files
 import program
 from folders import content, markers, same_content, shards
 from program import run
-from small_job import small_job
+from small_job import save_picture, small_job, write_cars, write_people
 
 
 def setUpModule():
@@ -155,7 +161,8 @@ class Damage(program.InFolder):
         run("verify", self.out, "--deep")
 
     def test_plan_of_another_manifest_is_refused_field_by_field(self):
-        manifest = small_job(self.folder / "other", seed=8, volume={"bins": 5})
+        manifest = job / "other.json"
+        manifest.write_text(json.dumps({**json.loads((job / "manifest.json").read_text()), "seed": 8, "volume": {"bins": 5}}))
         before = {path: stamp(path) for path in self.out.iterdir()}
         _, err = run("convert", manifest, "--output", self.out, "--progress", "none", expect=64)
         self.assertIn("manifest", err)
@@ -165,6 +172,20 @@ class Damage(program.InFolder):
         self.same_as_whole()
         run("convert", manifest, "--output", self.out, "--progress", "none", "--overwrite")
         run("verify", self.out, "--deep")
+
+    def test_shards_of_another_job_are_never_overwritten(self):
+        """Of other data under the same name: the second folder's labels would stand where the first one's shards were."""
+        before = {path: stamp(path) for path in self.out.iterdir()}
+        manifest = small_job(self.folder / "other", cars=6)
+        for command in [["convert", manifest], ["convert", manifest, "--overwrite"], ["plan", "--freeze", manifest]]:
+            _, err = run(*command, "--output", self.out, expect=64)
+            self.assertIn(f'got that of another, "small", in {self.out} '
+                          "(choose another output folder, or remove that one yourself):", err)
+            self.assertIn(f"sources[0].root: expected {job / 'cars'}, got {self.folder / 'other' / 'cars'}\n", err)
+            self.assertNotIn("--overwrite", err)
+            self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
+        self.assertIn("limit: expected nothing, got 2", self.convert(64, "--overwrite", "--limit", "2")[1])
+        self.assertEqual({path: stamp(path) for path in self.out.iterdir()}, before)
 
     def test_plan_put_in_place_of_another(self):
         """The shards are of one plan, plan.json of another: no shard is trusted."""
@@ -302,6 +323,113 @@ class Flips(program.InFolder):
             self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full, stderr=subprocess.PIPE).returncode, 1)
         pictures, _ = run("preview", lone, "--out", self.folder / "pictures", "--frames", self.folder / "job", "--count", "2")
         self.assertEqual([pathlib.Path(line).exists() for line in pictures.splitlines()], [True, True])
+
+
+class EveryColumn(program.InFolder):
+    """A value is changed, and the marker made to agree, as a faulty program or a careless hand would: the hash tells nothing then."""
+
+    def setUp(self):
+        super().setUp()
+        random = np.random.default_rng(7)
+        write_cars(self.folder / "cars", 4, random)
+        with open(self.folder / "cars" / "label_2" / "000001.txt", "a") as file:  # high enough to have a difficulty
+            file.write("Car 0.00 0 0.10 2.00 3.00 12.00 50.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n")
+        for k in range(4):
+            path = self.folder / "cars" / "calib" / f"{k:06d}.txt"
+            path.parent.mkdir(exist_ok=True)
+            path.write_text("P2: 30 0 16 1 0 30 12 0.5 0 0 1 0.01\n")
+        self.write_drive(self.folder / "drive", random)
+        self.write_walk(self.folder / "walk", random)
+        write_people(self.folder / "people", 2, random)
+        sources = [{"dataset": "kitti_object", "root": "cars", "pairs": program.pairs([1])},
+                   {"dataset": "kitti_tracking", "root": "drive", "pairs": program.pairs([1])},
+                   {"dataset": "human36m", "layout": "extracted", "root": "walk", "pairs": program.pairs([1])},
+                   {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json", "sequences": "people/sequences",
+                    "pairs": program.pairs([2], side="around")}]
+        path = self.write_manifest(program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
+                                                    generator={"kind": "difference"}))
+        run("convert", path, "--progress", "none")
+        self.out = self.folder / "out"
+
+    @staticmethod
+    def write_drive(root, random):
+        """KITTI tracking: a sequence of four frames with a car."""
+        (root / "label_02").mkdir(parents=True)
+        lines = []
+        for frame in range(4):
+            save_picture(root / "image_02" / "0000" / f"{frame:06d}.png", random)
+            lines.append(f"{frame} 3 Car 0 0 0.10 2.00 3.00 12.50 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n")
+        (root / "label_02" / "0000.txt").write_text("".join(lines))
+
+    @staticmethod
+    def write_walk(root, random):
+        """Human3.6M as pose trainers extract it: three frames of a person, and the camera with its lens."""
+        names = [f"S1_Walking_1.54138969_{5 * k + 1:06d}.jpg" for k in range(3)]
+        for name in names:
+            save_picture(root / "S1" / "S1_Walking_1.54138969" / name, random)
+        place = np.concatenate([random.uniform(-0.3, 0.3, (3, 17, 2)), np.full((3, 17, 1), 4.0), np.ones((3, 17, 1))], -1)
+        part = np.concatenate([place[..., :2] / 4 * 100 + [16, 12], np.ones((3, 17, 1))], -1)
+        np.savez(root / "a.npz", imgname=names, center=np.full((3, 2), [16.0, 12.0]), scale=np.full(3, 0.1), part=part, S=place)
+        camera = {"f": np.array([100.0, 100.0]), "c": np.array([16.0, 12.0]), "k": np.array([-0.2, 0.2, 0.01]), "p": np.array([0.001, 0.002])}
+        (root / "cameras.pkl").write_bytes(pickle.dumps({("S1", "54138969"): camera}, protocol=2))
+
+    def test_a_changed_value_is_named_by_its_column(self):
+        self.assertIn("labels of 11 samples compared", run("verify", self.out, "--deep")[0])
+        places = {}  # column: the shards that have rows of it
+        for path in sorted(self.out.glob("*.h5")):
+            with h5py.File(path) as shard:
+                names = []
+                shard.visit(names.append)
+                for name in names:
+                    if isinstance(shard[name], h5py.Dataset) and shard[name].size and not name.startswith("events/"):
+                        places.setdefault(name, []).append(path)
+        page = (program.SOURCE / "manifests" / "guides" / "shard_format.md").read_text()
+        columns = set(re.findall(r"(?m)^\| `/(valid|(?:pairs|labels)/\S+)` \| \[", page))
+        self.assertGreater(len(columns), 50)
+        self.assertEqual(set(places), columns, "the job has every column of the format")
+        while places:  # a column of each shard at a time
+            taken = {}
+            for column, paths in sorted(places.items()):
+                path = next((path for path in paths if path not in taken), None)
+                if path:
+                    taken[path] = column
+                    del places[column]
+            before = {path: (path.read_bytes(), path.with_suffix(".json").read_bytes()) for path in taken}
+            for path, column in taken.items():
+                self.change(path, column)
+            told = "".join(run("verify", self.out, "--deep", expect=1))
+            for path, column in taken.items():
+                self.assert_named(column, re.findall(rf"(?m)^{path}: (expected .*)$", told))
+                path.write_bytes(before[path][0])
+                path.with_suffix(".json").write_bytes(before[path][1])
+        run("verify", self.out, "--deep")
+
+    @staticmethod
+    def change(path, column):
+        with h5py.File(path, "r+") as file:
+            place = (1,) if column.endswith("/offsets") else (0,) * file[column].ndim
+            file[column][place] = changed(file[column][place])
+        marker = path.with_suffix(".json")
+        said = json.loads(marker.read_text())
+        said.update(size_bytes=path.stat().st_size, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
+        marker.write_text(json.dumps(said))
+
+    def assert_named(self, column, faults):
+        name = column.split("/")[-1]
+        also = {"offsets": "number of (boxes|persons)", "original": "other bytes", "sample_id": "the planned sample", "joints": "joint 0",
+                "source_size": "source size", "valid": "valid samples", "class_id": "boxes by class", "gap_frames": "samples by gap"}
+        frames = "frames of the plan" if re.match("(prev|next)_(path|index|video_frame)", name) else name
+        with self.subTest(column, faults=faults):
+            self.assertRegex("\n".join(faults), rf"\b({name}|{also.get(name, frames)})\b")
+
+
+def changed(value):
+    """Another value of its type."""
+    if isinstance(value, bytes):
+        return value + b"x"
+    if isinstance(value, np.ndarray):  # bytes of any number
+        return np.append(value, np.uint8(120))
+    return value.dtype.type(1 if np.isnan(value) else value + 1)
 
 
 def stamp(path):

@@ -3,8 +3,11 @@
 import json
 import pathlib
 import shutil
+import signal
 import struct
+import subprocess
 import tempfile
+import time
 import unittest
 
 import h5py
@@ -40,7 +43,7 @@ class Demo(program.InFolder):
     def test_converts_verifies_and_previews(self):
         out, err = self.convert()
         self.assertEqual(err.count("warning"), 1)
-        self.assertIn("the weights are those that come with the program (shipped:", err)
+        self.assertRegex(err, r"warning: shipped:\d+ are stand-in weights")
         self.assertIn("0 quarantined", out)
         self.assertIn("sound", run("verify", self.folder / "out")[0])
         shards = sorted((self.folder / "out").glob("*.h5"))
@@ -53,6 +56,24 @@ class Demo(program.InFolder):
             self.assertIn("sample", run("inspect", shard)[0])
             json.loads(run("inspect", shard, "--json")[0])
             json.loads(run("inspect", shard, "--sample", "0", "--json")[0])
+
+    def test_few_scenes_make_a_job_too(self):
+        for scenes in (1, 2, 3):
+            folder = self.folder / f"scenes-{scenes}"
+            run("make-demo", folder, "--scenes", scenes)
+            run("convert", folder / "manifest.json", "--limit", 5, "--progress", "none")
+            splits = {path.name.split("-")[1] for path in (folder / "events-trial-5").glob("*.h5")}
+            self.assertEqual(splits, {"train", "val"})
+
+    def test_made_in_part_nothing_of_it_is_left(self):
+        folder = self.folder / "stopped"
+        making = subprocess.Popen([program.PROGRAM, "make-demo", folder, "--scenes", "100000"], stderr=subprocess.PIPE, text=True)
+        while not (folder / "kitti" / "training" / "calib" / "000000.txt").exists():
+            time.sleep(0.01)
+        making.send_signal(signal.SIGINT)
+        _, err = making.communicate(timeout=60)
+        self.assertEqual((making.returncode, err), (75, "error: stopped; nothing is left of the dataset\n"))
+        self.assertFalse(folder.exists())
 
     def test_plan_writes_nothing_and_agrees_with_convert(self):
         before = sorted(demo.rglob("*"))

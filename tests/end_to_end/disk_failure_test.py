@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import resource
 import shutil
 import subprocess
 import sys
@@ -51,11 +52,14 @@ class DiskFailure(program.InFolder):
         same_folder(out, self.expected)
         shutil.rmtree(out)
 
-    def rules(self, failure, kinds, step):
+    def is_told(self, call):
+        """A full disk spares unlink; a file that was not written to is closed whatever that says."""
         written = {call.path for call in self.calls if call.kind == "write"}
+        return call.kind != "unlink" and (call.kind != "close" or call.path in written)
+
+    def rules(self, failure, kinds, step):
         calls = [(n, self.calls[n - 1]) for n in failing_files.thinned(self.calls, step)]
-        return [f"{failure} any {n}" for n, call in calls
-                if call.kind in kinds and (call.kind != "close" or call.path in written)]
+        return [f"{failure} any {n}" for n, call in calls if call.kind in kinds and self.is_told(call)]
 
     def test_full_at_every_call_that_takes_space(self):
         failing_files.for_each(self.fails_then_resumes,
@@ -68,7 +72,8 @@ class DiskFailure(program.InFolder):
         failing_files.for_each(self.fails_then_resumes, ["EDQUOT write 9", "EDQUOT create 3", "EROFS mkdir 1", "EROFS create 1"])
 
     def test_disk_that_stays_full(self):
-        numbers = range(1, len(self.calls), 9)
+        last = max(n for n, call in enumerate(self.calls, 1) if self.is_told(call))
+        numbers = range(1, last + 1, 9)
         failing_files.for_each(self.fails_then_resumes, [f"ENOSPC any {n}+" for n in numbers])
         failing_files.for_each(self.fails_then_resumes, [f"EIO any {n}+" for n in numbers[::3]])
 
@@ -152,6 +157,64 @@ class DiskFailure(program.InFolder):
                               env={**os.environ, MAY_MOUNT: "1"})
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertNotIn("skipped", done.stderr)
+
+
+class SizeLimit(program.InFolder):
+    """`ulimit -f`: the system would end the program with SIGXFSZ, without a word."""
+
+    def setUp(self):
+        super().setUp()
+        self.manifest = small_job(self.folder / "job")
+        self.out = self.folder / "job" / "out"
+
+    def refused(self, size, written_to, *arguments):
+        done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True,
+                              preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size)))
+        self.assertEqual(done.returncode, FAILED, f"{arguments}\n{done.stderr}")
+        self.assertRegex(done.stderr, re.escape(str(written_to)) + r".*ulimit -f allows files of " + str(size) + " bytes", arguments)
+        self.assertNotIn("damaged", done.stderr)
+        folder = written_to if written_to.is_dir() else written_to.parent
+        self.assertEqual(list(folder.rglob(".*.tmp")), [], arguments)
+
+    def test_every_writer_names_its_file_and_the_limit(self):
+        self.refused(500, self.out, "convert", self.manifest)  # the plan
+        run("convert", self.manifest, "--output", self.folder / "undisturbed")
+        largest = max(path.stat().st_size for path in (self.folder / "undisturbed").iterdir())
+        self.refused(largest - 1, self.out, "convert", self.manifest)  # a shard
+        run("convert", self.manifest)
+        same_folder(self.out, self.folder / "undisturbed")
+
+        self.refused(2000, self.out, "finalize", self.out)
+        self.refused(2000, self.out, "report", self.out)
+        run("report", self.out)
+        pictures = self.folder / "pictures"
+        self.refused(500, pictures, "preview", self.out, "--out", pictures)
+        run("finalize", self.out)
+        for to in ("yolo", "coco", "mpii", "davis", "webdataset", "events"):
+            exported = self.folder / to
+            self.refused(150, exported, "export", self.out, "--to", to, "--out", exported)
+            self.refused(400, exported, "export", self.out, "--to", to, "--out", exported)
+            run("export", self.out, "--to", to, "--out", exported)
+        demo = self.folder / "demo"
+        self.refused(5000, demo, "make-demo", demo)
+        network = json.loads(self.manifest.read_text())
+        network["generator"] = {"weights": "untrained:2"}
+        self.manifest.write_text(json.dumps(network))
+        weights = self.folder / "weights"
+        weights.mkdir()
+        self.refused(2000, weights, "calibrate", self.manifest, "--out", weights / "calibrated.safetensors")
+
+    def test_retry_leaves_the_shard_as_it_was(self):
+        manifest = small_job(self.folder / "lenient", cars=2, people=0, errors=LENIENT)
+        out = self.folder / "lenient" / "out"
+        with broken_cars(self.folder / "lenient", [1]):
+            run("convert", manifest)
+        before = content(out)
+        shard, = out.glob("*.h5")
+        self.refused(shard.stat().st_size // 2, out, "retry", out)
+        same_content({name: what for name, what in content(out).items() if name in before}, before, out)
+        run("retry", out)
+        run("verify", out, "--deep")
 
 
 @unittest.skipUnless(MAY_MOUNT in os.environ, "run by test_really_small_disk")

@@ -6,10 +6,13 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 import unittest
+from unittest import mock
 
 import h5py
 import numpy as np
+import PIL.Image
 
 import program
 from program import SOURCE, run
@@ -26,6 +29,61 @@ TOLERANCE = 1e-4  # of the largest value, between float32 volumes
 
 def relative_distance(volumes, reference):
     return np.linalg.norm(volumes - reference) / np.linalg.norm(reference)
+
+
+def pytorch():
+    """PyTorch, and what of the package is tried here; (None, None) without it."""
+    sys.path.insert(0, str(SOURCE / "manifests" / "python"))
+    try:
+        import torch
+    except ImportError:
+        return None, None
+    import eventgan_shards.torch
+    return torch, eventgan_shards.torch
+
+
+def write_persons(root, count=12):
+    """Sources of persons at random places in pictures of 200 x 160, a person a picture: MPII's with centre and scale, with one of these or
+    none, and Human3.6M's."""
+    random = np.random.default_rng(7)
+    (root / "images").mkdir(parents=True)
+
+    def save(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        PIL.Image.fromarray(random.integers(0, 256, (160, 200), dtype=np.uint8)).save(path)
+
+    people, middle, scale = [], random.uniform([20, 20], [180, 140], (count, 2)), random.uniform(0.02, 0.25, count)
+    for k in range(count):
+        name = f"{['annotated', 'annotated', 'joints', 'scale', 'center'][k % 5]}{k}"
+        frames = root / "sequences" / name
+        for frame in (4, 5, 6):
+            save(frames / f"{frame:08d}.jpg")
+        shutil.copy(frames / "00000005.jpg", root / "images" / f"{name}.jpg")
+        joints = middle[k] + random.uniform(-30, 30, (16, 2))
+        people.append({"image": f"{name}.jpg", "joints": np.clip(joints, 1, 160).tolist(), "joints_vis": [1] * 16,
+                       "center": [-1, -1] if name[0] in "js" else middle[k].tolist(), "scale": -1 if name[0] in "jc" else scale[k]})
+    (root / "people.json").write_text(json.dumps(people))
+
+    names = [f"S1_Walking.54138969_{5 * k + 1:06d}.jpg" for k in range(6)]
+    for name in names:
+        save(root / "h36m" / "S1" / "S1_Walking.54138969" / name)
+    part = np.concatenate([middle[:6, None] + random.uniform(-20, 20, (6, 17, 2)), np.ones((6, 17, 1))], -1)
+    np.savez(root / "h36m" / "a.npz", imgname=names, center=middle[:6], scale=scale[:6], part=part, S=np.ones((6, 17, 4)))
+    return [{"dataset": "mpii_list", "root": str(root), "annotations": str(root / "people.json"),
+             "sequences": str(root / "sequences"), "pairs": program.pairs([2], side="around")},
+            {"dataset": "human36m", "layout": "extracted", "root": str(root / "h36m"), "pairs": program.pairs([1])}]
+
+
+def tiles_of(to_volume, side, shape, tile_px=8):
+    """bool [rows, columns]: the tiles with a pixel that a crop of side x side samples, bilinearly."""
+    at = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1) @ to_volume[:, :2].T + to_volume[:, 2]
+    tiles = np.zeros(shape, bool)
+    for rounded in (np.floor(at + 1e-6), np.ceil(at - 1e-6)):
+        for columns in (np.floor(at[..., 0] + 1e-6), np.ceil(at[..., 0] - 1e-6)):
+            row, column = (rounded[..., 1] // tile_px).astype(int), (columns // tile_px).astype(int)
+            inside = (row >= 0) & (row < shape[0]) & (column >= 0) & (column < shape[1])
+            tiles[row[inside], column[inside]] = True
+    return tiles
 
 
 class Engines(program.InFolder):
@@ -69,6 +127,47 @@ class Engines(program.InFolder):
                 run("finalize", self.job / scope)
                 run("verify", self.job / scope, "--deep")
 
+    def test_labels_only_generates_all_that_pose_trainers_cut_out(self):
+        """The program's crop and the package's are written twice: neither can change alone."""
+        torch, cut_out = pytorch()
+        if torch is None:
+            self.skipTest("there is no PyTorch")
+        sources = write_persons(self.folder / "persons")
+        manifest = program.manifest(sources, generator={"weights": "untrained:2", "scope": "labels_only", "label_margin_px": 0,
+                                                        "tile_px": 8})
+        run("convert", self.write_manifest(manifest), "--progress", "none")
+        defaults = cut_out.PoseAugmentation()
+        # The largest crop, turned so that its corners reach farthest: the default angles go beyond that.
+        self.assertGreater(2 * defaults.rotation, 45)
+        farthest = [torch.tensor([9.0, angle / defaults.rotation]) for angle in (-45, 45)]
+        torch.manual_seed(7)
+        not_larger = 0
+        for path in sorted((self.folder / "out").glob("*.h5")):
+            with h5py.File(path) as shard:
+                self.assertTrue(shard["valid"][:].all())
+                tiles = dict(zip(shard["pairs/sample_id"].asstr()[:], shard["events/tiles"][:].astype(bool)))
+            samples = cut_out.Shards(path)
+            both_wrists = [name for name in samples.default_joints() if "wrist" in name]
+            for joints, augmentation in ((None, None), (None, defaults), (both_wrists, defaults)):
+                persons = cut_out.PoseDataset(samples, joints=joints, augmentation=augmentation)
+                for number in range(len(persons)):
+                    crops = [persons[number][3] for _ in range(4)]
+                    for drawn in farthest:
+                        with mock.patch.object(torch, "randn", return_value=drawn), mock.patch.object(torch, "rand", torch.zeros):
+                            crops.append(persons[number][3])
+                    name, wanted = crops[0]["image"], tiles[crops[0]["image"]]
+                    with self.subTest(name, joints=joints, augmentation=augmentation):
+                        seen = np.any([tiles_of(crop["to_volume"], 256, wanted.shape) for crop in crops], 0)
+                        self.assertEqual((seen & ~wanted).sum(), 0)
+                        # MPII's crop is no larger than that: what is sampled ends half an input pixel before its last edges.
+                        if name.startswith("annotated") and joints is None and augmentation:
+                            rows, columns = (np.flatnonzero(seen.any(axis)) for axis in (1, 0))
+                            reached = np.zeros_like(wanted)
+                            reached[rows[0]:rows[-1] + 2, columns[0]:columns[-1] + 2] = True
+                            self.assertEqual((wanted & ~reached).sum(), 0)
+                            not_larger += not wanted.all()
+        self.assertGreater(not_larger, 2)
+
     def is_offered(self, path):
         """Whether this program on this processor takes a manifest's engine and precision."""
         code = subprocess.run([program.PROGRAM, "plan", path], capture_output=True).returncode
@@ -76,8 +175,7 @@ class Engines(program.InFolder):
         return code == 0
 
     def needs_onednn(self):
-        _, err = run("plan", self.manifest())
-        if "without oneDNN" in err:
+        if not self.is_offered(self.manifest("offered.json", engine="onednn")):
             self.skipTest("the program was built without oneDNN")
 
     def assert_near(self, volumes, reference):
@@ -87,12 +185,12 @@ class Engines(program.InFolder):
     def test_both_engines_make_the_same_volumes_and_say_their_name(self):
         self.needs_onednn()
         torch, err = self.convert("torch", engine="torch")
-        self.assertRegex(err, r"(?m)^generator: torch float32 on \S+ \(as the manifest says\), trained on gaps 1-6$")
+        self.assertRegex(err, r"(?m)^generator: torch float32 on \S+, trained on gaps 1-6$")
         onednn, err = self.convert("onednn", engine="onednn", precision="float32")
-        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(as the manifest says\), trained on gaps 1-6$")
+        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+, trained on gaps 1-6$")
         self.assert_near(onednn, torch)
         fastest, err = self.convert("auto", engine="auto")
-        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+ \(auto: the fastest engine for float32 on this processor\), trained on gaps 1-6$")
+        self.assertRegex(err, r"(?m)^generator: onednn float32 on \S+, trained on gaps 1-6$")
         np.testing.assert_array_equal(fastest, onednn)
         engines = {name: json.loads((self.job / name / "plan.json").read_text())["fingerprint"]["engine"]
                    for name in ("torch", "onednn", "auto")}
@@ -125,15 +223,25 @@ class Engines(program.InFolder):
         _, err = run("convert", path, "--progress", "none", expect=64)
         self.assertRegex(err, r"engine: expected torch float32.*, got onednn float32")
 
-    def test_every_command_that_generates_says_so(self):
+    def test_convert_says_it_and_no_other_command(self):
         path = self.manifest("out.json", engine="torch")
-        line = r"generator: torch float32 on .+ \(as the manifest says\), trained on gaps 1-6"
-        self.assertRegex(run("plan", path)[1], line)
+        self.assertEqual(run("plan", path, "--progress", "none")[1], "")
         with broken_cars(self.job, [1]):
             _, err = run("convert", path, "--progress", "json")
         notes = [json.loads(text) for text in err.splitlines()]
+        line = r"generator: torch float32 on .+, trained on gaps 1-6"
         self.assertTrue(any(note["event"] == "note" and re.fullmatch(line, note["text"]) for note in notes), err)
-        self.assertRegex(run("retry", self.job / "out", "--progress", "none")[1], line)
+        self.assertEqual(run("retry", self.job / "out", "--progress", "none")[1], "")
+
+    def test_the_weights_warning_is_one_short_line_of_convert(self):
+        for weights, warning in [("shipped", r"shipped:\d+ are stand-in weights; .*"), ("untrained:2", r".* UNTRAINED \(untrained:2\).*")]:
+            path = self.manifest("warned.json", weights=weights)
+            self.assertEqual(run("plan", path, "--progress", "none")[1], "")
+            _, err = run("convert", path, "--overwrite", "--progress", "none")
+            warnings = [text for text in err.splitlines() if text.startswith("warning: ")]
+            self.assertEqual(len(warnings), 1, err)
+            self.assertRegex(warnings[0], f"^warning: {warning}$")
+            self.assertTrue(all(len(text) <= 80 for text in err.splitlines()), err)
 
     def test_what_is_no_engine_or_does_not_fit_is_64(self):
         _, err = run("plan", self.manifest(engine="cuda"), expect=64)
@@ -156,7 +264,7 @@ class Engines(program.InFolder):
             self.assertFalse((self.job / "cuda").exists())
             return
         volumes, err = self.convert("cuda", device="cuda")
-        self.assertRegex(err, r"(?m)^generator: torch float32 on cuda: .+ \(auto: the engine of device cuda\), trained on gaps 1-6$")
+        self.assertRegex(err, r"(?m)^generator: torch float32 on cuda: .+, trained on gaps 1-6$")
         self.assert_near(volumes, self.convert("torch", engine="torch")[0])
         shards = []
         for threads in (1, 3):
@@ -192,7 +300,7 @@ class Engines(program.InFolder):
         self.assertEqual(generator, {"weights": "w-calibrated.safetensors", "precision": "int8"})
         exact, _ = self.convert("exact", weights="w-calibrated.safetensors")
         int8, err = self.convert("int8", **generator)
-        self.assertRegex(err, r"(?m)^generator: onednn int8 on \S+ \(auto")
+        self.assertRegex(err, r"(?m)^generator: onednn int8 on \S+, ")
         self.assertLess(relative_distance(int8, exact), MOST_INT8_ERROR)
         plain, _ = self.convert("plain")
         np.testing.assert_array_equal(exact, plain)  # a calibration changes nothing else

@@ -4,6 +4,7 @@ import collections
 import io
 import json
 import pathlib
+import re
 import shutil
 import signal
 import subprocess
@@ -330,6 +331,10 @@ class Formats(Export):
             for row in range(len(events)):
                 expected = ids[row]["volume"].transpose(1, 2, 0) if row in ids else 0 * events[row]
                 np.testing.assert_array_equal(events[row], expected)
+            # The detector's list of ids: a line for each row that there is, and none for a hole.
+            lines = (self.out / "train-kitti_object.txt").read_text().splitlines()
+            self.assertEqual([int(line) for line in lines], list(np.flatnonzero(valid)))
+            self.assertLess(len(lines), len(valid))
         self.assertEqual((self.out / "val.txt").read_text().split(), [key[2] for key in of("val")])
         for dataset in ("mpii", "human36m"):
             persons = [(key[2], sample, row) for key, sample in of("train", dataset).items()
@@ -362,8 +367,8 @@ class Formats(Export):
         for path in [cars / "image_2" / "000002.png", *(cars / "prev_2").glob("000002_*.png")]:
             with PIL.Image.open(path) as picture:
                 picture.resize((40, 30)).save(path)
-        sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs([1, 2], choose=choose), "split": choose}
-                   for choose in ("one", "all")]
+        sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs(gaps, choose=choose), "split": split}
+                   for split, gaps, choose in (("one", [1, 2], "one"), ("all", [1, 2], "all"), ("two", [2], "all"))]
         manifest = self.out.parent / "manifest.json"
         manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"})))
         run("convert", manifest, "--progress", "none")
@@ -375,6 +380,10 @@ class Formats(Export):
                 valid[path.name] = (file["davis/events"].shape, list(file["davis/valid"][:]))
         self.assertEqual(valid, {"one-kitti_object-24x32.hdf5": ((4, 24, 32, 18), [1, 1, 0, 1]),
                                  "one-kitti_object-30x40.hdf5": ((3, 30, 40, 18), [0, 0, 1])})
+        self.assertEqual((self.out / "one-kitti_object-24x32.txt").read_text(), "000000\n000001\n000003\n")
+        two = self.out.parent / "two"
+        self.export("davis", "--split", "two", source=self.out.parent / "out", out=two)
+        self.assertEqual((two / "two-kitti_object-24x32.txt").read_text(), "000000\n000001\n000003\n")  # no 000000@before2
         for splits in (["--split", "all"], []):
             _, err = self.export("davis", *splits, source=self.out.parent / "out", out=self.out.parent / "yolo", expect=64)
             self.assertIn("000000@before1 and 000000@before2", err)
@@ -657,6 +666,107 @@ class AgainAndAgain(Export):
         self.assertNotIn("000011.npy", changed)
 
 
+class ForeignNames(Export):
+    """Names and links in a folder of an export that lead out of it: nothing there is touched, and the record is named."""
+
+    NAMES = ["../victim.txt", "volumes/../../victim.txt", "{victim}", "./victim.txt", "volumes//a.npy", "volumes/", "", "/", ".export/export.txt",
+             "volumes/val/.hidden.npy", "mine/a.npy", "volumes/val/below/a.npy", "notes.md", "volumes/a\0.npy", "a\n.txt", "\u00e4.txt"]
+
+    def setUp(self):
+        super().setUp()
+        self.victim = self.out.parent / "victim.txt"
+        self.victim.write_text("mine")
+        self.elsewhere = self.out.parent / "elsewhere"
+        self.elsewhere.mkdir()
+
+    def refused(self, *named, to="coco", arguments=()):
+        """The export must fail and change nothing; what stands in its message."""
+        before, outside = content(self.out), content(self.elsewhere)
+        done = subprocess.run([program.PROGRAM, "export", finalized, "--to", to, "--split", "val", "--out", self.out, "--progress", "none", *arguments],
+                              capture_output=True, text=True, timeout=100)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        for part in named:
+            self.assertIn(str(part), done.stderr)
+        self.assertEqual(self.victim.read_text(), "mine")
+        self.assertEqual(content(self.elsewhere), outside)
+        self.assertEqual(content(self.out), before)
+
+    def test_names_in_journals_and_receipts_are_not_believed(self):
+        self.export("coco", "--split", "val")
+        whole = content(self.out)
+        receipt = sorted((self.out / ".export").glob("*-of-*.json"))[0]
+        journal = receipt.with_suffix(".begun")
+        text_ = receipt.read_text()
+        overwrite = ["--full-scale", "2", "--overwrite"]
+        cases = [(self.NAMES[0], journal, overwrite), (self.NAMES[0], receipt, [])]
+        for name in self.NAMES:
+            cases += [(name, journal, []), (name, receipt, overwrite)]
+        for name, record, arguments in cases:
+            name = name.format(victim=self.victim)
+            with self.subTest(name=name, record=record.suffix, arguments=arguments):
+                if record == journal:
+                    journal.write_text("\n" + json.dumps(name))
+                else:
+                    described = json.loads(text_)
+                    described["files"][name] = 4
+                    receipt.write_text(json.dumps(described))
+                self.refused(record, json.dumps(name), to="yolo" if arguments else "coco", arguments=arguments)
+                journal.unlink(missing_ok=True)
+                receipt.write_text(text_)
+        self.export("coco", "--split", "val")
+        self.assertEqual(content(self.out), whole)
+
+    def test_links_are_not_followed(self):
+        self.export("coco", "--split", "val")
+        whole = content(self.out)
+        for name in ("volumes", "volumes/val", ".export"):
+            link, kept = self.out / name, self.elsewhere / "kept"
+            link.rename(kept)
+            link.symlink_to(kept, target_is_directory=True)
+            volume = next(kept.rglob("*.npy" if name != ".export" else "*"))
+            for cut in (False, True):
+                if cut and name != ".export":
+                    volume.write_bytes(b"other")
+                for arguments in ([], ["--full-scale", "2", "--overwrite"]):
+                    with self.subTest(link=name, cut=cut, arguments=arguments):
+                        self.refused(link, to="yolo" if arguments else "coco", arguments=arguments)
+            link.unlink()
+            kept.rename(link)
+        journal = next((self.out / ".export").glob("*-of-*.json")).with_suffix(".begun")
+        journal.symlink_to(self.victim)
+        self.refused(journal)
+        journal.unlink()
+        # A file of its own is made again in place of a link.
+        volume = next(self.out.rglob("*.npy"))
+        volume.rename(self.elsewhere / volume.name)
+        volume.symlink_to(self.elsewhere / volume.name)
+        self.export("coco", "--split", "val")
+        self.assertFalse(volume.is_symlink())
+        self.assertEqual(content(self.out), whole)
+        # The folder itself may be one: its user has named it.
+        linked = self.out.parent / "linked"
+        linked.symlink_to(self.out, target_is_directory=True)
+        self.export("coco", "--split", "val", out=linked)
+
+    def test_sources_of_the_description_are_those_of_the_plan(self):
+        source = self.out.parent / "source"
+        shutil.copytree(finalized, source)
+        for key in ("split", "dataset"):
+            for value in ("../../elsewhere/x", str(self.elsewhere), "val" if key == "split" else "mpii", None):
+                with self.subTest(key=key, value=value):
+                    description = json.loads((finalized / "dataset.json").read_text())
+                    description["sources"][0][key] = value
+                    (source / "dataset.json").write_text(json.dumps(description))
+                    _, err = self.export("yolo", source=source, expect=66)
+                    self.assertIn("dataset.json", err)
+                    self.assertIn("as source 0 of the plan", err)
+                    self.assertFalse(self.out.exists())
+        description["sources"] = description["sources"][:1]
+        (source / "dataset.json").write_text(json.dumps(description))
+        self.export("yolo", source=source, expect=66)
+        self.assertEqual(list(self.elsewhere.iterdir()), [])
+
+
 class BadInput(Export):
     def test_a_folder_that_is_not_finalized(self):
         source = self.out.parent / "source"
@@ -728,6 +838,20 @@ class BadInput(Export):
                 _, err = self.export("yolo", "--classes", classes, expect=64)
                 self.assertIn(what, err)
         self.export("yolo", "--classes", folder / "none.json", expect=66)
+
+    def test_an_export_of_another_job_is_never_replaced(self):
+        self.export("yolo", "--split", "val")
+        identity = self.out / ".export" / "export.txt"
+        text = identity.read_text()
+        self.assertRegex(text, r"\njob job, sources [0-9a-f]{16}\n")
+        for other in ("job other, sources 0123456789abcdef", "job job, sources 0123456789abcdef", "without one"):
+            identity.write_text(re.sub(r"\njob .*\n", f"\n{other}\n", text))
+            before = content(self.out)
+            for arguments in ([], ["--overwrite"]):
+                _, err = self.export("yolo", "--split", "val", *arguments, expect=64)
+                self.assertIn(other, err)
+                self.assertNotIn("--overwrite", err)
+            self.assertEqual(content(self.out), before)
 
     def test_a_folder_with_something_else(self):
         self.export("yolo", "--split", "val")

@@ -239,7 +239,7 @@ class Reading(unittest.TestCase):
         self.assertEqual(len(samples), 14)
         val = eventgan_shards.Shards(self.out, split="val")
         self.assertEqual([sample["pair"]["sample_id"] for sample in val], [f"{k:06d}" for k in range(5)])
-        with self.assertRaisesRegex(ValueError, "split 'test'"):
+        with self.assertRaisesRegex(ValueError, "split of train, val, got 'test'"):
             eventgan_shards.Shards(self.out, split="test")
 
     def test_the_reader_opens_few_files_and_none_before_it_reads(self):

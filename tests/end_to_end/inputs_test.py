@@ -174,6 +174,34 @@ class Files(program.InFolder):
 
 
 class Names(program.InFolder):
+    def test_control_characters_in_them_reach_no_terminal(self):
+        evil = "a\x1b]0;owned\x07\x9b31m\nsound: 9 shards"
+        clip = self.folder / "clip" / evil
+        clip.mkdir(parents=True)
+        random = np.random.default_rng(1)
+        for number in range(4):
+            save_picture(clip / f"{number:06}.png", random)
+        (clip / "000002.png").write_bytes(b"rubbish")
+        (clip / "odd\x1b.txt").write_text("")
+        source = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
+        manifest = self.write_manifest(program.manifest([source], errors=LENIENT))
+        out = self.folder / "out"
+
+        def check(*command):
+            done = subprocess.run([program.PROGRAM, *map(str, command)], capture_output=True, timeout=120)
+            said = (done.stdout + done.stderr).decode()
+            self.assertTrue(said.strip(), command)
+            self.assertEqual([c for c in said if c != "\n" and (c < " " or "\x7f" <= c < "\xa0")], [], command)
+            self.assertNotIn("\nsound: 9 shards", said, command)
+
+        for command in ("plan", "convert"):
+            check(command, manifest)
+        shard = next(out.glob("*.h5"))
+        for command in [("status", out), ("retry", out), ("verify", out, "--deep"), ("inspect", shard), ("inspect", shard, "--sample", 0),
+                        ("finalize", out), ("report", out), ("preview", out, "--out", self.folder / "pictures"),
+                        ("preview", out, "--out", self.folder / "more", "--sample", evil)]:
+            check(*command)
+
     def test_a_manifest_in_a_folder_whose_name_is_not_utf_8_works(self):
         folder = os.fsencode(self.folder / "job") + b"-\xff\xe9"
         manifest = small_job(pathlib.Path(os.fsdecode(folder)), people=0)

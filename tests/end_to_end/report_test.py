@@ -3,6 +3,7 @@
 import contextlib
 import html.parser
 import io
+import json
 import pathlib
 import re
 import shutil
@@ -133,6 +134,61 @@ class Report(program.InFolder):
         self.assertGreater(paper["light"], 200)
         self.assertLess(paper["dark"], 60)
 
+    def test_a_table_that_goes_on_beyond_its_box_glows_there(self):
+        run("report", self.out)
+        source = (self.out / "report.html").read_text(encoding="utf-8")
+        page = self.folder / "boxes.html"
+        for name, options in {"light": [], "dark": ["--blink-settings=preferredColorScheme=0"]}.items():
+            for width, hides in ((2000, True), (100, False)):
+                content = f'<div class=scroll><div style="width:{width}px;height:200px"></div></div>'
+                page.write_text(source[:source.index("<body>")] + "<body>" + content, encoding="utf-8")
+                picture = self.folder / "boxes.png"
+                self.browse(f"--screenshot={picture}", "--window-size=400,300", *options, page=page)
+                row = np.asarray(PIL.Image.open(picture).convert("RGB")).astype(int)[124]
+                inside = row[15:min(width, 370) + 10]  # of the box, which has a margin of 12 and a border
+                glow = np.abs(inside - inside[0]).max(1) > 20
+                self.assertEqual(glow[-6:].all(), hides, f"{name}, {width} wide")
+                self.assertFalse(glow[:-30].any(), f"{name}, {width} wide")
+
+    def test_inspect_takes_folder_view_shard_and_sample(self):
+        run("finalize", self.out)
+        first = shards(self.out)[0]
+        whole = json.loads((self.out / "dataset.json").read_text())
+        del whole["view"]
+        for where in (self.out, self.out / "dataset.h5"):
+            self.assertEqual(json.loads(run("inspect", where, "--json")[0]), whole)
+            told, _ = run("inspect", where)
+            self.assertIn("samples        11, 1 of them quarantined", told)
+            self.assertIn(first, told)
+            told, _ = run("inspect", where, "--sample", "000002")
+            self.assertIn("id             000002", told)
+            _, err = run("inspect", where, "--sample", "1", expect=64)
+            self.assertIn("expected the id of a sample", err)
+        by_slot = run("inspect", self.out / first, "--sample", "1")
+        self.assertIn("id             000001", by_slot[0])
+        self.assertEqual(run("inspect", self.out / first, "--sample", "000001"), by_slot)
+        self.assertEqual(run("inspect", self.out, "--sample", "000001"), by_slot)
+        told, _ = run("preview", self.out / first, "--out", self.folder / "p", "--sample", "1", "--sample", "000001")
+        self.assertEqual(pathlib.Path(told.strip()).name, first.removesuffix(".h5") + "_0001.png")
+        run("preview", self.out / first, "--out", self.folder / "p", "--sample", "1", "--samples", "0", expect=64)
+        for command in (["inspect"], ["preview", "--out", self.folder / "p"]):
+            with self.subTest(command=command[0]):
+                self.assertIn("a number that is an id", re.sub(r"\s+", " ", run(command[0], "--help")[0]).lower())
+                _, err = run(command[0], self.out / first, *command[1:], "--sample", "01", expect=64)
+                self.assertIn("slot in 0..1", err)
+
+    def test_inspect_of_an_id_that_two_sources_have_asks_for_the_shard(self):
+        job = self.folder / "twice"
+        manifest = small_job(job, cars=2, people=0)
+        document = json.loads(manifest.read_text())
+        document["sources"] = [dict(document["sources"][0], split=split) for split in ("train", "val")]
+        manifest.write_text(json.dumps(document))
+        run("convert", manifest, "--progress", "none")
+        _, err = run("inspect", job / "out", "--sample", "000000", expect=64)
+        for shard in shards(job / "out"):
+            self.assertIn(shard, err)
+            self.assertIn("000000", run("inspect", job / "out" / shard, "--sample", "000000")[0])
+
     def test_the_page_is_one_small_file_without_script_or_foreign_markup(self):
         told, err = run("report", self.out, "--out", self.folder / "page.html")
         self.assertEqual(told.strip(), str(self.folder / "page.html"))
@@ -158,7 +214,7 @@ class Report(program.InFolder):
         run("report", job / "out")
         source = (job / "out" / "report.html").read_text(encoding="utf-8")
         self.assertIn("data-key=warning", source)
-        self.assertIn("the weights are those that come with the program (shipped:8)", source)
+        self.assertIn("shipped:8 are stand-in weights", source)
         run("convert", job / "manifest.json", "--overwrite", "--progress", "none")
         self.assertFalse((job / "out" / "report.html").exists(), "it told of other shards")
 

@@ -161,7 +161,8 @@ class Scale(program.InFolder):
         status = json.loads(self.quick("status", self.out, "--json").out)
         self.assertTrue(status["complete"])
         self.assertEqual(status["shards"], {"planned": SHARDS, "done": SHARDS, "running": 0, "missing": 0})
-        self.assertEqual(status["samples"], {"planned": PAIRS, "written": PAIRS - self.quarantined, "quarantined": self.quarantined})
+        self.assertEqual(status["samples"], {"planned": PAIRS, "written": PAIRS - self.quarantined, "under_way": 0,
+                                             "quarantined": self.quarantined})
         self.assertEqual(status["quarantined_by_reason"], {"expected a PNG, got 0 bytes": self.quarantined})
 
         self.quick("finalize", self.out)

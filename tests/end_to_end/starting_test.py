@@ -164,6 +164,98 @@ class Init(program.InFolder):
         self.assertIn(f"expected the name of a new file, got one that is there, in {manifest}", errors)
         self.assertEqual(manifest.read_text(), "mine")
 
+    def test_a_second_one_in_a_folder_is_told_of_its_file_alone(self):
+        write_video(self.folder / "one.mp4", 3)
+        here = os.getcwd()
+        os.chdir(self.folder)
+        self.addCleanup(os.chdir, here)
+        run("init", "one.mp4")
+        _, errors = run("init", "one.mp4", expect=64)
+        self.assertEqual(errors, "error: expected no manifest yet, got one that is there, in manifest.json "
+                                 "(--out FILE writes to another)\n")
+
+    def test_each_is_named_after_what_was_shown(self):
+        """Two of one name would have one output folder, and the second's shards would want the first's place."""
+        random = np.random.default_rng(7)
+        write_video(self.folder / "a" / "one.mp4", 3)
+        write_video(self.folder / "a" / "two.mp4", 4)
+        write_cars(self.folder / "kitti" / "training", 2, random)
+        for folder in ["walk in the park (2)", "drive/images", "\u0432\u0438\u0434\u0435\u043e"]:
+            for k in range(2):
+                save_picture(self.folder / folder / f"{k}.png", random)
+        for path, name in [("a/one.mp4", "one"), ("a/two.mp4", "two"), ("a", "a"), ("kitti/training", "kitti"),
+                           ("walk in the park (2)", "walk_in_the_park_2_"), ("drive/images", "drive"),
+                           ("\u0432\u0438\u0434\u0435\u043e", "frames")]:
+            _, manifest = self.init(self.folder / path)
+            written = read_commented(manifest)
+            self.assertEqual((written["name"], written["output"]), (f"{name}-events", {"directory": f"out/{name}-events"}))
+
+        # Of one name all the same: no flag lets the second take the first one's place.
+        write_video(self.folder / "b" / "one.mp4", 5)
+        jobs = self.folder / "jobs"
+        jobs.mkdir()
+        for clip in "ab":
+            run("init", self.folder / clip / "one.mp4", "--out", jobs / f"{clip}.json")
+        run("convert", jobs / "a.json", "--progress", "none")
+        before = shard_bytes(jobs / "out" / "one-events")
+        self.assertEqual(len(before), 1)
+        for more in [], ["--overwrite"]:
+            _, errors = run("convert", jobs / "b.json", *more, "--progress", "none", expect=64)
+            self.assertIn("choose another output folder, or remove that one yourself", errors)
+            self.assertIn(f"{self.folder / 'a' / 'one.mp4'}", errors)
+            self.assertEqual(shard_bytes(jobs / "out" / "one-events"), before)
+
+    def test_names_of_files_break_no_comment_and_steer_no_terminal(self):
+        root = self.folder / "people"
+        write_people(root, 2, np.random.default_rng(7))
+        (root / "people.json").rename(root / "train.json")
+        for name in ["li\nne.json", "e\x1b[2Jsc.json", os.fsdecode(b"l\xe4tin.json")]:
+            shutil.copy(root / "train.json", root / name)
+        told, manifest = self.init(root)
+        self.assertNotIn("\x1b", told)
+        for name in ["li\\nne.json", "e\\u001b[2Jsc.json", "l\\xe4tin.json"]:
+            self.assertIn(f"another list of people, left out: {name}\n", told)
+            self.assertIn(f"// another list of people, left out: {name}\n", manifest.read_text())
+        run("plan", manifest)
+
+    def test_images_that_are_no_sequence_are_told(self):
+        random = np.random.default_rng(7)
+        root = self.folder / "training"
+        write_cars(root, 9, random)
+        told, manifest = self.init(root / "image_2")
+        part = f"warning: a part of KITTI object, whose labels and pairs it does not have alone: eventgan init \"{root}\"\n"
+        self.assertIn(part, told)
+        self.assertIn(f"// {part}", manifest.read_text())
+        self.assertRegex(told, r"warning: 8 of 8 neighbouring images that were compared do not show the same scene, "
+                               r"\S*image_2/000000.png and \S*image_2/000001.png the first")
+        self.assertNotIn("several sizes", told)
+        cv2.imwrite(str(root / "image_2" / "000004.png"), np.zeros((20, 30), np.uint8))
+        self.assertIn("warning: images of several sizes in one folder, 32x24 in ", self.init(root / "image_2")[0])
+
+        wide = texture(48, 80, 7)
+        for folder in "ab":  # of two sizes, but each of one
+            (self.folder / "clips" / folder).mkdir(parents=True)
+            for k in range(5):
+                cv2.imwrite(str(self.folder / "clips" / folder / f"{k}.png"), wide[:, 3 * k:3 * k + 64 - 8 * (folder == "a")])
+        for path in ["clips", "clips/a"]:
+            self.assertNotIn("warning", self.init(self.folder / path)[0])
+
+    @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
+    def test_real_sequences_and_stills_are_told_apart(self):
+        frames = SHARED / "labelled_frames"
+        sequences = [SHARED / "kitti_raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data", SHARED / "mpii/sequences",
+                     SHARED / "human36m_fetch/S1/Directions-1/imageSequence", SHARED / "davis/slider_depth/images",
+                     frames / "camvid/images", frames / "davis_tennis/images", frames / "davis_carshadow/images",
+                     frames / "cdnet_traffic/images", frames / "mot17_mini/images", frames / "sot_car/images",
+                     frames / "sot_person/images"]
+        stills = [SHARED / "kitti_object/training/image_2", SHARED / "mpii_lists/images", frames / "coco256/images",
+                  frames / "pennfudan/images", frames / "voc100/images", frames / "kitti_mini/images"]
+        for path in sequences + stills:
+            with self.subTest(path):
+                told, _ = self.init("frames", path)
+                self.assertEqual("do not show the same scene" in told, path in stills, told)
+                self.assertEqual("several sizes" in told, path in stills, told)
+
     def test_what_is_no_dataset_is_said_in_one_line(self):
         empty = self.folder / "empty"
         empty.mkdir()

@@ -3,6 +3,7 @@
 The layer of failing_files sends the signal at a chosen change of the folder, so that each moment is met without luck.
 """
 
+import json
 import os
 import pathlib
 import shutil
@@ -150,9 +151,31 @@ class SlowShard(program.InFolder):
         except FileNotFoundError:  # a claim, which is gone again
             return False
 
+    def test_status_counts_the_samples_of_the_shard_under_way_as_the_bar_does(self):
+        manifest = self.slow_job()
+        out = self.folder / "job" / "out"
+        process = subprocess.Popen([program.PROGRAM, "convert", manifest, "--threads", "1", "--progress", "json"],
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        for line in process.stderr:
+            progress = json.loads(line)
+            if progress["event"] == "progress" and "phase" not in progress and progress["done"] > 0:
+                break
+        samples = {"under_way": 0}
+        while samples["under_way"] < progress["done"]:
+            self.assertIsNone(process.poll(), "ended before status told")
+            samples = json.loads(run("status", out, "--json")[0])["samples"]
+            self.assertEqual((samples["written"], samples["quarantined"]), (0, 0))
+        self.assertLessEqual(samples["under_way"], 100)
+        self.assertRegex(run("status", out)[0], r"samples  0 of 100 written, \d+ more in shards under way, 0 quarantined")
+
+    def slow_job(self):
+        return small_job(self.folder / "job", cars=100, people=0, samples_per_shard=100,
+                         generator={"weights": "untrained:16"}, image={"width": 640, "height": 480, "preset": "mpii"})
+
     def test_ends_within_the_grace_period(self):
-        manifest = small_job(self.folder / "job", cars=100, people=0, samples_per_shard=100,
-                             generator={"weights": "untrained:16"}, image={"width": 640, "height": 480, "preset": "mpii"})
+        manifest = self.slow_job()
         out = self.folder / "job" / "out"
         for name, more in [("SIGTERM", ["--grace", "1"]), ("SIGINT", []), ("SIGUSR1", ["--grace", "0"])]:
             with self.subTest(signal=name):

@@ -6,6 +6,7 @@ import os
 import pty
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import termios
@@ -26,14 +27,17 @@ def set_columns(terminal, columns):
     fcntl.ioctl(terminal, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
 
 
-def on_terminal(*arguments, columns=80, resized=None, expect=0, **environment):
-    """Everything the program writes to a pseudo-terminal. `resized`: its columns from the first bar on."""
+def on_terminal(*arguments, columns=80, resized=None, typed=(), expect=0, **environment):
+    """Everything the program writes to a pseudo-terminal. `resized`: its columns from the first bar on. `typed`: pairs of what has
+    to stand there, as a regular expression, and of what a person types then."""
     terminal, other_end = pty.openpty()
     set_columns(terminal, columns)
     process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdin=other_end, stdout=other_end, stderr=other_end,
-                               env={**os.environ, "TERM": "xterm-256color", "NO_COLOR": "", **environment})
+                               env={**os.environ, "TERM": "xterm-256color", "NO_COLOR": "", **environment},
+                               start_new_session=True, preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
     os.close(other_end)
     written = b""
+    typed = list(typed)
     while True:
         try:
             data = os.read(terminal, 1 << 16)
@@ -42,6 +46,8 @@ def on_terminal(*arguments, columns=80, resized=None, expect=0, **environment):
                 raise
             break
         written += data
+        if typed and re.search(typed[0][0], written.decode(errors="replace")):
+            os.write(terminal, typed.pop(0)[1])
         if resized and b"\x1b[K" in written:
             set_columns(terminal, resized)
             at_resize, resized = len(written), None
@@ -89,6 +95,14 @@ class Terminal(program.InFolder):
                 self.assertNotIn("\n", before[before.index(drawn[0]):])
                 self.assertTrue(after.startswith("\x1b[?7h\r\r\n24 of 24 pairs written"), after)
 
+    def test_make_demo_shows_how_far_it_is(self):
+        text = on_terminal("make-demo", self.folder / "demo")
+        drawn = [row for row in bars(text) if "/19 images" in row]  # 12 of a drive and 7 of figures
+        self.assertGreater(len(drawn), 1)
+        after = text.rpartition(drawn[-1])[2]  # it goes when it is done
+        self.assertTrue(after.startswith(f"\x1b[?7h\r{WIPE}a small KITTI, MPII and Human3.6M dataset is in "), after)
+        self.assertEqual(program.run("make-demo", self.folder / "piped")[1], "")
+
     def test_the_bar_follows_a_resized_terminal(self):
         before, after = self.convert(columns=200, resized=40)
         self.assertGreater(max(map(len, bars(before))), 40)
@@ -128,6 +142,23 @@ class Terminal(program.InFolder):
         marker.write_text("torn")
         text = on_terminal("convert", self.manifest, "--output", self.folder / "out", NO_COLOR="1")
         self.assertRegex(text, re.escape(WIPE) + r"warning: [^\r\n]*it is made again\r\n")
+
+    def test_ctrl_c_is_answered_at_once(self):
+        one_shard = program.json.loads(self.manifest.read_text())
+        one_shard["output"].update(samples_per_shard=PAIRS)
+        manifest = self.job / "one_shard.json"
+        manifest.write_text(program.json.dumps(one_shard))
+        command = ["convert", manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1, "--grace", 3600]
+        told = "stopping: this shard is finished if 3600 s are enough; Ctrl-C again quits at once"
+        begun = (r"\] [1-9]\d*/24 pairs", b"\x03")
+        text = on_terminal(*command, typed=[begun])  # that shard is all there is
+        before, _, after = text.partition(f"{WIPE}{told}\r\n")
+        self.assertNotIn("24/24 pairs", before)
+        self.assertGreater(len([row for row in bars(after) if "/24 pairs" in row]), 1, "the bar goes on below")
+        self.assertIn("24 of 24 pairs written", after)
+        text = on_terminal(*command, typed=[begun, ("again quits at once", b"\x03")], expect=-signal.SIGINT)
+        self.assertEqual(text.count(told), 1)
+        self.assertNotIn("pairs written", text)
 
     def test_verify_says_how_far_it_is(self):
         large = program.json.loads(self.manifest.read_text())  # there must be something to read

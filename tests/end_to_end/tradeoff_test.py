@@ -5,12 +5,17 @@ import signal
 import subprocess
 import time
 
+import h5py
+import numpy as np
+import PIL.Image
+
+import camera_files
 import program
 import small_job
 from program import PROGRAM, run
 
 AXES = {"widths": "untrained:2,8", "precisions": "float32,int8", "methods": "network,difference", "sizes": "1,0.75",
-        "dtypes": "float32,uint8", "pairs": "4", "rounds": "2"}
+        "scopes": "whole,motion,labels", "dtypes": "float32,uint8", "pairs": "4", "rounds": "2"}
 
 
 class Tradeoff(program.InFolder):
@@ -63,7 +68,8 @@ class Tradeoff(program.InFolder):
 
     def test_the_lines_are_the_manifest_that_was_measured(self):
         text, _ = self.tradeoff(at_most_error="1e9", methods="network", precisions="float32", sizes="0.75")
-        lines = [line.strip() for line in text.splitlines() if line.startswith("    \"")]
+        chosen_text = text[text.index("The fastest with an error"):]
+        lines = [line.strip() for line in chosen_text.splitlines() if line.startswith("        \"")]
         self.assertEqual(len(lines), 3)
         keys = json.loads("{" + "".join(lines) + "}")
         self.assertEqual((keys["image"]["width"], keys["image"]["height"]), (24, 18))
@@ -73,6 +79,39 @@ class Tradeoff(program.InFolder):
         chosen = self.report()["answer"]["name"]
         self.assertIn(keys["generator"]["weights"], chosen)
         self.assertTrue(chosen.endswith(keys["output"]["dtype"]))
+
+    def test_by_default_it_is_a_few_and_ends_with_a_recommendation(self):
+        text, told = run("tradeoff", self.manifest, "--out", self.out, "--progress", "lines", "--pairs", "2", "--rounds", "1")
+        report = self.report()
+        self.assertLessEqual(len(report["configurations"]), 10)
+        self.assertIn(f"{len(report['configurations'])} configurations, 2 pairs, 1 round: about ", told.splitlines()[0])
+        self.assertEqual({configuration["dtype"] for configuration in report["configurations"]}, {"float16"})
+        self.assertEqual(len(report["recommended"]), 2)
+        for recommended in report["recommended"]:
+            self.assertIn(f"    {recommended['name']}\n", text)
+            self.assertIn(f"        {recommended['manifest'][0]},\n", text)
+        table = text[:text.index("* Pareto front")]
+        self.assertLessEqual(max(map(len, table.splitlines())), 80)
+
+    def test_a_camera_in_any_layout(self):
+        events = camera_files.random_events(3000, 0, 1, seed=1)
+        frames = np.random.default_rng(2).integers(0, 256, (3, camera_files.HEIGHT, camera_files.WIDTH), dtype=np.uint8)
+        with h5py.File(self.folder / "authors.hdf5", "w") as file:
+            file["davis/events/data"] = events
+            file["davis/image_raw/data"] = frames
+            file["davis/image_raw/timestamps"] = np.array([0.1, 0.5, 0.9])
+        camera_files.write_mvsec(self.folder / "mvsec.hdf5", events, [0.1, 0.5, 0.9])
+        folder = self.folder / "ecd"
+        (folder / "images").mkdir(parents=True)
+        (folder / "events.txt").write_text("".join(f"{t:.6f} {x:.0f} {y:.0f} {int(p > 0)}\n" for x, y, t, p in events))
+        for index, frame in enumerate(frames):
+            PIL.Image.fromarray(frame).save(folder / "images" / f"{index}.png")
+        (folder / "images.txt").write_text("".join(f"{time} images/{index}.png\n" for index, time in enumerate([0.1, 0.5, 0.9])))
+        recordings = [str(self.folder / name) for name in ("authors.hdf5", "mvsec.hdf5", "ecd")]
+        real = [part for recording in recordings for part in ("--real", recording)]
+        run(*self.command(methods="network", precisions="float32", sizes="1"), *real)
+        for configuration in self.report()["configurations"]:
+            self.assertEqual(set(configuration["real"]), {*recordings, "mean"})
 
     def test_goes_on_where_it_was_stopped(self):
         command = [PROGRAM, *map(str, self.command(rounds="40"))]

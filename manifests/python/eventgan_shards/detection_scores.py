@@ -45,9 +45,9 @@ class Truth(NamedTuple):
     """Boxes that are there: m rows."""
 
     image: np.ndarray  # int [m]
-    label: np.ndarray  # int [m]
+    label: np.ndarray  # int [m]; -1 for DontCare, which is of no class
     xyxy: np.ndarray  # [m, 4]
-    ignore: np.ndarray  # bool [m]; what is found there neither helps nor hurts
+    ignore: np.ndarray  # bool [m]; what is found there, of this class (-1: of any), neither helps nor hurts
     difficulty: np.ndarray  # int [m]: 0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 not known or none of them
 
 
@@ -60,12 +60,21 @@ class Overlaps(NamedTuple):
     share: np.ndarray  # [k] and as one of the first box
 
 
-def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray) -> Overlaps:
-    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], in order of the first and then the
-    second."""
-    order = np.argsort(other_image, kind="stable")
-    begin, end = (np.searchsorted(other_image[order], image, side) for side in ("left", "right"))
-    counts = end - begin
+def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray, iou: float = 0.0) -> Overlaps:
+    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], whose IoU is at least `iou`, in order of the first
+    and then the second. Boxes are compared with those alone that lie beside them: of the same picture, their left edges near enough."""
+    lefts, widths = np.sort(other_xyxy[:, 0]), xyxy[:, 2] - xyxy[:, 0]
+    widest = (other_xyxy[:, 2] - other_xyxy[:, 0]).max(initial=0)
+    reach = np.minimum(widths / iou, widest) if iou else widest  # none that is wider has that IoU
+
+    def place(images: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """int: by picture, then by x: where it comes among the left edges."""
+        return images * (len(lefts) + 1) + np.searchsorted(lefts, x)
+
+    places = place(other_image, other_xyxy[:, 0])
+    order = np.argsort(places, kind="stable")
+    begin, end = (np.searchsorted(places[order], place(image, x)) for x in (xyxy[:, 0] - reach, xyxy[:, 2]))
+    counts = np.maximum(end - begin, 0)
     areas, other_areas = (np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (xyxy, other_xyxy))
     parts = []
     for rows in np.split(np.arange(len(image)), np.searchsorted(np.cumsum(counts), np.arange(BLOCK, counts.sum(), BLOCK))):
@@ -75,7 +84,10 @@ def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, ot
         sides = np.minimum(xyxy[i, 2:], other_xyxy[j, 2:]) - np.maximum(xyxy[i, :2], other_xyxy[j, :2])
         touch = (sides > 0).all(1)
         i, j, both = i[touch], j[touch], sides[touch].prod(1)
-        parts.append((i, j, both / (areas[i] + other_areas[j] - both), both / areas[i]))
+        pairs = Overlaps(i, j, both / (areas[i] + other_areas[j] - both), both / areas[i])
+        kept = np.flatnonzero(pairs.iou >= iou)
+        kept = kept[np.lexsort((j[kept], i[kept]))]
+        parts.append(Overlaps(*(column[kept] for column in pairs)))
     return Overlaps(*map(np.concatenate, zip(*parts)))
 
 
@@ -97,12 +109,20 @@ def strongest(found: Found, iou: float) -> np.ndarray:
     """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU
     with it is above `iou`."""
     left = np.ones(len(found.score), bool)
-    group = _group(found)
-    pairs = overlapping(group, found.xyxy, group, found.xyxy)
-    higher = np.flatnonzero((pairs.first < pairs.second) & (pairs.iou > iou))
-    for rows in rounds(turns(group)[pairs.first[higher]]):
-        first, second = pairs.first[higher[rows]], pairs.second[higher[rows]]
-        left[second[left[first]]] = False
+    for rows in rounds(_group(found)):
+        low, high = found.xyxy[rows, :2], found.xyxy[rows, 2:]
+        sides, areas, is_left = high - low, np.prod(high - low, axis=1), np.ones(len(rows), bool)
+        order = np.argsort(low[:, 0])
+        widest = sides[:, 0].max(initial=0)
+        reach = np.minimum(sides[:, 0] / iou, widest) if iou else widest  # none that is wider has that IoU
+        begin, end = (np.searchsorted(low[order, 0], x) for x in (low[:, 0] - reach, high[:, 0]))
+        for i in range(len(rows)):
+            if is_left[i]:
+                near = order[begin[i]:end[i]]
+                near = near[is_left[near] & (near > i)]
+                both = np.prod(np.maximum(np.minimum(high[i], high[near]) - np.maximum(low[i], low[near]), 0), axis=1)
+                is_left[near[both > iou * (areas[i] + areas[near] - both)]] = False
+        left[rows] = is_left
     return left
 
 
@@ -130,30 +150,31 @@ def match_as_voc(found: Found, truth: Truth, iou: float = 0.5) -> tuple[np.ndarr
 
     As PASCAL VOC's development kit: a found box stands for the true one of its class with which its IoU is greatest, if that is at least
     `iou` and no box of a higher score has it; a second one on the same is wrong. What stands for none and lies with a share of at least
-    `iou` of its area in a box to be ignored, of whatever class, does not count.
+    `iou` of its area in a box to be ignored, of its class or of none, does not count.
     """
-    pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
+    pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy, iou)
     same = np.flatnonzero(_same_class(found, truth, pairs))
     same = same[np.lexsort((-pairs.iou[same], pairs.first[same]))]
     best = same[np.flatnonzero(np.diff(pairs.first[same], prepend=-1))]
-    best = best[pairs.iou[best] >= iou]
     stands_for = np.full(len(found.score), -1)
     rows, earliest = np.unique(pairs.second[best], return_index=True)
     stands_for[pairs.first[best[earliest]]] = rows
-    return stands_for, (stands_for >= 0) | (_ignored_share(found, truth, pairs) < iou)
+    return stands_for, (stands_for >= 0) | (_ignored_share(found, truth) < iou)
 
 
 def match_as_coco(found: Found, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
     """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the
     highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of
-    all classes. Beyond the 100 best of a class and sample none counts."""
-    pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy)
+    their class, or of all if they are of none. Beyond the 100 best of a class and sample none counts."""
     turn = turns(_group(found))
-    same = np.flatnonzero(_same_class(found, truth, pairs) & (turn[pairs.first] < COCO_MOST))
+    rows = np.flatnonzero(turn < COCO_MOST)
+    pairs = overlapping(found.image[rows], found.xyxy[rows], truth.image, truth.xyxy, COCO_IOUS[0])
+    pairs = pairs._replace(first=rows[pairs.first])
+    same = np.flatnonzero(_same_class(found, truth, pairs))
     same = same[np.lexsort((-pairs.second[same], -pairs.iou[same]))]
     least = np.minimum(COCO_IOUS, 1 - 1e-10)
     right = assigned(pairs.first[same], pairs.second[same], pairs.iou[same, None] >= least, turn, len(truth.image)) >= 0
-    return right, (right | (_ignored_share(found, truth, pairs)[:, None] < least)) & (turn < COCO_MOST)[:, None]
+    return right, (right | (_ignored_share(found, truth)[:, None] < least)) & (turn < COCO_MOST)[:, None]
 
 
 def _group(found: Found) -> np.ndarray:
@@ -164,10 +185,13 @@ def _same_class(found: Found, truth: Truth, pairs: Overlaps) -> np.ndarray:
     return (found.label[pairs.first] == truth.label[pairs.second]) & ~truth.ignore[pairs.second]
 
 
-def _ignored_share(found: Found, truth: Truth, pairs: Overlaps) -> np.ndarray:
-    """[n]: the greatest share of each found box that lies in one box to be ignored."""
+def _ignored_share(found: Found, truth: Truth) -> np.ndarray:
+    """[n]: the greatest share of each found box that lies in one box to be ignored, of its class or of none."""
     share = np.zeros(len(found.score))
-    rows = truth.ignore[pairs.second]
+    ignored = np.flatnonzero(truth.ignore)
+    pairs = overlapping(found.image, found.xyxy, truth.image[ignored], truth.xyxy[ignored])
+    label = truth.label[ignored[pairs.second]]
+    rows = (label == found.label[pairs.first]) | (label == -1)
     np.maximum.at(share, pairs.first[rows], pairs.share[rows])
     return share
 
@@ -197,29 +221,32 @@ def average_precisions(right: np.ndarray, truths: int) -> dict[str, float]:
             "ap_coco_101": at(np.linspace(0, 1, 101))}
 
 
-def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou: float = 0.5) -> dict[str, dict[str, float]]:
+def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou: float = 0.5,
+                     sure: np.ndarray | None = None) -> dict[str, dict[str, float]]:
     """By the name of each of `classes` (names with labels), and of "all":
 
     truths, easy, hard        how many boxes count, and how many of these have difficulty 0, and 1 or 2
-    found, right              how many predictions count, and how many of these are right (`match_as_voc`)
+    found, right              how many of the predictions that are `sure` [n] (None: all) count, and how many of these are right (`match_as_voc`)
     precision, recall, f1     of all these predictions; recall_easy, recall_hard: shares of those true boxes
-    ap_voc, ap_voc_11, ap_coco_101   see `average_precisions`, all with VOC's matching at `iou`
-    ap_coco                   COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
+    ap_voc, ap_voc_11, ap_coco_101   of all predictions, sure or not: see `average_precisions`, all with VOC's matching at `iou`
+    ap_coco                   of all, too, COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
 
     "all" counts all classes together, and has the mean of the classes' average precisions, without those that have no box to find.
     Found boxes of other classes are left out, and so are true ones, unless they are to be ignored.
     """
-    found = found.rows(np.isin(found.label, list(classes.values())))
-    stands_for, counts = match_as_voc(found, truth, iou)
-    coco_right, coco_counts = match_as_coco(found, truth)
+    ours = np.isin(found.label, list(classes.values()))
+    chosen, found = found.rows(ours if sure is None else ours & sure), found.rows(ours)
+    right_one, counts = match_as_voc(chosen, truth, iou)
     met = np.zeros(len(truth.image), bool)
-    met[stands_for[stands_for >= 0]] = True
+    met[right_one[right_one >= 0]] = True
+    voc_right, voc_counts = match_as_voc(found, truth, iou)
+    coco_right, coco_counts = match_as_coco(found, truth)
 
     def sums(labels: list[int]) -> dict[str, float]:
-        mine = counts & np.isin(found.label, labels)
+        mine = counts & np.isin(chosen.label, labels)
         there = ~truth.ignore & np.isin(truth.label, labels)
         easy, hard = there & (truth.difficulty == 0), there & (truth.difficulty > 0)
-        right = np.count_nonzero(stands_for[mine] >= 0)
+        right = np.count_nonzero(right_one[mine] >= 0)
         truths, all_found = np.count_nonzero(there), np.count_nonzero(mine)
         return {"truths": truths, "easy": np.count_nonzero(easy), "hard": np.count_nonzero(hard), "found": all_found, "right": right,
                 "precision": ratio(right, all_found), "recall_easy": ratio(met[easy].sum(), easy.sum()),
@@ -230,7 +257,7 @@ def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou
         own = sums([label])
         mine = found.label == label
         coco = [average_precisions(coco_right[kept, i], own["truths"])["ap_coco_101"] for i, kept in enumerate((coco_counts & mine[:, None]).T)]
-        scores[name] = {**own, **average_precisions(stands_for[mine & counts] >= 0, own["truths"]), "ap_coco": float(np.mean(coco))}
+        scores[name] = {**own, **average_precisions(voc_right[mine & voc_counts] >= 0, own["truths"]), "ap_coco": float(np.mean(coco))}
     means = {key: mean([each[key] for each in scores.values()]) for key in ("ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco")}
     return {**scores, "all": {**sums(list(classes.values())), **means}}
 
@@ -244,10 +271,11 @@ def kitti_average_precision(found: Found, truth: Truth, classes: Mapping[str, in
     rank = list(KITTI_LEVELS).index(level)
     of_class, small = truth.label == classes[name], height < KITTI_LEVELS[level]
     counted = of_class & ~truth.ignore & (truth.difficulty >= 0) & (truth.difficulty <= rank)
-    takes, candidate = of_class | (truth.label == classes.get(neighbour, -1)), small | (found.label == classes[name])
+    takes = of_class | np.isin(truth.label, [classes[neighbour]] if neighbour in classes else [])
+    candidate = small | (found.label == classes[name])
     if not counted.any():
         return math.nan
-    pairs = overlapping(truth.image, truth.xyxy, found.image, found.xyxy)
+    pairs = overlapping(truth.image, truth.xyxy, found.image, found.xyxy, least)
     pairs = Overlaps(*(column[takes[pairs.first] & candidate[pairs.second] & (pairs.iou > least)] for column in pairs))
     turn = turns(truth.image)
 
@@ -264,7 +292,7 @@ def kitti_average_precision(found: Found, truth: Truth, classes: Mapping[str, in
     right = np.bincount(trial[counted[row] & ~small[choice[row, trial]]], minlength=len(thresholds))
     free = ~small[:, None] & candidate[:, None] & (found.score[:, None] >= thresholds)
     free[choice[row, trial], trial] = False
-    stuff = np.flatnonzero(truth.label == classes.get(DONT_CARE, -1))
+    stuff = np.flatnonzero(truth.ignore & (truth.label == -1))
     within = overlapping(found.image, found.xyxy, truth.image[stuff], truth.xyxy[stuff])
     free[within.first[within.share > least]] = False
     precision = np.zeros(KITTI_POINTS)
@@ -287,6 +315,7 @@ def _kitti_thresholds(scores: np.ndarray, truths: int) -> np.ndarray:
 
 def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> Truth:
     """The boxes of all samples; `image` is the sample's index, `label` the class's number."""
+    numbers = {**numbers, DONT_CARE: -1}
     nothing = np.empty(0, int)
     parts = [(nothing, nothing, np.empty((0, 4)), nothing.astype(bool), nothing)]
     for i in range(len(shards)):

@@ -19,6 +19,7 @@ detection_scores.py and pose_scores.py say what each number is. One that is not 
 from __future__ import annotations
 
 import argparse
+import collections
 import functools
 import json
 import math
@@ -43,14 +44,36 @@ def read_predictions(path: PathLike, keys: Sequence[str]) -> list[dict[str, Any]
     """The file's list. What is not one, or lacks keys, is a ValueError."""
     try:
         entries = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
-    except ValueError as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"expected JSON, got {error}, in {path}") from error
     if not isinstance(entries, list):
         raise ValueError(f"expected a list, got {type(entries).__name__}, in {path}")
     for number, entry in enumerate(entries):
         if not isinstance(entry, dict) or not entry.keys() >= set(keys):
-            raise ValueError(f"expected {', '.join(keys)}, got {json.dumps(entry)[:80]}, in {path} (entry {number})")
+            raise ValueError(f"expected {', '.join(keys)}, got {_brief(entry)}, in {path} (entry {number})")
     return entries
+
+
+def _brief(value: Any) -> str:
+    """The beginning of the value in JSON."""
+    try:
+        return json.dumps(value)[:80]
+    except RecursionError:
+        return f"a {type(value).__name__} of too many levels"
+
+
+def _name(entry: Mapping[str, Any]) -> str:
+    return _brief(entry["image_id"]).strip('"')
+
+
+def _is_whole(value: Any) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool)
+
+
+def _are_numbers(value: Any, shape: tuple[int, ...]) -> bool:
+    if shape:
+        return isinstance(value, list) and len(value) == shape[0] and all(_are_numbers(each, shape[1:]) for each in value)
+    return _is_whole(value) or isinstance(value, float)
 
 
 def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int, ...], path: PathLike) -> np.ndarray:
@@ -58,14 +81,18 @@ def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int,
     values = np.empty((len(entries), *shape))
     for number, entry in enumerate(entries):
         try:
-            value = np.array(entry[key], float)
-        except (TypeError, ValueError, OverflowError):
-            value = np.array(np.nan)
-        if value.shape != shape or not np.isfinite(value).all():
+            values[number] = entry[key] if _are_numbers(entry[key], shape) else np.nan
+        except OverflowError:
+            values[number] = np.inf
+        if not np.isfinite(values[number]).all():
             wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "a finite number"
-            raise ValueError(f"expected {wanted} as {key}, got {json.dumps(entry[key])[:80]}, in {path} (entry {number}, sample {entry['image_id']})")
-        values[number] = value
+            raise ValueError(f"expected {wanted} as {key}, got {_brief(entry[key])}, in {path} (entry {number}, sample {_name(entry)})")
     return values
+
+
+def _places(shards: Shards) -> list[tuple[str, int]]:
+    """Of each sample its shard and slot, which no other one has."""
+    return [(sample["shard"], sample["slot"]) for sample in (shards.sample(i, ()) for i in range(len(shards)))]
 
 
 class Samples:
@@ -75,29 +102,29 @@ class Samples:
         where = {"dataset": dataset} if dataset else None
         self.shards = Shards(truth, split=split, where=where, ids=ids)
         self._of_split, self.classes = Shards(truth, split=split), Shards(truth).known_classes()
-        self._names = self.shards.column("sample_id").tolist()
-        self._all_names = self._of_split.column("sample_id").tolist()
+        scored = {place: i for i, place in enumerate(_places(self.shards))}
+        self._of_number = [scored.get(place, -1) for place in _places(self._of_split)]
+        names = self.shards.column("sample_id").tolist()
+        self._of_name = {**dict.fromkeys(self._of_split.column("sample_id").tolist(), -1), **{name: i for i, name in enumerate(names)}}
+        self._twice = {name for name, count in collections.Counter(names).items() if count > 1}
 
     def of(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. An id that there is not, or that two
-        scored samples have, is a ValueError."""
-        places = {**dict.fromkeys(self._all_names, -1), **{name: i for i, name in enumerate(self._names)}}
-        twice = {name for name, count in zip(*np.unique(self._names, return_counts=True)) if count > 1}
+        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. A number is a place in the split,
+        whatever is scored of it. An id that there is not, or that two scored samples have, is a ValueError."""
         found = np.empty(len(entries), int)
         for number, entry in enumerate(entries):
-            name = self._name(entry["image_id"])
-            if name not in places or name in twice:
-                raise ValueError(f"expected the image_id of {'a' if name not in places else 'one'} sample of {len(self._all_names)}, got "
-                                 f"{json.dumps(entry['image_id'])}{', which two have' if name in twice else ''}, in {path} (entry {number})")
-            found[number] = places[name]
+            name = entry["image_id"]
+            if _is_whole(name) and 1 <= name <= len(self._of_number):
+                if len(self._splits) > 1:
+                    raise ValueError(f"expected --split with samples that are numbered, got shards of {', '.join(self._splits)}")
+                found[number] = self._of_number[name - 1]
+                continue
+            is_known = isinstance(name, str) and name in self._of_name
+            if not is_known or name in self._twice:
+                raise ValueError(f"expected the image_id of {'one' if is_known else 'a'} sample of {len(self._of_number)}, got {_brief(name)}"
+                                 f"{', which two have' if is_known else ''}, in {path} (entry {number})")
+            found[number] = self._of_name[name]
         return found
-
-    def _name(self, image_id: Any) -> str | None:
-        if isinstance(image_id, int) and 1 <= image_id <= len(self._all_names):
-            if len(self._splits) > 1:
-                raise ValueError(f"expected --split with samples that are numbered, got shards of {', '.join(self._splits)}")
-            return self._all_names[image_id - 1]
-        return image_id if isinstance(image_id, str) else None
 
     @functools.cached_property
     def _splits(self) -> list[str]:
@@ -107,11 +134,12 @@ class Samples:
         """int [n]: the place in `classes` of each entry's category. One that there is not is a ValueError."""
         numbered = [name for name in self.classes if name != DONT_CARE]
         labels = {**{i + 1: self.classes.index(name) for i, name in enumerate(numbered)}, **{name: self.classes.index(name) for name in numbered}}
-        unknown = [i for i, entry in enumerate(entries) if not isinstance(entry["category_id"], (int, str)) or entry["category_id"] not in labels]
+        given = [entry["category_id"] for entry in entries]
+        unknown = [i for i, name in enumerate(given) if not (_is_whole(name) or isinstance(name, str)) or name not in labels]
         if unknown:
-            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got "
-                             f"{json.dumps(entries[unknown[0]]['category_id'])}, in {path} (entry {unknown[0]})")
-        return np.array([labels[entry["category_id"]] for entry in entries], int)
+            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got {_brief(given[unknown[0]])}, in {path} "
+                             f"(entry {unknown[0]})")
+        return np.array([labels[name] for name in given], int)
 
 
 def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
@@ -119,8 +147,8 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     """What `detections` prints, as a dictionary, with the boxes that it is of.
 
     classes: those to score (None: all that have a box to find or a prediction)
-    confidence, nms: predictions of a lower score are removed first, then non-maximum suppression at this IoU follows (1: none), as in the paper: what is
-        removed is in no score, the average precisions' neither
+    confidence, nms: precision, recall and F1 are, as in the paper, of predictions of at least this score that non-maximum suppression at this IoU
+        leaves (1: none); the average precisions are of all predictions
     Samples of sources without boxes are left out; that all are is a ValueError, and so are predictions that do not hold what they should.
     """
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
@@ -139,19 +167,24 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     boxes[:, 2:] += boxes[:, :2]
     found = Found.of(image, samples.labels(entries, predictions), boxes, scores)
     found = found.rows((found.image >= 0) & np.append(labelled, False)[found.image])
-    given, truth = len(found.score), read_boxes(shards, numbers)
-    found = found.rows(found.score >= confidence)
-    found = found.rows(strongest(found, nms))
+    truth, sure = read_boxes(shards, numbers), _sure(found, confidence, nms)
     if classes is None:
         there = np.concatenate([found.label, truth.label[~truth.ignore]])
         classes = [name for name, label in numbers.items() if name != DONT_CARE and (there == label).any()]
     counts = {"samples": int(labelled.sum()), "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))),
-              "ignored": int(truth.ignore.sum()), "predictions": len(entries), "not_of_these_samples": len(entries) - given,
-              "after_suppression": len(found.score)}
+              "ignored": int(truth.ignore.sum()), "predictions": len(entries), "not_of_these_samples": len(entries) - len(found.score),
+              "after_suppression": int(sure.sum())}
     result = {"settings": {"confidence": confidence, "nms": nms, "iou": iou}, "counts": counts,
-              "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou)}
+              "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou, sure)}
     kitti = _of_kitti(shards, found, truth, numbers, classes)
     return ({**result, "kitti": kitti} if kitti else result), found, truth
+
+
+def _sure(found: Found, confidence: float, nms: float) -> np.ndarray:
+    """bool [n]: what is left by the confidence, and then by non-maximum suppression."""
+    sure = found.score >= confidence
+    sure[sure] = strongest(found.rows(sure), nms)
+    return sure
 
 
 def _of_kitti(shards: Shards, found: Found, truth: Truth, numbers: Mapping[str, int], classes: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -178,11 +211,11 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
         if index < 0:
             continue
         person = entry.get("person", 0 if alone[index] else None)
-        at = rows.get((index, person)) if isinstance(person, int) else None
+        at = rows.get((index, person)) if _is_whole(person) else None
         if at is None or np.isfinite(found[at]).all():
-            what = f"got {json.dumps(person)}" if at is None else f"got {person} twice"
+            what = f"got {_brief(person)}" if at is None else f"got {person} twice"
             raise ValueError(f"expected a person of the {np.count_nonzero(persons.place[:, 0] == index)} there are, {what}, in {predictions} (entry {number}, "
-                             f"sample {entry['image_id']})")
+                             f"sample {_name(entry)})")
         found[at] = joints[number]
     not_found = np.isnan(found).all((1, 2)) & persons.scored(hidden).any(1)
     counts = {"persons": len(persons.place), "not_found": int(not_found.sum()), "predictions": len(entries), "not_of_these_samples": int((image < 0).sum()),
@@ -207,8 +240,8 @@ def _text(value: float | str, digits: int) -> str:
 def detection_tables(result: Mapping[str, Any]) -> str:
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
     first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} boxes to find, "
-             f"{counts['ignored']} to be ignored; {counts['after_suppression']} of {counts['predictions']} predictions left by confidence "
-             f"{settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
+             f"{counts['ignored']} to be ignored; average precisions of all {counts['predictions']} predictions, precision, recall and F1 of "
+             f"{counts['after_suppression']}, by confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
     if counts["not_of_these_samples"]:
         first += f"; {counts['not_of_these_samples']} are of other samples"
     tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", **PAPER_COLUMNS}),
@@ -230,14 +263,17 @@ def pose_tables(result: Mapping[str, Any]) -> str:
 
 
 def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Found, truth: Truth) -> None:
-    """Precision over recall, and some of the samples, evenly spread: found blue, true green, to be ignored red."""
+    """Precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue, true green, to be
+    ignored red."""
     from . import pictures  # OpenCV, which nothing else here needs
 
     names = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
     found = found.rows(np.isin(found.label, list(names)))
-    stands_for, counts = match_as_voc(found, truth, result["settings"]["iou"])
+    settings = result["settings"]
+    stands_for, counts = match_as_voc(found, truth, settings["iou"])
     curves = {name: curve(stands_for[counts & (found.label == label)] >= 0, result["classes"][name]["truths"]) for label, name in names.items()}
     pictures.write(folder, "precision_recall", pictures.of_precision(curves))
+    found = found.rows(_sure(found, settings["confidence"], settings["nms"]))
     true = ~truth.ignore & np.isin(truth.label, list(names))
     for i in _some(np.union1d(found.image, truth.image)):
         there, ours = truth.image == i, np.flatnonzero(found.image == i)
@@ -283,8 +319,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--ids", metavar="FILE", help="score these samples alone, an id a line")
     parser.add_argument("--classes", type=lambda text: text.split(","),
                         help="detections: names with commas between them (default: all that have a box or a prediction)")
-    parser.add_argument("--confidence", type=float, default=0.2, help="detections: predictions with a score below are removed (default: %(default)s)")
-    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression; 1: none (default: %(default)s)")
+    parser.add_argument("--confidence", type=float, default=0.2, help="detections: least score of what precision, recall and F1 are of; average precisions are of all (default: %(default)s)")
+    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression before precision, recall and F1; 1: none (default: %(default)s)")
     parser.add_argument("--iou", type=float, default=0.5, help="detections: IoU from which on a box is found (default: %(default)s)")
     parser.add_argument("--hidden", action="store_true", help="poses: score joints that are annotated and hidden, too, as MPII's own evaluation does")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")

@@ -10,6 +10,7 @@ import numpy as np
 
 FOUND, TRUE, IGNORED, BLACK = (230, 90, 20), (60, 170, 40), (40, 40, 220), (0, 0, 0)  # blue, green, red (BGR)
 ZOOM = 2
+FAR = 1e6  # pixels: what lies farther out is drawn there
 
 
 def of_events(volume: np.ndarray) -> np.ndarray:
@@ -24,7 +25,7 @@ def draw_boxes(picture: np.ndarray, boxes: Iterable[Iterable[float]], colour: tu
     """Boxes in volume pixels onto `of_events`, each with its text above."""
     texts = iter(texts)
     for box in boxes:
-        left, top, right, bottom = (round(ZOOM * float(edge)) for edge in box)
+        left, top, right, bottom = (round(ZOOM * float(edge)) for edge in np.clip(box, -FAR, FAR))
         cv2.rectangle(picture, (left, top), (right - 1, bottom - 1), colour, 1)
         cv2.putText(picture, next(texts, ""), (left, max(top - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
 
@@ -32,7 +33,8 @@ def draw_boxes(picture: np.ndarray, boxes: Iterable[Iterable[float]], colour: tu
 def draw_joints(picture: np.ndarray, joints: np.ndarray, colour: tuple[int, int, int], true: np.ndarray | None = None) -> None:
     """Joints [J, 2] in volume pixels onto `of_events`, with lines to the `true` ones [J, 2]. What is NaN is left out."""
     for i, joint in enumerate(joints):
-        ends = [tuple(int(x) for x in np.round(ZOOM * (end + 0.5) - 0.5)) for end in ([joint] if true is None else [joint, true[i]]) if np.isfinite(end).all()]
+        ends = [joint] if true is None else [joint, true[i]]
+        ends = [tuple(int(x) for x in np.round(ZOOM * (np.clip(end, -FAR, FAR) + 0.5) - 0.5)) for end in ends if np.isfinite(end).all()]
         if len(ends) == 2:
             cv2.line(picture, *ends, colour, 1, cv2.LINE_AA)
         if np.isfinite(joint).all():

@@ -19,6 +19,7 @@ FORMAT, FORMAT_VERSION = "eventgan-shard", 1
 PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", 1
 VIEW = "dataset.h5"
+SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # nothing that leads elsewhere
 FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "original")
 
 PathLike = Union[str, os.PathLike]
@@ -36,7 +37,7 @@ class Shards(Sequence):
 
     paths: a folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
         shards that its dataset.json lists, in the order of the plan: a shard that is gone or another one by now is a
-        ValueError. Of any other folder all shards that are done, so those with a marker, by name. No shard at all is a ValueError.
+        ValueError, and so is a name that is no shard's. Of any other folder all shards that are done, so those with a marker, by name. No shard at all is a ValueError.
     partial: True takes what is done of a folder that is not whole; without it a shard that dataset.json or plan.json misses,
         one without marker, and a marker without its shard are a ValueError.
     split: only the shards of this split ("train"...).
@@ -74,9 +75,11 @@ class Shards(Sequence):
         self._described_as = str(paths)
         shards = _find_shards(paths, partial)
         if split is not None:
-            shards = [shard for shard in shards if self._split(shard) == split]
-            if not shards:
-                raise ValueError(f"expected shards of split {split!r}, got none, in {self._described_as}")
+            splits = [self._split(shard) for shard in shards]
+            if split not in splits:
+                raise ValueError(f"expected a split of {', '.join(sorted(set(splits)))}, got {split!r}, in {self._described_as}")
+            shards = [shard for shard, of_it in zip(shards, splits) if of_it == split]
+            self._described_as += f", split {split}"
         self.paths = [shard.path for shard in shards]
         valid = [self._files[shard.path].column("valid") if shard.valid is None else shard.valid for shard in shards]
         self._shard = np.repeat(np.arange(len(valid), dtype=np.int32), [len(each) for each in valid])
@@ -158,7 +161,8 @@ class Shards(Sequence):
         name = "pairs/" + {"gap": "gap_frames"}.get(name, name)
         like = next((file.column(name) for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
         if like is None:
-            raise ValueError(f"expected a column {name}, got none, in {self._described_as}")
+            known = sorted({column for path in self.paths for column in self._files[path].file["pairs"]})
+            raise ValueError(f"expected a column of {', '.join(known)}, got {name[len('pairs/'):]!r}, in {self._described_as}")
         nothing = {"O": "", "f": np.nan}.get(like.dtype.kind, -1)
 
         def of_shard(file: _OpenShard) -> np.ndarray:
@@ -332,7 +336,8 @@ class Shards(Sequence):
     def _require_known(self, values: Iterable[Any], known: set, what: str, source: str) -> None:
         unknown = [value for value in values if value not in known]
         if unknown:
-            raise ValueError(f"expected {what} of {self._described_as}, got {len(unknown)} that it does not have "
+            there = _first(map(repr, sorted(known)), 20) or "none"
+            raise ValueError(f"expected {what} of {self._described_as} ({there}), got {len(unknown)} that it does not have "
                              f"({_first(map(repr, unknown))}), in {source}")
 
 
@@ -398,7 +403,7 @@ class _OpenShard:
         if unknown:
             also = [alias for alias in aliases if alias and alias not in known]
             raise ValueError(f"expected joints of {', '.join(known)}{' or ' if also else ''}{', '.join(also)}, got {', '.join(unknown)}, "
-                             f"in {self.file.filename}")
+                             f"in {self.file.filename} (where={{'dataset': ...}}, or --dataset, leaves out sources with other joints)")
         return [places[name] for name in names]
 
     def _group(self, group: str) -> list[tuple[str, np.ndarray]]:
@@ -473,9 +478,9 @@ def _frame_of(sample_id: str) -> str:
     return re.sub(r"@(before|after|around)\d+$", "", sample_id)
 
 
-def _first(texts: Iterable[str]) -> str:
+def _first(texts: Iterable[str], most: int = 5) -> str:
     texts = list(texts)
-    return ", ".join(texts[:5]) + (", ..." if texts[5:] else "")
+    return ", ".join(texts[:most]) + (", ..." if texts[most:] else "")
 
 
 def _marker(path: PathLike) -> pathlib.Path:
@@ -560,6 +565,8 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
         _require_whole(description["shards"], description.get("missing", ()), folder)
     shards = []
     for entry in description["shards"]:
+        if not SHARD_NAME.fullmatch(str(entry["name"])):
+            raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in {folder / DESCRIPTION}")
         path = folder / entry["name"]
         if not _is_same(path, entry):
             raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
@@ -587,7 +594,7 @@ def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
 
 
 def _is_done(path: pathlib.Path) -> bool:
-    """Whether the marker beside the file is a shard's and the file has its size (DESIGN section 6)."""
+    """Whether the marker beside the file is a shard's and the file has its size: that is what done means."""
     try:
         marker = json.loads(_marker(path).read_text(encoding="utf-8"))
     except (OSError, ValueError):

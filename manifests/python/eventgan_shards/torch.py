@@ -16,6 +16,7 @@ x, y in pixels whose centres are whole numbers; boxes are left, top, right, bott
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,6 +28,7 @@ import torch.nn.functional
 from torch import nn
 from torch.utils.data import ConcatDataset, Dataset, WeightedRandomSampler
 
+from .detection_scores import DONT_CARE
 from .shards import Shards
 
 Item = dict[str, Any]
@@ -151,14 +153,14 @@ class DetectionDataset(Dataset):
 
     volume   [2B, H, W] float32
     boxes    [n, 4] float32, left, top, right, bottom in its pixels, cut to it
-    labels   [n] int64, position in `classes`; -1 for a box to be ignored whose class is not among them
+    labels   [n] int64, position in `classes`; -1 for DontCare, to be ignored whatever the class
     ignore   [n] bool: neither to be learnt nor to be scored (annotated so, or less than `visible` of it is left)
     id       str, sample_id
     index    int, of the sample in `shards`
 
     classes: names in the order of their numbers, or name → number, which may join classes: {"Car": 0, "Van": 0}. Boxes of
-        other classes are left out, unless to be ignored. A name that no shard knows is a ValueError. None: all names that
-        the shards have, in their order, without DontCare: the same numbers for any part of them.
+        other classes are left out, but for DontCare. A name that no shard knows is a ValueError, and so are shards without any. None:
+        all names that the shards have, in their order, without DontCare: the same numbers for any part of them.
     size: (H, W) that volumes are filled up to with zeros, or cut to, at the right and at the bottom; None: as they are.
     augmentation: changes volume and boxes alike; None: nothing.
     visible: share of a box's area that must be left for it not to be ignored.
@@ -170,12 +172,14 @@ class DetectionDataset(Dataset):
                  view: np.ndarray | None = None) -> None:
         self._shards = shards
         known = shards.known_classes()
+        if not known:
+            raise ValueError(f"expected samples of sources with boxes, got none, in {shards._described_as}")
         if classes is None:
-            classes = [name for name in known if name != "DontCare"]
+            classes = [name for name in known if name != DONT_CARE]
         self.classes = dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
         unknown = [name for name in self.classes if name not in known]
         if unknown:
-            raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}")
+            raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}, in {shards._described_as}")
         self._size, self._augmentation, self._visible, self._view = size, augmentation, visible, view
 
     def __len__(self) -> int:
@@ -188,6 +192,7 @@ class DetectionDataset(Dataset):
         names = self._shards.class_names(index)
         labels = np.array([self.classes.get(names[each], -1) for each in rows["class_id"]], np.int64)
         ignore = rows["ignore"] != 0
+        wanted = (labels >= 0) | ignore & np.isin(rows["class_id"], [i for i, name in enumerate(names) if name == DONT_CARE])
         boxes = rows["xyxy"]
         height, width = self._size or volume.shape[1:]
         if self._augmentation:
@@ -197,7 +202,7 @@ class DetectionDataset(Dataset):
             volume, boxes = warp(volume, affine, height, width), move_boxes(boxes, affine)
         cut = np.clip(boxes, 0, [width, height, width, height])
         ignore = ignore | (_areas(cut) < self._visible * np.maximum(_areas(boxes), 1e-9))
-        kept = (_areas(cut) > 0) & (ignore | (labels >= 0))
+        kept = (_areas(cut) > 0) & wanted
         return {"volume": volume, "boxes": torch.from_numpy(cut[kept]).float(), "labels": torch.from_numpy(labels[kept]),
                 "ignore": torch.from_numpy(ignore[kept]), "id": sample["pair"]["sample_id"], "index": int(index)}
 
@@ -239,22 +244,46 @@ def collate_torchvision(items: Sequence[Item]) -> tuple[list[torch.Tensor], list
     return [item["volume"] for item in items], targets
 
 
+# What a name says of a side: "left" and "right"; "l" and "r" that stand alone, or are told from their word by its case ("lWrist", "LWrist", "wristL").
+_SIDE = re.compile(r"left|Left|LEFT|right|Right|RIGHT|(?<![^\W_])[lrLR](?![^\W_])|(?<![^\W_])[lrLR](?=[A-Z][a-z])|(?<=[a-z0-9])[LR](?![^\W_])")
+_PERHAPS_SIDES = re.compile("^[lrLR]"), re.compile("[lrLR]$")  # sides if there is a partner
+_OTHER_SIDE = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+_OTHER_SIDE |= {right: left for left, right in _OTHER_SIDE.items()}
+_NAMELESS = re.compile("joint_[0-9]+")  # what eventgan calls joints of which it knows nothing
+
+
 def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
-    """Joints that a mirror exchanges, as pairs of positions: those whose names differ by left and right, Left and Right (Human3.6M's), or
-    by l_ and r_ or L_ and R_ at their beginning (MPII's)."""
-    numbers = {name: i for i, name in enumerate(names)}
-    sides = {"left": "right", "Left": "Right", "l_": "r_", "L_": "R_"}
-    mirrored = {name: re.sub("left|Left|^l_|^L_", lambda side: sides[side[0]], name) for name in names}
-    return [(i, numbers[mirrored[name]]) for name, i in numbers.items() if mirrored[name] != name and mirrored[name] in numbers]
+    """Joints that a mirror exchanges, as pairs of positions (left, right): those whose names differ by the side alone, such as l_hip (MPII), left_hip
+    and LeftFoot (Human3.6M), hipL (DHP19), LHip; lhip, too, where there is rhip. Names that suggest a side and have no partner, or that say nothing
+    (joint_3), are a ValueError: a mirror would leave them where they are."""
+    places, pairs, alone = {name: i for i, name in enumerate(names)}, [], []
+    for name, place in places.items():
+        suggested = _SIDE.search(name)
+        for pattern in (_SIDE,) if suggested else _PERHAPS_SIDES:
+            side, other = pattern.search(name), pattern.sub(lambda side: _OTHER_SIDE[side[0]], name)
+            if side and other in places:
+                if side[0][0] in "lL":
+                    pairs.append((place, places[other]))
+                break
+        else:
+            if suggested or _NAMELESS.fullmatch(name):
+                alone.append(name)
+    if alone:
+        raise ValueError(f"expected joints whose names come in pairs of left and right, to be mirrored, got {', '.join(alone)} without a partner "
+                         "(flip=0 mirrors nothing)")
+    return pairs
 
 
 class _Joints:
     """The wanted joints, whatever order a source has them in."""
 
-    def __init__(self, shards: Shards, names: Sequence[str] | None) -> None:
+    def __init__(self, shards: Shards, names: Sequence[str] | None, mirrored: bool) -> None:
         self._shards = shards
         self.names = list(names) if names is not None else shards.default_joints()
-        self.pairs = flip_pairs(self.names)
+        if not self.names:
+            raise ValueError(f"expected samples of sources with joints, got none, in {shards._described_as}")
+        if mirrored:
+            flip_pairs(self.names)  # what it refuses is refused now, not in the midst of an epoch
         self._places: dict[tuple[str, ...], list[int]] = {}
 
     def of(self, persons: Mapping[str, np.ndarray], index: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -265,6 +294,10 @@ class _Joints:
         places = self._places[known]
         annotated = ~np.all(persons["joints_source"][:, places] == -1, axis=-1)
         return persons["joints"][:, places], annotated, annotated & (persons["visible"][:, places] == 0)
+
+    @functools.cached_property
+    def pairs(self) -> list[tuple[int, int]]:
+        return flip_pairs(self.names)
 
     def mirrored(self, rows: np.ndarray) -> np.ndarray:
         """`rows` [..., J, k] with left and right exchanged."""
@@ -282,12 +315,13 @@ class KeypointDataset(Dataset):
 
     A person's box holds its annotated joints and a margin of `margin` of its longer side around them; one without any
     annotated joint inside is to be ignored. joints: names to take, in that order; None: those of the first source, of Human3.6M the
-    17 in common use.
+    17 in common use; a source without joints is a ValueError. An augmentation that mirrors needs names with partners (`flip_pairs`).
     """
 
     def __init__(self, shards: Shards, joints: Sequence[str] | None = None, size: tuple[int, int] | None = None,
                  augmentation: EventAugmentation | None = None, margin: float = 0.15, view: np.ndarray | None = None) -> None:
-        self._shards, self._joints = shards, _Joints(shards, joints)
+        self._shards, self._joints = shards, _Joints(shards, joints, bool(augmentation and augmentation.flip))
+        shards.annotated(self._joints.names)  # a source that does not have them is refused now, too
         self._size, self._augmentation, self._margin, self._view = size, augmentation, margin, view
         self.classes, self.joint_names = {"person": 0}, self._joints.names
 
@@ -353,22 +387,29 @@ class PoseDataset(Dataset):
 
     The crop is 200 x scale volume pixels wide, around the person's centre, turned by `rotation`; it fills the input's width, so a
     higher input shows more above and below, a lower one less. MPII's centres are moved down by 15 x scale and its scales enlarged by
-    1.25 first, as there. A person without annotated centre and scale has those of its annotated joints' bounding box, enlarged by
-    1.25; one without annotated joints is left out.
+    1.25 first, as there. A person without annotated centre or scale has those of its annotated joints' bounding box, enlarged by
+    1.25; one without annotated joints is left out, and shards without anybody else are a ValueError.
     moved: True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
 
     size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: those of the first source, of
-        Human3.6M the 17 in common use.
+        Human3.6M the 17 in common use. An augmentation that mirrors needs names with partners (`flip_pairs`).
     """
 
     def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
                  sigma: float = 2.0, augmentation: PoseAugmentation | None = None, moved: bool = False) -> None:
         if size[0] % 4 or size[1] % 4:
             raise ValueError(f"expected sides that are multiples of 4, got {size}")
-        self._shards, self._joints = shards, _Joints(shards, joints)
-        self.joint_names, self.flip_pairs = self._joints.names, self._joints.pairs
+        self._shards, self._joints = shards, _Joints(shards, joints, bool(augmentation and augmentation.flip))
+        self.joint_names = self._joints.names
         self._size, self._sigma, self._augmentation, self._moved = size, sigma, augmentation, moved
         self.persons = shards.persons[shards.annotated(self.joint_names)]
+        if not len(self.persons):
+            raise ValueError(f"expected persons of whom one of {', '.join(self.joint_names)} is annotated, got none, in {shards._described_as}")
+
+    @property
+    def flip_pairs(self) -> list[tuple[int, int]]:
+        """The joints that a mirror exchanges, as `flip_pairs` has them."""
+        return self._joints.pairs
 
     def __len__(self) -> int:
         return len(self.persons)
@@ -402,7 +443,7 @@ class PoseDataset(Dataset):
         sample = self._shards.sample(index, {"pair", "persons"})
         joints, annotated, _ = (each[row] for each in self._joints.of(sample["persons"], index))
         center, scale = sample["persons"]["center"][row].copy(), float(sample["persons"]["scale_volume"][row])
-        if scale > 0:
+        if scale > 0 and not np.all(sample["persons"]["center_source"][row] == -1):
             if sample["pair"]["dataset"].startswith("mpii") and not self._moved:
                 center[1] += 15 * scale
                 scale *= 1.25

@@ -1,3 +1,4 @@
+#!/usr/bin/python3
 """The EventGAN paper's experiments, in small, with a stand-in for the camera: networks trained on made events, tested on "real" ones.
 
     experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars

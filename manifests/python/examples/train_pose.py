@@ -52,13 +52,16 @@ def main() -> None:
 
     learnt, checked = training.divided(args, with_persons)
     size = (args.size, args.size)
-    learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
-    check = PoseDataset(checked, size, learn.joint_names, sigma=args.sigma)
-    persons = read_persons(checked)
+    searched = training.tested(args, checked, with_persons)
+    try:
+        learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
+        check = PoseDataset(checked, size, learn.joint_names, sigma=args.sigma)
+        test = PoseDataset(searched, size, learn.joint_names, sigma=args.sigma)
+        persons = read_persons(checked)
+    except ValueError as error:
+        raise SystemExit(str(error))
     persons = persons.rows(checked.annotated(learn.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
     check.persons = persons.place
-    searched = training.tested(args, checked, with_persons)
-    test = PoseDataset(searched, size, learn.joint_names, sigma=args.sigma)
     if not len(check) or persons.names != learn.joint_names:
         raise SystemExit(f"expected persons with head boxes and the joints that are learnt to check, got {len(check)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")

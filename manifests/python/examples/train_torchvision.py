@@ -76,7 +76,7 @@ def main() -> None:
             check = DetectionDataset(checked, learn.classes, **place)
             test = DetectionDataset(training.tested(args, checked, usable(args.task)), learn.classes, **place)
     except ValueError as error:
-        raise SystemExit(f"{error}, in {args.data}")
+        raise SystemExit(str(error))
     classes = list(learn.classes)
     print(f"input {height} x {width}, classes " + ", ".join(classes))
     model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), (height, width), args.regions)

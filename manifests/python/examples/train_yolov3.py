@@ -79,7 +79,7 @@ def main() -> None:
         check = DetectionDataset(checked, classes, (height, width), view=view)
         test = DetectionDataset(training.tested(args, checked, with_boxes), classes, (height, width), view=view)
     except ValueError as error:
-        raise SystemExit(f"{error}, in {args.data}")
+        raise SystemExit(str(error))
 
     path = pathlib.Path(args.cfg) if pathlib.Path(args.cfg).exists() else folder / "cfg" / args.cfg
     if not path.exists():

@@ -42,7 +42,7 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
     parser.add_argument("--epochs", type=int, help="limit")
     parser.add_argument("--steps", type=int, help="limit, in batches")
-    parser.add_argument("--minutes", type=float, help="limit, with all checking (default: 30 if there is no other limit)")
+    parser.add_argument("--minutes", type=float, help="limit, of training steps: checks come on top (default: 30 if there is no other limit)")
     parser.add_argument("--every", type=int, default=1, help="check after each such number of epochs, and at the end")
     parser.add_argument("--batch", type=int)
     parser.add_argument("--lr", type=float, help="highest learning rate: it rises for 5 %% of the way and falls to 1 %% as a cosine")
@@ -120,13 +120,14 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
             shards = Shards(args.data, where=where, partial=True)
             shards = shards[list(usable(shards))]
             by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
-            parts, how = ([shards, shards], "the same") if args.overfit else (shards.divide(0.8, by, args.seed), f"of another {by}")
+            parts, how = ([shards, shards], "the same") if args.overfit or not len(shards) else (shards.divide(0.8, by, args.seed), f"of another {by}")
     except FileNotFoundError as error:
         sys.exit(f"expected a folder that eventgan finalize has completed, got no {error.filename}")
     except ValueError as error:
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
-        sys.exit(f"expected labelled samples to learn and to check, got {len(parts[0])} and {len(parts[1])}, in {args.data}")
+        sys.exit(f"expected labelled samples to learn and to check, got {len(parts[0])} and {len(parts[1])}, in {args.data} (--dataset {args.dataset}; it has "
+                 f"samples of {', '.join(description['counts']['by_dataset'])})")
     if description.get("missing"):
         print(f"{len(description['missing'])} shards are missing in {args.data}, as finalize --partial was told")
     if description["quarantined"]:
@@ -179,7 +180,8 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
 def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,
         loss_of: Callable[[Any, float], torch.Tensor], check: Callable[[], dict[str, float]], metric: str) -> None:
     """Trains up to the limits, from the checkpoint if there is one. loss_of(batch, progress): the loss, progress 0..1 of the way to
-    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch (each --every)."""
+    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch (each --every). Minutes are
+    those of the steps, here and in metrics.json."""
     out = pathlib.Path(args.out)
     settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
@@ -193,22 +195,17 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
         print(f"goes on after epoch {state['epoch']}")
     for group in optimizer.param_groups:
         group.setdefault("initial_lr", group["lr"])
-    began = time.monotonic() - state["seconds"]
+    began = time.monotonic()
     steps = min(math.inf if args.steps is None else args.steps, math.inf if args.epochs is None else args.epochs * len(loader))
-    checking = 0.0
 
     def progress() -> float:
-        minutes = (time.monotonic() - began + checking) / 60
+        minutes = (state["seconds"] + time.monotonic() - began) / 60
         return max(state["step"] / steps, 0 if args.minutes is None else minutes / args.minutes)
 
     def report(loss: float | None) -> None:
-        nonlocal checking
-        start = time.monotonic()
         model.eval()
         with torch.no_grad():
             found = check()
-        checking = time.monotonic() - start
-        state["seconds"] = time.monotonic() - began
         row = {"epoch": state["epoch"], "step": state["step"], "minutes": round(state["seconds"] / 60, 2), "loss": loss, **found}
         state["history"].append({name: None if value is None or math.isnan(value) else value for name, value in row.items()})
         numbers = " ".join(f"{name} {value:.4g}" for name, value in row.items() if value is not None and name not in ("epoch", "step"))
@@ -216,7 +213,9 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
 
     if not state["history"]:
         report(None)
-    while progress() < 1:
+        began = time.monotonic()
+    done = progress() >= 1
+    while not done:
         state["epoch"] += 1
         torch.manual_seed(args.seed * 1_000_003 + state["epoch"])  # what an epoch draws does not depend on where a run went on
         model.train()
@@ -236,10 +235,13 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             state["step"] += 1
             if progress() >= 1:
                 break
-        if state["epoch"] % args.every and progress() < 1:
+        done = progress() >= 1
+        if state["epoch"] % args.every and not done:
             continue
+        state["seconds"] += time.monotonic() - began
         report(float(np.mean(losses)))
         _replace(out / "checkpoint.pt", lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()}, path))
+        began = time.monotonic()
     model.eval()
     untrained, last = state["history"][0][metric], state["history"][-1][metric]
     summary = {"metric": metric, "untrained": untrained, metric: last, "minutes": round(state["seconds"] / 60, 2), **state["settings"],

@@ -2,11 +2,13 @@
 
 #include <fcntl.h>
 #include <stdio.h>
+#include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <atomic>
 #include <cerrno>
+#include <optional>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -18,9 +20,18 @@ namespace {
 
 namespace fs = std::filesystem;
 
-[[noreturn]] void fail(const std::string& what) {
-  throw std::system_error(errno, std::generic_category(), what);
+/// Bytes that a file of this process may have; none: any number.
+std::optional<rlim_t> size_limit() {
+  rlimit limit{};
+  if (::getrlimit(RLIMIT_FSIZE, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return {};
+  return limit.rlim_cur;
 }
+
+std::string limit_text(rlim_t limit) {
+  return " (ulimit -f allows files of " + std::to_string(limit) + " bytes)";
+}
+
+[[noreturn]] void fail(const std::string& what) { throw_system_error(what, errno); }
 
 fs::path folder_of(const fs::path& file) {
   return file.has_parent_path() ? file.parent_path() : fs::path(".");
@@ -44,6 +55,18 @@ bool link_exclusively(const fs::path& temporary, const fs::path& target) {
 
 }  // namespace
 
+void throw_system_error(const std::string& what, int error) {
+  const auto limit = error == EFBIG ? size_limit() : std::nullopt;
+  throw std::system_error(error, std::generic_category(), limit ? what + limit_text(*limit) : what);
+}
+
+std::string unsaid_reason(const fs::path& file) {
+  const auto limit = size_limit();
+  std::error_code unknown;
+  const auto size = fs::file_size(file, unknown);
+  return limit && !unknown && size >= *limit ? limit_text(*limit) : " (is the disk full?)";
+}
+
 fs::path temporary_beside(const fs::path& target) {
   static std::atomic<unsigned> next_attempt{0};
   fs::path temporary;
@@ -53,6 +76,16 @@ fs::path temporary_beside(const fs::path& target) {
                                                             ::getpid(), next_attempt++});
   } while (fs::exists(fs::symlink_status(temporary)));
   return temporary;
+}
+
+void require_no_link(const fs::path& folder, const fs::path& relative) {
+  fs::path path = folder;
+  for (const fs::path& part : relative) {
+    path /= part;
+    if (!fs::is_symlink(fs::symlink_status(path))) continue;
+    throw std::runtime_error("expected nothing that leads out of " + folder.string() +
+                             ", got a symbolic link, in " + path.string());
+  }
 }
 
 void sync_to_disk(const fs::path& path) {

@@ -2,12 +2,13 @@
 
 #include <filesystem>
 #include <functional>
+#include <string>
 #include <string_view>
 
 namespace eventgan {
 
-// How every file that this program writes comes to be under its name whole or not at all (DESIGN
-// section 6, manifests/guides/guarantees.md):
+// How every file that this program writes comes to be under its name whole or not at all
+// (manifests/guides/guarantees.md):
 //
 //   1. Create a temporary of a name that no other writer uses, beside the target:
 //      FOLDER/.NAME.HOST.PID.ATTEMPT.tmp.
@@ -24,7 +25,17 @@ namespace eventgan {
 // power cut before step 4 the temporary stays, with a name that says whose it was: the next run
 // removes it (unfinished_files.h).
 //
-// Errors of the system are std::system_error, a std::runtime_error, "cannot DO PATH: REASON".
+// Errors of the system are std::system_error, a std::runtime_error, "cannot DO PATH: REASON". The
+// program ignores SIGXFSZ, so that a file that would pass the process's limit (ulimit -f) is one of
+// them, too.
+
+/// Throws the std::system_error "WHAT: REASON" of an errno; of EFBIG with the process's limit of a
+/// file's size, if it has one.
+[[noreturn]] void throw_system_error(const std::string& what, int error);
+
+/// Why a library that does not say so may have failed to write `file`: that it has come to the
+/// process's limit of a file's size, else " (is the disk full?)".
+std::string unsaid_reason(const std::filesystem::path& file);
 
 /// A file on its way through the steps above. Thread safety: one thread at a time.
 class AtomicFile {
@@ -78,6 +89,11 @@ bool create_file_atomically(const std::filesystem::path& target,
 
 /// Step 1's name, never given twice.
 std::filesystem::path temporary_beside(const std::filesystem::path& target);
+
+/// Throws std::runtime_error naming it if a part of FOLDER/RELATIVE below FOLDER is a symbolic
+/// link: what is written or removed there would be somewhere else. FOLDER itself may be one, as its
+/// user has named it; what is not there is none. Thread safe.
+void require_no_link(const std::filesystem::path& folder, const std::filesystem::path& relative);
 
 /// fsync of a file or a folder.
 void sync_to_disk(const std::filesystem::path& path);

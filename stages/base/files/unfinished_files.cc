@@ -10,6 +10,7 @@
 #include <array>
 #include <cerrno>
 #include <charconv>
+#include <cmath>
 #include <stdexcept>
 #include <system_error>
 
@@ -61,7 +62,7 @@ std::optional<UnfinishedFile> look_at(const fs::path& path) {
   struct stat status {};
   if (!name || ::lstat(path.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return std::nullopt;
   const double silent_s = seconds_between(status.st_mtim, now(CLOCK_REALTIME));
-  return UnfinishedFile{path, *name, life_of(*name, status.st_mtim), std::max(silent_s, 0.0)};
+  return UnfinishedFile{path, *name, life_of(*name, status.st_mtim), silent_s};
 }
 
 }  // namespace
@@ -119,7 +120,7 @@ std::vector<UnfinishedFile> unfinished_files(const fs::path& folder) {
 }
 
 bool is_stale(const UnfinishedFile& file) {
-  return file.writer == WriterLife::kDead || file.silent_s >= kSilenceOfTheDead_s;
+  return file.writer == WriterLife::kDead || std::abs(file.silent_s) >= kSilenceOfTheDead_s;
 }
 
 std::vector<fs::path> remove_stale_temporaries(const fs::path& folder, std::string_view target) {

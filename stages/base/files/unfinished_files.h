@@ -50,11 +50,13 @@ struct UnfinishedFile {
   std::filesystem::path path;
   TemporaryName name;
   WriterLife writer = WriterLife::kUnknown;
-  double silent_s = 0;  ///< since its last write, by this machine's clock; ≥ 0
+  double silent_s =
+      0;  ///< since its last write, by this machine's clock; negative if that is ahead
 };
 
 /// A writer that has not written for so long counts as dead: of another host nothing else is known,
-/// and on this one the number of a dead process may meanwhile be that of an unrelated one.
+/// and on this one the number of a dead process may meanwhile be that of an unrelated one. So does
+/// one whose last write is so far ahead of this machine's clock: its file would never grow old.
 inline constexpr double kSilenceOfTheDead_s = 3600;
 
 /// The temporaries in `folder` (not below it), sorted by path. One with this process's own number

@@ -144,15 +144,14 @@ Hdf5OutputFile::Hdf5OutputFile(const std::filesystem::path& target)
   const hid_t id =
       H5Fcreate(path.c_str(), H5F_ACC_EXCL, creation_properties(H5P_FILE_CREATE), access);
   if (id < 0 && *error != 0) {
-    throw std::runtime_error("cannot create " + path + ": " + std::strerror(*error));
+    throw_system_error("cannot create " + path, *error);
   }
   file_ = Hdf5Handle(id, H5Fclose, "create", path);
 }
 
 void Hdf5OutputFile::check() const {
   if (*error_ == 0) return;
-  throw std::runtime_error("cannot write " + output_.temporary().string() + ": " +
-                           std::strerror(*error_));
+  throw_system_error("cannot write " + output_.temporary().string(), *error_);
 }
 
 }  // namespace eventgan

@@ -69,7 +69,7 @@ void require_frames(const fs::path& part, int frames, const fs::path& path) {
   if (got == frames) return;
   throw std::runtime_error("cannot write " + path.string() + ": expected " +
                            std::to_string(frames) + " frames, got " +
-                           std::to_string(static_cast<int>(got)));
+                           std::to_string(static_cast<int>(got)) + unsaid_reason(part));
 }
 
 }  // namespace

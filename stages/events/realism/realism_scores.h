@@ -14,8 +14,8 @@ namespace eventgan {
 /// A voxel, or a sum of voxels, above this counts as an event (V2CE, Zhang et al. 2024).
 inline constexpr float kEventThreshold = 0.01f;
 
-/// How one volume compares with the real one of the same frames, both normalised volumes V̂ (DESIGN
-/// section 5). F1 after V2CE: of what is an event, above kEventThreshold. NaN where a score has no
+/// How one volume compares with the real one of the same frames, both normalised, V̂ = min(V,
+/// η98) / η98. F1 after V2CE: of what is an event, above kEventThreshold. NaN where a score has no
 /// meaning (a correlation with a constant), 1 for the F1 of two empty volumes.
 struct RealismScores {
   double f1_raw = 0;            ///< voxel by voxel

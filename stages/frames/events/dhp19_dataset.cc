@@ -1,6 +1,6 @@
 #include "stages/frames/events/dhp19_dataset.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
@@ -22,6 +22,7 @@
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/frames/kitti/calibration_file_internal.h"
 #include "stages/frames/mpii/mat_file_internal.h"
 #include "stages/frames/mpii/mat_json_internal.h"
 #include "stages/frames/source_folders.h"
@@ -123,6 +124,10 @@ Projection read_matrix(const SourceRoot& root, const std::string& name) try {
   }
   Projection matrix;
   for (std::size_t i = 0; i < matrix.size(); ++i) matrix[i] = array.number(i);
+  if (!has_full_rank(matrix)) {
+    throw InputError(fmt::format("expected a projection of full rank, got [{:g}], in {}",
+                                 fmt::join(matrix, " "), root.written(name)));
+  }
   return matrix;
 } catch (const InputError&) {
   throw;

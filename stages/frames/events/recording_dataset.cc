@@ -11,6 +11,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string>
 #include <system_error>
 #include <utility>
@@ -36,9 +37,10 @@ struct Recorded {
   std::string path;  ///< as FrameRef::path is written
   std::unique_ptr<Recording> recording;
   std::vector<double> frame_times_s;
-  std::array<double, 2> span{};  ///< first and last time of a frame or an event
-  std::string label_file;        ///< written as `path`; empty: none
-  RecordingLabels labels;        ///< class_id is the source's
+  std::array<double, 2> span{};                     ///< first and last time of a frame or an event
+  std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
+  std::string label_file;                           ///< written as `path`; empty: none
+  RecordingLabels labels;                           ///< class_id is the source's
 
   /// The last frame at or before the time; -1 if there is none.
   std::int64_t frame_at(double time_s) const {
@@ -84,7 +86,11 @@ class RecordingDataset final : public Dataset {
     find_labels(spec, base);
     for (auto& [name, recorded] : recordings_) open(recorded, base);
     number_classes();
-    for (const auto& [name, recorded] : recordings_) list_times(name, recorded);
+    for (const auto& [name, recorded] : recordings_) {
+      const std::size_t first = labelled_.size();
+      list_times(name, recorded);
+      compare_clocks(recorded, std::span(labelled_).subspan(first));
+    }
     if (labelled_.empty()) {
       throw InputError("expected labels or frames to make samples of, got none, in " + spec.root);
     }
@@ -103,6 +109,8 @@ class RecordingDataset final : public Dataset {
     }
     return notes;
   }
+
+  std::vector<std::string> warnings() const override { return warnings_; }
 
   Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
     if (steps == 0) return {Neighbour::State::kPresent, labelled.frame};
@@ -315,7 +323,8 @@ class RecordingDataset final : public Dataset {
           recorded.path);
     }
     recorded.span = {recorded.frame_times_s.front(), recorded.frame_times_s.back()};
-    if (const auto events = recording.event_span()) {
+    recorded.event_span = recording.event_span();
+    if (const auto& events = recorded.event_span) {
       recorded.span[0] = std::min(recorded.span[0], (*events)[0]);
       recorded.span[1] = std::max(recorded.span[1], (*events)[1]);
     }
@@ -367,6 +376,39 @@ class RecordingDataset final : public Dataset {
     }
   }
 
+  /// Whether there can be events of the window's time.
+  bool meets_events(const Recorded& recorded, double time_s) const {
+    if (!recorded.event_span) return false;
+    const auto [first_s, last_s] = *recorded.event_span;
+    const Span window = span_of(recorded, time_s).value_or(Span{time_s, time_s});
+    return window[1] >= first_s && (window[0] < last_s || window[1] <= last_s);
+  }
+
+  /// A clock that began elsewhere makes sound samples of nothing: no single one can tell.
+  void compare_clocks(const Recorded& recorded, std::span<const LabelledFrame> windows) {
+    std::vector<double> all, outside;
+    for (const LabelledFrame& window : windows) {
+      if (!window.fault.empty()) continue;
+      all.push_back(window.frame.time_s);
+      if (!meets_events(recorded, all.back())) outside.push_back(all.back());
+    }
+    if (outside.empty()) return;
+    const bool is_all = outside.size() == all.size();
+    if (!recorded.event_span) {
+      notes_.push_back(fmt::format("expected events, got none: {} event volumes are empty, in {}",
+                                   all.size(), recorded.path));
+    } else {
+      const auto [first_s, last_s] = *recorded.event_span;
+      notes_.push_back(fmt::format(
+          "expected windows within the times of the events, {} s to {} s, got {} of {} outside "
+          "them, at {} s to {} s{}, in {}",
+          first_s, last_s, outside.size(), all.size(), std::ranges::min(outside),
+          std::ranges::max(outside), is_all ? " (are events, frames and labels on one clock?)" : "",
+          recorded.path));
+    }
+    if (is_all) warnings_.push_back(notes_.back());
+  }
+
   void list_time(const std::string& name, const Recorded& recorded, double time_s) {
     LabelledFrame frame;
     frame.sample_id = fmt::format("{}/{:017.6f}", name, time_s);
@@ -396,6 +438,7 @@ class RecordingDataset final : public Dataset {
   std::vector<LabelledFrame> labelled_;
   std::vector<std::string> annotation_files_;  ///< as FrameRef::path is written
   std::vector<std::string> notes_;
+  std::vector<std::string> warnings_;
 };
 
 }  // namespace

@@ -23,7 +23,8 @@ namespace eventgan {
 ///   events      the last so many events with a time ≤ t.
 /// With t in its middle it is shifted by half of its length, of n events by the later n - n/2. A
 /// label within a microsecond of a frame has the frame's time. A time outside the recording's
-/// frames and events is at fault.
+/// frames and events is at fault. Windows before or after all events are noted, and warned of where
+/// all of a recording's are.
 ///
 /// sample_id is NAME/SECONDS with six decimals, and the same two stand in label_key. FrameRef::path
 /// is the HDF5 file or the folder's events.txt, and FrameRef::video_frame the last frame at or

@@ -1,5 +1,6 @@
 #include "stages/frames/events/recording_labels.h"
 
+#include <fmt/core.h>
 #include <utf8.h>
 
 #include <algorithm>
@@ -10,6 +11,8 @@
 #include <optional>
 #include <string_view>
 #include <system_error>
+#include <unordered_map>
+#include <unordered_set>
 #include <utility>
 
 #include "manifests/documents/json_text_internal.h"
@@ -30,16 +33,27 @@ constexpr std::array kCategoryWords{Word<Category>{"easy", {0, false}},
                                     Word<Category>{"hard", {2, false}},
                                     Word<Category>{"dont_care", {-1, true}}};
 
-// No camera has pixels farther away, no clock runs longer; what is beyond is a slip.
-constexpr double kFarthest_px = 1e6;
-constexpr double kLatest_s = 1e12;
+constexpr double kLatest_s = 1e12;  // no clock runs longer; what is beyond is a slip
 
-int class_number(const std::string& name, RecordingLabels& labels) {
-  const auto known = std::ranges::find(labels.class_names, name);
-  const auto number = static_cast<int>(known - labels.class_names.begin());
-  if (known == labels.class_names.end()) labels.class_names.push_back(name);
-  return number;
-}
+/// Classes by their names, numbered as they first occur.
+class ClassNumbers {
+ public:
+  int of(const std::string& name) {
+    const auto [known, is_new] = numbers_.try_emplace(name, static_cast<int>(names_.size()));
+    if (is_new) names_.push_back(name);
+    return known->second;
+  }
+
+  const std::vector<std::string>& names() const { return names_; }
+
+ private:
+  std::unordered_map<std::string, int> numbers_;
+  std::vector<std::string> names_;
+};
+
+/// A shard's text ends at a NUL, so that two names could become one; other control characters have
+/// no place in a name either.
+bool is_label_name(std::string_view text) { return !text.empty() && escape_controls(text) == text; }
 
 // ---- CSV
 
@@ -100,6 +114,7 @@ class CsvReader {
       fault("a header line time_s,left,top,right,bottom,class,category", "none");
     }
     if (!faults_.empty()) throw InputError(faults_);
+    labels_.class_names = classes_.names();
     return std::move(labels_);
   }
 
@@ -112,7 +127,7 @@ class CsvReader {
     faults_ += ", in " + file_ + " (line " + std::to_string(line_) + ")";
   }
 
-  static std::string quoted(std::string_view text) { return '"' + std::string(text) + '"'; }
+  static std::string quoted(std::string_view text) { return '"' + escape_controls(text) + '"'; }
 
   void read_header(std::string_view line) {
     for (const std::string_view name : split(line)) {
@@ -159,10 +174,14 @@ class CsvReader {
     const std::array edges{&box.xyxy.left, &box.xyxy.top, &box.xyxy.right, &box.xyxy.bottom};
     for (std::size_t i = 0; i < edges.size(); ++i) {
       const std::optional<double> edge = number_of(row[1 + i]);
-      if (!edge) return fault(std::string(kColumns[1 + i]) + " in pixels", quoted(row[1 + i]));
+      if (!edge || std::abs(*edge) > kFarthest_px) {
+        return fault(fmt::format("{} within {:g} pixels", kColumns[1 + i], kFarthest_px),
+                     quoted(row[1 + i]));
+      }
       *edges[i] = *edge;
     }
     if (row[5].empty()) return fault("a class", "none");
+    if (!is_label_name(row[5])) return fault("a class without control characters", quoted(row[5]));
     if (!row[kCategory].empty()) {
       const auto category =
           std::ranges::find(kCategoryWords, row[kCategory], &Word<Category>::word);
@@ -172,7 +191,7 @@ class CsvReader {
       box.difficulty = category->value.difficulty;
       box.ignore = category->value.ignore;
     }
-    box.class_id = class_number(std::string(row[5]), labels_);
+    box.class_id = classes_.of(std::string(row[5]));
     annotation.boxes.push_back(box);
   }
 
@@ -180,6 +199,7 @@ class CsvReader {
   std::string faults_;
   std::size_t line_ = 0;
   std::vector<std::size_t> places_;  ///< in kColumns, of the file's columns
+  ClassNumbers classes_;
   RecordingLabels labels_;
 };
 
@@ -199,14 +219,13 @@ Rectangle read_rectangle(const StrictValue& value) {
   return {pixel(edges[0]), pixel(edges[1]), pixel(edges[2]), pixel(edges[3])};
 }
 
-Box read_box(const StrictValue& value, RecordingLabels& labels) {
+Box read_box(const StrictValue& value, ClassNumbers& classes) {
   Box box;
   StrictObject object = value.object();
   box.xyxy = {pixel(object.at("left")), pixel(object.at("top")), pixel(object.at("right")),
               pixel(object.at("bottom"))};
-  box.class_id = class_number(
-      object.at("class").text("a class", [](std::string_view name) { return !name.empty(); }),
-      labels);
+  box.class_id =
+      classes.of(object.at("class").text("a class without control characters", is_label_name));
   if (const auto category = object.find("category")) {
     const Category counts = category->sound_choice(kCategoryWords).value_or(Category{});
     box.difficulty = counts.difficulty;
@@ -253,14 +272,26 @@ Person read_person(const StrictValue& value, std::size_t joint_count) {
   return person;
 }
 
+/// Each a name, and once: a joint is known by it alone.
+std::vector<std::string> read_joint_names(const StrictValue& value) {
+  std::vector<std::string> names;
+  std::unordered_set<std::string> known;
+  for (const StrictValue& element : value.elements()) {
+    names.push_back(element.text("a joint's name without control characters", is_label_name));
+    if (!known.insert(names.back()).second) element.fault("each joint once");
+  }
+  return names;
+}
+
 RecordingLabels read_json(std::string_view text, const std::string& file) {
   RecordingLabels labels;
+  ClassNumbers classes;
   FaultList faults(file);
   if (const auto document = parse_json_text(text, faults)) {
     StrictObject object = StrictValue(*document, faults).object();
     if (object.has_format(kFormat, kVersion)) {
       if (const auto names = object.find("joint_names")) {
-        for (const StrictValue& name : names->elements()) labels.joint_names.push_back(name.text());
+        labels.joint_names = read_joint_names(*names);
       }
       const StrictValue samples = object.at("samples");
       std::size_t number = 0;
@@ -271,7 +302,7 @@ RecordingLabels read_json(std::string_view text, const std::string& file) {
         annotation.original = dump_json(document->at("samples").at(number++));
         if (const auto boxes = sample.find("boxes")) {
           for (const StrictValue& box : boxes->elements()) {
-            annotation.boxes.push_back(read_box(box, labels));
+            annotation.boxes.push_back(read_box(box, classes));
           }
         }
         if (const auto persons = sample.find("persons")) {
@@ -288,6 +319,7 @@ RecordingLabels read_json(std::string_view text, const std::string& file) {
     }
   }
   if (!faults.empty()) throw InputError(faults.text());
+  labels.class_names = classes.names();
   return labels;
 }
 

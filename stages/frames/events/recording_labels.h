@@ -26,6 +26,9 @@ struct RecordingLabels {
 /// Category: easy is difficulty 0; hard is 2, which the scores count as hard, as 1 would be;
 /// dont_care is to be ignored; none is difficulty -1, not known.
 ///
+/// Names of classes and joints have no control characters, a joint's stands once; places lie within
+/// 1e6 px, as everywhere (map_labels).
+///
 /// Throws InputError, with every fault of the file: "expected X, got Y, in FILE (line 3)".
 RecordingLabels read_recording_labels(const std::filesystem::path& file);
 

@@ -69,7 +69,20 @@ std::optional<LensDistortion> distortion_of(const PickleNode& camera, const std:
   if (camera.find("k") == nullptr && camera.find("p") == nullptr) return std::nullopt;
   const auto k = numbers(camera, "k", 3, file);
   const auto p = numbers(camera, "p", 2, file);
-  return LensDistortion{k[0], k[1], k[2], p[0], p[1]};
+  const LensDistortion lens{k[0], k[1], k[2], p[0], p[1]};
+  for (const double number : {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2}) {
+    if (std::isfinite(number)) continue;
+    throw InputError(
+        fmt::format("expected a finite lens distortion, got {:g}, in {}", number, file));
+  }
+  return lens;
+}
+
+/// False of zeros and NaN.
+bool sees(const Intrinsics& camera) {
+  return camera.focal_x > 0 && camera.focal_x <= kFarthest_px && camera.focal_y > 0 &&
+         camera.focal_y <= kFarthest_px && std::abs(camera.centre_x) <= kFarthest_px &&
+         std::abs(camera.centre_y) <= kFarthest_px;
 }
 
 /// Where the camera sees a place before it, by the equations in manifests/values/labels.h.
@@ -108,7 +121,14 @@ CameraBook read_camera_book(const std::filesystem::path& path) try {
     const auto c = numbers(camera, "c", 2, file);
     Human36mCamera entry;
     entry.intrinsics = {f[0], f[1], c[0], c[1]};
-    entry.distortion = distortion_of(camera, file);
+    const std::string name = text_of(*key.items[0], file) + " " + text_of(*key.items[1], file);
+    if (!sees(entry.intrinsics)) {
+      throw InputError(fmt::format(
+          "expected focal lengths above 0 and a centre within 1e6 px, got f [{:g} {:g}] and c "
+          "[{:g} {:g}], in {} ({})",
+          f[0], f[1], c[0], c[1], file, name));
+    }
+    entry.distortion = distortion_of(camera, file + " (" + name + ")");
     entry.fields = nlohmann::ordered_json::object();
     for (std::size_t k = 0; k + 1 < camera.items.size(); k += 2) {
       entry.fields[text_of(*camera.items[k], file)] = json_of(*camera.items[k + 1], file);

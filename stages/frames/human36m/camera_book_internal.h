@@ -25,7 +25,9 @@ using CameraBook = std::map<std::pair<std::string, std::string>, Human36mCamera>
 
 /// Reads cameras.pkl: a dictionary of (subject, serial number) to a dictionary with at least the
 /// numpy arrays f and c of two elements, in pixels; k of three (k1, k2, k3) and p of two (p1, p2)
-/// are the lens distortion, if they are there. Executes nothing of it. Throws InputError.
+/// are the lens distortion, if they are there. Executes nothing of it. Throws InputError, also for
+/// a camera that sees nothing: a focal length that is not above 0, numbers beyond 1e6 px or not
+/// finite.
 CameraBook read_camera_book(const std::filesystem::path& file);
 
 /// That of a subject; null if the book has none.

@@ -7,7 +7,7 @@
 
 namespace eventgan {
 
-/// The published generator's state dict (DESIGN section 4) as folded convolutions. Base width and
+/// The published generator's state dict as folded convolutions. Base width and
 /// bins come from the shapes. Each layer's convolution may be
 ///   spectral-normalised, NAME.conv2d.module.{weight_bar, weight_u, weight_v},
 ///   plain, NAME.conv2d.weight, or

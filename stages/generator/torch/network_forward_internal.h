@@ -52,7 +52,7 @@ void use_one_thread();
 /// changed.
 using TensorObserver = std::function<void(const std::string& name, const at::Tensor& tensor)>;
 
-/// The generator's network (DESIGN section 4) in LibTorch. Thread safe.
+/// The generator's network (weights.h) in LibTorch. Thread safe.
 class NetworkForward {
  public:
   /// `kind`: what is computed in, at::kFloat or at::kBFloat16, and the device, else the CPU. Throws

@@ -87,8 +87,14 @@ void write_frame(const std::filesystem::path& root, int number, const RoadScene&
 
 }  // namespace
 
+std::vector<std::string> kitti_layout_names(int scenes) {
+  std::vector<std::string> names;
+  for (int i = 0; i < (scenes > 0 ? scenes : kLabelledFrames); ++i) names.push_back(numbered(i, 6));
+  return names;
+}
+
 void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes,
-                        int between) {
+                        int between, const std::function<void()>& on_frame) {
   for (const char* folder : {"image_2", "prev_2", "label_2", "calib"}) make_folder(root / folder);
   if (scenes > 0) {
     for (int i = 0; i < scenes; ++i) {
@@ -98,6 +104,7 @@ void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, i
       write_frame(root, i, scene, labelled, files);
       write_moments([&](double frame) { return scene.picture(frame); }, labelled - 1, labelled,
                     between, root / "between_2" / numbered(i, 6));
+      on_frame();
     }
     return;
   }
@@ -105,6 +112,7 @@ void write_kitti_layout(const std::filesystem::path& root, std::uint64_t seed, i
   FrameFiles files(scene);
   for (int i = 0; i < kLabelledFrames; ++i) {
     write_frame(root, i, scene, kPreviousFrames + kFramesBetween * i, files);
+    on_frame();
   }
 }
 

@@ -223,8 +223,16 @@ FigureScene scene_of(std::uint64_t seed, int image) {
 
 }  // namespace
 
+std::vector<std::string> mpii_layout_names(int scenes) {
+  std::vector<std::string> names;
+  for (int image = 0; image < std::max(kImages, scenes); ++image) {
+    if (image != kTestImage) names.push_back(numbered(image + 1, 9));
+  }
+  return names;
+}
+
 void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, int scenes,
-                       int between) {
+                       int between, const std::function<void()>& on_image) {
   make_folder(root / "images");
   std::vector<DemoMpiiEntry> entries;
   for (int image = 0; image < std::max(kImages, scenes); ++image) {
@@ -239,6 +247,7 @@ void write_mpii_layout(const std::filesystem::path& root, std::uint64_t seed, in
     write_moments([&](double frame) { return scene.picture(frame); }, kKeyFrame - 1, kKeyFrame + 1,
                   between, root / "between" / name);
     entries.push_back({name, image + 1, image != kTestImage, scene.labels(kKeyFrame)});
+    on_image();
   }
   write_mat_file(root / "mpii_human_pose_v1_u12_1.mat", "RELEASE", mpii_release(entries));
   write_mat_file(root / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",

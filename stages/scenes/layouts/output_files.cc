@@ -1,8 +1,11 @@
 #include "stages/scenes/layouts/output_files.h"
 
+#include <cerrno>
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
+
+#include "stages/base/files/atomic_file.h"
 
 namespace eventgan {
 
@@ -16,7 +19,7 @@ void write_text(const std::filesystem::path& path, std::string_view text) {
   std::ofstream stream(path, std::ios::binary);
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
   stream.close();
-  if (!stream) throw std::runtime_error("cannot write " + path.string());
+  if (!stream) throw_system_error("cannot write " + path.string(), errno);
 }
 
 void copy_output(const std::filesystem::path& from, const std::filesystem::path& to) {

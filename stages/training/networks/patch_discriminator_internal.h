@@ -6,7 +6,7 @@
 
 namespace eventgan {
 
-/// The PatchGAN discriminator (DESIGN section 4): six 4x4 convolutions with bias, padding 1,
+/// The PatchGAN discriminator of the published code: six 4x4 convolutions with bias, padding 1,
 /// strides 2, 2, 2, 2, 1, 1, widths base · (1, 2, 4, 8, 8) → 1, LeakyReLU 0.2 between them. Each
 /// logit judges a patch of 142x142 pixels. Pictures need sides of at least smallest_side().
 class PatchDiscriminatorImpl : public torch::nn::Module {

@@ -21,7 +21,7 @@ struct UNetSettings {
   double difference_gain = 0;  ///< as NetworkSpec says, of a network of two frames
 };
 
-/// The U-Net of generator and cycle networks as it is trained (DESIGN section 4): batch norm and
+/// The U-Net of generator and cycle networks as it is trained: batch norm and
 /// spectral norm are not folded, and parameters and buffers have the published names. kDecoders
 /// puts spectral norm on residual blocks and decoders, as the published code does.
 class UNetImpl : public torch::nn::Module {

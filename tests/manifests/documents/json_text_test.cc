@@ -27,6 +27,21 @@ TEST(JsonPath, OddKeysAreQuotedInAscii) {
 
 TEST(JsonPath, ElementsHaveBrackets) { EXPECT_EQ(json_path("$.a", std::size_t{12}), "$.a[12]"); }
 
+TEST(EscapeControls, LeavesNoControlCharactersAndNoBrokenText) {
+  using namespace std::string_literals;
+  EXPECT_EQ(escape_controls("naïve — 自転車 \"a\\b\""), "naïve — 自転車 \"a\\b\"");
+  EXPECT_EQ(escape_controls("a\0b\r\n\t"s), "a\\u0000b\\u000d\\n\\t");
+  EXPECT_EQ(escape_controls("\x1b[31m\x7f"), "\\u001b[31m\\u007f");
+  EXPECT_EQ(escape_controls("\xc2\x9b"
+                            "1A\xc2\xa0z"),
+            "\\u009b1A\xc2\xa0z")
+      << "C1 is a terminal's, too";
+  EXPECT_EQ(escape_controls("\x9b"
+                            "1A\xff\xc3"),
+            "\\x9b1A\\xff\\xc3");
+  EXPECT_EQ(escape_controls(""), "");
+}
+
 TEST(FaultList, IsEmptyAtFirst) {
   const FaultList faults("m");
   EXPECT_TRUE(faults.empty());

@@ -148,8 +148,9 @@ TEST(Marker, EveryRuleIsChecked) {
       {"/format", R"("eventgan-manifest")",
        R"($.format: expected "eventgan-marker", got "eventgan-manifest")"},
       {"/version", "1", "$.version: expected 2 (the version that this program reads), got 1"},
-      {"/shard", R"("a.hdf5")", R"($.shard: expected a file name ending in .h5, got "a.hdf5")"},
-      {"/shard", R"("../a.h5")", R"($.shard: expected a file name ending in .h5, got "../a.h5")"},
+      {"/shard", R"("../job-train-00000-of-00001.h5")",
+       "$.shard: expected a shard's name, such as job-train-00012-of-01024.h5, got "
+       R"("../job-train-00000-of-00001.h5")"},
       {"/plan_hash", R"("")", R"($.plan_hash: expected a SHA-256 of 64 digits 0-9a-f, got "")"},
       {"/sha256", "7", "$.sha256: expected a SHA-256 of 64 digits 0-9a-f, got 7"},
       {"/size_bytes", "1.5", "$.size_bytes: expected an integer 0..9223372036854775807, got 1.5"},
@@ -216,7 +217,8 @@ TEST(Marker, AllFaultsAreReportedAtOnce) {
   document.erase("shard");
   EXPECT_THAT([&] { parse_marker(document.dump(), "m"); },
               ThrowsMessage<std::runtime_error>(
-                  "m: $.shard: expected a file name ending in .h5, got nothing\n"
+                  "m: $.shard: expected a shard's name, such as job-train-00012-of-01024.h5, got "
+                  "nothing\n"
                   "m: $.sha256: expected a SHA-256 of 64 digits 0-9a-f, got \"x\"\n"
                   "m: $.valid: expected an integer 0..4, got \"x\""));
 }
@@ -226,6 +228,41 @@ TEST(Marker, HalfAFileIsNoMarker) {
   // Without the last line feed it is still whole.
   for (std::size_t size = 0; size + 1 < text.size(); ++size) {
     EXPECT_THROW(parse_marker(text.substr(0, size), "m"), std::runtime_error) << size;
+  }
+}
+
+TEST(ShardName, IsWhatAPlanGivesAndNothingThatLeadsElsewhere) {
+  const std::string end = "-00000-of-00001.h5";
+  const std::string longest(64, 'a');
+  for (const std::string& name :
+       {"job-train" + end, "my-job-2-val.b" + end, longest + "-" + longest + end,
+        std::string("job-train-123456-of-654321.h5"), "job-train-00000-of-00001" + end}) {
+    EXPECT_TRUE(is_shard_name(name)) << name;
+  }
+  for (const std::string& name : {std::string(),
+                                  end,
+                                  "train" + end,
+                                  "-train" + end,
+                                  "job-" + end,
+                                  ".job-train" + end,
+                                  "../job-train" + end,
+                                  "/job-train" + end,
+                                  "a/job-train" + end,
+                                  "job-train/" + end,
+                                  "job-tr ain" + end,
+                                  "job-tr\nain" + end,
+                                  std::string("job\0-train", 10) + end,
+                                  "job-train" + end + std::string(1, '\0'),
+                                  longest + "a-train" + end,
+                                  std::string("job-train-0000-of-00001.h5"),
+                                  std::string("job-train-00000-of-0001.h5"),
+                                  std::string("job-train-00000-00001.h5"),
+                                  std::string("job-train-00000-of-00001.json"),
+                                  std::string("job-train.h5"),
+                                  std::string("dataset.h5"),
+                                  std::string("mine.h5"),
+                                  std::string("00000-of-00001.h5")}) {
+    EXPECT_FALSE(is_shard_name(name)) << name;
   }
 }
 

@@ -133,7 +133,7 @@ TEST(PlanJson, EveryRuleIsChecked) {
       {"\"height\":3", "\"height\":0", "p:9: $.shards[0].height: expected an integer"},
       {"\"height\":3", "\"depth\":3,\"height\":3", "p:9: $.shards[0].depth: expected"},
       {"\"source\":1", "\"source\":2", "p: expected a source 0..1, got 2"},
-      {"00001-of-00002.h5", "00001-of-00002.h6", "$.shards[1].name: expected a file name"},
+      {"00001-of-00002.h5", "00001-of-00002.h6", "$.shards[1].name: expected a shard's name"},
       {"\"gap\":2,", "\"gap\":2,\"gap\":2,", "p:11: $.gap: expected the key"},
       {"\"gap\":2,", "\"gap\":2,\"Gap\":2,", "p:11: $.shards[1].samples[0].Gap: expected"},
       {"\"label\":\"label#1\",", "", "p:7: $.shards[0].samples[0].label: expected text"},

@@ -12,15 +12,16 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import NAME, SOURCE
+from conftest import NAME, SECOND, SOURCE
 
+from eventgan_shards import Shards
 from eventgan_shards.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Found, Truth, average_precisions, detection_scores,
                                               kitti_average_precision, match_as_coco, match_as_voc, strongest)
 from eventgan_shards.evaluate import Samples, evaluate_detections, evaluate_poses
 from eventgan_shards.pose_scores import Persons, head_lengths, pose_scores
 
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
-CAR, VAN, DONT_CARE = 0, 1, 2
+CAR, VAN, DONT_CARE = 0, 1, -1
 CLASSES = {"Car": CAR, "Van": VAN}
 
 
@@ -134,7 +135,8 @@ def rows_of(boxes, image):
 
 
 def ignored_by_loops(found, truth, n, least):
-    return any(truth.ignore[m] and iou_of(found.xyxy[n], truth.xyxy[m], share=True) >= least for m in rows_of(truth, found.image[n]))
+    return any(truth.ignore[m] and truth.label[m] in (found.label[n], DONT_CARE) and iou_of(found.xyxy[n], truth.xyxy[m], share=True) >= least
+               for m in rows_of(truth, found.image[n]))
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -167,6 +169,84 @@ def test_coco_s_matching_is_that_of_its_loop(seed):
             assert right[n, t] == hit and counted[n, t] == (hit or not ignored_by_loops(found, truth, n, least))
 
 
+def pycocotools(found, annotations, label, images):
+    """COCOeval's AP@[.5:.95] of a class, all areas, 100 detections, as its evaluateImg and accumulate have it, in plain loops; annotations are dictionaries
+    of image_id, category_id, bbox and iscrowd."""
+    precision = []
+    for least in np.linspace(0.5, 0.95, 10):
+        scores, right, ignored, truths = [], [], [], 0
+        for image in range(images):
+            there = sorted((each for each in annotations if each["image_id"] == image and each["category_id"] == label), key=lambda each: each["iscrowd"])
+            truths += sum(not each["iscrowd"] for each in there)
+            rows = [n for n in rows_of(found, image) if found.label[n] == label]
+            matched = {}
+            for n in sorted(rows, key=lambda n: -found.score[n])[:100]:
+                best, at = min(least, 1 - 1e-10), None
+                for g, each in enumerate(there):
+                    if g in matched and not each["iscrowd"]:
+                        continue
+                    if at is not None and not there[at]["iscrowd"] and each["iscrowd"]:
+                        break
+                    left, top, width, height = each["bbox"]
+                    box, true = found.xyxy[n], [left, top, left + width, top + height]
+                    overlap = iou_of(box, true, share=each["iscrowd"])
+                    if overlap >= best:
+                        best, at = overlap, g
+                if at is not None:
+                    matched[at] = n
+                scores.append(found.score[n])
+                right.append(at is not None and not there[at]["iscrowd"])
+                ignored.append(at is not None and bool(there[at]["iscrowd"]))
+        if not truths:
+            return math.nan
+        hits, misses, recall, precisions = 0, 0, [], []
+        for n in sorted(range(len(scores)), key=lambda n: -scores[n]):
+            hits, misses = hits + right[n], misses + (not right[n] and not ignored[n])
+            recall.append(hits / truths)
+            precisions.append(hits / max(hits + misses, 1))
+        for n in range(len(precisions) - 1, 0, -1):
+            precisions[n - 1] = max(precisions[n - 1], precisions[n])
+        for point in np.linspace(0, 1, 101):
+            n = next((n for n in range(len(recall)) if recall[n] >= point), None)
+            precision.append(0 if n is None else precisions[n])
+    return np.mean(precision)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_coco_s_average_precision_is_pycocotools_of_our_own_export(seed):
+    found, truth = scene(seed, images=12, each=12)
+    annotations = []
+    for image, label, (left, top, right, bottom), ignore in zip(truth.image, truth.label, truth.xyxy.tolist(), truth.ignore.tolist()):
+        for category in CLASSES.values() if label == DONT_CARE else [label]:  # exports.md: one of every class
+            annotations.append({"image_id": image, "category_id": category, "bbox": [left, top, right - left, bottom - top], "iscrowd": int(ignore)})
+    scores = detection_scores(found, truth, CLASSES)
+    for name, label in CLASSES.items():
+        assert scores[name]["ap_coco"] == pytest.approx(pycocotools(found, annotations, label, 12), abs=1e-12)
+        assert 0.1 < scores[name]["ap_coco"] < 0.6
+    none = detection_scores(found, truth._replace(ignore=np.zeros_like(truth.ignore)), CLASSES)
+    assert none["Car"]["ap_coco"] != scores["Car"]["ap_coco"]  # it matters
+
+
+def test_boxes_to_be_ignored_ignore_their_class_and_dont_care_all():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, VAN, 20, 0, 40, 20, 1, -1], [0, DONT_CARE, 60, 0, 80, 20, 1, -1])
+    for left, label, counts in ((20, VAN, 0), (20, CAR, 1), (60, VAN, 0), (60, CAR, 0)):
+        found = found_of([0, label, left, 0, left + 10, 10, 0.9])
+        assert match_as_voc(found, truth)[1].tolist() == [counts]
+        assert match_as_coco(found, truth)[1].tolist() == [[counts] * 10]
+        assert detection_scores(found, truth, CLASSES)["all"]["found"] == counts
+
+
+def test_average_precisions_are_of_all_predictions_and_the_others_of_those_that_are_sure():
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 20, 0, 30, 10, 0, 0])
+    found = found_of([0, CAR, 0, 0, 10, 10, 0.9], [0, CAR, 40, 0, 50, 10, 0.5], [0, CAR, 20, 0, 30, 10, 0.1])
+    car = detection_scores(found, truth, CLASSES, sure=found.score >= 0.2)["Car"]
+    assert (car["found"], car["right"], car["precision"], car["recall"], car["f1"]) == (2, 1, 1 / 2, 1 / 2, 2 / 4)
+    assert car["ap_voc"] == pytest.approx(1 / 2 + 2 / 3 / 2)
+    assert car["ap_coco"] == pytest.approx((51 + 50 * 2 / 3) / 101)
+    sure = detection_scores(found.rows(found.score >= 0.2), truth, CLASSES)["Car"]
+    assert {key for key in sure if sure[key] != pytest.approx(car[key], nan_ok=True)} == {"ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco"}
+
+
 def test_coco_counts_a_hundred_of_a_class_and_sample():
     truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0])
     found = found_of(*([0, CAR, 20 * i, 20, 20 * i + 9, 30, 0.9] for i in range(100)), [0, CAR, 0, 0, 10, 10, 0.1], [0, VAN, 0, 0, 10, 10, 0.1])
@@ -174,13 +254,13 @@ def test_coco_counts_a_hundred_of_a_class_and_sample():
     assert not right.any() and counted.sum(0).tolist() == [101] * 10
 
 
-@pytest.mark.parametrize("iou", [0.2, 0.6])
+@pytest.mark.parametrize("iou", [0, 0.2, 0.6, 1])
 def test_suppression_is_torchvision_s(iou):
     torch, ops = pytest.importorskip("torch"), pytest.importorskip("torchvision.ops")
     found, _ = scene(1)
     kept = ops.batched_nms(torch.from_numpy(found.xyxy), torch.from_numpy(found.score), torch.from_numpy(2 * found.image + found.label), iou)
     assert np.flatnonzero(strongest(found, iou)).tolist() == kept.tolist()  # both from the highest score on
-    assert 0 < len(kept) < len(found.score)
+    assert 0 < len(kept) < len(found.score) or iou == 1
 
 
 def kitti_by_loops(found, truth, classes, name, level, height):
@@ -368,6 +448,24 @@ def test_a_hundred_thousand_predictions_take_seconds():
     assert time.process_time() - start < 30
 
 
+def test_a_hundred_thousand_boxes_in_twelve_images():
+    """8,333 boxes an image: 100 places, at each of which the best of 83 or 84 is right."""
+    rng = np.random.default_rng(0)
+    image, at = np.arange(100_000) % 12, np.arange(100_000) // 12 % 100
+    corner = np.stack([at % 10, at // 10], 1) * 50.0
+    found = Found.of(image, np.zeros(len(image)), np.hstack([corner, corner + 40]) + rng.uniform(-1, 1, (len(image), 4)), rng.random(len(image)))
+    place = np.arange(100)
+    corner = np.stack([place % 10, place // 10], 1) * 50.0
+    truth = Truth(np.repeat(np.arange(12), 100), np.zeros(1200, int), np.tile(np.hstack([corner, corner + 40]), (12, 1)), np.zeros(1200, bool), np.zeros(1200, int))
+    sure = strongest(found, 0.2)
+    assert sure.sum() == 1200
+    car = detection_scores(found, truth, CLASSES, sure=sure)["Car"]
+    assert (car["right"], car["precision"], car["recall"]) == (1200, 1, 1)
+    assert 0.5 < car["ap_voc"] < 0.9  # of all 100,000
+    assert detection_scores(found.rows(sure), truth, CLASSES)["Car"]["ap_voc"] == pytest.approx(1)
+    assert kitti_average_precision(found.rows(sure), truth, CLASSES, "Car", "easy", np.full(1200, 40.0)) == pytest.approx(1)
+
+
 # The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare, and two
 # persons; the last one.
 
@@ -386,7 +484,7 @@ def test_detections_of_a_folder(folder, tmp_path):
                                             box("000003", "Car", [0, 0, 3, 3], 0.1)])
     result, _, truth = evaluate_detections(found, Samples(folder, None, None, None))
     car = result["classes"]["Car"]
-    assert result["counts"] == {"samples": 4, "samples_without_prediction": 2, "ignored": int(truth.ignore.sum()), "predictions": 3, "not_of_these_samples": 0,
+    assert result["counts"] == {"samples": 4, "samples_without_prediction": 1, "ignored": int(truth.ignore.sum()), "predictions": 3, "not_of_these_samples": 0,
                                 "after_suppression": 2}
     assert (car["truths"], car["found"], car["right"]) == (2, 2, 1)
     numbered = write(tmp_path / "numbered.json", [box(1, 1, [1, 1, 3.25, 3.5]), box(2, 1, [0, 0, 3, 3], 0.5), box(3, 1, [0, 0, 3, 3], 0.1)])
@@ -394,6 +492,39 @@ def test_detections_of_a_folder(folder, tmp_path):
     (tmp_path / "ids.txt").write_text("000000\n000003\n")
     part, _, _ = evaluate_detections(found, Samples(folder, None, None, tmp_path / "ids.txt"))
     assert part["counts"]["not_of_these_samples"] == 1 and part["classes"]["Car"]["precision"] == 1
+
+
+def test_a_number_is_the_place_in_the_split_whatever_is_scored_of_it(two_shards, tmp_path):
+    """The second shard is of another source, whose samples have the same ids: its places are 5 to 8."""
+    with h5py.File(two_shards / SECOND, "r+") as file:
+        file["pairs/dataset"][...] = "frames"
+    dataset = Shards(two_shards / NAME).column("dataset")[0]
+    right = [1, 1, 3.25, 3.5]
+    for source, own, other in ((dataset, 1, 5), ("frames", 5, 1)):
+        samples = Samples(two_shards, "train", source, None)
+        result, _, _ = evaluate_detections(write(tmp_path / "found.json", [box(other, 1, right)]), samples)
+        assert result["counts"]["not_of_these_samples"] == 1 and result["classes"]["Car"]["recall"] == 0
+        result, found, _ = evaluate_detections(write(tmp_path / "found.json", [box(own, 1, right)]), samples)
+        assert result["counts"]["not_of_these_samples"] == 0 and result["classes"]["Car"]["recall"] == 1 / 2 and found.image.tolist() == [0]
+        joints = samples.shards.labels(0)["persons"]["joints"][1, samples.shards.joint_places(0, samples.shards.default_joints())].tolist()
+        for number, there in ((own, 1), (other, 0)):
+            entry = {"image_id": number, "person": 1, "joints": joints}
+            assert np.isfinite(evaluate_poses(write(tmp_path / "poses.json", [entry]), samples)[1]).all((1, 2)).sum() == there
+    (tmp_path / "ids.txt").write_text("000003\n")
+    samples = Samples(two_shards, "train", "frames", tmp_path / "ids.txt")
+    assert samples.of([box(n, 1, right) for n in range(1, 9)], "").tolist() == [-1] * 6 + [0, -1]
+
+
+def test_average_precision_has_no_least_score_and_no_suppression(folder, tmp_path):
+    found = write(tmp_path / "found.json", [box("000003", "Car", [0, 0, 3, 3], 0.06), box("000000", "Car", [1, 1, 3.25, 3.5], 0.05),
+                                            box("000000", "Car", [1, 1, 3.25, 3.4], 0.04)])
+    result, boxes, _ = evaluate_detections(found, Samples(folder, None, None, None))
+    car = result["classes"]["Car"]
+    assert (len(boxes.score), result["counts"]["after_suppression"], car["found"], car["recall"]) == (3, 0, 0, 0) and math.isnan(car["precision"])
+    assert car["ap_voc"] == 1 / 2 / 2 and car["ap_coco"] > 0  # one of two cars, after a wrong one
+    everything, _, _ = evaluate_detections(found, Samples(folder, None, None, None), confidence=0, nms=1)
+    assert {key: everything["classes"]["Car"][key] for key in car if key.startswith("ap_")} == {key: car[key] for key in car if key.startswith("ap_")}
+    assert everything["counts"]["after_suppression"] == 3
 
 
 def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
@@ -413,6 +544,15 @@ def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
 @pytest.mark.parametrize(("entry", "error"), [
     (box("000002", "Car", [0, 0, 1, 1]), r'expected the image_id of a sample of 4, got "000002", in .*json \(entry 1\)'),
     (box(5, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 5"),
+    (box(0, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 0"),
+    (box(True, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got true"),
+    (box(1.0, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 1.0"),
+    (box("000001", True, [0, 0, 1, 1]), "expected a category_id of Car, or its number from 1 on, got true"),
+    (box("000001", "Car", [0, 0, 1, 1], True), "expected a finite number as score, got true"),
+    (box("000001", "Car", [0, 0, 1, 1], "0.9"), 'expected a finite number as score, got "0.9"'),
+    (box("000001", "Car", [0, 0, 1, 1], 10**400), "expected a finite number as score, got 1000"),
+    (box("000001", "Car", [0, 0, 1, True]), r"expected 4 finite numbers as bbox, got \[0, 0, 1, true\]"),
+    (box("000001", "Car", ["0", 0, 1, 1]), r"expected 4 finite numbers as bbox, got \[\"0\", 0, 1, 1\]"),
     (box("000001", "Bus", [0, 0, 1, 1]), 'expected a category_id of Car, or its number from 1 on, got "Bus"'),
     (box("000001", 2, [0, 0, 1, 1]), "expected a category_id of Car, or its number from 1 on, got 2"),
     (box("000001", "DontCare", [0, 0, 1, 1]), 'got "DontCare"'),
@@ -430,7 +570,7 @@ def test_wrong_predictions_are_refused(folder, tmp_path, entry, error):
 
 
 def test_what_is_no_list_and_ids_that_two_have_are_refused(two_shards, tmp_path):
-    for text, error in (("{}", "expected a list, got dict"), ("[", "expected JSON, got")):
+    for text, error in (("{}", "expected a list, got dict"), ("[", "expected JSON, got"), (100_000 * "[", "expected JSON, got .*recursion")):
         (tmp_path / "found.json").write_text(text)
         with pytest.raises(ValueError, match=error):
             evaluate_detections(tmp_path / "found.json", Samples(two_shards, None, None, None))
@@ -456,6 +596,8 @@ def test_poses_of_a_folder(folder, tmp_path):
     moved = math.hypot(3 / linear[0, 0], 4 / linear[1, 1])
     assert result["joints"]["all"]["mpjpe_source"] == pytest.approx(moved * of_it[0].sum() / of_it.sum())
     for wrong, error in (({}, "expected a person of the 2 there are, got null"), ({"person": 2}, "expected a person of the 2 there are, got 2"),
+                         ({"person": True}, "expected a person of the 2 there are, got true"),
+                         ({"person": 0, "joints": [[0, 0], [0, True]]}, "expected 2 x 2 finite numbers as joints, got .*true"),
                          ({"person": 1}, "got 1 twice"), ({"person": 0, "joints": [[0, 0]]}, "expected 2 x 2 finite numbers as joints")):
         with pytest.raises(ValueError, match=error):
             evaluate_poses(write(tmp_path / "wrong.json", [*entries, {"image_id": "000000", "joints": joints[0].tolist(), **wrong}]), samples)
@@ -469,17 +611,26 @@ def evaluate(*arguments, expect=0):
 
 
 def test_the_command_prints_tables_json_and_pictures(folder, tmp_path):
-    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5])])
+    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
     said = evaluate("detections", found, "--truth", folder)
     assert "4 samples (3 without a prediction), 2 boxes to find" in said
+    assert "average precisions of all 2 predictions, precision, recall and F1 of 1, by confidence 0.2 and non-maximum" in said
     heading, car = said.split("\n\n")[1].splitlines()[:2]
     assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500", "0.500", "0.667"] and heading.split()[-1] == "F1"
     assert json.loads(evaluate("detections", found, "--truth", folder, "--json"))["classes"]["Car"]["recall_easy"] is None
     poses = write(tmp_path / "poses.json", [])
     assert "3 persons, 1 of them not found" in evaluate("poses", poses, "--truth", folder)  # of the others all joints are hidden
     assert "nowhere" in evaluate("detections", poses, "--truth", tmp_path / "nowhere", expect=1)
+    for more, error in ((("--split", "val"), "expected a split of train, got 'val'"), (("--dataset", "mpii"), "('kitti_object'), got 1 that it does not"),
+                        (("--classes", "Bus"), "expected classes of Car, DontCare, got Bus")):
+        assert error in evaluate("detections", poses, "--truth", folder, *more, expect=1)
+    for depth in (900, 100_000):  # as Python's reader of JSON gives it back, and as it does not
+        (tmp_path / "deep.json").write_text('[{"image_id": ' + depth * "[" + depth * "]" + ', "category_id": 1, "bbox": [0, 0, 1, 1], "score": 1}]')
+        said = evaluate("detections", tmp_path / "deep.json", "--truth", folder, expect=1)
+        assert said.startswith("error: expected ") and "Traceback" not in said
     pytest.importorskip("cv2")
-    evaluate("detections", found, "--truth", folder, "--pictures", tmp_path / "boxes")
+    evaluate("detections", found, "--truth", folder, "--pictures", tmp_path / "boxes", "--confidence", "0")
+    write(poses, [{"image_id": "000000", "person": 1, "joints": [[1e30, 2], [3, -1e30]]}])
     evaluate("poses", poses, "--truth", folder, "--pictures", tmp_path / "joints")
     assert {path.name for path in (tmp_path / "boxes").iterdir()} >= {"precision_recall.png", "000000.png"}
     assert len(list((tmp_path / "joints").glob("*.png"))) == 2

@@ -1,5 +1,6 @@
 """manifests/python/examples: a few steps of each on the demo dataset, and going on where they ended."""
 
+import argparse
 import json
 import os
 import pathlib
@@ -7,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+import types
 
 import numpy as np
 import pytest
@@ -83,7 +85,7 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
     (tmp_path / "ids.txt").write_text("\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
-    scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--confidence", "0", "--nms", "1", "--classes", "Car")
+    scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--classes", "Car")
     assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
     assert "expected --lr 0.0002, with which this run began, got 0.5, in" in said
@@ -122,7 +124,7 @@ def test_yolov3_learns(data, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
     train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2", "--batch", "2", "--scale", "1",
           "--every", "9", "--classes", "Car,Van", "--test", data)
-    scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object", "--confidence", "0", "--nms", "1")
+    scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object")
     assert scores["counts"]["samples"] == 12 and scores["counts"]["not_of_these_samples"] == 0
     assert_trained(tmp_path / "out", [0, 2], pictures=2)
     assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
@@ -175,11 +177,47 @@ def test_the_trade_in_small(tmp_path):
     assert errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and all(0 < error < 1 for [error] in errors.values())
 
 
+def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
+    """A step takes 10 seconds, a check 1000: 6 steps are a minute, however long the checks and wherever it is broken off."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import training
+
+    clock = [0.0]
+    monkeypatch.setattr(training, "time", types.SimpleNamespace(monotonic=lambda: clock[0]))
+    model = torch.nn.Linear(1, 1)
+
+    def loss_of(batch, progress):
+        clock[0] += 10
+        return model(batch).sum()
+
+    def check():
+        clock[0] += 1000
+        return {"score": 0.5}
+
+    def fit(minutes):
+        args = argparse.Namespace(out=str(tmp_path), device="cpu", seed=0, every=1, epochs=None, steps=None, minutes=minutes)
+        training.fit(args, model, torch.optim.SGD(model.parameters(), 0.1), 4 * [torch.ones(1, 1)], loss_of, check, "score")
+        return [(row["step"], row["minutes"]) for row in history(tmp_path)]
+
+    assert fit(1.0) == [(0, 0), (4, 0.67), (6, 1)]
+    assert fit(2.0)[3:] == [(10, 1.67), (12, 2)]
+
+
+def test_what_is_to_be_run_can_be_run():
+    for path in EXAMPLES.glob("*.py"):
+        text = path.read_text()
+        runs = '__name__ == "__main__"' in text
+        assert os.access(path, os.X_OK) == text.startswith("#!/usr/bin/python3\n") == runs, path
+    assert "USE_SOURCE_PERMISSIONS" in (SOURCE / "docker" / "CMakeLists.txt").read_text().partition("manifests/python/examples ")[2].partition(")")[0]
+
+
 def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     said = train("train_torchvision", tmp_path, tmp_path / "out", expect=1)
     assert f"got no {tmp_path / 'dataset.json'}" in said and "Traceback" not in said
     said = train("train_torchvision", data, tmp_path / "out", "--dataset", "kitti_raw", expect=1)
-    assert "kitti_raw" in said and "Traceback" not in said
+    assert "('human36m', 'kitti_object', 'mpii'), got 1 that it does not have ('kitti_raw')" in said and "Traceback" not in said
+    said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "kitti_object", expect=1)
+    assert f"got 0 and 0, in {data} (--dataset kitti_object; it has samples of " in said
     for limit in ("--epochs", "--steps", "--minutes", "--every"):
         said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)
         assert f"expected {limit} " in said and "got 0" in said

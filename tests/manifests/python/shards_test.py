@@ -134,7 +134,7 @@ def test_ids_from_a_list_or_a_file(two_shards, tmp_path):
     assert len(Shards(two_shards, ids=[])) == 0
     listed.write_text("000004\n", encoding="utf-8-sig")  # as Windows' editors begin a file
     assert ids_of(Shards(two_shards, ids=listed)) == ["000004"] * 2
-    with pytest.raises(ValueError, match="expected sample ids of .*, got 1 that it does not have .'7'., in ids"):
+    with pytest.raises(ValueError, match=r"expected sample ids of .* \('000000', '000001', .*\), got 1 that it does not have .'7'., in ids"):
         Shards(two_shards, ids=["7", "000000", "000002"])  # 000002 is in quarantine
 
 
@@ -177,7 +177,15 @@ def test_where(two_shards):
     for where in ({"gap": [1, 2]}, {"sequence": "drive_7"}, {"class": "Bus"}, {"class": "DontCare"}):  # a box to be ignored is none
         with pytest.raises(ValueError, match="that it does not have"):
             Shards(two_shards, where=where)
-    with pytest.raises(ValueError, match="expected a column pairs/weather, got none"):
+    with pytest.raises(ValueError, match=f"expected a split of train, got 'val', in {two_shards}"):
+        Shards(two_shards, split="val")
+    with pytest.raises(ValueError, match=r"expected classes of .* \('Car'\), got 1 that it does not have \('Bus'\), in where"):
+        Shards(two_shards, where={"class": ["Car", "Bus"]})
+    with pytest.raises(ValueError, match=r"expected values of sequence of .* \('drive_0', 'drive_1', 'drive_2'\), got 1 that it does not have \('drive_7'\)"):
+        Shards(two_shards, where={"sequence": "drive_7"})
+    with pytest.raises(ValueError, match=f"expected values of gap of {two_shards}, split train .2., got 1 that it does not have .1., in where"):
+        Shards(two_shards, split="train", where={"gap": 1})
+    with pytest.raises(ValueError, match="expected a column of action, camera, .*, got 'weather', in "):
         Shards(two_shards, where={"weather": "rain"})
 
 
@@ -286,6 +294,17 @@ def test_a_description_that_misses_shards(folder):
     with pytest.raises(ValueError, match=f"expected 2 shards that are done, got 1 that are not .{SECOND}."):
         Shards(folder)
     assert len(Shards(folder, partial=True)) == 4
+
+
+@pytest.mark.parametrize("name", [f"../out/{NAME}", "{folder}/" + NAME, f"./{NAME}", "other.h5", f"{NAME}\n", f"..-train-{NAME}", 7])
+def test_names_in_a_description_that_are_no_shards_are_refused(folder, name):
+    marker = json.loads((folder / NAME).with_suffix(".json").read_text())
+    name = name.format(folder=folder) if isinstance(name, str) else name
+    (folder / "other.h5").write_bytes((folder / NAME).read_bytes())
+    entry = {"name": name, "split": "train", "samples": 5, "size_bytes": marker["size_bytes"], "sha256": marker["sha256"]}
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "quarantined": []}))
+    with pytest.raises(ValueError, match="expected the name of a shard beside it, got .*dataset.json"):
+        Shards(folder)
 
 
 def test_the_fields_asked_for(folder):

@@ -1,7 +1,9 @@
 """eventgan_shards.torch: volumes, boxes and joints that stay together whatever is done to them."""
 
+import dataclasses
 import os
 import pathlib
+import re
 
 import h5py
 import numpy as np
@@ -199,14 +201,83 @@ def test_keypoint_items(shards):
 
 
 def test_mirrored_joints():
-    names = ["left hand", "nose", "right hand", "left ear"]
-    assert flip_pairs(names) == [(0, 2)]
-    # As MPII and Human3.6M have them; the pairs of MPII are those of Simple Baselines' lib/dataset/mpii.py.
-    mpii = ["r_ankle", "r_knee", "r_hip", "l_hip", "l_knee", "l_ankle", "pelvis", "thorax", "upper_neck", "head_top", "r_wrist", "r_elbow",
-            "r_shoulder", "l_shoulder", "l_elbow", "l_wrist"]
-    assert {frozenset(pair) for pair in flip_pairs(mpii)} == {frozenset(pair) for pair in ((0, 5), (1, 4), (2, 3), (10, 15), (11, 14), (12, 13))}
+    assert flip_pairs(["left hand", "nose", "right hand", "head"]) == [(0, 2)]
     assert flip_pairs(["RightFoot", "Hips", "LeftFoot", "R_Wrist_End", "L_Wrist_End"]) == [(2, 0), (4, 3)]
     assert flip_pairs(["r_hip", "l_hip", "pelvis", "l_wrist", "r_wrist"]) == [(1, 0), (3, 4)]
+    assert flip_pairs(["head", "foot"]) == flip_pairs([]) == []
+
+
+def words_of(path, begin, end):
+    """The words in quotation marks between these texts of one of the program's sources."""
+    return re.findall('"([^"]+)"', (SOURCE / path).read_text().partition(begin)[2].partition(end)[0])
+
+
+HUMAN36M = "stages/frames/human36m/human36m_dataset.cc"
+LISTS = {  # every one that the program names itself: path, text before it, text behind it, its joints on the left, and on the right
+    "MPII": ("stages/frames/mpii/mpii_annotations.cc", "schema{", "}};",
+             ["l_" + name for name in ("ankle", "knee", "hip", "wrist", "elbow", "shoulder")],
+             ["r_" + name for name in ("ankle", "knee", "hip", "wrist", "elbow", "shoulder")]),
+    "MPII's short names": ("stages/exports/pose_list.cc", 'kNames[] = {', "};", ["lank", "lkne", "lhip", "lwri", "lelb", "lsho"],
+                           ["rank", "rkne", "rhip", "rwri", "relb", "rsho"]),
+    "Human3.6M, 17": (HUMAN36M, "count == 17", "};", ["left_" + name for name in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")],
+                      ["right_" + name for name in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")]),
+    "Human3.6M, 32": (HUMAN36M, "count == 32", "};",
+                      ["LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", "LeftToeBase_Site", "LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand",
+                       "LeftHandThumb", "LeftHandThumb_Site", "L_Wrist_End", "L_Wrist_End_Site"],
+                      ["RightUpLeg", "RightLeg", "RightFoot", "RightToeBase", "RightToeBase_Site", "RightShoulder", "RightArm", "RightForeArm", "RightHand",
+                       "RightHandThumb", "RightHandThumb_Site", "R_Wrist_End", "R_Wrist_End_Site"]),
+    "DHP19": ("stages/frames/events/dhp19_dataset.cc", "kJoints = {", "};", ["shoulderL", "elbowL", "hipL", "handL", "kneeL", "footL"],
+              ["shoulderR", "elbowR", "hipR", "handR", "kneeR", "footR"])}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_mirror_exchanges_the_sides_of_every_list_that_the_program_writes(name):
+    path, begin, end, left, right = LISTS[name]
+    names = words_of(path, begin, end)
+    names = list(dict.fromkeys(names[1::2])) if name == "MPII's short names" else names
+    assert len(names) == {"MPII": 16, "MPII's short names": 16, "Human3.6M, 17": 17, "Human3.6M, 32": 32, "DHP19": 13}[name]
+    assert {(names[i], names[j]) for i, j in flip_pairs(names)} == set(zip(left, right)) and len(flip_pairs(names)) == len(left)
+    for i in range(len(names)):  # and nothing is left where it is if one is missing
+        if names[i] in left and name != "MPII's short names":
+            with pytest.raises(ValueError, match=f"got {right[left.index(names[i])]} without a partner"):
+                flip_pairs(names[:i] + names[i + 1:])
+
+
+@pytest.mark.parametrize(("left", "right"), [
+    ("lShoulder", "rShoulder"), ("LShoulder", "RShoulder"), ("LBigToe", "RBigToe"), ("ShoulderLeft", "ShoulderRight"), ("LEFT_HIP", "RIGHT_HIP"),
+    ("hip_l", "hip_r"), ("Hip_L", "Hip_R"), ("hip.L", "hip.R"), ("hip_left", "hip_right"), ("handL_end", "handR_end"), ("hip (l)", "hip (r)"),
+    ("body_l_hip", "body_r_hip"), ("l", "r"), ("toe1L", "toe1R")])
+def test_sides_in_names_of_one_s_own(left, right):
+    assert flip_pairs([right, "nose", left]) == [(2, 0)]
+    for alone in (left, right):
+        with pytest.raises(ValueError, match=f"got {re.escape(alone)} without a partner"):
+            flip_pairs(["nose", alone])
+
+
+def test_names_that_suggest_no_side():
+    middle = ["root (pelvis)", "Spine1", "neck_base", "ROOT", "L5", "Head_Site", "lower back", "rib", "tail", "C7", "nostril"]
+    assert flip_pairs(middle) == []
+    with pytest.raises(ValueError, match="got joint_0, joint_1 without a partner"):  # of which nothing is known
+        flip_pairs(["joint_0", "joint_1"])
+    with pytest.raises(ValueError, match="got left_hip, RAnkle, kneeR without a partner .flip=0 mirrors nothing."):
+        flip_pairs(["left_hip", "RAnkle", "kneeR", "l_knee", "r_knee"])
+
+
+def test_persons_of_dhp19_s_names_are_mirrored(folder):
+    with h5py.File(folder / NAME, "r+") as file:
+        file["labels/poses"].attrs["joint_names"] = ["head", "handL", "handR"]
+        file["labels/poses"].attrs["joint_aliases"] = ["", "", ""]
+    shards = Shards(folder / NAME)
+    keypoints = [KeypointDataset(shards, augmentation=EventAugmentation(flip=flip))[0]["keypoints"][1] for flip in (0, 1)]
+    np.testing.assert_allclose(keypoints[1][:, 0], 7 - keypoints[0][[0, 2, 1], 0])  # of 8 columns
+    persons = [PoseDataset(shards, size=(64, 64), augmentation=PoseAugmentation(scale=0, rotated=0, flip=flip))[1] for flip in (0, 1)]
+    np.testing.assert_allclose(persons[1][3]["joints"][:, 0], 63 - persons[0][3]["joints"][[0, 2, 1], 0])
+    assert PoseDataset(shards).flip_pairs == [(1, 2)]
+    for dataset, augmentation in ((KeypointDataset, EventAugmentation()), (PoseDataset, PoseAugmentation())):
+        with pytest.raises(ValueError, match="got handL without a partner"):  # at once
+            dataset(shards, joints=["head", "handL"], augmentation=augmentation)
+        dataset(shards, joints=["head", "handL"], augmentation=dataclasses.replace(augmentation, flip=0))[0]
+        dataset(shards, joints=["head", "handL"])[0]
 
 
 @pytest.mark.parametrize(("moved", "center", "scale"), [(False, [2.75, 2.25 + 15 * 0.875], 1.25 * 0.875), (True, [2.75, 2.25], 0.875)])
@@ -220,8 +291,9 @@ def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
 
 def test_joints_by_the_names_in_common_use(shards):
     assert PoseDataset(shards, joints=["right_wrist", "nose"], size=(64, 64))[1][3]["joints_vis"].tolist() == [[1, 1, 0]] * 2
-    with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand or left_wrist, right_wrist, got tail"):
-        PoseDataset(shards, joints=["tail"])
+    for dataset in (PoseDataset, KeypointDataset):
+        with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand or left_wrist, right_wrist, got tail, in .*'dataset'"):
+            dataset(shards, joints=["tail"])
 
 
 def test_pose_items(shards):
@@ -242,7 +314,25 @@ def test_joints_in_common_use_are_taken_unless_told_otherwise(shards):
     annotated = [source != [-1, -1] for source in sources]
     assert shards.annotated(["right hand"]).tolist() == annotated and len(set(annotated)) == 2
     assert PoseDataset(shards, joints=["right hand"], size=(64, 64)).persons.tolist() == shards.persons[annotated].tolist()
-    assert len(PoseDataset(shards[1:2])) == 0
+
+
+def test_datasets_without_anything_to_learn_say_so(shards, example, folder):
+    with pytest.raises(ValueError, match=f"expected persons of whom one of left_wrist, right_wrist is annotated, got none, in {folder}"):
+        PoseDataset(shards[1:2])
+    unlabelled = Shards(example.path("unlabelled"))
+    for dataset, what in ((PoseDataset, "joints"), (KeypointDataset, "joints"), (DetectionDataset, "boxes")):
+        with pytest.raises(ValueError, match=f"expected samples of sources with {what}, got none, in .*{NAME}"):
+            dataset(unlabelled)
+
+
+def test_boxes_of_classes_that_are_not_asked_for_are_not_to_be_ignored_either(folder):
+    with h5py.File(folder / NAME, "r+") as file:
+        file["labels/boxes/class_id"].attrs["class_names"] = ["Car", "Van"]  # the one to ignore
+    shards = Shards(folder / NAME)
+    assert DetectionDataset(shards, ["Car"])[0]["labels"].tolist() == [0]
+    assert DetectionDataset(shards, ["Car"], size=(2, 8), visible=0.5)[0]["labels"].tolist() == [0]  # 1/3.5 is left
+    assert DetectionDataset(shards, ["Van"])[0]["ignore"].tolist() == [True]
+    assert DetectionDataset(shards, ["Van"], size=(2, 8), visible=0.5)[0]["labels"].tolist() == [0]
 
 
 def test_persons_are_counted_without_reading_each(shards, monkeypatch):
@@ -260,6 +350,15 @@ def test_a_person_without_a_scale_has_that_of_its_joints(shards):
     np.testing.assert_allclose(meta["center"], [1.875, 2.3125])
     np.testing.assert_allclose(meta["scale"], 1.25 * 1.125 / 200)
     assert meta["joints_vis"].tolist() == [[1, 1, 0], [1, 1, 0], [0, 0, 0]]
+
+
+def test_a_person_with_a_scale_and_no_centre_has_both_of_its_joints(folder):
+    with h5py.File(folder / NAME, "r+") as file:
+        for column in ("center", "center_source"):
+            file[f"labels/poses/{column}"][1] = -1
+    meta = PoseDataset(Shards(folder / NAME), size=(64, 64), joints=JOINTS)[1][3]  # joints 1.5, 1.75 to 3.25, 3.25
+    np.testing.assert_allclose(meta["center"], [2.375, 2.5])
+    np.testing.assert_allclose(meta["scale"], 1.25 * 1.75 / 200)
 
 
 def test_varied_poses_still_lead_back(shards):

@@ -8,14 +8,17 @@
 #include <set>
 
 #include "manifests/documents/job_manifest.h"
+#include "manifests/documents/marker.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/verify_folder.h"
 #include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/memory.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
 #include "tests/pipeline/conversion/small_conversion.h"
+#include "tests/testing/hdf5_file.h"
 #include "tests/testing/picture_file.h"
 
 namespace eventgan {
@@ -135,6 +138,31 @@ TEST_F(Convert, RefusesAFolderOfAnotherPlanUnlessToldToOverwrite) {
   run("out", 2, /*overwrite=*/true);
   EXPECT_EQ(shards("out").size(), 1u);
   EXPECT_THAT(verify_folder(folder_ / "out").faults, ::testing::IsEmpty());
+}
+
+TEST_F(Convert, NeverOverwritesAnotherJob) {
+  run();
+  const auto whole = shards("out");
+  const auto refused = ::testing::ThrowsMessage<UsageError>(
+      ::testing::HasSubstr("choose another output folder, or remove that one yourself"));
+  fs::copy(folder_ / "clip", folder_ / "second");
+  for (const auto& [was, is] :
+       {std::pair{R"("root": "clip")", R"("root": "second")"},
+        std::pair{R"("root": "second")", R"("root": "clip", "split": "val")"},
+        std::pair{R"("name": "job")", R"("name": "other")"}}) {
+    change(was, is);
+    for (const bool overwrite : {false, true}) {
+      EXPECT_THAT([&] { run("out", 2, overwrite); }, refused) << is;
+      EXPECT_EQ(shards("out"), whole) << is;
+    }
+  }
+  ConversionOptions trial = options();
+  trial.limit = 2;
+  trial.overwrite = true;
+  change(R"("name": "other")", R"("name": "job")");
+  change(R"(, "split": "val")", "");
+  EXPECT_THAT([&] { run(trial); }, refused);
+  EXPECT_EQ(shards("out"), whole);
 }
 
 TEST_F(Convert, ACommentOrOtherLimitsDoNotMeanStartingOver) {
@@ -335,6 +363,75 @@ TEST(ConvertKinds, GivePairsAndLabelsAlike) {
   }
   EXPECT_EQ(std::set<std::string>(rows.begin(), rows.end()).size(), 6u);  // they say something
 }
+
+/// A job of 81 flat frames of 4x3 pixels, or of a recording of as many with an event in each
+/// interval: 80 samples in 4 shards, whose volumes are 160x120, so 1.4 MB each.
+class ConvertMemory : public ::testing::TestWithParam<GeneratorKind> {
+ protected:
+  static constexpr int kFrames = 81;
+
+  std::string write_source() const {
+    if (GetParam() != GeneratorKind::kEvents) {
+      for (int frame = 0; frame < kFrames; ++frame) {
+        testing::write_flat_picture(folder_ / "clip" / (std::to_string(1000 + frame) + ".png"),
+                                    {3, 4}, 100 + 40 * (frame % 2));
+      }
+      return R"("dataset": "frames", "root": "clip", "pairs": { "gaps": [1], "side": "before" })";
+    }
+    std::vector<double> rows, times;
+    for (int frame = 0; frame < kFrames; ++frame) {
+      rows.insert(rows.end(), {1, 1, frame - 0.5, 1});
+      times.push_back(frame);
+    }
+    testing::write_hdf5(
+        folder_ / "clip.h5",
+        {{"davis/left/events", {{kFrames, 4}, rows}},
+         {"davis/left/image_raw", {{kFrames, 3, 4}, std::vector<std::uint8_t>(kFrames * 12)}},
+         {"davis/left/image_raw_ts", {{kFrames}, times}}});
+    return R"("dataset": "recording", "root": "clip.h5")";
+  }
+
+  std::string generator() const {
+    if (GetParam() == GeneratorKind::kNetwork) return R"("weights": "untrained:1")";
+    return "\"kind\": \"" + std::string(to_string(GetParam())) + "\"";
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_P(ConvertMemory, DoesNotGrowWithTheSamples) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizers keep what is freed";
+#endif
+  const JobManifest manifest = parse_job_manifest(
+      R"({ "format": "eventgan-manifest", "version": 1, "name": "job",
+           "sources": [{ )" +
+          write_source() + R"( }],
+           "image": { "width": 160, "height": 120 },
+           "generator": { )" +
+          generator() + R"( },
+           "output": { "directory": "out", "samples_per_shard": 20 } })",
+      folder_.path(), "manifest.json");
+  const LoadedGenerator loaded = load_generator(manifest);
+  ConversionOptions options;
+  options.output = folder_ / "out";
+  options.threads = 2;
+  if (!restart_peak_memory()) GTEST_SKIP() << "the kernel keeps the peak";
+  ASSERT_EQ(convert(manifest, *loaded.generator, loaded.weights_hash, options).written, 80);
+  const auto peak = [&](int shard) {
+    const std::string name = "job-train-0000" + std::to_string(shard) + "-of-00004.json";
+    return parse_marker(testing::read_file(folder_ / "out" / name), name).peak_bytes;
+  };
+  constexpr std::int64_t kVolume = 18 * 160 * 120 * sizeof(float);
+  ASSERT_GT(peak(0), 0);
+  // 60 samples more. A few more may have been under way at once.
+  EXPECT_LT(peak(3) - peak(0), 20 * kVolume);
+}
+
+INSTANTIATE_TEST_SUITE_P(OfEachKind, ConvertMemory,
+                         ::testing::Values(GeneratorKind::kNetwork, GeneratorKind::kDifference,
+                                           GeneratorKind::kEsim, GeneratorKind::kEvents),
+                         [](const auto& kind) { return std::string(to_string(kind.param)); });
 
 }  // namespace
 }  // namespace eventgan

@@ -108,10 +108,26 @@ TEST(MeasureTrial, LeavesOutPairsThatFail) {
   const testing::TemporaryFolder folder;
   const JobManifest manifest = testing::make_small_job(folder, 3);
   const PlannedJob job = make_plan(manifest, "w", "e");
-  testing::write_file(folder / "clip" / "f_12.png", "");
+  testing::write_file(folder / "clip" / "f_11.png", "");  // of both pairs
   const TrialEstimate estimate = measure_trial(manifest, job, testing::FakeGenerator(), 2);
   EXPECT_EQ(estimate.pairs_measured, 0);
   EXPECT_EQ(estimate.seconds, 0);
+}
+
+TEST(MeasureTrial, TakesTheFirstPairWhereNoOtherCanBeTried) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 3);
+  const PlannedJob job = make_plan(manifest, "w", "e");
+  testing::write_file(folder / "clip" / "f_12.png", "");  // of the second
+  const TrialEstimate estimate = measure_trial(manifest, job, testing::FakeGenerator(), 2);
+  EXPECT_EQ(estimate.pairs_measured, 1);
+  EXPECT_GT(estimate.seconds, 0);
+  EXPECT_GT(estimate.stored_bytes, 0);
+
+  const testing::TemporaryFolder one;
+  const JobManifest lone = testing::make_small_job(one, 2);
+  const PlannedJob lone_job = make_plan(lone, "w", "e");
+  EXPECT_EQ(measure_trial(lone, lone_job, testing::FakeGenerator(), 2).pairs_measured, 1);
 }
 
 }  // namespace

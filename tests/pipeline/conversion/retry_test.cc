@@ -9,6 +9,7 @@
 #include <map>
 #include <optional>
 #include <sstream>
+#include <stdexcept>
 
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
@@ -28,9 +29,11 @@ namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
 
 /// 12 frames, so 11 pairs in shards of 4, 4 and 3; pair k is of the frames k and k + 1.
 class Retry : public ::testing::Test {
@@ -384,6 +387,47 @@ TEST_F(Retry, ARequestToStopStartsNoShard) {
   EXPECT_EQ(shards("out"), before);
   options_ = {.threads = 2, .grace_s = 20, .since_stop_request = {}, .make_progress = {}};
   EXPECT_EQ(again().mended, 2);
+}
+
+TEST_F(Retry, OfTwoAtOnceTheSecondIsRefused) {
+  spoil(5);
+  run();
+  mend(5);
+  const RunOptions others = options_;
+  options_.make_progress = [&](std::int64_t) {
+    EXPECT_THAT([&] { retry(out_, manifest_, generator_, "weights", others); },
+                ThrowsMessage<std::runtime_error>(
+                    AllOf(HasSubstr("no other retry"), HasSubstr(out_.string()))));
+    return nullptr;
+  };
+  EXPECT_EQ(again().mended, 2);
+  expect_sound();
+}
+
+/// Where the file system knows no locks, another retry may get between the first look and the work.
+TEST_F(Retry, WhatAnotherHasMendedMeanwhileStays) {
+  spoil(1);  // pairs 0 and 1, of the first shard
+  spoil(5);  // of the second
+  run();
+  mend(1);
+  mend(5);
+  fs::copy(out_, folder_ / "other", fs::copy_options::recursive);
+  EXPECT_EQ(retry(folder_ / "other", manifest_, generator_, "weights", options_).mended, 4);
+  std::atomic<bool> is_first = true;
+  options_.since_stop_request = [&]() -> std::optional<double> {
+    if (is_first.exchange(false)) {
+      for (const char* name : {"job-train-00000-of-00003.h5", "job-train-00000-of-00003.json"}) {
+        fs::copy(folder_ / "other" / name, out_ / name, fs::copy_options::overwrite_existing);
+      }
+    }
+    return std::nullopt;
+  };
+  const RetryReport report = again();
+  EXPECT_EQ(report.mended, 2);
+  EXPECT_EQ(report.quarantined, 0);
+  EXPECT_EQ(report.shards_rewritten, 1);
+  EXPECT_EQ(shards("out"), shards("other"));
+  expect_sound();
 }
 
 TEST_F(Retry, ShowsProgress) {

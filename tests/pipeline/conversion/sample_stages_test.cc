@@ -175,6 +175,21 @@ TEST_F(CameraStagesTest, GeometryIsThatOfFrames) {
   EXPECT_EQ(message.sample.labels.boxes.at(0).clipped, (Rectangle{2, 2, 6, 4}));
 }
 
+TEST_F(CameraStagesTest, TimeRunsOverTheWindowWhateverACropLeaves) {
+  manifest_.image.size = shard_.volume_size = {2, 2};  // a column less on either side
+  manifest_.image.fit = ImageFit::kCrop;
+  camera_->window = {{0, 0, 1, true}, {1, 1, 2, true}, {2, 0, 2.5, false}, {3, 1, 5, true}};
+  const SampleMessage message = run();
+  ASSERT_FALSE(message.failed()) << message.sample.fault;
+  // t* = 8 (t - 1) / 4: 2 at 2 s, 3 at 2.5 s.
+  std::vector<float> expected(18 * 4, 0.0f);
+  expected[2 * 4 + 2] = 1;        // positive, row 1, column 1 - 1
+  expected[(9 + 3) * 4 + 1] = 1;  // negative, row 0, column 2 - 1
+  EXPECT_EQ(volume(message), expected);
+  EXPECT_EQ(message.sample.pair.previous.time_s, 1);
+  EXPECT_EQ(message.sample.pair.next.time_s, 5);
+}
+
 TEST_F(CameraStagesTest, NormalisesAsItDoesGeneratedVolumes) {
   manifest_.volume.normalize = Normalization::kEta98;
   camera_->window = {{0, 0, 1, true}, {0, 0, 1, true}, {1, 0, 1, true}};

@@ -202,14 +202,27 @@ TEST_F(ShardRewriteTest, OneThatIsGivenUpLeavesTheShardAsItWas) {
   EXPECT_EQ(marker(), before_);
 }
 
-TEST_F(ShardRewriteTest, AMarkerThatCannotBeWrittenPutsTheShardBack) {
+TEST_F(ShardRewriteTest, WhatAnotherHasPutInItsPlaceMeanwhileStays) {
   ShardRewrite rewrite(folder_.path(), before_);
   rewrite.redo(0, message(whole_, 0));
-  std::filesystem::remove(marker_file());
-  std::filesystem::create_directory(marker_file());  // no file can be renamed to it
-  EXPECT_THROW(rewrite.commit(), std::runtime_error);
+  const ShardMarker others = write_shard(folder_.path(), whole_);
+  testing::write_file(marker_file(), to_json(others));
+  const std::string bytes = testing::read_file(shard());
+  EXPECT_THAT([&] { rewrite.commit(); },
+              ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr(shard().string())));
+  EXPECT_EQ(testing::read_file(shard()), bytes);
+  EXPECT_EQ(marker(), others);
+}
+
+TEST_F(ShardRewriteTest, OneWhoseMarkerIsGoneIsLeftAsItIs) {
+  {
+    ShardRewrite rewrite(folder_.path(), before_);
+    rewrite.redo(0, message(whole_, 0));
+    std::filesystem::remove(marker_file());
+    EXPECT_THROW(rewrite.commit(), std::runtime_error);
+  }
   EXPECT_EQ(testing::read_file(shard()), bytes_before_);
-  EXPECT_EQ(files(), 2);
+  EXPECT_EQ(files(), 1);
 }
 
 }  // namespace

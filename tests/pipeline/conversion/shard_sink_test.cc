@@ -162,7 +162,7 @@ class ShardSinkTest : public ::testing::Test {
     manifest_.volume.bins = kShape.bins;
     datasets_.push_back(std::make_unique<testing::FakeDataset>("clip", 0));
     frozen_.hash = std::string(64, 'a');
-    for (const char* name : {"a.h5", "b.h5"}) {
+    for (const char* name : {"job-a-00000-of-00001.h5", "job-b-00000-of-00001.h5"}) {
       frozen_.plan.shards.push_back({name, 0, kShape.size, std::vector<PlannedSample>(2)});
     }
   }
@@ -200,7 +200,7 @@ class ShardSinkTest : public ::testing::Test {
   RunOptions options_;
   const ConversionJob job_{manifest_,      datasets_, generator_, weights_,
                            folder_.path(), frozen_,   options_};
-  SharedFolder shared_{folder_.path(), std::string(64, 'a'), {}};
+  SharedFolder shared_{folder_.path(), std::string(64, 'a'), {}, std::chrono::seconds(0)};
   std::optional<ShardSink> sink_;
 };
 
@@ -213,12 +213,14 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_TRUE(accept(b, 0));
   EXPECT_TRUE(accept(b, 1));
   EXPECT_FALSE(sink_->closed());
-  EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json", "b.h5", "b.json"));
+  EXPECT_THAT(names_in(folder_.path()),
+              ElementsAre("job-a-00000-of-00001.h5", "job-a-00000-of-00001.json",
+                          "job-b-00000-of-00001.h5", "job-b-00000-of-00001.json"));
   ASSERT_EQ(sink_->committed().size(), 2u);
   const ShardMarker& marker = sink_->committed()[0].marker;
   EXPECT_EQ(sink_->committed()[0].shard, &a);
-  EXPECT_EQ(parse_marker(testing::read_file(folder_ / "a.json"), "a"), marker);
-  EXPECT_EQ(marker.sha256, sha256_of_file(folder_ / "a.h5"));
+  EXPECT_EQ(parse_marker(testing::read_file(folder_ / "job-a-00000-of-00001.json"), "a"), marker);
+  EXPECT_EQ(marker.sha256, sha256_of_file(folder_ / "job-a-00000-of-00001.h5"));
   EXPECT_EQ(marker.valid, 1);
   EXPECT_EQ(marker.quarantined.at(0).slot, 1);
   EXPECT_EQ(marker.contents.boxes, (std::vector<std::int32_t>{0, 0}));
@@ -228,19 +230,23 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
   EXPECT_GT(marker.peak_bytes, 1 << 20);
 }
 
-TEST_F(ShardSinkTest, AClaimStandsUntilTheFileItselfIsThere) {
+TEST_F(ShardSinkTest, AClaimStandsUntilTheShardIsThereAndTellsOfItsSamples) {
   open_sink();
   const PlannedShard& a = frozen_.plan.shards[0];
   EXPECT_EQ(shared_.look_at(a), ShardActivity::kFree);
   const auto claim = names_in(folder_.path());
+  ASSERT_EQ(claim.size(), 1u);
   accept(a, 0);
-  const auto file = names_in(folder_.path());
-  EXPECT_EQ(file.size(), 1u);
-  EXPECT_NE(file, claim);
+  EXPECT_EQ(names_in(folder_.path()).size(), 2u);
+  EXPECT_EQ(testing::read_file(folder_ / claim[0]), "1");
+  accept(a, 1);
+  EXPECT_THAT(names_in(folder_.path()),
+              ElementsAre("job-a-00000-of-00001.h5", "job-a-00000-of-00001.json"));
 }
 
 TEST_F(ShardSinkTest, AbandonedLeavesNothing) {
   open_sink();
+  EXPECT_EQ(shared_.look_at(frozen_.plan.shards[0]), ShardActivity::kFree);
   accept(frozen_.plan.shards[0], 0);
   sink_->abandon();
   EXPECT_THAT(names_in(folder_.path()), IsEmpty());
@@ -285,12 +291,13 @@ TEST_F(ShardSinkTest, AFileLostUnderWayIsAnErrorUnlessAnotherHasMadeTheShard) {
   marker.size_bytes = 4;
   marker.samples = marker.valid = 2;
   marker.contents.boxes = marker.contents.persons = {0, 0};
-  testing::write_file(folder_ / "a.h5", "made");
-  testing::write_file(folder_ / "a.json", to_json(marker));
+  testing::write_file(folder_ / "job-a-00000-of-00001.h5", "made");
+  testing::write_file(folder_ / "job-a-00000-of-00001.json", to_json(marker));
   EXPECT_FALSE(accept(a, 1));
   EXPECT_THAT(sink_->committed(), IsEmpty());
-  EXPECT_THAT(names_in(folder_.path()), ElementsAre("a.h5", "a.json"));
-  EXPECT_EQ(testing::read_file(folder_ / "a.h5"), "made");
+  EXPECT_THAT(names_in(folder_.path()),
+              ElementsAre("job-a-00000-of-00001.h5", "job-a-00000-of-00001.json"));
+  EXPECT_EQ(testing::read_file(folder_ / "job-a-00000-of-00001.h5"), "made");
   EXPECT_TRUE(accept(frozen_.plan.shards[1], 0));  // and goes on
 }
 

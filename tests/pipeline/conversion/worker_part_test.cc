@@ -288,15 +288,28 @@ class SharedFolderTest : public ::testing::Test {
   PlannedShard shard_{"job-train-00000-of-00001.h5", 0, {1, 1}, {}};
 };
 
-TEST_F(SharedFolderTest, AFreeShardIsClaimedUntilItIsOpened) {
+TEST_F(SharedFolderTest, AFreeShardIsClaimedUntilItIsReleased) {
   SharedFolder shared(folder_.path(), "hash", {});
   EXPECT_EQ(shared.look_at(shard_), ShardActivity::kFree);
   const auto names = testing::names_in(folder_.path());
   ASSERT_EQ(names.size(), 1u);
   EXPECT_EQ(parse_temporary_name(names[0])->target, shard_.name);
-  shared.opened(shard_);
+  shared.release(shard_);
   EXPECT_THAT(testing::names_in(folder_.path()), IsEmpty());
-  shared.opened(shard_);  // once more, or without a claim, is nothing
+  shared.release(shard_);  // once more, or without a claim, is nothing
+}
+
+TEST_F(SharedFolderTest, TheClaimTellsHowManySamplesAreWritten) {
+  SharedFolder shared(folder_.path(), "hash", {}, std::chrono::seconds(0));
+  shared.tell(shard_, 1);  // nothing, without a claim
+  ASSERT_EQ(shared.look_at(shard_), ShardActivity::kFree);
+  const auto claim = folder_ / testing::names_in(folder_.path()).at(0);
+  EXPECT_EQ(testing::read_file(claim), "");
+  shared.tell(shard_, 12);
+  EXPECT_EQ(testing::read_file(claim), "12");
+  std::filesystem::remove(claim);  // as others do where its worker seems dead
+  EXPECT_NO_THROW(SharedFolder(folder_.path(), "hash", {}).tell(shard_, 13));
+  EXPECT_THAT(testing::names_in(folder_.path()), IsEmpty());
 }
 
 TEST_F(SharedFolderTest, ClaimsEndWithTheWorker) {

@@ -5,6 +5,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "manifests/values/faults.h"
 #include "tests/pipeline/folder/converted_folder.h"
 
 namespace eventgan {
@@ -12,6 +13,7 @@ namespace {
 
 using testing::ConvertedFolder;
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
 using testing::parts_of;
 
 TEST(DatasetCounts, AddUp) {
@@ -197,6 +199,29 @@ TEST(DatasetDescription, AmendmentsAreTold) {
   EXPECT_EQ(
       text["amendments"],
       nlohmann::json::array({{{"fields", {{"annotations", "4567"}}}, {"samples", {"000002"}}}}));
+}
+
+TEST(DatasetDescription, BeforeThereIsAViewItIsTheSameWithoutIt) {
+  const ConvertedFolder folder(2);
+  nlohmann::json text = description_of(folder);
+  EXPECT_EQ(text.erase("view"), 1u);
+  EXPECT_EQ(nlohmann::json::parse(describe_dataset(read_dataset_parts(folder.path()))), text);
+}
+
+TEST(DatasetText, TellsAPersonWhatThereIs) {
+  // Two shards of the example: 5 samples, one in quarantine, 3 boxes, 3 persons each.
+  const std::string text = dataset_text(read_dataset_parts(ConvertedFolder(2).path()));
+  for (const char* part :
+       {"2 of 4 done", "samples        10, 2 of them quarantined, 6 boxes, 6 persons",
+        "split val: samples 5, 1 of them quarantined, 3 boxes, 3 persons", "6 x 8",
+        "2: 10 (frames: samples)", "Car: 4, DontCare: 2",
+        "demo-val-00000-of-00001.h5, samples 5, 1 of them quarantined"}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+}
+
+TEST(DatasetText, WithoutAShardThereIsNothingToTell) {
+  EXPECT_THROW(read_dataset_parts(ConvertedFolder(0).path()), InputError);
 }
 
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {

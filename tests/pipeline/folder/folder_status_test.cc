@@ -52,6 +52,10 @@ TEST(WorkerRate, WhatIsLongPastDoesNotCount) {
   EXPECT_DOUBLE_EQ(*worker_rate(records, 20), 10);  // the last 60: 20 of 2 and 40 of 10 a second
 }
 
+constexpr char kA[] = "job-train-00000-of-00003.h5";
+constexpr char kB[] = "job-train-00001-of-00003.h5";
+constexpr char kC[] = "job-train-00002-of-00003.h5";
+
 /// A folder with a plan of three shards of two samples each, and whatever a test puts beside it.
 class FolderStatusTest : public ::testing::Test {
  protected:
@@ -59,7 +63,7 @@ class FolderStatusTest : public ::testing::Test {
     Plan plan;
     plan.name = "job";
     plan.sources.resize(1);
-    for (const char* name : {"a.h5", "b.h5", "c.h5"}) {
+    for (const char* name : {kA, kB, kC}) {
       PlannedShard shard{name, 0, {2, 2}, {}};
       for (const char* sample : {"0", "1"}) {
         shard.samples.push_back({name + std::string(sample), "", "", {{"p"}, {"n"}, 1, 0, 1}, ""});
@@ -88,8 +92,8 @@ class FolderStatusTest : public ::testing::Test {
 
   /// Parent and grandparent live as long as this process.
   void write_temporary(const std::string& target, const std::string& host, pid_t pid,
-                       unsigned attempt = 0) {
-    testing::write_file(folder_ / to_string(TemporaryName{target, host, pid, attempt}), "");
+                       unsigned attempt = 0, const std::string& text = "") {
+    testing::write_file(folder_ / to_string(TemporaryName{target, host, pid, attempt}), text);
   }
 
   FolderStatus status() const { return folder_status(folder_.path()); }
@@ -116,7 +120,7 @@ TEST_F(FolderStatusTest, AtTheBeginningEverythingIsMissing) {
 }
 
 TEST_F(FolderStatusTest, AtTheEndNothingIsLeft) {
-  for (const char* shard : {"a.h5", "b.h5", "c.h5"}) commit(shard, 1);
+  for (const char* shard : {kA, kB, kC}) commit(shard, 1);
   const FolderStatus now = status();
   EXPECT_TRUE(now.complete());
   EXPECT_EQ(now.samples_written, 6);
@@ -124,20 +128,40 @@ TEST_F(FolderStatusTest, AtTheEndNothingIsLeft) {
   EXPECT_THAT(now.damaged, IsEmpty());
 }
 
+TEST_F(FolderStatusTest, SamplesOfShardsUnderWayAreThoseThatTheirWritersTell) {
+  commit(kA, 4);
+  write_temporary(kA, host_name(), ::getppid(), 0, "2");  // just committed: they count once
+  write_temporary(kB, host_name(), ::getppid(), 0, "1");
+  write_temporary(kB, host_name(), ::getppid(), 1, "\x89HDF, the shard itself");
+  FolderStatus now = status();
+  EXPECT_EQ(now.samples_written, 2);
+  EXPECT_EQ(now.samples_under_way, 1);
+  EXPECT_EQ(now.seconds_left(), 3 / (2 / 4.0));
+  write_temporary(kB, "node7-1", 4242, 0, "2");  // two at one shard: the farther one counts
+  write_temporary(kC, "node7-1", 4242, 0, "");
+  now = status();
+  EXPECT_EQ(now.samples_under_way, 2);
+  for (const char* nonsense : {"-1", "99", "1 ", "12345678901"}) {
+    write_temporary(kC, "node7-1", 4242, 0, nonsense);
+    EXPECT_LE(status().samples_under_way, 2 + 2) << nonsense;
+    EXPECT_GE(status().samples_under_way, 2) << nonsense;
+  }
+}
+
 TEST_F(FolderStatusTest, TheRateIsThatOfEveryoneAtWork) {
-  commit("a.h5", 4, {{1, "a1", "expected a picture, got none, in x.png"}});
-  write_temporary("b.h5", host_name(), ::getppid());
-  write_temporary("c.h5", "node7-1", 4242);
+  commit(kA, 4, {{1, "a1", "expected a picture, got none, in x.png"}});
+  write_temporary(kB, host_name(), ::getppid());
+  write_temporary(kC, "node7-1", 4242);
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_done, 1);
   EXPECT_EQ(now.shards_running, 2);
   EXPECT_EQ(now.shards_missing(), 0);
   EXPECT_EQ(now.samples_written, 1);
   ASSERT_EQ(now.quarantined.size(), 1u);
-  EXPECT_EQ(now.quarantined[0].shard, "a.h5");
+  EXPECT_EQ(now.quarantined[0].shard, kA);
   EXPECT_EQ(now.quarantined[0].slot, 1);
   ASSERT_EQ(now.running.size(), 2u);
-  EXPECT_EQ(now.running[0].shard, "b.h5");
+  EXPECT_EQ(now.running[0].shard, kB);
   EXPECT_EQ(now.running[0].file.writer, WriterLife::kAlive);
   EXPECT_EQ(now.running[1].file.name.host, "node7-1");
   EXPECT_EQ(now.running[1].file.writer, WriterLife::kUnknown);
@@ -146,16 +170,16 @@ TEST_F(FolderStatusTest, TheRateIsThatOfEveryoneAtWork) {
 }
 
 TEST_F(FolderStatusTest, TheRateIsUnknownBeforeTheFirstShard) {
-  write_temporary("b.h5", "node7-1", 4242);
+  write_temporary(kB, "node7-1", 4242);
   EXPECT_FALSE(status().pairs_per_second());
   EXPECT_FALSE(status().seconds_left());
 }
 
 TEST_F(FolderStatusTest, AWorkerIsCountedOnceHoweverManyFilesItHas) {
   write_temporary("a.json", "node7-1", 4242, 1);
-  write_temporary("a.h5", "node7-1", 4242, 0);
-  write_temporary("b.h5", "node7-1", 4242, 2);
-  write_temporary("a.h5", "node8-1", 4242, 0);
+  write_temporary(kA, "node7-1", 4242, 0);
+  write_temporary(kB, "node7-1", 4242, 2);
+  write_temporary(kA, "node8-1", 4242, 0);
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_running, 2);
   EXPECT_EQ(now.running.size(), 3u);
@@ -166,7 +190,7 @@ TEST_F(FolderStatusTest, DeadWritersLeaveRemainders) {
   const pid_t dead = ::fork();
   if (dead == 0) ::_exit(0);
   ::waitpid(dead, nullptr, 0);
-  write_temporary("a.h5", host_name(), dead);
+  write_temporary(kA, host_name(), dead);
   write_temporary("plan.json", host_name(), dead);
   write_temporary("run.json", "node7-1", 4242);  // neither a shard's nor a remainder
   const FolderStatus now = status();
@@ -174,33 +198,33 @@ TEST_F(FolderStatusTest, DeadWritersLeaveRemainders) {
   EXPECT_EQ(now.shards_missing(), 3);
   EXPECT_THAT(now.running, IsEmpty());
   ASSERT_EQ(now.left_over.size(), 2u);
-  EXPECT_EQ(now.left_over[0].name.target, "a.h5");
+  EXPECT_EQ(now.left_over[0].name.target, kA);
   EXPECT_EQ(now.left_over[1].name.target, "plan.json");
 }
 
 TEST_F(FolderStatusTest, NamesWhatIsDamagedAndCountsItAsMissing) {
-  commit("a.h5");
-  testing::write_file(folder_ / "a.h5", "123");
-  testing::write_file(folder_ / "b.h5", "12345");
+  commit(kA);
+  testing::write_file(folder_ / kA, "123");
+  testing::write_file(folder_ / kB, "12345");
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_missing(), 3);
-  EXPECT_THAT(now.damaged, ElementsAre(HasSubstr((folder_ / "a.").string()),
-                                       HasSubstr((folder_ / "b.").string())));
+  EXPECT_THAT(now.damaged,
+              ElementsAre(HasSubstr((folder_ / kA).string()), HasSubstr((folder_ / kB).string())));
 }
 
 TEST_F(FolderStatusTest, WhatIsMadeAgainIsRunning) {
-  testing::write_file(folder_ / "b.h5", "12345");
-  write_temporary("b.json", "node7-1", 4242);
+  testing::write_file(folder_ / kB, "12345");
+  write_temporary(marker_name(kB), "node7-1", 4242);
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_running, 1);
   EXPECT_THAT(now.damaged, IsEmpty());
 }
 
 TEST_F(FolderStatusTest, ACommitUnderWayIsNoDamage) {
-  testing::write_file(folder_ / "b.h5", "12345");
+  testing::write_file(folder_ / kB, "12345");
   std::jthread committer([this] {
     std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    commit("b.h5");
+    commit(kB);
   });
   const FolderStatus now = status();
   EXPECT_THAT(now.damaged, IsEmpty());
@@ -222,6 +246,7 @@ FolderStatus half_done() {
   status.shards_running = 2;
   status.samples_planned = 1000;
   status.samples_written = 397;
+  status.samples_under_way = 100;
   status.running = {{"a-00004.h5", file("a-00004.h5", 7, WriterLife::kAlive, 2)},
                     {"a-00005.h5", file("a-00005.h5", 4242, WriterLife::kUnknown, 200)}};
   status.left_over = {file("a-00006.h5", 5, WriterLife::kDead, 9000)};
@@ -249,8 +274,8 @@ TEST(StatusText, TellsWhereARunStands) {
             "folder   /data/out\n"
             "plan     cccccccccccccccc\n"
             "shards   4 of 10 done, 2 running, 4 missing (1 of them damaged)\n"
-            "samples  397 of 1000 written, 3 quarantined\n"
-            "work     2 processes are at work, 5 pairs/s, about 2m00s left\n"
+            "samples  397 of 1000 written, 100 more in shards under way, 3 quarantined\n"
+            "work     2 processes are at work, 5 pairs/s, about 1m40s left\n"
             "running\n"
             "  a-00004.h5  node7-1  pid 7     alive    last wrote 2s ago\n"
             "  a-00005.h5  node7-1  pid 4242  unknown  last wrote 3m20s ago\n"
@@ -261,6 +286,13 @@ TEST(StatusText, TellsWhereARunStands) {
             "quarantined (eventgan retry makes them once their inputs are mended)\n"
             "  2  expected 15 columns, got 5 (first: y, a-00001.h5 slot 8)\n"
             "  1  expected a picture, got none (x, a-00000.h5 slot 3)\n");
+}
+
+TEST(StatusText, TellsOfAFileThatIsDatedAhead) {
+  FolderStatus status = half_done();
+  status.left_over = {file("a-00006.h5", 5, WriterLife::kUnknown, -9000)};
+  EXPECT_THAT(status_text(status),
+              HasSubstr("  .a-00006.h5.node7-1.5.0.tmp  unknown  dated 2h30m ahead\n"));
 }
 
 TEST(StatusText, SaysWhatItDoesNotKnow) {
@@ -299,7 +331,8 @@ TEST(StatusJson, HasEverything) {
   EXPECT_EQ(json["shards"],
             nlohmann::json::parse(R"({"planned": 10, "done": 4, "running": 2, "missing": 4})"));
   EXPECT_EQ(json["samples"],
-            nlohmann::json::parse(R"({"planned": 1000, "written": 397, "quarantined": 3})"));
+            nlohmann::json::parse(
+                R"({"planned": 1000, "written": 397, "under_way": 100, "quarantined": 3})"));
   EXPECT_EQ(json["running"][0], nlohmann::json::parse(R"({"shard": "a-00004.h5", "host": "node7-1",
       "pid": 7, "silent_s": 2.0, "writer": "alive"})"));
   EXPECT_EQ(json["left_over"][0],
@@ -312,7 +345,7 @@ TEST(StatusJson, HasEverything) {
   EXPECT_EQ(json["quarantined"][2], nlohmann::json::parse(R"({"sample_id": "z",
       "shard": "a-00002.h5", "slot": 0, "reason": "expected 15 columns, got 5, in z.txt"})"));
   EXPECT_EQ(json["pairs_per_second"], 5);
-  EXPECT_EQ(json["seconds_left"], 120);
+  EXPECT_EQ(json["seconds_left"], 100);
 }
 
 TEST(StatusJson, IsNullWhereUnknown) {

@@ -239,21 +239,143 @@ TEST(ReadFrozenOutline, IsThePlanWithoutItsSamples) {
 
 TEST(DiscardOutput, RemovesWhatThePlanNamesAndNothingElse) {
   const TemporaryFolder folder;
-  discard_output(folder.path());  // nothing there
+  const auto discard = [&] { discard_output(folder.path(), plan("v").fingerprint, "/jobs"); };
+  discard();  // nothing there
   freeze_plan(folder.path(), plan("w"));
   for (const char* name : {kShard, "job-train-00000-of-00001.json", "mine.h5", "dataset.json",
                            "dataset.h5", "amendments.json"}) {
     write_file(folder / name, "x");
   }
-  discard_output(folder.path());
+  discard();
   EXPECT_THAT(names_in(folder.path()), ElementsAre("mine.h5"));
+}
+
+TEST(DiscardOutput, BelievesNoNameThatAPlanDoesNotGive) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"mine.h5", "../job-train-00000-of-00001.h5", "out/mine.h5",
+                                 "mine.h5\\u0000-train-00000-of-00001.h5"}) {
+    for (const char* file : {"mine.h5", "mine.json", kShard, "out/mine.h5"}) {
+      write_file(folder / "job" / file, "mine");
+    }
+    for (const char* file : {kShard, "job-train-00000-of-00001.json"}) {
+      write_file(folder / file, "mine");
+    }
+    const std::string text = to_json(plan("w"));
+    const std::size_t at = text.find(kShard);
+    write_file(folder / "job/plan.json", std::string(text).replace(at, sizeof kShard - 1, name));
+    EXPECT_THAT([&] { read_frozen_outline(folder / "job"); },
+                ThrowsMessage<std::runtime_error>(HasSubstr("plan.json")));
+    discard_output(folder / "job", plan("w").fingerprint, "/jobs");
+    EXPECT_THAT(names_in(folder / "job"), ElementsAre(kShard, "mine.h5", "mine.json", "out"));
+    EXPECT_TRUE(fs::exists(folder / "job/out/mine.h5"));
+    EXPECT_THAT(names_in(folder.path()),
+                ElementsAre("job", kShard, "job-train-00000-of-00001.json"));
+  }
 }
 
 TEST(DiscardOutput, OfADamagedPlanLeavesTheShardsItCannotName) {
   const TemporaryFolder folder;
   for (const char* name : {"plan.json", kShard, "dataset.json"}) write_file(folder / name, "x");
-  discard_output(folder.path());
+  discard_output(folder.path(), plan("w").fingerprint, "/jobs");
   EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard));
+}
+
+/// A folder with the shard of a job over the clip FOLDER/a/clip, and the plans of others.
+class DiscardOutputOfAnotherJob : public ::testing::Test {
+ protected:
+  DiscardOutputOfAnotherJob() {
+    fs::create_directories(out_);
+    fs::create_directories(folder_ / "a/clip");
+    fs::create_directories(folder_ / "b/clip");
+    mine_.fingerprint["manifest $.name"] = R"("job")";
+    mine_.fingerprint["manifest $.seed"] = "7";
+    mine_.fingerprint["frames"] = "theirs";
+    mine_.fingerprint["manifest $.sources[0].dataset"] = R"("frames")";
+    mine_.fingerprint["manifest $.sources[0].root"] = R"("clip")";
+    mine_.fingerprint["manifest $.sources[0].pairs.gaps[0]"] = "1";
+    freeze_plan(out_, mine_);
+    JobManifest manifest;
+    manifest.directory = folder_ / "a";
+    record_manifest_folder(out_, manifest);
+    write_file(out_ / kShard, "x");
+  }
+
+  Plan with(const std::string& field, const std::string& value) const {
+    Plan other = mine_;
+    other.fingerprint[field] = value;
+    return other;
+  }
+
+  /// What both ways to the folder say, after which all is as it was.
+  void expect_refused(const Plan& other, const std::string& where, const std::string& text) const {
+    const auto before = names_in(out_);
+    const fs::path manifest_folder = folder_ / where;
+    const auto refused = ThrowsMessage<UsageError>(
+        AllOf(HasSubstr("got that of another, \"job\", in " + out_.string()),
+              HasSubstr("choose another output folder, or remove that one yourself"),
+              HasSubstr(text), Not(HasSubstr("--overwrite"))));
+    EXPECT_THAT([&] { discard_output(out_, other.fingerprint, manifest_folder); }, refused);
+    if (other.fingerprint != mine_.fingerprint) {
+      EXPECT_THAT([&] { freeze_plan(out_, other, {}, manifest_folder); }, refused);
+    }
+    EXPECT_EQ(names_in(out_), before);
+  }
+
+  void expect_discarded(const Plan& other, const fs::path& manifest_folder) {
+    discard_output(out_, other.fingerprint, manifest_folder);
+    EXPECT_THAT(names_in(out_), ElementsAre("run.json"));
+  }
+
+  TemporaryFolder folder_;
+  const fs::path out_ = folder_ / "out";
+  Plan mine_ = plan("w");
+};
+
+TEST_F(DiscardOutputOfAnotherJob, IsRefused) {
+  expect_refused(with("manifest $.name", R"("other")"), "a", R"(.name: expected "job", got "oth)");
+  expect_refused(with("manifest $.sources[0].root", R"("../b/clip")"), "a", "sources[0].root: ");
+  expect_refused(with("manifest $.sources[0].split", R"("val")"), "a", "sources[0].split: ");
+  expect_refused(with("manifest $.sources[1].root", R"("clip")"), "a", "sources[1].root: ");
+  expect_refused(with("limit", "20"), "a", "limit: expected nothing, got 20");
+}
+
+TEST_F(DiscardOutputOfAnotherJob, IsToldByWhereItsFramesLie) {
+  expect_refused(
+      mine_, "b",
+      "root: expected " + (folder_ / "a/clip").string() + ", got " + (folder_ / "b/clip").string());
+  expect_discarded(with("manifest $.sources[0].root", R"("../a/./clip")"), folder_ / "b");
+}
+
+TEST_F(DiscardOutputOfAnotherJob, IsTheSameWhereItsFramesWereMoved) {
+  fs::remove_all(folder_ / "b");
+  fs::rename(folder_ / "a", folder_ / "b");
+  EXPECT_THROW(discard_output(out_, with("frames", "others").fingerprint, folder_ / "b"),
+               UsageError);  // a job of another folder, whose own is not mounted
+  expect_discarded(mine_, folder_ / "b");
+}
+
+TEST_F(DiscardOutputOfAnotherJob, IsToldByItsFramesWhereNothingSaysWhereTheyLie) {
+  fs::remove(out_ / "run.json");
+  EXPECT_THROW(discard_output(out_, with("frames", "others").fingerprint, folder_ / "a"),
+               UsageError);
+  EXPECT_NO_THROW(discard_output(out_, mine_.fingerprint, folder_ / "a"));
+}
+
+TEST_F(DiscardOutputOfAnotherJob, IsTheSameWithOtherSettings) {
+  Plan other = with("manifest $.seed", "8");
+  other.fingerprint["manifest $.sources[0].pairs.gaps[0]"] = "2";
+  other.fingerprint["weights"] = "v";
+  EXPECT_THAT([&] { freeze_plan(out_, other, {}, folder_ / "a"); },
+              ThrowsMessage<UsageError>(HasSubstr("--overwrite starts again")));
+  expect_discarded(other, folder_ / "a");
+}
+
+TEST_F(DiscardOutputOfAnotherJob, IsToldByADamagedPlanToo) {
+  std::string text = read_file(out_ / "plan.json");
+  write_file(out_ / "plan.json", text.substr(0, text.size() / 2));
+  Plan other = with("manifest $.name", R"("other")");
+  EXPECT_THROW(discard_output(out_, other.fingerprint, folder_ / "a"), UsageError);
+  EXPECT_NO_THROW(discard_output(out_, mine_.fingerprint, folder_ / "a"));
 }
 
 TEST(RecordedManifestFolder, IsWhatWasRecorded) {
@@ -265,6 +387,19 @@ TEST(RecordedManifestFolder, IsWhatWasRecorded) {
   EXPECT_EQ(recorded_manifest_folder(folder.path()), "/data/here");
   write_file(folder / "run.json", "[1, 2");
   EXPECT_FALSE(recorded_manifest_folder(folder.path()));
+}
+
+TEST(RecordedManifestFolder, IsAnAbsolutePathOrNone) {
+  const TemporaryFolder folder;
+  for (const char* path : {R"("")", R"("here")", R"("../here")", R"("http://here")",
+                           R"("/a\u0000b")", "7", R"(["/a"])"}) {
+    write_file(folder / "run.json", R"({"manifest_folder": )" + std::string(path) + "}");
+    EXPECT_FALSE(recorded_manifest_folder(folder.path())) << path;
+  }
+  write_file(folder / "run.json", R"({"manifest_folder_bytes": [97, 255]})");
+  EXPECT_FALSE(recorded_manifest_folder(folder.path()));
+  write_file(folder / "run.json", R"({"manifest_folder_bytes": [47, 255]})");
+  EXPECT_EQ(recorded_manifest_folder(folder.path()), "/\xff");
 }
 
 }  // namespace

@@ -28,6 +28,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::ThrowsMessage;
 
 class ReadGuarded : public ::testing::Test {
@@ -40,7 +41,7 @@ class ReadGuarded : public ::testing::Test {
     marker.plan_hash = std::string(64, 'a');
     marker.sha256 = sha256_hex(bytes);
     marker.size_bytes = static_cast<std::int64_t>(bytes.size());
-    testing::write_file(folder_ / "job-00000-of-00001.json", to_json(marker));
+    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(marker));
   }
 
   /// Whether `read` runs in this very process.
@@ -57,7 +58,7 @@ class ReadGuarded : public ::testing::Test {
   }
 
   testing::TemporaryFolder folder_;
-  const std::filesystem::path shard_ = folder_ / "job-00000-of-00001.h5";
+  const std::filesystem::path shard_ = folder_ / "job-train-00000-of-00001.h5";
 };
 
 TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
@@ -71,7 +72,7 @@ TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
 
 TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {
   EXPECT_FALSE(is_trusted());
-  testing::write_file(folder_ / "job-00000-of-00001.json", "{");
+  testing::write_file(folder_ / "job-train-00000-of-00001.json", "{");
   EXPECT_FALSE(is_trusted());
   EXPECT_EQ(read_guarded(shard_, []() -> int { throw InputError("gone"); }), 66);
 }
@@ -79,6 +80,15 @@ TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {
 TEST_F(ReadGuarded, ACrashIsDamage) {
   expect_damaged([] { return ::raise(SIGSEGV); }, "Segmentation fault");
   expect_damaged([] { return ::raise(SIGABRT); }, "Aborted");
+}
+
+TEST_F(ReadGuarded, WhatEndsTheChildFromOutsideIsNoDamage) {
+  for (const int signal : {SIGKILL, SIGXCPU}) {
+    EXPECT_THAT([&] { read_apart(folder_.path(), [&] { return ::raise(signal); }); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("stopped from outside"),
+                                                        HasSubstr(folder_.path().string()),
+                                                        Not(HasSubstr("damaged")))));
+  }
 }
 
 TEST_F(ReadGuarded, ALoopWithoutEndIsDamage) {
@@ -197,10 +207,14 @@ TEST_F(Preview, OfAFolderSpreadsOverAllShards) {
 }
 
 TEST_F(Preview, FindsSamplesByTheirId) {
-  options_.sample_ids = {"f_16", "f_12"};
+  options_.samples = {"f_16", "f_12"};
   EXPECT_THAT(draw("out"), ElementsAre("job-train-00000-of-00002_0001.png",
                                        "job-train-00001-of-00002_0001.png"));
-  options_.sample_ids.push_back("f_99");
+  options_.samples = {"f_16", "1"};
+  EXPECT_THAT(draw("out/job-train-00001-of-00002.h5"),
+              ElementsAre("job-train-00001-of-00002_0001.png"))
+      << "id and slot of one sample";
+  options_.samples = {"f_12", "f_99"};
   EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<UsageError>(HasSubstr("\"f_99\"")));
 }
 

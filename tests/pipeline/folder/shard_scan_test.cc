@@ -149,7 +149,7 @@ TEST(ShardStates, AreInTheOrderOfThePlan) {
   const testing::TemporaryFolder folder;
   std::vector<ShardOutline> shards;
   for (int i = 0; i < 100; ++i) {
-    const std::string name = "job-train-" + std::to_string(i) + ".h5";
+    const std::string name = "job-train-" + std::to_string(10000 + i) + "-of-10100.h5";
     shards.push_back({name, 0, {2, 2}, 1});
     if (i % 3 == 2) continue;
     ShardMarker marker;

@@ -2,12 +2,15 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
-#include <functional>
+#include <utility>
 
 #include "manifests/documents/job_manifest.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/folder/output_folder.h"
+#include "stages/shards/shard_rows.h"
+#include "stages/shards/shard_tables.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/fake_generator.h"
 #include "tests/testing/picture_file.h"
@@ -24,75 +27,100 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-/// The example's first sample has two boxes and two persons.
-class LabelDifferences : public ::testing::Test {
+/// The example's first sample has two boxes and two persons, its last one person.
+class RowDifferences : public ::testing::Test {
  protected:
-  LabelDifferences()
-      : stored_(testing::example_shard().samples[0]),
-        source_(stored_.annotation),
-        mapped_(stored_.labels) {}
-
-  std::vector<std::string> found() const {
-    return label_differences(stored_, source_, mapped_, "labels/0.txt");
+  RowDifferences() {
+    for (const ShardSample& sample : example_.samples) {
+      append_row(example_.header, sample, stored_);
+    }
   }
 
-  ShardSample stored_;
-  Annotation source_;
-  VolumeLabels mapped_;
+  std::vector<std::string> found(const ShardSample& expected, int slot = 0) const {
+    return row_differences(example_.header, stored_, slot, expected, "labels/0.txt");
+  }
+
+  testing::ExampleShard example_ = testing::example_shard();
+  ShardTables stored_;
+  ShardSample expected_ = example_.samples[0];
 };
 
-TEST_F(LabelDifferences, AreNoneIfAllIsTheSame) {
-  EXPECT_THAT(found(), IsEmpty());
-  mapped_.boxes[0].clipped.left += 1e-9;  // another compiler's last bits
-  EXPECT_THAT(found(), IsEmpty());
-  stored_.labels.boxes[0].unclipped.right = 1e300;
-  mapped_.boxes[0].unclipped.right = 1e300 * (1 + 1e-15);
-  EXPECT_THAT(found(), IsEmpty());
+TEST_F(RowDifferences, AreNoneIfAllIsTheSame) {
+  for (const int slot : {0, 1, 3, 4}) {
+    EXPECT_THAT(found(example_.samples[static_cast<std::size_t>(slot)], slot), IsEmpty());
+  }
+  expected_.labels.boxes[0].clipped.left += 1e-12;  // another compiler's last bits
+  EXPECT_THAT(found(expected_), IsEmpty());
+  expected_.labels.boxes[0].unclipped.right = 1e300;
+  stored_.boxes.xyxy_unclipped[2] = 1e300 * (1 + 1e-15);
+  EXPECT_THAT(found(expected_), IsEmpty());
 }
 
-TEST_F(LabelDifferences, OtherBytesAreToldAlone) {
-  source_.original += "\n";
-  source_.boxes.clear();
-  EXPECT_THAT(found(),
+TEST_F(RowDifferences, OtherBytesAreToldAlone) {
+  expected_.annotation.original += "\n";
+  expected_.annotation.boxes.clear();
+  expected_.labels.boxes.clear();
+  EXPECT_THAT(found(expected_),
               ElementsAre("expected the annotation as it stands in labels/0.txt, got other bytes"));
 }
 
-TEST_F(LabelDifferences, AnnotatedNumbersMustBeTheSameExactly) {
-  source_.boxes[1].track_id = 8;
-  source_.persons[0].joints[1].at.x += 1e-9;
-  EXPECT_THAT(found(), ElementsAre("expected box 1 as annotated in labels/0.txt, got another",
-                                   "expected person 0 as annotated in labels/0.txt, got another"));
+TEST_F(RowDifferences, NameTheColumnAndBothValues) {
+  expected_.annotation.boxes[1].track_id = 8;
+  expected_.annotation.persons[0].joints[1].at.x = 5.5;
+  expected_.labels.persons[1].head_box.reset();
+  expected_.sequence = "drive_7";
+  EXPECT_THAT(
+      found(expected_),
+      ElementsAre(R"(expected "drive_7" in /pairs/sequence by the plan, got "drive_0")",
+                  "expected 8 in /labels/boxes/track_id of box 1 by labels/0.txt, got -1",
+                  "expected 5.5 in /labels/poses/joints_source of person 0 by labels/0.txt, got 5",
+                  "expected -1 in /labels/poses/head_box of person 1 by labels/0.txt, got 0.5"));
 }
 
-TEST_F(LabelDifferences, PlacesInTheVolumeAreCompared) {
-  const auto difference = [&](const std::function<void(VolumeLabels&)>& change) {
-    mapped_ = stored_.labels;
-    change(mapped_);
-    return found();
-  };
-  const std::string box =
-      "expected box 0 where labels/0.txt puts it in the volume, got another place";
-  const std::string person =
-      "expected person 1 where labels/0.txt puts it in the volume, got another place";
-  EXPECT_THAT(difference([](auto& m) { m.boxes[0].clipped.right += 1e-3; }), ElementsAre(box));
-  EXPECT_THAT(difference([](auto& m) { m.boxes[0].unclipped.top -= 1e-3; }), ElementsAre(box));
-  EXPECT_THAT(difference([](auto& m) { m.boxes[0].ignore = true; }), ElementsAre(box));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].joints[2].y += 1; }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].joints.pop_back(); }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].center.x = 0; }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].scale = 2; }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].head_box.reset(); }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].head_box->left = 7; }), ElementsAre(person));
-  EXPECT_THAT(difference([](auto& m) { m.persons[1].camera->focal_y = 1; }), ElementsAre(person));
+TEST_F(RowDifferences, AnotherNumberOfLabelsIsTold) {
+  expected_.annotation.boxes.pop_back();
+  expected_.labels.boxes.pop_back();
+  expected_.annotation.persons.clear();
+  expected_.labels.persons.clear();
+  EXPECT_THAT(found(expected_), ElementsAre("expected 1 boxes, as in labels/0.txt, got 2",
+                                            "expected 0 persons, as in labels/0.txt, got 2"));
 }
 
-TEST_F(LabelDifferences, AnotherNumberOfLabelsIsTold) {
-  source_.boxes.pop_back();
-  mapped_.boxes.pop_back();
-  source_.persons.clear();
-  mapped_.persons.clear();
-  EXPECT_THAT(found(), ElementsAre("expected as many of kind box as in labels/0.txt, 1, got 2",
-                                   "expected as many of kind person as in labels/0.txt, 0, got 2"));
+TEST_F(RowDifferences, AreNotOfColumnsThatAnOlderShardLacks) {
+  stored_.projection.clear();
+  stored_.pairs.subject.clear();
+  stored_.poses.box.clear();
+  EXPECT_THAT(found(expected_), IsEmpty());
+}
+
+void change(std::string& text) { text += "x"; }
+void change(std::vector<char>& bytes) { bytes.push_back('x'); }
+template <class Number>
+void change(Number& number) {
+  number = number == number ? static_cast<Number>(number + 1) : 1;  // NaN: there was none
+}
+
+TEST_F(RowDifferences, AreFoundInEveryColumnThatTheGeneratorDoesNotMake) {
+  std::vector<std::string> paths;
+  visit_columns(stored_, example_.header,
+                [&](const ColumnSpec& spec, const auto&) { paths.emplace_back(spec.path); });
+  const ShardTables sound = stored_;
+  for (const std::string& path : paths) {
+    if (path.starts_with("/events/")) continue;
+    stored_ = sound;
+    visit_columns(stored_, example_.header, [&](const ColumnSpec& spec, auto& column) {
+      if (spec.path != path) return;
+      ASSERT_FALSE(column.empty()) << path << ": the example has no value";
+      change(column[spec.rows == Rows::kOffsets ? 1 : 0]);
+    });
+    if (path == "/labels/original") {
+      EXPECT_THAT(found(expected_), ElementsAre(HasSubstr("got other bytes"))) << path;
+    } else if (path.ends_with("/offsets")) {
+      EXPECT_THAT(found(expected_), ElementsAre(HasSubstr(", as in labels/"))) << path;
+    } else {
+      EXPECT_THAT(found(expected_), ElementsAre(HasSubstr(" in " + path))) << path;
+    }
+  }
 }
 
 /// Three KITTI pictures with a car each, converted into one shard; the picture of sample 2 was
@@ -196,6 +224,30 @@ TEST_F(SourceComparisonTest, NamesAPlacementThatTheSettingsDoNotGive) {
   manifest_.image.fit = ImageFit::kStretch;
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected source_to_volume of a picture of 36x24"),
                                     HasSubstr("(sample 1, 000001)")));
+}
+
+/// An attribute says what class numbers mean.
+TEST_F(SourceComparisonTest, NamesClassesThatAreNotTheSources) {
+  const hid_t file =
+      H5Fopen((folder_ / "out/job-train-00000-of-00001.h5").c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+  ASSERT_GE(file, 0);
+  const hid_t column = H5Dopen2(file, "/labels/boxes/class_id", H5P_DEFAULT);
+  const hid_t attribute = H5Aopen(column, "class_names", H5P_DEFAULT);
+  const hid_t type = H5Aget_type(attribute);
+  const hid_t space = H5Aget_space(attribute);
+  std::vector<char*> names(static_cast<std::size_t>(H5Sget_simple_extent_npoints(space)));
+  ASSERT_GE(H5Aread(attribute, type, names.data()), 0);
+  std::swap(names[0], names[1]);
+  EXPECT_GE(H5Awrite(attribute, type, names.data()), 0);
+  H5Dvlen_reclaim(type, space, H5P_DEFAULT, names.data());
+  H5Sclose(space);
+  H5Tclose(type);
+  H5Aclose(attribute);
+  H5Dclose(column);
+  ASSERT_GE(H5Fclose(file), 0);
+  EXPECT_THAT(faults(/*compared=*/0),
+              ElementsAre(AllOf(HasSubstr("expected the class_names of the source, Car, Van"),
+                                HasSubstr("got Van, Car"))));
 }
 
 TEST_F(SourceComparisonTest, ASourceThatIsNotThereIsANoteAndNoFault) {

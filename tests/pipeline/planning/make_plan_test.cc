@@ -155,7 +155,7 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   for (const char* name : {"f_02.png", "f_03.png"}) {
     testing::write_file(folder_ / "clip" / name, "not a picture");
   }
-  auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
+  auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
   ASSERT_EQ(plan.shards.size(), 2u);  // of the pairs 0-1 and 1-2, and of 2-3
   EXPECT_TRUE(plan.shards[1].size_unknown);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6}));
@@ -179,7 +179,7 @@ TEST_F(MakePlan, AHoleThatWasFilledBecomesWhatItWouldBePlannedAsToday) {
     const PlannedSample& meant = whole.shards[0].samples.at(1);  // of f_01 and f_02
     const std::string picture = testing::read_file(folder_ / "clip" / "f_01.png");
     std::filesystem::remove(folder_ / "clip" / "f_01.png");
-    auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
+    auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
     const PlannedSample& hole = plan.shards.at(0).samples.at(0);
     ASSERT_EQ(hole.sample_id, meant.sample_id);
     const std::string before = to_json(plan);
@@ -200,7 +200,7 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
   for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
     manifest_.sources[0].pairs.choose = choice;
     testing::write_file(folder_ / "clip" / "f_01.json", "{}");
-    auto [plan, by_gap, datasets] = make_plan(manifest_, "w", "e");
+    auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
     const std::string whole = to_json(plan);
     PlannedSample& sample = plan.shards.at(0).samples.at(0);
     ASSERT_NE(sample.label_key, "");

@@ -3,6 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <regex>
+#include <string>
+#include <utility>
+
 namespace eventgan {
 namespace {
 
@@ -78,6 +82,42 @@ TEST(ReportPage, IsSmallAndWithoutForeignMarkupForAnyJob) {
   EXPECT_THAT(page, HasSubstr("… and 1\u202F940 more")) << "2000 sources, 60 in the table";
 }
 
+/// Every text of a chart lies within its 460 x 260, and no number reaches the rotated title of its
+/// axis, which takes the leftmost 18.
+void expect_texts_inside(const std::string& page) {
+  constexpr double kDigit = 7.7;  // the width of a digit of 12 px, in DejaVu Sans, a wide typeface
+  const std::regex text("<text class=t x=\"([0-9.]+)\"[^>]* text-anchor=(middle|end)>([^<]*)<");
+  int count = 0;
+  for (std::sregex_iterator at(page.begin(), page.end(), text), none; at != none; ++at, ++count) {
+    const double width = kDigit * static_cast<double>((*at)[3].length());
+    const double right = std::stod((*at)[1]) + ((*at)[2] == "middle" ? width / 2 : 0);
+    EXPECT_GE(right - width, (*at)[2] == "middle" ? 0 : 18) << at->str();
+    EXPECT_LE(right, 460) << at->str();
+  }
+  EXPECT_GT(count, 4);
+}
+
+TEST(ReportPage, NoLabelOfAnAxisIsCutOff) {
+  for (const auto& [least, most] : {std::pair{6.9, 99.0}, {1.2e-5, 0.00014}, {2e5, 9e5}}) {
+    Survey survey;
+    survey.header.volume = {9, {2, 2}};
+    survey.parts.manifest.sources.resize(1);
+    survey.parts.frozen.plan.sources.resize(1);
+    survey.sources.resize(1);
+    survey.counts.boxes = 123'456;
+    for (double value = least; value < most; value *= 1.2) {
+      survey.box_sides.add(value);
+      survey.sources[0].events_per_pixel.add(value);
+    }
+    survey.positive_bins.assign(9, most);
+    survey.negative_bins.assign(9, least / 3);
+    PageContext context;
+    context.folder = "out";
+    context.file = "out/report.html";
+    expect_texts_inside(report_page(survey, context));
+  }
+}
+
 TEST(ReportPage, LinksLeadFromThePageToTheShards) {
   Survey survey;
   survey.header.volume = {9, {2, 2}};
@@ -89,6 +129,25 @@ TEST(ReportPage, LinksLeadFromThePageToTheShards) {
   const std::string page = report_page(survey, context);
   EXPECT_THAT(page, HasSubstr("href=\"../%C3%B6/out/a%20b-00000-of-00001.h5\""));
   EXPECT_THAT(page, Not(HasSubstr("class=warning"))) << "the weights are somebody's own";
+}
+
+TEST(ReportPage, CountsVolumesWithoutEventsAndWarnsWhereAllOfASourceAre) {
+  Survey survey;
+  survey.header.volume = {9, {2, 2}};
+  survey.sources.resize(2);
+  survey.parts.manifest.sources.resize(2);
+  survey.parts.frozen.plan.sources.resize(2);
+  for (SourceSurvey& source : survey.sources) source.counts.samples = source.counts.valid = 3;
+  for (int i = 0; i < 3; ++i) survey.sources[0].events_per_pixel.add(0);
+  for (const double events : {0.0, 0.5, 0.0}) survey.sources[1].events_per_pixel.add(events);
+  PageContext context;
+  context.folder = "out";
+  context.file = "out/report.html";
+  const std::string page = report_page(survey, context);
+  EXPECT_THAT(page, HasSubstr("data-key=\"source.0.empty\" data-value=\"3\""));
+  EXPECT_THAT(page, HasSubstr("data-key=\"source.1.empty\" data-value=\"2\""));
+  EXPECT_THAT(page, HasSubstr("data-key=source.0.warning>Warning: all 3 volumes of "));
+  EXPECT_THAT(page, Not(HasSubstr("source.1.warning")));
 }
 
 }  // namespace

@@ -186,6 +186,17 @@ TEST(StopSignal, ASecondInterruptEndsTheProcess) {
   EXPECT_EXIT(interrupt_twice(), ::testing::KilledBySignal(SIGINT), "");
 }
 
+TEST(StopSignal, TheFirstInterruptIsAnsweredAtOnce) {
+  const StopSignal signal("stopping\n");
+  const auto said_at = [](int number) {
+    ::testing::internal::CaptureStderr();
+    std::raise(number);
+    return ::testing::internal::GetCapturedStderr();
+  };
+  EXPECT_EQ(said_at(SIGTERM), "");  // nobody looks at a scheduler's terminal
+  EXPECT_EQ(said_at(SIGINT), "stopping\n");
+}
+
 TEST(StopSignal, LeavesSignalsAsTheyWere) {
   std::array<struct sigaction, 3> before{};
   for (std::size_t i = 0; i < kSignals.size(); ++i) before[i] = action_of(kSignals[i]);

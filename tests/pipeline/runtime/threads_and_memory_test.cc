@@ -1,13 +1,18 @@
 #include <gtest/gtest.h>
 #include <malloc.h>
+#include <sched.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdlib>
+#include <filesystem>
 #include <stdexcept>
+#include <string>
 #include <thread>
 #include <vector>
 
+#include "pipeline/runtime/control_groups.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "tests/testing/temporary_folder.h"
@@ -69,20 +74,111 @@ TEST(MemoryLimit, IsAtMostTheMachines) {
   EXPECT_LT(memory_limit_bytes(), std::size_t{1} << 50);
 }
 
-TEST(GroupMemoryLimit, IsTheLeastOfTheGroupAndThoseAbove) {
-  const testing::TemporaryFolder root;
-  std::filesystem::create_directories(root / "jobs/one/step");
-  testing::write_file(root / "jobs/memory.max", "3000\n");
-  testing::write_file(root / "jobs/one/memory.max", "5000\n");
-  testing::write_file(root / "jobs/one/step/memory.max", "max\n");
-  const std::filesystem::path folder = root / "";
-  EXPECT_EQ(group_memory_limit_bytes(folder, "jobs/one/step", 9000), 3000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "jobs/one/step", 2000), 2000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "jobs", 9000), 3000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "/jobs/", 9000), 3000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "", 9000), 9000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "elsewhere", 9000), 9000u);
-  EXPECT_EQ(group_memory_limit_bytes(folder, "../outside", 9000), 9000u);
+/// A file system of its own with control groups.
+class ControlGroups : public ::testing::Test {
+ protected:
+  void say(const std::string& file, const std::string& text) const {
+    std::filesystem::create_directories((root_ / file).parent_path());
+    testing::write_file(root_ / file, text);
+  }
+
+  std::uint64_t memory_bytes() const { return control_group_limits(root_.path()).memory_bytes; }
+  double processors() const { return control_group_limits(root_.path()).processors; }
+
+  testing::TemporaryFolder root_;
+  const std::uint64_t any_bytes_ = GroupLimits().memory_bytes;
+  const double any_processors_ = GroupLimits().processors;
+};
+
+TEST_F(ControlGroups, ThatAreNotThereLimitNothing) {
+  EXPECT_EQ(memory_bytes(), any_bytes_);
+  EXPECT_EQ(processors(), any_processors_);
+  say("proc/self/cgroup", "0::/jobs/one\n\nnonsense\n");
+  EXPECT_EQ(memory_bytes(), any_bytes_);
+  EXPECT_EQ(processors(), any_processors_);
+}
+
+TEST_F(ControlGroups, OfVersion2TheTightestFromTheOwnOneToTheTopCounts) {
+  say("proc/self/cgroup", "0::/jobs/one/step\n");
+  say("sys/fs/cgroup/jobs/memory.max", "3000\n");
+  say("sys/fs/cgroup/jobs/one/memory.max", "5000\n");
+  say("sys/fs/cgroup/jobs/one/step/memory.max", "max\n");
+  say("sys/fs/cgroup/jobs/other/memory.max", "1\n");
+  say("sys/fs/cgroup/jobs/cpu.max", "max 100000\n");
+  say("sys/fs/cgroup/jobs/one/cpu.max", "400000 100000\n");
+  say("sys/fs/cgroup/jobs/one/step/cpu.max", "90000 20000\n");
+  say("sys/fs/cgroup/jobs/other/cpu.max", "1 100000\n");
+  EXPECT_EQ(memory_bytes(), 3000u);
+  EXPECT_EQ(processors(), 4);
+  say("sys/fs/cgroup/jobs/one/step/cpu.max", "30000 20000\n");
+  EXPECT_EQ(processors(), 1.5);
+}
+
+TEST_F(ControlGroups, OfVersion2AContainerSeesItsOwnAtTheTop) {
+  say("sys/fs/cgroup/memory.max", "7000\n");
+  say("sys/fs/cgroup/cpu.max", "200000 100000\n");
+  for (const char* group : {"0::/\n", "0::/kubepods/pod7\n", "0::/../../other\n"}) {
+    say("proc/self/cgroup", group);
+    EXPECT_EQ(memory_bytes(), 7000u) << group;
+    EXPECT_EQ(processors(), 2) << group;
+  }
+}
+
+TEST_F(ControlGroups, OfVersion1EachControllerHasItsOwnTree) {
+  say("proc/self/cgroup",
+      "11:cpuset:/docker/7\n5:memory:/docker/7\n3:cpuacct,cpu:/docker/8\n0::/docker/9\n");
+  say("sys/fs/cgroup/memory/memory.limit_in_bytes", "9223372036854771712\n");
+  say("sys/fs/cgroup/memory/docker/7/memory.limit_in_bytes", "6000\n");
+  say("sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n");
+  say("sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n");
+  say("sys/fs/cgroup/cpu/docker/8/cpu.cfs_quota_us", "250000\n");
+  say("sys/fs/cgroup/cpu/docker/8/cpu.cfs_period_us", "100000\n");
+  say("sys/fs/cgroup/cpu/docker/7/cpu.cfs_quota_us", "1000\n");  // the memory's group
+  say("sys/fs/cgroup/cpu/docker/7/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(memory_bytes(), 6000u);
+  EXPECT_EQ(processors(), 2.5);
+}
+
+TEST_F(ControlGroups, OfVersion1AContainerSeesItsOwnAtTheTop) {
+  say("proc/self/cgroup", "5:memory:/docker/7\n3:cpu:/docker/7\n");
+  say("sys/fs/cgroup/memory/memory.limit_in_bytes", "6000\n");
+  say("sys/fs/cgroup/cpu/cpu.cfs_quota_us", "50000\n");
+  say("sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(memory_bytes(), 6000u);
+  EXPECT_EQ(processors(), 0.5);
+}
+
+TEST_F(ControlGroups, DecideWhatMemoryAndThreadsThereAre) {
+  const int all = thread_count(0, root_.path());
+  EXPECT_GT(memory_limit_bytes(root_.path()), std::size_t{1} << 20);
+  say("proc/self/cgroup", "0::/\n");
+  say("sys/fs/cgroup/memory.max", "1048576\n");
+  EXPECT_EQ(memory_limit_bytes(root_.path()), std::size_t{1} << 20);
+  const auto threads_of = [&](const std::string& quota) {
+    say("sys/fs/cgroup/cpu.max", quota + " 100000\n");
+    return thread_count(0, root_.path());
+  };
+  EXPECT_EQ(threads_of("20000"), 1);
+  EXPECT_EQ(threads_of("100000"), 1);
+  EXPECT_EQ(threads_of("150000"), std::min(all, 2));
+  EXPECT_EQ(threads_of("100000000000"), all);
+  EXPECT_EQ(thread_count(7, root_.path()), 7);
+}
+
+TEST(ThreadCount, MindsTheAffinity) {
+  cpu_set_t before, one;
+  ASSERT_EQ(::sched_getaffinity(0, sizeof(before), &before), 0);
+  CPU_ZERO(&one);
+  for (int core = 0; core < CPU_SETSIZE && CPU_COUNT(&one) == 0; ++core) {
+    if (CPU_ISSET(core, &before)) CPU_SET(core, &one);
+  }
+  // oneTBB looks once in a process, so this takes one of its own.
+  const auto count = [&] {
+    ::sched_setaffinity(0, sizeof(one), &one);
+    std::exit(thread_count(0));
+  };
+  GTEST_FLAG_SET(death_test_style, "threadsafe");
+  EXPECT_EXIT(count(), ::testing::ExitedWithCode(1), "");
 }
 
 TEST(KeepBigBuffers, WhatIsFreedStaysWithTheProcess) {

@@ -183,6 +183,22 @@ TEST_F(Simulate, RefusesRecordingsOfOtherSettingsUnlessToldToOverwrite) {
   EXPECT_NE(files("out"), before);
 }
 
+TEST_F(Simulate, NeverOverwritesARecordingOfSomethingElse) {
+  const std::string source = R"({"path": "clip", "name": "a"})";
+  run("out", 1, false, source);
+  testing::write_moving_clip(folder_ / "second", {32, 48}, 4);
+  testing::write_file(folder_ / "out/b.hdf5", "a camera's, say");
+  const auto before = files("out");
+  for (const bool overwrite : {false, true}) {
+    EXPECT_THAT([&] { run("out", 1, overwrite, R"({"path": "second", "name": "a"})"); },
+                ::testing::ThrowsMessage<UsageError>(::testing::AllOf(
+                    ::testing::HasSubstr(R"($.source.path: expected "clip", got "second")"),
+                    ::testing::Not(::testing::HasSubstr("--overwrite")))));
+    EXPECT_THROW(run("out", 1, overwrite, R"({"path": "clip", "name": "b"})"), InputError);
+    EXPECT_EQ(files("out"), before);
+  }
+}
+
 TEST_F(Simulate, CountsFramesAsItGoes) {
   std::ostringstream shown;
   SimulationOptions options;

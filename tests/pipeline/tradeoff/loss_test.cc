@@ -11,6 +11,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::FloatEq;
@@ -72,30 +73,29 @@ TEST(LabelledPixels, AreThoseOfBoxesWhoseCentreLiesInside) {
   EXPECT_THAT(labelled_pixels(labels, {2, 5}), ElementsAre(0, 1, 1, 1, 0, 0, 0, 0, 0, 0));
 }
 
-TEST(LabelledPixels, AreNearJointsWithinATenthOfThePerson) {
+TEST(LabelledPixels, AreThoseOfPersonsCrops) {
   VolumePerson person;
-  person.joints = {{10, 50}, {10, 110}, kMissingPoint};  // 60 px high: within 6 px
+  person.center = {9, 14};
+  person.scale = 0.02;  // 221 x 0.02 = 4.42 px to each side of (9, 14.3)
   VolumeLabels labels;
-  labels.persons.push_back(person);
-  const std::vector<std::uint8_t> pixels = labelled_pixels(labels, {100, 30});
-  const auto at = [&](int x, int y) { return pixels[static_cast<std::size_t>(y * 30 + x)]; };
-  EXPECT_EQ(at(10, 50), 1);
-  EXPECT_EQ(at(16, 50), 1);
-  EXPECT_EQ(at(17, 50), 0);
-  EXPECT_EQ(at(10, 44), 1);
-  EXPECT_EQ(at(14, 54), 1);  // 5.7 away
-  EXPECT_EQ(at(15, 55), 0);  // 7.1
-  EXPECT_EQ(at(10, 99), 0);  // the other joint lies 11 px below the picture
-  EXPECT_EQ(at(0, 0), 0);    // a missing joint marks nothing
+  labels.persons.resize(2);
+  labels.persons[0] = person;  // nothing is known of the other
+  const std::vector<std::uint8_t> pixels = labelled_pixels(labels, {18, 12});
+  for (int y = 0; y < 18; ++y) {
+    for (int x = 0; x < 12; ++x) {
+      const bool inside = x >= 5 && y >= 10;  // to column 13 and row 18, of which there are fewer
+      EXPECT_EQ(pixels[static_cast<std::size_t>(y * 12 + x)], inside ? 1 : 0) << x << ", " << y;
+    }
+  }
 }
 
-TEST(LabelledPixels, OfASmallPersonReachFourPixels) {
+TEST(LabelledPixels, OfACropThatReachesFarBeyondTheVolumeAreAll) {
   VolumePerson person;
-  person.joints = {{10, 10}};
+  person.center = {3, 3};
+  person.scale = 1e300;
   VolumeLabels labels;
   labels.persons.push_back(person);
-  const std::vector<std::uint8_t> pixels = labelled_pixels(labels, {30, 30});
-  EXPECT_EQ(std::accumulate(pixels.begin(), pixels.end(), 0), 49);  // lattice points in radius 4
+  EXPECT_THAT(labelled_pixels(labels, {5, 7}), Each(1));
 }
 
 TEST(PairLoss, IsDerivedByHand) {

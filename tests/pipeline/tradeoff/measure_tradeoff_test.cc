@@ -1,12 +1,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <memory>
 #include <sstream>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "pipeline/runtime/memory.h"
 #include "pipeline/tradeoff/tradeoff.h"
+#include "tests/testing/fake_recording.h"
 #include "tests/testing/picture_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
@@ -105,6 +108,103 @@ TEST(MeasureTradeoff, MeasuresEveryConfigurationOnceAndKeepsIt) {
   EXPECT_EQ(again, 6 * 3 + 3 * 6 * 3);
 }
 
+TEST(MeasureTradeoff, TellsBeforehandHowMuchItIs) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 7);
+  TradeoffOptions options = small_options(folder);
+  options.axes.sizes = {1};
+  std::vector<std::string> told;
+  std::int64_t total = 0;
+  options.tell = [&](const std::string& text) {
+    EXPECT_EQ(total, 0) << "before the first pair";
+    told.push_back(text);
+  };
+  options.make_progress = counting(total);
+  measure_tradeoff(manifest, options);
+  EXPECT_GT(total, 0);
+  total = 0;
+  measure_tradeoff(manifest, options);
+  EXPECT_THAT(told,
+              ElementsAre(::testing::StartsWith("6 configurations, 4 pairs, 2 rounds: about "),
+                          "6 configurations, 4 pairs, 2 rounds: all measured before"));
+}
+
+TEST(MeasureTradeoff, FramesOfTheSameNameAndSizeAreOthersIfTheirPixelsAre) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 5);
+  TradeoffOptions options = small_options(folder);
+  options.axes = {{GeneratorKind::kNetwork},
+                  {"untrained:1"},
+                  {Precision::kFloat32},
+                  {1},
+                  {StoredType::kFloat16}};
+  options.rounds = 1;
+  std::int64_t total = 0;
+  options.make_progress = counting(total);
+  measure_tradeoff(manifest, options);
+  const auto frame = folder / "clip" / "f_11.png";
+  const auto size = std::filesystem::file_size(frame);
+  testing::write_flat_picture(frame, {20, 30}, 21);
+  ASSERT_EQ(std::filesystem::file_size(frame), size);
+  total = 0;
+  measure_tradeoff(manifest, options);
+  EXPECT_EQ(total, 2 * 4);
+}
+
+TEST(MeasureTradeoff, ScoresAgainstACameraAreKeptByWhatTheCameraSaw) {
+  const testing::TemporaryFolder folder;
+  const JobManifest manifest = testing::make_small_job(folder, 5);
+  TradeoffOptions options = small_options(folder);
+  options.axes = {{GeneratorKind::kNetwork},
+                  {"untrained:1"},
+                  {Precision::kFloat32},
+                  {1},
+                  {StoredType::kFloat16, StoredType::kUint8}};
+  options.rounds = 1;
+  std::int64_t total = 0;
+  options.make_progress = counting(total);
+  const auto measure = [&](const std::string& name, int step_px) {
+    total = 0;
+    auto recording = std::make_unique<testing::FakeRecording>(
+        testing::moving_bar_recording({16, 20}, 9, step_px));
+    recording->set_name(name);
+    options.real.clear();
+    options.real.push_back(std::move(recording));
+    const TradeoffReport report = measure_tradeoff(manifest, options);
+    EXPECT_THAT(report.trials.front().real, ElementsAre(::testing::Key(name)));
+    return report.trials.front().real.at(name).f1_raw;
+  };
+  const double score = measure("drive.hdf5", 2);
+  EXPECT_EQ(total, 4 + 4 + 4);  // losses, a round, and of 8 intervals as many as pairs
+  EXPECT_EQ(measure("./drive.hdf5", 2), score);
+  EXPECT_EQ(total, 0) << "it is the same recording";
+  const double other = measure("drive.hdf5", 3);
+  EXPECT_EQ(total, 4) << "another one by that name";
+  EXPECT_NE(other, score);
+}
+
+TEST(DefaultAxes, AreAtMostTenConfigurations) {
+  const testing::TemporaryFolder folder;
+  JobManifest manifest = testing::make_small_job(folder, 2);
+  const auto count = [&] {
+    const TradeoffAxes axes = default_axes(manifest);
+    return computations(axes).size() * axes.dtypes.size();
+  };
+  for (const char* weights : {"shipped", "untrained:1", "mine.safetensors"}) {
+    manifest.generator.weights = weights;
+    EXPECT_LE(count(), 10u) << weights;
+    EXPECT_GT(count(), 1u) << weights;
+  }
+  manifest.generator.kind = GeneratorKind::kEsim;
+  manifest.output.dtype = StoredType::kUint8;
+  manifest.generator.scope.scope = Scope::kMotion;
+  EXPECT_LE(count(), 10u);
+  const TradeoffAxes axes = default_axes(manifest);
+  EXPECT_THAT(axes.methods, ElementsAre(GeneratorKind::kNetwork, GeneratorKind::kEsim));
+  EXPECT_THAT(axes.dtypes, ElementsAre(StoredType::kUint8));
+  EXPECT_THAT(axes.scopes, ElementsAre(Scope::kMotion));
+}
+
 TEST(MeasureTradeoff, GoesOnAfterAStop) {
   const testing::TemporaryFolder folder;
   const JobManifest manifest = testing::make_small_job(folder, 7);
@@ -144,6 +244,37 @@ TEST(MeasureTradeoff, RefusesWhatCannotBeCompared) {
   options.reference.reset();
   options.axes.weights = {"none.safetensors"};
   EXPECT_THROW(measure_tradeoff(manifest, options), InputError);
+}
+
+TEST(MeasureTradeoff, ThePeakOfMemoryDoesNotGrowWithThePairsAndTheStoredTypes) {
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+  GTEST_SKIP() << "the sanitizers keep what is freed";
+#endif
+  if (!restart_peak_memory()) GTEST_SKIP() << "the kernel keeps the peak";
+  const testing::TemporaryFolder folder;
+  JobManifest manifest = testing::make_small_job(folder, 12);
+  std::string text = manifest.text;
+  text.replace(text.find("\"preset\""), 0, R"("width": 160, "height": 120, )");
+  text.replace(text.find("[1]"), 3, "[1, 2, 3, 4, 5, 6]");
+  text.replace(text.find("\"one\""), 5, "\"all\"");
+  manifest = parse_job_manifest(text, folder.path(), "manifest.json");
+  TradeoffOptions options = small_options(folder);
+  options.axes = {{GeneratorKind::kNetwork},
+                  {"untrained:1"},
+                  {Precision::kFloat32},
+                  {1},
+                  {StoredType::kFloat32, StoredType::kFloat16, StoredType::kUint8}};
+  options.rounds = 1;
+  const auto peak = [&](int pairs) {
+    options.pairs = pairs;
+    const TradeoffReport report = measure_tradeoff(manifest, options);
+    EXPECT_EQ(report.pairs, pairs);
+    return report.trials.front().rounds.front().peak_bytes;
+  };
+  constexpr double kVolume = 18 * 160 * 120 * sizeof(float);
+  const double few = peak(5);
+  ASSERT_GT(few, kVolume);
+  EXPECT_LT(peak(20) - few, 10 * kVolume);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pipeline/tradeoff/kept_trials.h"
 #include "tests/testing/temporary_folder.h"
@@ -14,10 +15,10 @@
 namespace eventgan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsNan;
-using ::testing::Not;
 
 Trial trial_of(const std::string& weights, double pairs_per_s, double error) {
   Trial trial;
@@ -100,18 +101,64 @@ TEST(BestTrial, IsTheFastestNearEnoughOrTheNearestFastEnough) {
   EXPECT_EQ(best_trial(trials, {{}, 20}), 3u);
   EXPECT_EQ(best_trial(trials, {{}, 50}), std::nullopt);
   EXPECT_EQ(best_trial(trials, {0.03, 20}), std::nullopt);
+  // Reference 0.5 s a pair, so that pairs/s are twice the times.
+  EXPECT_EQ(best_trial(trials, {{}, {}, 2}), 2u);
+  EXPECT_EQ(best_trial(trials, {{}, {}, 2.6}), 3u);
+  EXPECT_EQ(best_trial(trials, {{}, {}, 21}), std::nullopt);
 }
 
 TEST(TradeoffText, HasTheFrontTheRefusalsAndTheLinesToPaste) {
-  const std::string text = to_text(small_report(), {0.03, {}});
+  const std::string text = to_text(small_report(), {0.3, {}});
   EXPECT_THAT(text, HasSubstr("*  c float32 x1 float16"));
   EXPECT_THAT(text, HasSubstr("   b float32 x1 float16"));
   EXPECT_THAT(text, HasSubstr("not run: f int8 x1: no calibration"));
-  EXPECT_THAT(text, HasSubstr("    \"generator\": {\"weights\":\"c\"},\n    \"output\": {}\n"));
+  EXPECT_THAT(text, HasSubstr("The fastest with an error of at most 0.3:\n    d float32"));
+  EXPECT_THAT(text, HasSubstr("        \"generator\": {\"weights\":\"d\"},\n"
+                              "        \"output\": {}\n"));
   EXPECT_THAT(to_text(small_report(), {{}, 50}),
-              HasSubstr("no configuration has 50 pairs/s or more"));
-  EXPECT_THAT(to_text(small_report(), {}), Not(HasSubstr("manifest")));
+              HasSubstr("The nearest with 50 pairs/s or more:\n    no configuration\n"));
   EXPECT_THAT(to_markdown(small_report(), {}), HasSubstr("| **c float32 x1 float16** |"));
+}
+
+TEST(TradeoffText, AlwaysRecommends) {
+  // c is the fastest within 3 %, and at 2.5 times the nearest of those that are twice as fast.
+  constexpr char kBoth[] =
+      "\nThe fastest within 3 % of the reference:\n"
+      "The nearest to the reference at twice its speed:\n"
+      "    c float32 x1 float16\n    2.50 times its speed, 5.0 pairs/s, error 0.02\n"
+      "        \"generator\": {\"weights\":\"c\"},\n        \"output\": {}\n";
+  EXPECT_THAT(to_text(small_report(), {}), HasSubstr(kBoth));
+  TradeoffReport report = small_report();
+  report.trials.erase(report.trials.begin() + 2);  // then b, which is exactly twice as fast
+  EXPECT_THAT(to_text(report, {}), HasSubstr("    b float32 x1 float16\n    2.00 times"));
+  report.trials.erase(report.trials.begin() + 1);  // then a, and d
+  EXPECT_THAT(to_text(report, {}), AllOf(HasSubstr("within 3 % of the reference:\n    a float32"),
+                                         HasSubstr("at twice its speed:\n    d float32")));
+  report.trials = {trial_of("near", 2, 0.04), trial_of("fast", 3, 0.5)};
+  EXPECT_THAT(
+      to_text(report, {}),
+      AllOf(HasSubstr("None is within 3 % of the reference; the nearest:\n    near float32"),
+            HasSubstr("None is twice as fast as the reference; the fastest:\n    fast float32")));
+  EXPECT_THAT(to_markdown(report, {}), HasSubstr("the nearest:\n\n    near float32"));
+  report.trials.clear();
+  EXPECT_THAT(to_text(report, {}), HasSubstr("the fastest:\n    no configuration\n"));
+}
+
+TEST(TradeoffText, TheTableFitsInto80ColumnsWhateverTheNames) {
+  TradeoffReport report = small_report();
+  report.trials.push_back(trial_of(std::string(60, 'w') + ".safetensors", 1234.5, 0.00021));
+  report.trials.push_back(trial_of("shipped:16", 0.1, 12345));
+  for (Trial& trial : report.trials) trial.real["camera"].f1_time = 0.5;
+  const std::string text = to_text(report, {});
+  const std::string table = text.substr(0, text.find("Pareto front"));
+  std::istringstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    // The long name alone has a line for itself, the numbers in the one below.
+    if (line.ends_with(".safetensors float32 x1 float16")) continue;
+    EXPECT_LE(line.size(), 80u) << line;
+  }
+  EXPECT_THAT(table, HasSubstr("617.25   1234.5  0.00021"));
+  EXPECT_THAT(table, HasSubstr("shipped:16 float32 x1 float16  "));
 }
 
 TEST(TradeoffJson, HasNullForWhatIsNotKnown) {
@@ -122,6 +169,9 @@ TEST(TradeoffJson, HasNullForWhatIsNotKnown) {
   EXPECT_EQ(json["configurations"][1]["times_reference"]["median"], 2);
   EXPECT_TRUE(json["configurations"][4]["relative_l2"].is_null());
   EXPECT_EQ(json["answer"]["name"], "c float32 x1 float16");
+  ASSERT_EQ(json["recommended"].size(), 2u);
+  EXPECT_EQ(json["recommended"][1]["name"], "c float32 x1 float16");
+  EXPECT_EQ(json["recommended"][1]["manifest"].size(), 2u);
   EXPECT_EQ(json["not_run"][0]["reason"], "no calibration");
 }
 
@@ -134,6 +184,13 @@ TEST(TradeoffPicture, IsDrawnAlsoOfOneAndOfNothing) {
     if (report.trials.empty()) break;
     report.trials.resize(report.trials.size() > 1 ? 1 : 0);
   }
+}
+
+TEST(KeptTrials, AreNotKeptThroughALink) {
+  const testing::TemporaryFolder folder;
+  const testing::TemporaryFolder elsewhere;
+  std::filesystem::create_directory_symlink(elsewhere.path(), folder / "kept");
+  EXPECT_THROW(KeptTrials(folder.path()), std::runtime_error);
 }
 
 TEST(KeptTrials, ComeBackUnderTheirKeyAlone) {
@@ -165,12 +222,40 @@ TEST(KeptTrials, ComeBackUnderTheirKeyAlone) {
   EXPECT_EQ(again.rounds[0].pairs_per_s, 2);
   EXPECT_EQ(again.quarantined, 3);
   EXPECT_EQ(again.real.at("r.hdf5").f1_raw, 0.25);
+}
 
-  testing::write_file(folder.path() / "kept" / (key.substr(0, 24) + ".json"), "{\"key\": \"");
-  Trial damaged;
-  damaged.configuration = trial.configuration;
-  kept.load(damaged, key);
-  EXPECT_TRUE(damaged.losses.empty());
+TEST(KeptTrials, WhatIsNotAsItWasWrittenIsMeasuredAgain) {
+  const testing::TemporaryFolder folder;
+  KeptTrials kept(folder.path());
+  const std::string key(64, 'a');
+  Trial trial;
+  kept.load(trial, key);
+  trial.losses = trial_of("a", 2, 0.25).losses;
+  trial.rounds = trial_of("a", 2, 0.25).rounds;
+  kept.save(trial);
+  const auto file = folder.path() / "kept" / (key.substr(0, 24) + ".json");
+  const std::string sound = testing::read_file(file);
+  const auto is_believed = [&](const std::string& text) {
+    testing::write_file(file, text);
+    Trial again;
+    kept.load(again, key);
+    EXPECT_EQ(again.losses.empty(), again.rounds.empty());
+    return !again.losses.empty();
+  };
+  EXPECT_TRUE(is_believed(sound));
+  for (const char* number : {"0.25", "100000000.0", "\"lost_events\":1", "\"quarantined\":0"}) {
+    std::string edited = sound;
+    ASSERT_NE(sound.find(number), std::string::npos) << number << sound;
+    edited[sound.find(number) + std::string(number).size() - 1] = '9';
+    EXPECT_FALSE(is_believed(edited)) << number;
+  }
+  std::string without = sound;
+  without.replace(without.find("\"sha256\""), 8, "\"sha257\"");
+  EXPECT_FALSE(is_believed(without));
+  EXPECT_FALSE(is_believed(sound.substr(0, sound.size() / 2)));
+  EXPECT_FALSE(is_believed(std::string(1'000'000, '[')));
+  EXPECT_FALSE(is_believed("[]"));
+  EXPECT_FALSE(is_believed(""));
 }
 
 }  // namespace

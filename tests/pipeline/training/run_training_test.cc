@@ -48,6 +48,35 @@ TEST(TrainingFolder, DiscardsItsOwnFilesOnly) {
   EXPECT_TRUE(std::filesystem::exists(folder.pictures() / "mine.png"));
 }
 
+TEST(TrainingFolder, ReachesNothingThroughALink) {
+  for (const char* name : {"checkpoints", "pictures"}) {
+    const testing::TemporaryFolder root;
+    const testing::TemporaryFolder elsewhere;
+    const TrainingFolder folder{root.path()};
+    const std::vector<std::string> files{"generator-12.png", "latest.safetensors"};
+    for (const std::string& file : files) testing::write_file(elsewhere / file, "mine");
+    testing::write_file(folder.weights(), "x");
+    std::filesystem::create_directory_symlink(elsewhere.path(), root / name);
+    const auto names_it = ThrowsMessage<std::runtime_error>(
+        HasSubstr("got a symbolic link, in " + (root / name).string()));
+    EXPECT_THAT([&] { folder.discard(); }, names_it);
+    EXPECT_THAT([&] { folder.prepare(); }, names_it);
+    for (const std::string& file : files) EXPECT_TRUE(std::filesystem::exists(elsewhere / file));
+    EXPECT_TRUE(std::filesystem::exists(folder.weights()));
+  }
+}
+
+TEST(TrainingFolder, DiscardsPicturesOfItsOwnNamesAlone) {
+  const testing::TemporaryFolder root;
+  const TrainingFolder folder{root.path()};
+  folder.prepare();
+  for (const char* mine : {"generator-best.png", "generator-.png", "generator-12.png.png"}) {
+    testing::write_file(folder.pictures() / mine, "mine");
+    folder.discard();
+    EXPECT_TRUE(std::filesystem::exists(folder.pictures() / mine)) << mine;
+  }
+}
+
 TEST(TrainingFolder, DiscardsNothingWhereNothingIs) {
   EXPECT_NO_THROW(TrainingFolder{"/nowhere"}.discard());
 }
@@ -62,6 +91,16 @@ TEST(TrainingLock, HoldsOthersOffAndSaysWhoItIs) {
   const TrainingLock elsewhere(root / "other");
   first.reset();
   EXPECT_NO_THROW(TrainingLock(root / "out"));
+}
+
+TEST(TrainingLock, IsNotWrittenThroughALink) {
+  const testing::TemporaryFolder root;
+  testing::write_file(root / "mine.txt", "mine");
+  std::filesystem::create_directory(root / "out");
+  std::filesystem::create_symlink(root / "mine.txt", root / "out/training.lock");
+  EXPECT_THAT([&] { TrainingLock(root / "out"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("training.lock")));
+  EXPECT_EQ(testing::read_file(root / "mine.txt"), "mine");
 }
 
 TEST(TrainingLock, NamesTheFileThatCannotBeMade) {
@@ -240,6 +279,27 @@ TEST_F(SmallTraining, RefusesOtherSettings) {
   EXPECT_EQ(train("out", 1, "\"seed\": 3", "\"seed\": 4").position.step, 1);
 }
 
+TEST_F(SmallTraining, NeverOverwritesAnotherTraining) {
+  train("out", 1);
+  const std::string checkpoint = file("out/checkpoints/latest.safetensors");
+  fs::copy(folder_ / "bar.hdf5", folder_ / "second.hdf5");
+  const struct {
+    std::string was, is;
+  } others[] = {{"\"name\": \"", "\"name\": \"other-"},
+                {"\"path\": \"bar.hdf5\"", "\"path\": \"second.hdf5\""}};
+  for (const auto& other : others) {
+    for (const bool overwrite : {false, true}) {
+      overwrite_ = overwrite;
+      const auto train_other = [&] { train("out", 1, other.was, other.is); };
+      EXPECT_THAT(train_other,
+                  ::testing::ThrowsMessage<UsageError>(
+                      AllOf(HasSubstr("got that of another"), Not(HasSubstr("--overwrite")))))
+          << other.is;
+      EXPECT_EQ(file("out/checkpoints/latest.safetensors"), checkpoint) << other.is;
+    }
+  }
+}
+
 TEST_F(SmallTraining, ADamagedCheckpointFallsBackToTheOneBefore) {
   train("whole");
   train("out", 2);
@@ -291,6 +351,12 @@ TEST_F(SmallTraining, DrawsPictures) {
   train("out", {}, "\"picture_minutes\": 1000", "\"picture_minutes\": 0");
   EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-1.png"));
   EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
+}
+
+TEST_F(SmallTraining, DrawsAPictureAfterItsLastStepHoweverFewThereAre) {
+  train("out");  // in far less than the 1000 minutes between two
+  EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/pictures/generator-1.png"));
 }
 
 TEST(TrainingReport, IsTextAndJson) {

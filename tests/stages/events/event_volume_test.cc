@@ -95,6 +95,19 @@ TEST(EventVolume, CountsBeyondWhatFloat32CanCountTo) {
   EXPECT_EQ(event_volume(events, {1, {1, 1}})[0], float((1 << 24) + 8));
 }
 
+TEST(EventVolume, OfAPartOfTheEventsHasTheTimesOfAll) {
+  const std::vector<Event> events{{0, 0, 2, true}, {0, 0, 4, true}};
+  // t* = 2 (t - 1) / 4: 0.5 and 1.5.
+  EXPECT_EQ(event_volume(events, {3, {1, 1}}, std::array{1.0, 5.0}),
+            (std::vector<float>{0.5f, 1, 0.5f, 0, 0, 0}));
+  EXPECT_EQ(event_volume(events, {3, {1, 1}}, std::array{2.0, 4.0}),
+            event_volume(events, {3, {1, 1}}));
+  EXPECT_EQ(event_volume({}, {3, {1, 1}}, std::array{2.0, 4.0}), std::vector<float>(6));
+  for (const std::array<double, 2> times_s : {std::array{2.5, 5.0}, std::array{1.0, 3.0}}) {
+    EXPECT_THROW(event_volume(events, {3, {1, 1}}, times_s), std::invalid_argument);
+  }
+}
+
 TEST(PlacedEvents, ComeToThePixelThatTheirCentreFallsIn) {
   // 4x2 pixels stretched to 6x1: columns (x + 0.5) 1.5 = 0.75, 2.25, 3.75, 5.25; all rows to 0.
   std::vector<Event> events{{0, 0, 1, true}, {1, 1, 2, false}, {2, 0, 2, true}, {3, 1, 3, true}};

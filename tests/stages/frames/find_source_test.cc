@@ -127,6 +127,32 @@ TEST_F(FindSource, PicturesTellNoTimes) {
   EXPECT_THAT(find("videos/1.mp4").remarks, IsEmpty());
 }
 
+TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
+  const struct {
+    std::string label, frames, root;
+  } cases[] = {{"kitti/training/label_2/000000.txt", "kitti/training/image_2", "kitti/training"},
+               {"kitti/training/label_2/000000.txt", "kitti/training/prev_2", "kitti/training"},
+               {"tracking/label_02/0000.txt", "tracking/image_02/0000", "tracking"},
+               {"raw/2011_09_26/a/oxts", "raw/2011_09_26/drive/image_02/data", "raw"},
+               {"mpii/mpii_human_pose_v1_u12_1.mat", "mpii/images", "mpii"},
+               {"h36m/S1/Walking-1/annot.h5", "h36m/S1/Walking-1/imageSequence/5", "h36m"}};
+  for (const auto& part : cases) {
+    write(part.label);
+    write(part.frames + "/000000.png");
+    const FoundSource found = find(part.frames);
+    EXPECT_EQ(found.root, at(part.frames));
+    ASSERT_FALSE(found.remarks.empty()) << part.frames;
+    EXPECT_THAT(found.remarks.front(),
+                AllOf(HasSubstr("warning: a part of "),
+                      ::testing::EndsWith("eventgan init \"" + at(part.root).string() + "\"")));
+  }
+  write("mini/label_2/000000.txt");
+  write("mini/images/000000.png");
+  EXPECT_THAT(find("mini/images").remarks.front(), ::testing::EndsWith("in image_2"));
+  write("mini/other/000000.png");
+  EXPECT_THAT(find("mini/other").remarks, Not(Contains(HasSubstr("a part of"))));
+}
+
 TEST_F(FindSource, SaysWhatThereIsInstead) {
   write("testing/image_2/000000.png");
   write("notes/readme.txt");

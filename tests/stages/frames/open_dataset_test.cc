@@ -126,6 +126,25 @@ TEST(OpenDataset, OpensTheKindTheManifestNames) {
   }
 }
 
+// What stands behind a NUL is lost in a shard and to the file system: two names could be one.
+TEST(OpenDataset, RefusesNamesWithNul) {
+  const TemporaryFolder folder;
+  SourceSpec spec;
+  spec.dataset = DatasetKind::kMpiiList;
+  spec.root = "mpii";
+  spec.annotations = "mpii/list.json";
+  write_file(folder / "mpii/images/a.jpg", "");
+  write_file(folder / "mpii/list.json", R"([{"image": "a.jpg\u0000x"}])");
+  try {
+    open_dataset(spec, folder.path());
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(),
+                 "expected names of frames without NUL, got \"mpii/images/a.jpg\\u0000x\", in "
+                 "mpii/list.json:a.jpg\\u0000x");
+  }
+}
+
 TEST(OpenDataset, OpensRealDataOfEveryKind) {
   EVENTGAN_SHARED_DATA_OR_SKIP(data);
   const auto labelled = [&](DatasetKind kind, const char* root, const char* annotations = nullptr) {

@@ -9,7 +9,7 @@
 
 namespace eventgan::testing {
 
-/// The generator written from DESIGN section 4 as plain loops in double precision: slow, and with
+/// The generator's network (weights.h) written as plain loops in double precision: slow, and with
 /// nothing in common with the engines it judges. frames [2, H, W] → volume [2 bins, H, W].
 /// `change` sees, and may change, the tensors [channel, y, x] of quantized_tensors(), and
 /// decoders.3, behind their activations.

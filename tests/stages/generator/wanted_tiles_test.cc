@@ -3,7 +3,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
+#include <random>
 
 namespace eventgan {
 namespace {
@@ -87,11 +91,15 @@ TEST(WantedTiles, AreAroundLabels) {
 
   VolumeLabels person;
   person.persons.resize(1);
-  person.persons[0].joints = {kMissingPoint, {40, 4}, {44, 6}};
-  EXPECT_THAT(wanted(person), ElementsAre(0, 0, 1, 0, 0, 0));
-  // 1.25 x 200 x 0.04 = 10 px wide.
-  person.persons[0].center = {24, 24};
-  person.persons[0].scale = 0.04;
+  // Their box is 4 px wide and 2 high: the crop reaches 1.105 x 4 - 4 / 2 = 2.4 px to the left and
+  // right of it and 1.105 x 4 = 4.4 px, with one of them alone, above and below it.
+  person.persons[0].joints = {kMissingPoint, {39, 6}, {43, 8}};
+  EXPECT_THAT(wanted(person), ElementsAre(0, 0, 1, 0, 0, 0));  // to row 13, and 2 of margin
+  person.persons[0].joints = {kMissingPoint, {39, 7}, {43, 9}};
+  EXPECT_THAT(wanted(person), ElementsAre(0, 0, 1, 0, 0, 1));
+  // 221 x 0.02 = 4.4 px to each side of (24, 23 + 15 x 0.02), and 2 of margin.
+  person.persons[0].center = {24, 23};
+  person.persons[0].scale = 0.02;
   EXPECT_THAT(wanted(person), ElementsAre(0, 0, 0, 0, 1, 0));
   person.persons[0] = {};
   person.persons[0].joints = {kMissingPoint};
@@ -99,6 +107,70 @@ TEST(WantedTiles, AreAroundLabels) {
 
   scope.scope = Scope::kLabels;
   EXPECT_THAT(wanted(box_labels({20, 20, 28, 28})), ElementsAre(1, 0, 0, 0, 1, 0));
+}
+
+/// What PoseDataset and Simple Baselines do, sampled: the extent of squares of any joints, as they
+/// may be varied, of pixels whose corners are sampled.
+TEST(PoseCrop, HoldsEverySquareThatAugmentationMakes) {
+  const auto extent = [](Point center, double scale) {
+    Rectangle all{center.x, center.y, center.x, center.y};
+    for (const double factor : {0.75, 1.0, 1.25}) {
+      for (int angle_deg = -60; angle_deg <= 60; ++angle_deg) {
+        const double angle = angle_deg * std::numbers::pi / 180;
+        for (const double x : {-100.0, 100.0}) {
+          for (const double y : {-100.0, 100.0}) {
+            const double size = scale * factor;
+            const Point corner{center.x + size * (x * std::cos(angle) - y * std::sin(angle)),
+                               center.y + size * (x * std::sin(angle) + y * std::cos(angle))};
+            all = {std::min(all.left, corner.x), std::min(all.top, corner.y),
+                   std::max(all.right, corner.x), std::max(all.bottom, corner.y)};
+          }
+        }
+      }
+    }
+    return all;
+  };
+  const auto expect_inside = [](const Rectangle& inner, const Rectangle& outer) {
+    EXPECT_GE(inner.left, outer.left - 1e-9);
+    EXPECT_GE(inner.top, outer.top - 1e-9);
+    EXPECT_LE(inner.right, outer.right + 1e-9);
+    EXPECT_LE(inner.bottom, outer.bottom + 1e-9);
+  };
+  std::mt19937 random(7);
+  const auto between = [&](double low, double high) {
+    return std::uniform_real_distribution<>(low, high)(random);
+  };
+  for (int i = 0; i < 30; ++i) {
+    VolumePerson person;
+    person.center = {between(-20, 300), between(-20, 300)};
+    person.scale = between(0.01, 3);
+    const Rectangle mpii =
+        extent({person.center.x, person.center.y + 15 * person.scale}, 1.25 * person.scale);
+    const Rectangle crop = pose_crop(person);
+    EXPECT_NEAR(crop.left, mpii.left, 1e-9);  // no larger than MPII's
+    EXPECT_NEAR(crop.top, mpii.top, 1e-9);
+    EXPECT_NEAR(crop.right, mpii.right, 1e-9);
+    EXPECT_NEAR(crop.bottom, mpii.bottom, 1e-9);
+    expect_inside(extent(person.center, person.scale), crop);
+
+    person.scale = -1;
+    for (int joint = 0; joint < 4; ++joint) {
+      person.joints.push_back({between(0, 40), between(0, i % 2 == 0 ? 40 : 3)});
+    }
+    for (unsigned taken = 1; taken < 16; ++taken) {
+      Rectangle box{1e9, 1e9, -1e9, -1e9};
+      for (unsigned joint = 0; joint < 4; ++joint) {
+        if ((taken >> joint & 1) == 0) continue;
+        const Point at = person.joints[joint];
+        box = {std::min(box.left, at.x), std::min(box.top, at.y), std::max(box.right, at.x),
+               std::max(box.bottom, at.y)};
+      }
+      const double side = std::max({box.right - box.left, box.bottom - box.top, 1.0});
+      expect_inside(
+          extent({(box.left + box.right) / 2, (box.top + box.bottom) / 2}, 1.25 * side / 200),
+          pose_crop(person));
+    }
+  }
 }
 
 }  // namespace

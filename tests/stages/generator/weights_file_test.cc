@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "manifests/values/faults.h"
+#include "pipeline/runtime/errors.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/weights.h"
@@ -150,6 +151,33 @@ TEST(WeightsFile, TakesTheGapsOfAnEarlierFileFromItsTrainingManifest) {
   EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").training_gaps, (GapRange{2, 4}));
   weights.metadata["training_manifest"] = "gaps: 2, 4";
   EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").training_gaps, std::nullopt);
+}
+
+TEST(WeightsFile, SaysOfAPyTorchCheckpointHowItIsImported) {
+  const testing::TemporaryFolder folder;
+  const std::filesystem::path file = folder / "EventGAN.pt";
+  const std::string advice = "run `eventgan import-weights \"" + file.string() + "\" \"" +
+                             (folder / "EventGAN.safetensors").string() + "\"`";
+  // The beginnings of torch.save's files: since version 1.6, before that, and of a plain pickle.
+  for (const std::string& start : {std::string("PK\3\4\0\0\10\10\0\0", 10),
+                                   std::string("\200\2\212\12l\374\234F\371 j\250P\31.", 15),
+                                   std::string("\200\2}q\0X\3\0\0\0gen", 13)}) {
+    testing::write_file(file, start);
+    try {
+      read_weights(file);
+      FAIL() << "expected an error";
+    } catch (const InputError& error) {
+      EXPECT_THAT(error_text(error), ::testing::HasSubstr(advice));
+    }
+  }
+  // 640 bytes of header, which begins as a pickle does: no checkpoint.
+  testing::write_file(file, std::string("\200\2\0\0\0\0\0\0{", 9));
+  try {
+    read_weights(file);
+    FAIL() << "expected an error";
+  } catch (const InputError& error) {
+    EXPECT_THAT(error_text(error), ::testing::Not(::testing::HasSubstr("PyTorch")));
+  }
 }
 
 TEST(WeightsFile, RefusesOtherSafetensorsAndMissingFiles) {

@@ -14,7 +14,7 @@ namespace eventgan {
 namespace {
 
 TEST(NetworkLayout, HasThePublishedNumberOfParameters) {
-  // DESIGN section 4: 13.36 M parameters at base width 32. Folding turns the batch norms' γ and β
+  // As published: 13.36 M parameters at base width 32. Folding turns the batch norms' γ and β
   // into one bias for each channel; the published count has γ, β for every channel but those of
   // head and pred.
   std::size_t weights = 0, biases = 0, normalised = 0;

@@ -9,8 +9,11 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "stages/frames/frame_selection.h"
 #include "stages/scenes/layouts/kitti_layout_writer.h"
+#include "stages/scenes/layouts/mpii_layout_writer.h"
 #include "stages/scenes/road_scene.h"
+#include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -112,6 +115,51 @@ TEST(DemoDataset, RefusesAFolderWithContentAndAFile) {
   EXPECT_EQ(content_of(folder.path()).size(), 1u) << "nothing was written";
 }
 
+TEST(DemoDataset, LeavesNothingOnAFullDisk) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "empty");
+  for (const char* name : {"new", "empty"}) {
+    // Enough for some pictures.
+    EXPECT_THAT(
+        testing::error_on_full_disk(20000, [&] { write_demo_dataset(folder / name, 7, 1, 1); }),
+        ::testing::HasSubstr((folder / name).string() + "/"));
+  }
+  EXPECT_THAT(testing::names_in(folder.path()), ::testing::ElementsAre("empty"));
+  EXPECT_THAT(testing::names_in(folder / "empty"), ::testing::IsEmpty());
+}
+
+TEST(DemoDataset, CountsItsImages) {
+  const TemporaryFolder folder;
+  int images = 0;
+  write_demo_dataset(folder / "one", 7, 1, 0, [&] { ++images; });
+  EXPECT_EQ(images, 1 + 7);
+  EXPECT_EQ(demo_image_count(1), images);
+  EXPECT_EQ(demo_image_count(0), 12 + 7);
+  EXPECT_EQ(demo_image_count(10), 10 + 10);
+}
+
+TEST(DemoManifest, HasBothPartsOfAnyNumberOfScenes) {
+  for (int scenes = 1; scenes < 40; ++scenes) {
+    for (const std::uint64_t seed : {1, 7, 12345}) {
+      const JobManifest manifest =
+          parse_job_manifest(demo_manifest(seed, scenes), "/demo", "manifest.json");
+      ASSERT_EQ(manifest.sources.size(), scenes == 1 ? 4u : 5u);
+      for (const SourceSpec& source : manifest.sources) {
+        if (source.dataset == DatasetKind::kHuman36m) continue;
+        const bool is_kitti = source.dataset == DatasetKind::kKittiObject;
+        std::vector<LabelledFrame> frames;
+        for (const std::string& name :
+             is_kitti ? kitti_layout_names(scenes) : mpii_layout_names(scenes)) {
+          frames.push_back({name, is_kitti ? "" : name, {}, name});
+        }
+        EXPECT_NO_THROW(select_frames(frames, source, "/demo", manifest.seed))
+            << scenes << " scenes, " << seed << ", " << to_string(source.dataset) << ", "
+            << source.split;
+      }
+    }
+  }
+}
+
 TEST(DemoManifest, IsAManifestOfTheThreeLayouts) {
   const JobManifest manifest = parse_job_manifest(demo_manifest(12345), "/demo", "manifest.json");
   EXPECT_EQ(manifest.seed, 12345u);
@@ -126,7 +174,8 @@ TEST(DemoManifest, IsAManifestOfTheThreeLayouts) {
   const JobManifest split = parse_job_manifest(demo_manifest(7, 400), "/demo", "manifest.json");
   ASSERT_EQ(split.sources.size(), 5u);
   EXPECT_EQ(split.sources[1].split, "val");
-  EXPECT_EQ(split.sources[0].selection.fraction[1], split.sources[1].selection.fraction[0]);
+  EXPECT_EQ(split.sources[0].selection.fraction[1], 0.8);
+  EXPECT_EQ(split.sources[1].selection.fraction[0], 0.8);
 }
 
 }  // namespace

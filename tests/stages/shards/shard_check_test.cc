@@ -131,6 +131,7 @@ TEST_F(ShardCheck, AValueOutsideTheGeneratedTilesIsAFault) {
   std::vector<std::uint8_t> tiles(5 * 4, 1);
   tiles[1] = 0;  // of sample 0: rows 0-3, columns 4-7
   overwrite("/events/tiles", H5T_NATIVE_UINT8, tiles);
+  overwrite<float>("/events/statistics/generated_fraction", H5T_NATIVE_FLOAT, {0.75f, 1, 0, 1, 1});
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("zeros outside the tiles"),
                                           HasSubstr("(sample 0, 000000)"))));
 }
@@ -340,6 +341,48 @@ TEST_F(ShardCheck, LabelsInTheWrongPlaceAreFound) {
                           HasSubstr("xyxy of box 0 to be"), HasSubstr("center of person 0 where")));
 }
 
+TEST_F(ShardCheck, WhatElseSourceToVolumeMapsIsFound) {
+  testing::ExampleShard example = testing::example_shard();
+  VolumeLabels& labels = example.samples[0].labels;
+  labels.projection->at(11) += 1;
+  VolumePerson& person = labels.persons[1];
+  person.scale += 0.1;
+  person.head_box.reset();
+  person.box->right += 0.25;
+  person.camera->focal_x *= 2;
+  write(example);
+  EXPECT_THAT(faults(),
+              ElementsAre(HasSubstr("scale_volume of person 1 as"),
+                          HasSubstr("head_box of person 1 if there is head_box_source"),
+                          HasSubstr("box of person 1 where source_to_volume puts box_source"),
+                          HasSubstr("camera of person 1 where"), HasSubstr("projection where")));
+}
+
+TEST_F(ShardCheck, AGeneratedFractionThatIsNotTheTilesIsFound) {
+  write(testing::example_shard());
+  // Three of four tiles, nothing of the quarantined sample.
+  overwrite<float>("/events/statistics/generated_fraction", H5T_NATIVE_FLOAT,
+                   {0.75f, 0.5f, 0, 0.75f, 0.75f});
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected generated_fraction (sample 1, 000001) "
+                                              "0.750000, got 0.500000")));
+}
+
+TEST_F(ShardCheck, OfAQuarantinedSampleTheSourcesProjectionMayStandAlone) {
+  testing::ExampleShard example = testing::example_shard();
+  example.samples[2].annotation.projection = example.samples[0].annotation.projection;
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty());
+}
+
+TEST_F(ShardCheck, AClassWithoutANameIsFound) {
+  write(testing::example_shard());
+  overwrite<std::int32_t>("/labels/boxes/class_id", H5T_NATIVE_INT32, {0, 2, -1});
+  EXPECT_THAT(faults(),
+              ElementsAre(HasSubstr("class_id of box 1 to have a name, got 2"),
+                          HasSubstr("class_id of box 0 to have a name, got -1"),
+                          HasSubstr("expected boxes by class Car: 2, DontCare: 1, got Car: 1")));
+}
+
 TEST_F(ShardCheck, NanInALabelIsFound) {
   testing::ExampleShard example = testing::example_shard();
   example.samples[0].labels.boxes[1].clipped.top = std::numeric_limits<double>::quiet_NaN();
@@ -367,6 +410,10 @@ TEST_F(ShardCheck, InfinityInAnyLabelIsFound) {
       {"head_box_source of person 1",
        [](auto& a, auto&) { a.persons[1].head_box->left = kInfinity; }},
       {"head_box of person 1", [](auto&, auto& v) { v.persons[1].head_box->bottom = kInfinity; }},
+      {"box_source of person 1", [](auto& a, auto&) { a.persons[1].box->top = kInfinity; }},
+      {"box of person 1", [](auto&, auto& v) { v.persons[1].box->top = kInfinity; }},
+      {"projection_source", [](auto& a, auto&) { a.projection->at(3) = kInfinity; }},
+      {"projection", [](auto&, auto& v) { v.projection->at(3) = kInfinity; }},
       {"joints3d_mm of person 1",
        [](auto& a, auto&) { a.persons[1].joints3d_mm[1]->at(2) = kInfinity; }},
       {"joints3d_mm of person 1",  // half known

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "stages/shards/shard_tables.h"
@@ -143,6 +144,27 @@ TEST_F(ShardSummary, TextSaysWhatIsInASample) {
   EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
   EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
   EXPECT_THROW(describe_sample(reader_, -1), std::out_of_range);
+}
+
+TEST(ShardText, HasNoControlCharactersOfTheShard) {
+  const testing::TemporaryFolder folder;
+  testing::ExampleShard example = testing::example_shard();
+  for (std::string& name : example.header.label_schema.class_names) name += "\x1b[31m";
+  for (std::string& name : example.header.label_schema.joint_names) name += "\x9b";
+  for (ShardSample& sample : example.samples) {
+    sample.sample_id += "\x1b]0;x\x07\nvalid yes";
+    sample.sequence += "\r";
+    sample.pair.next.path += "\x7f";
+  }
+  const ShardReader reader(folder / write_shard(folder.path(), example).shard);
+  for (const std::string& text : {describe_shard(reader), describe_sample(reader, 0)}) {
+    EXPECT_TRUE(std::ranges::none_of(text, [](unsigned char c) {
+      return (c < 0x20 && c != '\n') || c == 0x7f || c == 0x9b;
+    })) << text;
+  }
+  EXPECT_THAT(describe_shard(reader), HasSubstr("Car\\u001b[31m: 2"));
+  EXPECT_THAT(describe_sample(reader, 0),
+              HasSubstr("000000\\u001b]0;x\\u0007\\nvalid yes, sequence"));
 }
 
 TEST_F(ShardSummary, JsonHoldsTheSame) {

@@ -44,6 +44,27 @@ TEST(AtomicFile, WritesAndReplaces) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre("a.json"));
 }
 
+TEST(RequireNoLink, NamesALinkBelowTheFolder) {
+  const TemporaryFolder folder;
+  const TemporaryFolder elsewhere;
+  testing::write_file(folder / "own/below/a.txt", "x");
+  namespace fs = std::filesystem;
+  fs::create_symlink(elsewhere.path(), folder / "linked");
+  fs::create_symlink(elsewhere / "none", folder / "own/dangling");
+  for (const char* own : {"", "own", "own/below/a.txt", "own/none/a.txt", "none"}) {
+    EXPECT_NO_THROW(require_no_link(folder.path(), own)) << own;
+  }
+  EXPECT_NO_THROW(require_no_link(folder / "linked", "a.txt")) << "its user has named it";
+  for (const auto& [relative, link] :
+       std::vector<std::pair<std::string, std::string>>{{"linked", "linked"},
+                                                        {"linked/a.txt", "linked"},
+                                                        {"linked/b/a.txt", "linked"},
+                                                        {"own/dangling", "own/dangling"}}) {
+    EXPECT_THAT(error_of([&] { require_no_link(folder.path(), relative); }),
+                HasSubstr("got a symbolic link, in " + (folder / link).string()));
+  }
+}
+
 TEST(AtomicFile, CreatesOnlyWhatIsNotThere) {
   const TemporaryFolder folder;
   EXPECT_TRUE(create(folder / "plan.json", "mine"));

@@ -127,10 +127,14 @@ TEST_F(UnfinishedFiles, OfThisProcessAreAlive) {
   EXPECT_FALSE(is_stale(files[0]));
 }
 
-TEST_F(UnfinishedFiles, AreNeverOlderThanNow) {
-  const UnfinishedFile file = file_of("node7-1", 1, -7200);  // of a clock that is ahead
-  EXPECT_EQ(file.silent_s, 0);
-  EXPECT_FALSE(is_stale(file));
+TEST_F(UnfinishedFiles, OfAClockThatIsAheadAreStaleFromAnHourOn) {
+  const UnfinishedFile little = file_of("node7-1", 1, -3500);
+  EXPECT_NEAR(little.silent_s, -3500, 60);
+  EXPECT_FALSE(is_stale(little));
+  EXPECT_TRUE(is_stale(file_of("node7-1", 1, -3700)));
+  // Years ahead: it would lie there for years.
+  EXPECT_TRUE(is_stale(file_of("node7-1", 1, -1e8)));
+  EXPECT_TRUE(is_stale(file_of(host_name(), kAlivePid, -1e8)));
 }
 
 TEST_F(UnfinishedFiles, NamesAFolderThatCannotBeListed) {
@@ -148,14 +152,18 @@ TEST(StaleTemporaries, OnlyThoseOfDeadWritersGo) {
   const std::string stale_too = to_string(TemporaryName{"plan.json", host_name(), dead, 17});
   const std::string alive = to_string(TemporaryName{"a.h5", host_name(), ::getpid(), 0});
   const std::string foreign = to_string(TemporaryName{"a.h5", other_host, dead, 0});
-  for (const auto& name : {stale, silent, stale_too, alive, foreign, std::string("a.h5")}) {
+  const std::string ahead = to_string(TemporaryName{"c.h5", other_host, dead, 0});
+  for (const auto& name : {stale, silent, ahead, stale_too, alive, foreign, std::string("a.h5")}) {
     testing::write_file(folder / name, "x");
   }
   using std::chrono::hours;
   std::filesystem::last_write_time(folder / silent,
                                    std::filesystem::file_time_type::clock::now() - hours(2));
-  EXPECT_THAT(remove_stale_temporaries(folder.path()),
-              ::testing::ElementsAre(folder / stale, folder / silent, folder / stale_too));
+  std::filesystem::last_write_time(folder / ahead,
+                                   std::filesystem::file_time_type::clock::now() + hours(2));
+  EXPECT_THAT(
+      remove_stale_temporaries(folder.path()),
+      ::testing::ElementsAre(folder / stale, folder / silent, folder / ahead, folder / stale_too));
   EXPECT_THAT(testing::names_in(folder.path()),
               ::testing::UnorderedElementsAre(alive, foreign, "a.h5"));
   EXPECT_TRUE(remove_stale_temporaries(folder.path()).empty());

@@ -174,6 +174,17 @@ TEST_F(Dhp19Test, ProjectsTheMeanPoseByTheCamerasMatrix) {
   }
 }
 
+// All joints would be missing from every pose, and all windows sound.
+TEST_F(Dhp19Test, RefusesMatricesThatProjectNothing) {
+  const std::vector<double> zeros(12), equal(12, 7.0), nan(12, kNan), huge(12, 1e308);
+  for (const std::vector<double>& matrix : {zeros, equal, nan, huge}) {
+    testing::write_file(folder_ / "dhp19/P_matrices/P3.npy", testing::npy_doubles({3, 4}, matrix));
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(
+                                     AllOf(HasSubstr("expected a projection of full rank, got ["),
+                                           HasSubstr("in dhp19/P_matrices/P3.npy"))));
+  }
+}
+
 TEST_F(Dhp19Test, WindowsThatLastLongerThanThePosesAreLeftOut) {
   write_poses("S1_1_1", 2);  // to 20 ms; the third window ends at 24 ms
   const auto dataset = open();

@@ -165,6 +165,48 @@ TEST_F(RecordingDatasetTest, TimesOutsideTheRecordingAreFaults) {
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[0]));
 }
 
+/// The small recording with its frames so many seconds later.
+std::map<std::string, testing::Hdf5Dataset> frames_later(double seconds) {
+  auto datasets = testing::small_mvsec();
+  std::vector<double> times = testing::kSmallTimes;
+  for (double& time : times) time += seconds;
+  datasets["davis/left/image_raw_ts"].values = times;
+  datasets.erase("davis/left/image_raw_event_inds");
+  datasets.erase("davis/left/flow_dist");
+  return datasets;
+}
+
+TEST_F(RecordingDatasetTest, WarnsWhereWindowsLieElsewhereThanTheEvents) {
+  EXPECT_THAT(open()->warnings(), IsEmpty());
+  EXPECT_THAT(open()->notes(), IsEmpty());
+  // Windows of the second and third frame: (1001, 1001.5] and (1001.5, 1002].
+  testing::write_hdf5(folder_ / "drive.h5", frames_later(1000));
+  constexpr char kBoth[] =
+      "expected windows within the times of the events, 0.5 s to 2.5 s, got 2 of 2 outside them, "
+      "at 1001.5 s to 1002 s (are events, frames and labels on one clock?), in drive.h5";
+  EXPECT_THAT(open()->warnings(), ElementsAre(kBoth));
+  EXPECT_THAT(open()->notes(), ElementsAre(kBoth));
+  spec_.window.events = 3;  // the last three events of all, whatever the label
+  EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr("got 3 of 3 outside them, at 1001 s")));
+  spec_.window.events.reset();
+  testing::write_hdf5(folder_ / "drive.h5", frames_later(-1000));
+  EXPECT_THAT(open()->warnings(), ElementsAre(HasSubstr("at -998.5 s to -998 s")));
+
+  // (2.25, 2.75] has an event, (2.75, 3.25] is behind the last one: for a note, no more.
+  testing::write_hdf5(folder_ / "drive.h5", frames_later(1.25));
+  EXPECT_THAT(open()->warnings(), IsEmpty());
+  EXPECT_THAT(open()->notes(), ElementsAre(AllOf(HasSubstr("got 1 of 2 outside them, at 3.25 s"),
+                                                 ::testing::Not(HasSubstr("clock")))));
+}
+
+TEST_F(RecordingDatasetTest, WarnsOfARecordingWithoutEvents) {
+  auto datasets = frames_later(0);
+  datasets["davis/left/events"] = {{0, 4}, std::vector<double>{}};
+  testing::write_hdf5(folder_ / "drive.h5", datasets);
+  EXPECT_THAT(open()->warnings(),
+              ElementsAre("expected events, got none: 2 event volumes are empty, in drive.h5"));
+}
+
 TEST_F(RecordingDatasetTest, CorruptEventsAreTheFaultOfTheirWindow) {
   auto datasets = testing::small_mvsec();
   std::get<std::vector<double>>(datasets["davis/left/events"].values)[4 * 4] = std::nan("");

@@ -71,7 +71,7 @@ TEST_F(RecordingLabelsTest, CsvNamesEveryLineThatIsWrong) {
               "x,1,2,3,4,car,\n1,1,2,nan,4,car,\n1,1,2,3,4,,\n"
               "1,1,2,3,4,car,eazy\n1,2,3\n\xff\n1,1,2,3,4,\"a,b\",easy\n",
           {"expected a time in seconds, got \"x\", in " + place + " (line 2)",
-           "expected right in pixels, got \"nan\", in " + place + " (line 3)",
+           "expected right within 1e+06 pixels, got \"nan\", in " + place + " (line 3)",
            "expected a class, got none, in " + place + " (line 4)",
            "expected easy, hard, dont_care or nothing, got \"eazy\", in " + place + " (line 5)",
            "expected 7 fields, none with a comma in it, got 3, in " + place + " (line 6)",
@@ -121,13 +121,65 @@ TEST_F(RecordingLabelsTest, JsonTellsEveryFaultAndTheNearestKey) {
       { "time_s": 1 }] })",
           {R"($.samples[0].time_s: expected a number)", R"(expected the key "boxes" or none)",
            "$.samples[1].boxes[0].bottom: expected a number",
-           R"($.samples[1].boxes[0].class: expected a class, got "")",
+           R"($.samples[1].boxes[0].class: expected a class without control characters, got "")",
            R"(expected "easy", "hard" or "dont_care", got "eazy")",
            "$.samples[1].persons[0].joints[0]: expected [x, y], [x, y, visible] or []",
            "$.samples[1].persons[0].joints: expected as many as joint_names, 1, got 2",
            "$.samples[2]: expected each time once"});
   refuses("a.json", R"({"format": "coco", "version": 1})", {"expected \"eventgan-labels\""});
   refuses("a.json", "{", {"a.json"});
+}
+
+// A shard keeps names as texts that end at a NUL: "ca\0r" and "ca\0t" would be one class there.
+TEST_F(RecordingLabelsTest, NamesHaveNoControlCharacters) {
+  using namespace std::string_literals;
+  const std::string place = (folder_ / "a.csv").string();
+  refuses(
+      "a.csv", kHeader + "1,1,2,3,4,ca\0r,\n1,1,2,3,4,car,\n1,1,2,3,4,\x1b[31mred,\n"s,
+      {"expected a class without control characters, got \"ca\\u0000r\", in " + place + " (line 2)",
+       "got \"\\u001b[31mred\", in " + place + " (line 4)"});
+  refuses("a.csv", kHeader + "1,1,2,3,4,car,ea\0sy\n"s, {"nothing, got \"ea\\u0000sy\""});
+  for (const std::string bad : {"\\u0000", "\\n", "\\u007f", "\\u009b"}) {
+    refuses("a.json",
+            R"({ "format": "eventgan-labels", "version": 1, "joint_names": ["he)" + bad +
+                R"(ad"], "samples": [{ "time_s": 1, "boxes": [
+                            { "left": 1, "top": 2, "right": 3, "bottom": 4, "class": "ca)" +
+                bad + R"(r" }] }] })",
+            {"$.joint_names[0]: expected a joint's name without control characters, got \"he",
+             "$.samples[0].boxes[0].class: expected a class without control characters, got \"ca"});
+  }
+  EXPECT_THAT(read("a.csv", kHeader + "1,1,2,3,4,été — 自行车,\n"s).class_names,
+              ElementsAre("été — 自行车"));
+}
+
+TEST_F(RecordingLabelsTest, AJointStandsOnce) {
+  refuses("a.json", R"({ "format": "eventgan-labels", "version": 1,
+                         "joint_names": ["head", "foot", "head"], "samples": [] })",
+          {R"($.joint_names[2]: expected each joint once, got "head")"});
+}
+
+TEST_F(RecordingLabelsTest, BothFormsTakePlacesWithinAMillionPixels) {
+  const std::string place = (folder_ / "a.csv").string();
+  EXPECT_EQ(read("a.csv", kHeader + std::string("1,-1e6,0,1e6,9,car,\n")).annotations.size(), 1u);
+  refuses("a.csv", kHeader + std::string("1,-1e300,0,1e300,9,car,\n1,0,0,1000001,9,car,\n"),
+          {"expected left within 1e+06 pixels, got \"-1e300\", in " + place + " (line 2)",
+           "expected right within 1e+06 pixels, got \"1000001\", in " + place + " (line 3)"});
+  refuses("a.json", R"({ "format": "eventgan-labels", "version": 1, "samples": [{ "time_s": 1,
+            "boxes": [{ "left": -1e300, "top": 0, "right": 9, "bottom": 9, "class": "car" }] }] })",
+          {"$.samples[0].boxes[0].left: expected a number -1e+06..1e+06"});
+}
+
+TEST_F(RecordingLabelsTest, ClassesAreNumberedAsTheyFirstOccurHoweverManyThereAre) {
+  constexpr int kCount = 60000;  // comparing each with all before it would take half a minute
+  std::string text = kHeader;
+  for (int repeat = 0; repeat < 2; ++repeat) {
+    for (int i = kCount; i-- > 0;) text += "1,1,2,3,4,class " + std::to_string(i) + ",\n";
+  }
+  const RecordingLabels labels = read("a.csv", text);
+  ASSERT_EQ(labels.class_names.size(), std::size_t{kCount});
+  EXPECT_EQ(labels.class_names[1], "class 59998");
+  const std::vector<Box>& boxes = labels.annotations.at(1).boxes;
+  for (int i = 0; i < kCount; ++i) ASSERT_EQ(boxes.at(kCount + i).class_id, i);
 }
 
 }  // namespace

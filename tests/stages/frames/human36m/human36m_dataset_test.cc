@@ -221,6 +221,22 @@ TEST(CameraBookTest, ReadsTheLensDistortion) {
               ThrowsMessage<InputError>(HasSubstr("expected 3 numbers, got [2]")));
 }
 
+TEST(CameraBookTest, RefusesCamerasThatSeeNothing) {
+  using namespace std::string_literals;
+  const std::string f =
+      "U\x01"
+      "f";
+  const std::string c =
+      "U\x01"
+      "c" +
+      pickled_bytes("\x05\x06");
+  for (const std::string& focal : {"\0\0"s, "\0\x0c"s, "\x0b\0"s}) {
+    EXPECT_THAT([&] { read(camera_pickle(f + pickled_bytes(focal) + c)); },
+                ThrowsMessage<InputError>(
+                    AllOf(HasSubstr("expected focal lengths above 0"), HasSubstr("(S1 7)"))));
+  }
+}
+
 /// One joint at (X, Y, Z) = (500, -250, 1000) mm, so at (a, b) = (0.5, -0.25).
 Person person_seen_at(Point at) {
   Person person;

@@ -372,6 +372,10 @@ TEST_F(KittiObjectDatasetTest, TheCalibrationGivesTheProjection) {
             (std::array<double, 12>{700, 0, 8, 40, 0, 700, 6, 2, 0, 0, 1, 4}));
   EXPECT_EQ(std::get<SampleFault>(annotation("label_2/000001.txt")).reason,
             "expected 12 numbers for P2, got 3, in training/calib/000001.txt:1");
+  write("training/calib/000001.txt", "P2: 0 0 0 0 0 0 0 0 0 0 0 0\n");
+  EXPECT_EQ(std::get<SampleFault>(annotation("label_2/000001.txt")).reason,
+            "expected a matrix of full rank for P2, got 'P2: 0 0 0 0 0 0 0 0 0 0 0 0?', in "
+            "training/calib/000001.txt:1");
   EXPECT_FALSE(std::get<Annotation>(annotation("label_2/000002.txt")).projection);
   EXPECT_THAT(dataset->annotation_files(), Contains("training/calib/000000.txt"));
 }
