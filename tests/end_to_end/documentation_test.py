@@ -1,13 +1,18 @@
-"""The pages against the program: commands, options, exit codes, links, and the tests that the pages of guarantees and of numbers name."""
+"""The pages against the program: commands, options, exit codes, links, Python, and the tests that the pages of guarantees and of numbers name."""
 
 import functools
+import os
 import re
+import subprocess
+import sys
+import tempfile
 import unittest
 
 import program
 from program import SOURCE, run
 
-PAGES = [SOURCE / "README.md", SOURCE / "docker" / "running.md", *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
+PAGES = [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", SOURCE / "docker" / "running.md", SOURCE / "manifests" / "weights" / "README.md",
+         *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
 GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
 NUMERICS = SOURCE / "manifests" / "guides" / "numerics.md"
 COMMAND = re.compile(r"\beventgan ([a-z][a-z-]*)([^#|;&]*)")
@@ -51,6 +56,39 @@ class Documentation(unittest.TestCase):
         for page in (GUARANTEES, SOURCE / "docker" / "running.md"):
             rows = set(re.findall(r"(?m)^\| (\d+) \|", page.read_text(encoding="utf-8")))
             self.assertEqual(rows - {"137"}, codes, page)  # 128 + SIGKILL, the shell's own
+
+    def test_lines_are_short(self):
+        for page in PAGES:
+            is_fenced = False
+            for number, line in enumerate(page.read_text(encoding="utf-8").splitlines(), 1):
+                is_fenced ^= line.startswith("```")
+                if not is_fenced and not line.startswith(("|", "    ")):
+                    self.assertLessEqual(len(line), 120, f"{page}:{number}")
+
+    def test_the_python_page_runs(self):
+        """Its blocks one after the other in one process, as somebody who pastes them, on a small demo dataset."""
+        page = (SOURCE / "manifests" / "guides" / "python.md").read_text(encoding="utf-8")
+        blocks = re.findall(r"(?:^    .*\n|^\n(?=    ))+", page, re.M)
+        code = "\n".join(re.sub(r"(?m)^    ", "", block) for block in blocks if re.search(r"\b(import|Shards\()", block))
+        self.assertGreater(code.count("import"), 4)
+        try:
+            import matplotlib
+            import torch
+        except ImportError as missing:
+            self.skipTest(str(missing))
+        with tempfile.TemporaryDirectory(prefix="eventgan-") as folder:
+            for command in (["make-demo", "demo", "--scenes", "10"], ["convert", "demo/manifest.json", "--output", "out", "--progress", "none"], ["finalize", "out"]):
+                subprocess.run([program.PROGRAM, *command], cwd=folder, check=True, capture_output=True)
+            ids = subprocess.run([sys.executable, "-c", "from eventgan_shards import Shards; print(Shards('out').column('sample_id')[0])"],
+                                 cwd=folder, env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")}, check=True, capture_output=True)
+            with open(os.path.join(folder, "wanted.txt"), "wb") as file:
+                file.write(ids.stdout)
+            shard = next(name for name in sorted(os.listdir(os.path.join(folder, "out"))) if name.endswith(".h5") and "-train-" in name)
+            code = code.replace("kitti-events-train-00000-of-00117.h5", shard)
+            run = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True,
+                                 env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python"), "MPLBACKEND": "agg", "OMP_NUM_THREADS": "1"})
+            self.assertEqual(run.returncode, 0, run.stderr)
+            self.assertTrue(os.path.exists(os.path.join(folder, "volume.png")))
 
     def test_links_lead_somewhere(self):
         for page in PAGES:
