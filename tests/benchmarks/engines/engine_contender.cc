@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "manifests/values/counter_random.h"
+#include "pipeline/generators/choose_engine.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/torch/torch_generator.h"
 
@@ -42,7 +43,13 @@ std::vector<float> volume_of(const Weights& weights, ImageSize size) {
   return std::vector<float>(2 * static_cast<std::size_t>(weights.bins) * size.pixel_count());
 }
 
+/// Throws UsageError where a job could not have this engine either, before a pass fails in it.
 std::unique_ptr<Generator> make_generator(const ContenderSetup& setup, const Weights& weights) {
+  EngineRequest request;
+  request.engine = setup.engine;
+  request.precision = setup.precision;
+  request.calibrated = weights.calibration != nullptr;
+  choose_engine(request, engine_support(setup.precision));
   return setup.engine == Engine::kTorch ? make_torch_generator(weights, setup.precision)
                                         : make_onednn_generator(weights, setup.precision);
 }
