@@ -19,21 +19,17 @@ it was.
 from __future__ import annotations
 
 import argparse
-import functools
-import hashlib
 import json
 import pathlib
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-import cv2
-import h5py
 import numpy as np
 import training
-from eventgan_shards import Sample, Shards, read_description
+from eventgan_shards import Shards, read_description
 from eventgan_shards.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
 
 EXAMPLES = pathlib.Path(__file__).resolve().parent
@@ -82,72 +78,21 @@ def run(*command: Any, **options: Any) -> None:
         sys.exit(f"error: expected exit code 0, got {done.returncode}, of {command[0]}")
 
 
-def convert(args: argparse.Namespace, scenes: pathlib.Path, name: str, sources: list[dict[str, Any]], generator: Mapping[str, Any],
-            volume_of: Callable[[Sample], np.ndarray] | None = None) -> pathlib.Path:
-    """SCENES/NAME, finalized: volumes made by the generator, divided by their 98th percentile as in the paper; or, where it is given, by `volume_of`."""
+def convert(args: argparse.Namespace, scenes: pathlib.Path, name: str, sources: list[dict[str, Any]], generator: Mapping[str, Any]) -> pathlib.Path:
+    """SCENES/NAME, finalized: volumes made by the generator, divided by their 98th percentile as in the paper."""
     folder = scenes / name
     if (folder / "dataset.json").exists():
         return folder
-    if volume_of:  # half of them may be exchanged
-        shutil.rmtree(folder, ignore_errors=True)
+    sources = [{**source, "root": str(scenes / source["root"])} for source in sources]  # so that --frames finds the frames from anywhere
     manifest = {"format": "eventgan-manifest", "version": 1, "name": name, "seed": 7, "sources": sources, "generator": generator,
                 "image": {**SIZE, "fit": "letterbox", **({} if generator == CAMERA else {"preset": "mpii"})},
-                "volume": {"bins": 9, "normalize": "none" if volume_of else "eta98"},
-                # Not compressed, so that volumes can be exchanged in place.
-                "output": {"directory": name, "samples_per_shard": 64, "dtype": "float16", "deflate_level": 0}}
+                "volume": {"bins": 9, "normalize": "eta98"},
+                "output": {"directory": name, "samples_per_shard": 64, "dtype": "float16"}}
     path = scenes / f"{name}.json"
     path.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
     run(args.program, "convert", path, "--progress", "none")
-    if volume_of:
-        exchange_volumes(folder, volume_of)
     run(args.program, "finalize", folder)
     return folder
-
-
-def exchange_volumes(folder: pathlib.Path, volume_of: Callable[[Sample], np.ndarray]) -> None:
-    """Puts `volume_of` each sample, [2B, H, W] from 0 to 1, in place of its volume, with its statistics, and the shards' new hashes into their
-    markers."""
-    for path in sorted(folder.glob("*.h5")):
-        with h5py.File(path, "r+") as file, Shards(path) as samples:
-            for sample in (samples[i] for i in range(len(samples))):
-                slot, volume, stored = sample["slot"], volume_of(sample).astype(np.float16).astype(float), file["events/volume"]
-                scale = (volume.max() or 1) / 255 if stored.dtype == np.uint8 else 1  # a --truth may have bytes
-                codes = np.round(volume / scale) if scale != 1 else volume
-                stored[slot], file["events/scale"][slot], volume = codes, scale, codes * scale
-                positive, negative = volume.reshape(2, -1)
-                file["events/eta98"][slot] = eta98(volume)
-                for name, value in {"nonzero_fraction": (volume > 0).mean(), "sum_positive": positive.sum(), "sum_negative": negative.sum(),
-                                    "max": volume.max(), "flags": not volume.any()}.items():
-                    file["events/statistics"][name][slot] = value
-        marker = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
-        marker.update(size_bytes=path.stat().st_size, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
-        path.with_suffix(".json").write_text(json.dumps(marker), encoding="utf-8")
-
-
-def eta98(volume: np.ndarray) -> float:
-    """The 98th percentile of the values that are not zero, as shards have it; 0 if there are none."""
-    values = np.sort(volume[volume > 0])
-    return float(values[max(int(0.98 * len(values)), 1) - 1]) if len(values) else 0.0
-
-
-def place_of(sample: Sample) -> tuple[int, int, int, int]:
-    """Where the picture lies in the volume, in whole pixels: left, top, width, height."""
-    (scale_x, _, x), (_, scale_y, y) = sample["pair"]["source_to_volume"]
-    height, width = sample["pair"]["source_size"]
-    return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
-
-
-def frames_as_volumes(args: argparse.Namespace, scenes: pathlib.Path, sources: list[dict[str, Any]]) -> pathlib.Path:
-    """The folder of the labelled frames, grey from 0 to 1, in the first channel of volumes."""
-
-    def volume_of(sample: Sample) -> np.ndarray:
-        picture = cv2.imread(str(scenes / sample["pair"]["next_path"]), cv2.IMREAD_GRAYSCALE)
-        left, top, width, height = place_of(sample)
-        volume = np.zeros((18, SIZE["height"], SIZE["width"]), np.float32)
-        volume[0, top:top + height, left:left + width] = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA) / 255
-        return volume
-
-    return convert(args, scenes, "frames", sources, {"kind": "difference"}, volume_of)
 
 
 def make_scenes(args: argparse.Namespace, name: str, count: int, *more: Any) -> pathlib.Path:
@@ -166,7 +111,7 @@ def camera_recordings(args: argparse.Namespace, scenes: pathlib.Path, moments: s
     sources = [{"path": str(path.relative_to(scenes)), "name": path.name, "method": "difference", "frames_per_second": (BETWEEN + 1) * FRAMES_PER_SECOND}
                for path in sorted((scenes / moments).iterdir())]
     path = scenes / "camera.json"
-    size = dict(zip(("width", "height"), place_of(labelled.labels(0))[2:]))
+    size = dict(zip(("width", "height"), training.place_of(labelled.labels(0))[2:]))
     path.write_text(json.dumps({"format": "eventgan-simulation", "version": 1, "name": "camera", "seed": 1, "sources": sources, "size": size,
                                 "sensor": SENSOR, "output": {"directory": folder.name}}, indent=1), encoding="utf-8")
     run(args.program, "simulate", path, "--progress", "none", stdout=subprocess.DEVNULL)
@@ -178,7 +123,7 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
     joint_names = samples.default_joints() if len(samples.persons) else []
     for i in range(len(samples)):
         sample = samples.labels(i)
-        corner = np.array(place_of(sample)[:2])  # of the picture in the volume
+        corner = np.array(training.place_of(sample)[:2])  # of the picture in the volume
         columns, classes = sample["boxes"], samples.class_names(i)
         difficulty = columns.get("difficulty", np.full(len(columns["xyxy"]), -1))  # KITTI's labels have it
         boxes = [{**dict(zip(("left", "top", "right", "bottom"), box)), "class": classes[class_id],
@@ -195,41 +140,6 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
         labels = {"format": "eventgan-labels", "version": 1, "joint_names": joint_names,
                   "samples": [{"time_s": 1 / FRAMES_PER_SECOND, "boxes": boxes, "persons": persons}]}
         (recordings / f"{sample['pair']['sample_id']}.json").write_text(json.dumps(labels), encoding="utf-8")
-
-
-def changed(args: argparse.Namespace, real: pathlib.Path, name: str, volume_of: Callable[[Sample], np.ndarray]) -> pathlib.Path:
-    """OUT/NAME: the samples of `real` with other volumes."""
-    folder = args.out / name
-    if not (folder / "dataset.json").exists():
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(real, folder, ignore=shutil.ignore_patterns("dataset.*"))
-        exchange_volumes(folder, volume_of)
-        run(args.program, "finalize", folder)
-    return folder
-
-
-def as_bright(args: argparse.Namespace, real: pathlib.Path, learnt: pathlib.Path) -> pathlib.Path:
-    """The volumes of `real` times one number, cut to 1, so that their mean is that of the volumes to learn: one's 98th percentile leaves a camera's
-    fainter than generated ones, of which more are not 0."""
-
-    @functools.cache
-    def factor() -> float:
-        ratio = mean_of(Shards(learnt, split="train")) / mean_of(Shards(real))
-        print(f"the camera's volumes times {ratio:.2f}, for {learnt.name}")
-        return ratio
-
-    return changed(args, real, f"as-bright/{learnt.name}", lambda sample: np.minimum(factor() * sample["volume"], 1))
-
-
-def without_noise(sample: Sample) -> np.ndarray:
-    """The volume without what stands alone: pixels with events that have fewer than two such neighbours."""
-    volume = sample["volume"]
-    there = (volume > 0).any(0).astype(np.float32)
-    return volume * (cv2.filter2D(there, -1, np.ones((3, 3), np.float32), borderType=cv2.BORDER_CONSTANT) > 2)
-
-
-def mean_of(samples: Shards) -> float:
-    return float(np.mean([samples[i]["volume"].mean() for i in range(len(samples))]))
 
 
 def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, test: pathlib.Path, seed: int, *options: Any,
@@ -280,22 +190,22 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     sources = pairs_of("kitti_object", {"train": [1, 2, 3], "val": [1]})
     data = {name: convert(args, scenes, name.replace(",", "").replace(" ", "-"), sources, generator) for name, generator in generators.items()}
     errors = {name: {"error": error_of(folder, data[next(iter(TRADE))])} for name, folder in data.items()} if args.what == "trade" else {}
-    if args.what == "detection":
-        data["Frame"] = frames_as_volumes(args, scenes, sources)
-    frames = frames_as_volumes(args, seen, pairs_of("kitti_object", {"test": [1]}))
-    real = camera(args, seen, frames, "kitti/training/between_2", {"window_s": 1 / FRAMES_PER_SECOND}, ["test"])
+    labelled = convert(args, seen, "labelled", pairs_of("kitti_object", {"test": [1]}), {"kind": "difference"})
+    real = camera(args, seen, labelled, "kitti/training/between_2", {"window_s": 1 / FRAMES_PER_SECOND}, ["test"])
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
+        scale = "--scale", 1.5  # cheaper than its default by half
+        tests = {}
         for name, folder in data.items():
-            scale = "--scale", 1.5  # cheaper than its default by half
-            test = frames if name == "Frame" else real
-            tests = {name: (train(args, "train_yolov3.py", name, folder, test, seed, *scale), test)}
-            if name != "Frame":
-                bright, row = as_bright(args, real, folder), f"{name}, as bright"
-                tests[row] = train(args, "train_yolov3.py", row, folder, bright, seed, *scale, learnt=tests[name][0]), bright
-            for row, (out, test) in tests.items():
-                result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
-                scores.setdefault(row, []).append(result["classes"]["Car"] | errors.get(name, {}))
+            learnt, row = train(args, "train_yolov3.py", name, folder, real, seed, *scale), f"{name}, as bright"
+            tests[name] = learnt, real
+            tests[row] = train(args, "train_yolov3.py", row, folder, real, seed, *scale, "--as-bright", learnt=learnt), real
+        if args.what == "detection":
+            frames = data["log difference"]  # or any other of the same pairs: --frames leaves the events
+            tests["Frame"] = train(args, "train_yolov3.py", "Frame", frames, labelled, seed, *scale, "--frames"), labelled
+        for row, (out, test) in tests.items():
+            result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
+            scores.setdefault(row, []).append(result["classes"]["Car"] | errors.get(row.removesuffix(", as bright"), {}))
     return scores
 
 
@@ -312,12 +222,11 @@ def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     made = convert(args, scenes, "EventGAN", pairs_of("mpii", {"train": [2, 4], "val": [2]}), GENERATORS["EventGAN"])
     labelled = convert(args, seen, "labelled", pairs_of("mpii", {"train": [2]}), {"kind": "difference"})
     real = camera(args, seen, labelled, "mpii/between", {"window_s": 2 / FRAMES_PER_SECOND, "label_at": "middle"}, ["train", "val"])
-    quiet = changed(args, real, "without-noise", without_noise)
     of_camera = ("--dataset", next(iter(read_description(real)["counts"]["by_dataset"])))
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
         learnt, row = train(args, "train_pose.py", "EventGAN", made, real, seed), "EventGAN, without noise"
-        tests = {"EventGAN": (learnt, real), row: (train(args, "train_pose.py", row, made, quiet, seed, learnt=learnt), quiet)}
+        tests = {"EventGAN": (learnt, real), row: (train(args, "train_pose.py", row, made, real, seed, "--without-noise", learnt=learnt), real)}
         for epochs, name in ((1, "1 epoch"), (5, "5 epochs")):
             tuned = "--pretrained", learnt / "weights.pt", "--last-layer", "--epochs", epochs
             tests[f"EventGAN, last layer {name}"] = train(args, "train_pose.py", f"tuned-{epochs}", real, real, seed, *tuned, *of_camera), real

@@ -52,7 +52,7 @@ def main() -> None:
 
     learnt, checked = training.divided(args, with_persons)
     size = (args.size, args.size)
-    searched = training.tested(args, checked, with_persons)
+    searched = training.tested(args, learnt, checked, with_persons)
     try:
         learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
         check = PoseDataset(checked, size, learn.joint_names, sigma=args.sigma)

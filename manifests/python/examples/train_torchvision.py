@@ -74,7 +74,7 @@ def main() -> None:
         else:
             learn = DetectionDataset(learnt, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
             check = DetectionDataset(checked, learn.classes, **place)
-            test = DetectionDataset(training.tested(args, checked, usable(args.task)), learn.classes, **place)
+            test = DetectionDataset(training.tested(args, learnt, checked, usable(args.task)), learn.classes, **place)
     except ValueError as error:
         raise SystemExit(str(error))
     classes = list(learn.classes)

@@ -77,7 +77,7 @@ def main() -> None:
     try:
         learn = DetectionDataset(learnt, classes, (height, width), augmentation, view=view)
         check = DetectionDataset(checked, classes, (height, width), view=view)
-        test = DetectionDataset(training.tested(args, checked, with_boxes), classes, (height, width), view=view)
+        test = DetectionDataset(training.tested(args, learnt, checked, with_boxes), classes, (height, width), view=view)
     except ValueError as error:
         raise SystemExit(str(error))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import functools
 import importlib
 import json
 import math
@@ -15,6 +16,7 @@ import types
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 import torch
 from torch import nn
@@ -22,13 +24,14 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan_shards import Shards, pictures, read_description  # noqa: E402
+from eventgan_shards import Sample, Shards, pictures, read_description  # noqa: E402
 from eventgan_shards.detection_scores import Found, Truth, detection_scores  # noqa: E402
 from eventgan_shards.torch import inverse, move_boxes  # noqa: E402
 
 CHECKED_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
-MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every", "test"}  # when a run goes on
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every", "test", "as_bright",
+              "without_noise"}  # when a run goes on
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
@@ -39,6 +42,12 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
     parser.add_argument("--test", help="folder of shards whose labelled samples (of its split for checking, if it has one) predictions.json is of at the end; "
                         "default: those that are checked")
+    parser.add_argument("--as-bright", action="store_true", help="multiply the volumes that predictions.json is of by one number that gives them the mean of "
+                        "those that are learnt, and clip them at 1: a camera's may be fainter than generated ones, of which more are not 0")
+    parser.add_argument("--without-noise", action="store_true", help="leave out what stands alone in the volumes that predictions.json is of: pixels with "
+                        "events that have fewer than two such neighbours")
+    parser.add_argument("--frames", action="store_true", help="take the labelled frames, grey in the first channel, in place of events; "
+                        "their paths are the shards' (next_path)")
     parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
     parser.add_argument("--epochs", type=int, help="limit")
     parser.add_argument("--steps", type=int, help="limit, in batches")
@@ -133,20 +142,66 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     if description["quarantined"]:
         print(f"{len(description['quarantined'])} samples are in quarantine and left out")
     print(f"{len(parts[0])} samples to learn, {len(parts[1])} to check, {how}")
-    return parts[0], parts[1]
+    learnt, checked = (part.changed(labelled_frame) if args.frames else part for part in parts)
+    return learnt, checked
 
 
-def tested(args: argparse.Namespace, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
-    """The samples that predictions.json is of."""
+def tested(args: argparse.Namespace, learnt: Shards, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
+    """The samples that predictions.json is of, changed as the options say."""
+    shards = _to_test(args, checked, usable)
+    if args.without_noise:
+        shards = shards.changed(without_noise)
+    if args.as_bright:
+        factor = _mean(learnt) / _mean(shards)
+        print(f"the volumes of {args.test or args.data} times {factor:.2f}, as bright as those of {args.data}")
+        shards = shards.changed(functools.partial(_brighter, factor=factor))
+    return shards
+
+
+def _to_test(args: argparse.Namespace, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
     if not args.test:
         return checked
     try:
         description = read_description(args.test)
         where = {"dataset": args.dataset} if args.dataset in description["counts"]["by_dataset"] else None
         shards = Shards(args.test, split=checked_split(description), where=where, partial=True)
-        return shards[list(usable(shards))]
+        shards = shards[list(usable(shards))]
     except (OSError, ValueError) as error:
         sys.exit(str(error))
+    return shards.changed(labelled_frame) if args.frames else shards
+
+
+def _mean(shards: Shards) -> float:
+    return float(np.mean([shards.sample(i, {"volume"})["volume"].mean() for i in range(len(shards))]))
+
+
+def _brighter(sample: Sample, factor: float) -> np.ndarray:
+    return np.minimum(factor * sample["volume"], 1)
+
+
+def without_noise(sample: Sample) -> np.ndarray:
+    """The volume without what stands alone: pixels with events that have fewer than two such neighbours."""
+    volume = sample["volume"]
+    there = (volume > 0).any(0).astype(np.float32)
+    return volume * (cv2.filter2D(there, -1, np.ones((3, 3), np.float32), borderType=cv2.BORDER_CONSTANT) > 2)
+
+
+def place_of(sample: Sample) -> tuple[int, int, int, int]:
+    """Where the picture lies in the volume, in whole pixels: left, top, width, height."""
+    (scale_x, _, x), (_, scale_y, y) = sample["pair"]["source_to_volume"]
+    height, width = sample["pair"]["source_size"]
+    return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
+
+
+def labelled_frame(sample: Sample) -> np.ndarray:
+    """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel. It must be a picture at the pair's end."""
+    pair, volume = sample["pair"], np.zeros_like(sample["volume"])
+    picture = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
+    if picture is None:
+        raise ValueError(f"expected a picture, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
+    left, top, width, height = place_of(sample)
+    volume[0, top:top + height, left:left + width] = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA) / 255
+    return volume
 
 
 def _divides(shards: Shards, by: str) -> bool:

@@ -148,22 +148,22 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     assert list(rows) == names and all(len(row[score]) == 1 for row in rows.values())
     assert all(name in again.stdout for name in names)
     camera = tmp_path / "out" / "camera"
+    events, labelled = Shards(camera / "events"), Shards(camera / "labelled")
+    for folder in (camera / "events", camera / "labelled"):
+        subprocess.run([PROGRAM, "verify", folder], check=True, capture_output=True)  # nothing has changed them
     if what == "detection":
-        subprocess.run([PROGRAM, "verify", camera / "frames"], check=True, capture_output=True)  # exchanged volumes are sound ones
-        events, frames = Shards(camera / "events"), Shards(camera / "frames")
-        learnt, bright = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train"), Shards(tmp_path / "out" / "as-bright" / "ESIM")
+        learnt = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
         factor = np.mean([s["volume"].mean() for s in learnt]) / np.mean([s["volume"].mean() for s in events])
-        np.testing.assert_allclose(bright[0]["volume"], np.minimum(factor * events[0]["volume"], 1), atol=1e-3)
-        for i in range(len(frames)):
-            seen, drawn = events.labels(i), frames.labels(i)
+        assert f"{camera / 'events'} times {factor:.2f}, as bright as those of {tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout
+        for i in range(len(labelled)):
+            seen, drawn = events.labels(i), labelled.labels(i)
             assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
             np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)  # the camera's picture is whole pixels high
             np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
             np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
     else:
-        events, drawn = Shards(camera / "events"), Shards(camera / "labelled")
-        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"] for sample in map(drawn.labels, range(len(drawn)))}
-        assert len(events) == len(drawn)
+        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"] for sample in map(labelled.labels, range(len(labelled)))}
+        assert len(events) == len(labelled)
         for sample in map(events.labels, range(len(events))):
             np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]], atol=0.51)
 
@@ -175,6 +175,44 @@ def test_the_trade_in_small(tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
     errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
     assert errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and all(0 < error < 1 for [error] in errors.values())
+
+
+def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
+    """As bright, without noise, frames: what predictions.json is of, from the stored volumes, which stay as they are."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    monkeypatch.chdir(tmp_path)
+    import cv2
+    import training
+
+    def tested(shards, learnt=None, **options):
+        args = argparse.Namespace(**{"test": None, "data": "data", "as_bright": False, "without_noise": False, **options})
+        return training.tested(args, learnt, shards, None)
+
+    shards, before = Shards(folder), {path: path.read_bytes() for path in folder.iterdir()}
+    assert [sample["volume"].tolist() for sample in tested(shards)] == [sample["volume"].tolist() for sample in shards]
+    mean = np.mean([sample["volume"].mean() for sample in shards])
+    top = max(sample["volume"].max() for sample in shards)
+    learnt = shards.changed(lambda sample: np.full_like(sample["volume"], 2 * mean / top))
+    bright = tested(shards.changed(lambda sample: sample["volume"] / top), learnt, as_bright=True)
+    for i in range(len(shards)):
+        np.testing.assert_allclose(bright[i]["volume"], np.minimum(2 * shards[i]["volume"] / top, 1), rtol=1e-6)
+
+    events = np.zeros(shards[0]["volume"].shape, np.float32)
+    events[0, 0, 0] = events[1, 0, 1] = 0.5  # a pair
+    events[[0, 1, 0], [3, 3, 4], [4, 5, 4]] = 0.25  # three, each beside the two others
+    quiet = np.where(events == 0.25, events, 0)
+    np.testing.assert_array_equal(tested(shards.changed(lambda sample: events), without_noise=True)[0]["volume"], quiet)
+
+    path = pathlib.Path(shards[0]["pair"]["next_path"])
+    path.parent.mkdir(parents=True)
+    picture = np.arange(12 * 16, dtype=np.uint8).reshape(12, 16)
+    assert cv2.imwrite(str(path), picture)
+    volume = shards.changed(training.labelled_frame)[0]["volume"]  # of half its size
+    np.testing.assert_allclose(volume[0], picture.reshape(6, 2, 8, 2).mean((1, 3)) / 255, atol=0.6 / 255)
+    assert not volume[1:].any()
+    with pytest.raises(ValueError, match=f"expected a picture, .* got none, in {shards[1]['pair']['next_path']} "):
+        shards.changed(training.labelled_frame)[1]
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
 
 
 def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):

@@ -71,6 +71,24 @@ def test_volumes_as_they_are_stored(example):
     np.testing.assert_allclose(sample["volume"] * sample["scale"], expected, rtol=0, atol=3e-3)
 
 
+def half(sample):
+    return sample["volume"] / 2
+
+
+def test_changed_volumes(folder):
+    shards = Shards(folder, invalid="keep", decode=False)
+    changed = shards.changed(half).changed(lambda sample: sample["volume"] + sample["pair"]["gap_frames"])
+    for stored, sample in zip(shards, changed):
+        if sample["valid"]:
+            np.testing.assert_allclose(sample["volume"], stored["volume"] * stored["scale"] / 2 + sample["pair"]["gap_frames"], rtol=1e-6)
+            assert sample["volume"].dtype == np.float32 and "scale" not in sample
+        else:
+            assert not sample["volume"].any()
+    assert changed[1:].sample(0, {"volume"})["volume"].tolist() == changed[1]["volume"].tolist()
+    assert "pair" not in changed.sample(0, {"boxes"})
+    assert pickle.loads(pickle.dumps(shards.changed(half)))[0]["volume"].tolist() == shards.changed(half)[0]["volume"].tolist()
+
+
 def test_labels(folder):
     shards = Shards(folder)
     first = shards[0]
