@@ -224,6 +224,21 @@ class Training(program.InFolder):
             content = (work / recording["path"]).read_bytes()
             self.assertEqual(listed[recording["path"]], hashlib.sha256(content).hexdigest())
 
+    def test_the_shortest_example_runs_as_it_is_but_for_its_steps(self):
+        write_pictures(self.folder / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
+        (self.folder / "simulation.json").write_text(json.dumps({
+            "format": "eventgan-simulation", "version": 1, "name": "one", "size": {"width": 144, "height": 128}, "output": {"directory": "."},
+            "sources": [{"path": "pictures", "name": "recording", "method": "difference", "frames_per_second": FRAMES_PER_SECOND}]}))
+        run("simulate", self.folder / "simulation.json", "--progress", "none")
+        example, steps = (program.SOURCE / "manifests" / "examples" / "train_one.json").read_text(), '"steps": { "generator": 2000 }'
+        self.assertEqual((example.count(steps), example.count('"path": "recording.hdf5"')), (1, 1))
+        (self.folder / "train_one.json").write_text(example.replace(steps, '"steps": { "generator": 2 }'))
+        run("train", self.folder / "train_one.json", "--threads", "1", "--progress", "none")
+        rows = without_seconds(self.folder / "training" / "training.csv")
+        self.assertEqual([row["phase"] for row in rows], 2 * ["generator"])
+        self.assertTrue(all(np.isfinite(float(row["generator.total"])) for row in rows), rows)
+        self.assertEqual(len(read_safetensors(self.folder / "training" / "weights.safetensors")[0]), 2 * 14)
+
     def test_other_settings_do_not_go_on(self):
         shutil.copytree(work / "whole", self.folder / "whole")
         other = work / "other.json"
