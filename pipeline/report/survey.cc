@@ -7,9 +7,9 @@
 
 #include "manifests/values/counter_random.h"
 #include "pipeline/folder/folder_status.h"
-#include "pipeline/folder/preview.h"
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/folder/shard_scan.h"
+#include "pipeline/preview/preview.h"
 #include "stages/events/event_places.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"

@@ -20,7 +20,7 @@ FLOORS = [
     ["pipeline/runtime"],
     ["pipeline/planning"],
     ["pipeline/folder"],
-    ["pipeline/conversion"],
+    ["pipeline/conversion", "pipeline/preview"],
     ["pipeline/generators", "pipeline/simulation", "pipeline/training", "pipeline/realism",
      "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],

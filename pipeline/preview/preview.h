@@ -2,12 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "stages/events/pictures/preview_picture.h"
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
@@ -42,24 +40,6 @@ struct PreviewOptions {
 std::vector<std::filesystem::path> preview(const std::filesystem::path& where,
                                            const PreviewOptions& options,
                                            std::vector<std::string>& warnings);
-
-/// Reads samples as pictures show them.
-class PreviewReader {
- public:
-  /// Relative frame paths start at `frames`. `warnings`, which outlives this, gets a line for each
-  /// frame that cannot be shown.
-  PreviewReader(std::filesystem::path frames, std::vector<std::string>& warnings);
-  ~PreviewReader();
-  PreviewReader(PreviewReader&&) noexcept;
-
-  /// What a picture of the sample shows. The shard stays open until another one is asked for.
-  /// Throws as ShardReader does.
-  PreviewContent content(const std::filesystem::path& shard, int slot);
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
 
 /// Slots named by text such as "0,3-5": {0, 3, 4, 5}; ascending, each once. Throws UsageError for
 /// anything else, or a slot that a shard of `sample_count` samples does not have.

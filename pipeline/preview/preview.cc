@@ -1,6 +1,4 @@
-#include "pipeline/folder/preview.h"
-
-#include <fmt/core.h>
+#include "pipeline/preview/preview.h"
 
 #include <algorithm>
 #include <charconv>
@@ -9,173 +7,79 @@
 #include <set>
 #include <utility>
 
-#include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
-#include "manifests/values/placement.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/folder/shown_samples.h"
+#include "pipeline/preview/preview_reader.h"
 #include "stages/events/pictures/picture_output.h"
-#include "stages/frames/decoding/frame_decoder.h"
-#include "stages/frames/decoding/prepared_frame.h"
-#include "stages/recordings/recording.h"
+#include "stages/events/pictures/preview_picture.h"
 
 namespace eventgan {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string picture_name(const fs::path& shard, int slot) {
-  std::string number = std::to_string(slot);
-  number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
-  return shard.stem().string() + "_" + number + ".png";
-}
-
-/// The frame of a recording of events; a fault names its file. `source`: that of the sample, if
-/// known. A path alone does not lead to it: two sources can be the two cameras of one file.
-Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* source,
-                                     const FrameRef& frame) try {
-  fs::path path = folder / frame.path;
-  if (source == nullptr) {
-    return SampleFault{
-        "expected the shard's plan beside it, since its manifest has several such "
-        "sources, got none, for a frame in " +
-        path.string()};
-  }
-  if (path.filename() == "events.txt") path = path.parent_path();
-  const auto format = find_recording_format(path, source->camera).value_or(RecordingFormat::kMvsec);
-  const GreyImage grey = open_recording(path, format, source->camera)->frame(frame.video_frame);
-  ColourFrame colour{grey.size, {}};
-  for (const std::uint8_t pixel : grey.pixels) colour.bgr.insert(colour.bgr.end(), 3, pixel);
-  return colour;
-} catch (const std::exception& error) {
-  return SampleFault{error.what()};
-}
-
-/// The colour frame laid into the volume; empty, with a warning, if it cannot be had.
-std::vector<std::uint8_t> frame_picture(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
-                                        const ShardSample& sample, const ImageSpec& image,
-                                        std::vector<std::string>& warnings) {
-  if (is_fault(decoded)) {
-    warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
-    return {};
-  }
-  const ColourFrame& colour = std::get<ColourFrame>(decoded);
-  const Placement placement = place(sample.source_size, image);
-  if (colour.size != placement.source) {
-    warnings.push_back("expected the frame's size of when it was converted, got another, in " +
-                       frame.path + " (" + sample.sample_id + ")");
-    return {};
-  }
-  return place_colour(colour, placement);
-}
-
-}  // namespace
-
-struct PreviewReader::State {
-  fs::path frames;
-  std::vector<std::string>& warnings;
-  FrameDecoder decoder;
-  fs::path shard{};  ///< that `reader` has open
-  std::optional<ShardReader> reader{};
-  JobManifest manifest{};
-  bool has_events = false;  ///< is made of a camera's events
-  /// Of events: the source that `shard` is of; null if nothing tells.
-  const SourceSpec* source = nullptr;
-  fs::path planned{};                     ///< the folder whose plan was asked for
-  std::optional<FrozenOutline> frozen{};  ///< if it has a sound one
-
-  void open(const fs::path& file) {
-    if (reader && shard == file) return;
-    reader.reset();
-    renew_time_limit();
-    reader.emplace(file);
-    lift_time_limit();
-    manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
-    has_events = manifest.generator.kind == GeneratorKind::kEvents;
-    shard = file;
-    if (has_events) find_source();
-  }
-
-  /// The plan beside the shard says which source it is of; without it the manifest does, if it has
-  /// only one that can be meant.
-  void find_source() {
-    const ShardHeader& header = reader->header();
-    read_plan(fs::absolute(shard).parent_path());
-    source = nullptr;
-    if (frozen && frozen->hash == header.plan_hash) {
-      for (const ShardOutline& outline : frozen->plan.shards) {
-        if (outline.name != header.name) continue;
-        source = &manifest.sources.at(static_cast<std::size_t>(outline.source));
-        return;
-      }
-    }
-    for (const SourceSpec& spec : manifest.sources) {
-      if (to_string(spec.dataset) != header.dataset || spec.split != header.split) continue;
-      if (source != nullptr) {
-        source = nullptr;
-        return;
-      }
-      source = &spec;
-    }
-  }
-
-  void read_plan(const fs::path& folder) {
-    if (planned == folder) return;
-    planned = folder;
-    frozen.reset();
-    try {
-      frozen = read_frozen_outline(folder);
-    } catch (const std::runtime_error&) {  // a shard can have been taken elsewhere on its own
-    }
-  }
-};
-
-PreviewReader::PreviewReader(fs::path frames, std::vector<std::string>& warnings)
-    : state_(new State{frames, warnings, FrameDecoder(frames)}) {}
-PreviewReader::~PreviewReader() = default;
-PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;
-
-PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
-  state_->open(shard);
-  const ShardReader& reader = *state_->reader;
-  const ShardHeader& header = reader.header();
-  renew_time_limit();
-  ShardSample sample = reader.sample(slot);
-  PreviewContent content;
-  content.shape = header.volume;
-  if (sample.valid) content.volume = reader.volume(slot);
-  lift_time_limit();
-  const auto frame = [&](const FrameRef& which) {
-    // Of events there may be no frames, or none yet.
-    if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
-      return std::vector<std::uint8_t>();
-    }
-    return frame_picture(state_->has_events
-                             ? decode_recorded(state_->frames, state_->source, which)
-                             : state_->decoder.decode(which, sample.pair.video_stride()),
-                         which, sample, state_->manifest.image, state_->warnings);
-  };
-  content.previous_bgr = frame(sample.pair.previous);
-  content.next_bgr = frame(sample.pair.next);
-  const FramePair& pair = sample.pair;
-  content.title = header.dataset + " " + sample.sample_id +
-                  (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
-                                      : ", gap " + std::to_string(pair.gap_frames)) +
-                  (sample.valid ? "" : ", QUARANTINED");
-  content.label_position = sample.pair.label_position;
-  content.annotation = std::move(sample.annotation);
-  content.labels = std::move(sample.labels);
-  content.schema = header.label_schema;
-  return content;
-}
-
-namespace {
-
 [[noreturn]] void refuse_slots(const std::string& text, int sample_count) {
   throw UsageError("--samples: expected slots 0.." + std::to_string(sample_count - 1) +
                    " such as 0,3-5, got \"" + text + "\"");
 }
+
+}  // namespace
+
+std::vector<int> parse_slots(const std::string& text, int sample_count) {
+  std::set<int> slots;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  const auto number = [&] {
+    int value = -1;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc() || value < 0 || value >= sample_count)
+      refuse_slots(text, sample_count);
+    at = next;
+    return value;
+  };
+  while (true) {
+    const int first = number();
+    int last = first;
+    if (at != end && *at == '-') {
+      ++at;
+      last = number();
+    }
+    if (last < first) refuse_slots(text, sample_count);
+    for (int slot = first; slot <= last; ++slot) slots.insert(slot);
+    if (at == end) break;
+    if (*at++ != ',') refuse_slots(text, sample_count);
+  }
+  return {slots.begin(), slots.end()};
+}
+
+std::vector<std::int64_t> spread(std::int64_t count, std::int64_t all) {
+  std::vector<std::int64_t> places;
+  const std::int64_t taken = std::min(count, all);
+  for (std::int64_t i = 0; i < taken; ++i) places.push_back(i * all / taken);
+  return places;
+}
+
+std::optional<double> rank(Extreme extreme, const ShardOverview& shard, int slot) {
+  const auto at = static_cast<std::size_t>(slot);
+  const EventColumns& events = shard.tables.events;
+  if (shard.tables.valid[at] == 0) return std::nullopt;
+  const double sum = (events.sum_positive[at] + events.sum_negative[at]) /
+                     static_cast<double>(shard.header.volume.size.pixel_count());
+  switch (extreme) {
+    case Extreme::kEmptiest:
+      return -sum;
+    case Extreme::kFullest:
+      return sum;
+    case Extreme::kExtrapolated:
+      if ((events.flags[at] & (kFlagExtrapolated | kFlagBeyondCalibration)) == 0) break;
+      return shard.tables.pairs.gap_frames[at];
+  }
+  return std::nullopt;
+}
+
+namespace {
 
 ShardOverview overview_of(const ShownShards& shards, std::size_t shard) {
   renew_time_limit();
@@ -334,6 +238,12 @@ Sequence read_sequence(const ShownShards& shards, const PreviewOptions& options)
   return sequence;
 }
 
+std::string picture_name(const fs::path& shard, int slot) {
+  std::string number = std::to_string(slot);
+  number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
+  return shard.stem().string() + "_" + number + ".png";
+}
+
 /// A sequence's name as that of a file.
 std::string file_name(std::string sequence) {
   if (sequence.empty()) return "sequence";
@@ -342,24 +252,6 @@ std::string file_name(std::string sequence) {
 }
 
 }  // namespace
-
-std::optional<double> rank(Extreme extreme, const ShardOverview& shard, int slot) {
-  const auto at = static_cast<std::size_t>(slot);
-  const EventColumns& events = shard.tables.events;
-  if (shard.tables.valid[at] == 0) return std::nullopt;
-  const double sum = (events.sum_positive[at] + events.sum_negative[at]) /
-                     static_cast<double>(shard.header.volume.size.pixel_count());
-  switch (extreme) {
-    case Extreme::kEmptiest:
-      return -sum;
-    case Extreme::kFullest:
-      return sum;
-    case Extreme::kExtrapolated:
-      if ((events.flags[at] & (kFlagExtrapolated | kFlagBeyondCalibration)) == 0) break;
-      return shard.tables.pairs.gap_frames[at];
-  }
-  return std::nullopt;
-}
 
 std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& options,
                               std::vector<std::string>& warnings) {
@@ -401,40 +293,6 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
     write_png(draw_preview(content(place)), pictures.back());
   }
   return pictures;
-}
-
-std::vector<int> parse_slots(const std::string& text, int sample_count) {
-  std::set<int> slots;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  const auto number = [&] {
-    int value = -1;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc() || value < 0 || value >= sample_count)
-      refuse_slots(text, sample_count);
-    at = next;
-    return value;
-  };
-  while (true) {
-    const int first = number();
-    int last = first;
-    if (at != end && *at == '-') {
-      ++at;
-      last = number();
-    }
-    if (last < first) refuse_slots(text, sample_count);
-    for (int slot = first; slot <= last; ++slot) slots.insert(slot);
-    if (at == end) break;
-    if (*at++ != ',') refuse_slots(text, sample_count);
-  }
-  return {slots.begin(), slots.end()};
-}
-
-std::vector<std::int64_t> spread(std::int64_t count, std::int64_t all) {
-  std::vector<std::int64_t> places;
-  const std::int64_t taken = std::min(count, all);
-  for (std::int64_t i = 0; i < taken; ++i) places.push_back(i * all / taken);
-  return places;
 }
 
 }  // namespace eventgan

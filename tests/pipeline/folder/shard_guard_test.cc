@@ -1,0 +1,126 @@
+#include "pipeline/folder/shard_guard.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <csignal>
+#include <functional>
+#include <stdexcept>
+#include <vector>
+
+#include "manifests/documents/marker.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/sha256.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::ThrowsMessage;
+
+class ReadGuarded : public ::testing::Test {
+ protected:
+  ReadGuarded() { testing::write_file(shard_, "bytes"); }
+
+  void write_marker_of(const std::string& bytes) const {
+    ShardMarker marker;
+    marker.shard = shard_.filename().string();
+    marker.plan_hash = std::string(64, 'a');
+    marker.sha256 = sha256_hex(bytes);
+    marker.size_bytes = static_cast<std::int64_t>(bytes.size());
+    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(marker));
+  }
+
+  /// Whether `read` runs in this very process.
+  bool is_trusted() const {
+    bool here = false;
+    EXPECT_EQ(read_guarded(shard_, [&] { return here = true, 7; }), 7);
+    return here;
+  }
+
+  void expect_damaged(const std::function<int()>& read, const std::string& why) const {
+    EXPECT_THAT([&] { read_guarded(shard_, read); },
+                ThrowsMessage<std::runtime_error>(
+                    AllOf(HasSubstr("damaged"), HasSubstr(why), HasSubstr(shard_.string()))));
+  }
+
+  testing::TemporaryFolder folder_;
+  const std::filesystem::path shard_ = folder_ / "job-train-00000-of-00001.h5";
+};
+
+TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
+  write_marker_of("bytes");
+  EXPECT_TRUE(is_trusted());
+  write_marker_of("bytez");
+  expect_damaged([]() -> int { throw std::logic_error("was read"); }, "SHA-256");
+  write_marker_of("byte");
+  expect_damaged([]() -> int { throw std::logic_error("was read"); }, "size in bytes 4");
+}
+
+TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {
+  EXPECT_FALSE(is_trusted());
+  testing::write_file(folder_ / "job-train-00000-of-00001.json", "{");
+  EXPECT_FALSE(is_trusted());
+  EXPECT_EQ(read_guarded(shard_, []() -> int { throw InputError("gone"); }), 66);
+}
+
+TEST_F(ReadGuarded, ACrashIsDamage) {
+  expect_damaged([] { return ::raise(SIGSEGV); }, "Segmentation fault");
+  expect_damaged([] { return ::raise(SIGABRT); }, "Aborted");
+}
+
+TEST_F(ReadGuarded, WhatEndsTheChildFromOutsideIsNoDamage) {
+  for (const int signal : {SIGKILL, SIGXCPU}) {
+    EXPECT_THAT([&] { read_apart(folder_.path(), [&] { return ::raise(signal); }); },
+                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("stopped from outside"),
+                                                        HasSubstr(folder_.path().string()),
+                                                        Not(HasSubstr("damaged")))));
+  }
+}
+
+TEST_F(ReadGuarded, ALoopWithoutEndIsDamage) {
+  expect_damaged(
+      [] {
+        const volatile bool for_ever = true;
+        while (for_ever) {
+        }
+        return 0;
+      },
+      "10 s");
+}
+
+TEST_F(ReadGuarded, MoreMemoryThanThereIsIsDamage) {
+  EXPECT_EQ(read_guarded(shard_,
+                         [] {
+                           const std::vector<char> most(std::size_t{1} << 46);
+                           return static_cast<int>(most.back());
+                         }),
+            1);
+}
+
+TEST_F(ReadGuarded, PartsOfManyShardsAreReadApartAlways) {
+  write_marker_of("bytes");
+  bool here = false;
+  EXPECT_EQ(read_apart(folder_.path(), [&] { return here = true, 7; }), 7);
+  EXPECT_FALSE(here);
+  EXPECT_THAT([&] { read_apart(folder_.path(), [] { return ::raise(SIGSEGV); }); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(folder_.path().string())));
+}
+
+TEST_F(ReadGuarded, OnlyARegularFileIsOpened) {
+  const std::filesystem::path pipe = folder_ / "pipe.h5";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_THAT([&] { read_guarded(pipe, [] { return 0; }); },
+              ThrowsMessage<std::runtime_error>(HasSubstr(pipe.string())));
+  bool here = false;  // what reads says that there is none
+  read_guarded(folder_ / "none.h5", [&] { return here = true, 0; });
+  EXPECT_TRUE(here);
+}
+
+}  // namespace
+}  // namespace eventgan
