@@ -8,7 +8,7 @@
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/folder/finalize.h"
+#include "pipeline/dataset/finalize.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {

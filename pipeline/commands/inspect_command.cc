@@ -8,9 +8,9 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
+#include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/shard_guard.h"
-#include "pipeline/folder/shown_samples.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"

@@ -7,8 +7,8 @@
 #include "manifests/documents/json_text_internal.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/standard_streams.h"
+#include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/shard_guard.h"
-#include "pipeline/folder/shown_samples.h"
 #include "pipeline/preview/preview.h"
 #include "pipeline/runtime/errors.h"
 

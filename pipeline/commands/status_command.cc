@@ -8,8 +8,8 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/folder_status.h"
-#include "pipeline/folder/shown_samples.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {

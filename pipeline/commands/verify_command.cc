@@ -6,7 +6,7 @@
 
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
-#include "pipeline/folder/verify_folder.h"
+#include "pipeline/dataset/verify_folder.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {

@@ -13,7 +13,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/input_file.h"

@@ -8,9 +8,9 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
-#include "pipeline/folder/shown_samples.h"
 #include "pipeline/preview/preview_reader.h"
 #include "stages/events/pictures/picture_output.h"
 #include "stages/events/pictures/preview_picture.h"

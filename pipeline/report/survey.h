@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "manifests/values/shard.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 
 namespace eventgan {
 

@@ -6,7 +6,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/folder/verify_folder.h"
+#include "pipeline/dataset/verify_folder.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 
 namespace eventgan {

@@ -13,10 +13,10 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
+#include "pipeline/dataset/dataset_description.h"
+#include "pipeline/dataset/finalize.h"
+#include "pipeline/dataset/verify_folder.h"
 #include "pipeline/folder/amendments.h"
-#include "pipeline/folder/dataset_description.h"
-#include "pipeline/folder/finalize.h"
-#include "pipeline/folder/verify_folder.h"
 #include "pipeline/planning/make_plan.h"
 #include "stages/base/files/unfinished_files.h"
 #include "stages/shards/shard_reader.h"

@@ -1,4 +1,4 @@
-#include "tests/pipeline/folder/converted_folder.h"
+#include "tests/pipeline/dataset/converted_folder.h"
 
 #include "manifests/documents/marker.h"
 #include "stages/base/files/atomic_file.h"

@@ -1,4 +1,4 @@
-#include "pipeline/folder/source_comparison.h"
+#include "pipeline/dataset/source_comparison.h"
 
 #include <fmt/format.h>
 

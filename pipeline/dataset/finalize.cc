@@ -1,4 +1,4 @@
-#include "pipeline/folder/finalize.h"
+#include "pipeline/dataset/finalize.h"
 
 #include <fmt/core.h>
 
@@ -8,7 +8,7 @@
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/job.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "manifests/values/shard.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/runtime/progress.h"
 
 namespace eventgan {

@@ -1,4 +1,4 @@
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 
 #include <fmt/core.h>
 #include <fmt/ranges.h>

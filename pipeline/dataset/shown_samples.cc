@@ -1,11 +1,11 @@
-#include "pipeline/folder/shown_samples.h"
+#include "pipeline/dataset/shown_samples.h"
 
 #include <charconv>
 #include <optional>
 #include <set>
 
 #include "manifests/values/faults.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/folder/shard_scan.h"

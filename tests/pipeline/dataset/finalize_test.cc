@@ -1,4 +1,4 @@
-#include "pipeline/folder/finalize.h"
+#include "pipeline/dataset/finalize.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,9 +7,9 @@
 #include <stdexcept>
 
 #include "manifests/documents/marker.h"
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 #include "stages/base/files/sha256.h"
-#include "tests/pipeline/folder/converted_folder.h"
+#include "tests/pipeline/dataset/converted_folder.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/text_file.h"
 

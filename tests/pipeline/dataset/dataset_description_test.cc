@@ -1,4 +1,4 @@
-#include "pipeline/folder/dataset_description.h"
+#include "pipeline/dataset/dataset_description.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/values/faults.h"
-#include "tests/pipeline/folder/converted_folder.h"
+#include "tests/pipeline/dataset/converted_folder.h"
 
 namespace eventgan {
 namespace {

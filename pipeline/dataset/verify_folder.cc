@@ -1,4 +1,4 @@
-#include "pipeline/folder/verify_folder.h"
+#include "pipeline/dataset/verify_folder.h"
 
 #include <fmt/core.h>
 
@@ -17,11 +17,11 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/marker.h"
+#include "pipeline/dataset/dataset_description.h"
+#include "pipeline/dataset/source_comparison.h"
 #include "pipeline/folder/amendments.h"
-#include "pipeline/folder/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
-#include "pipeline/folder/source_comparison.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"

@@ -1,10 +1,10 @@
-#include "pipeline/folder/shown_samples.h"
+#include "pipeline/dataset/shown_samples.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/values/faults.h"
-#include "tests/pipeline/folder/converted_folder.h"
+#include "tests/pipeline/dataset/converted_folder.h"
 
 namespace eventgan {
 namespace {

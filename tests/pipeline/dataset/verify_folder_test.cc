@@ -1,11 +1,11 @@
-#include "pipeline/folder/verify_folder.h"
+#include "pipeline/dataset/verify_folder.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/convert.h"
-#include "pipeline/folder/finalize.h"
+#include "pipeline/dataset/finalize.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/atomic_file.h"
