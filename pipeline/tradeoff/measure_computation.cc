@@ -1,0 +1,198 @@
+#include "pipeline/tradeoff/measure_computation.h"
+
+#include <algorithm>
+#include <chrono>
+#include <memory>
+#include <mutex>
+#include <numeric>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include "pipeline/conversion/conversion_run.h"
+#include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/memory.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/events/volume_statistics.h"
+#include "stages/shards/codec/quantization.h"
+#include "stages/shards/codec/volume_codec.h"
+
+namespace eventgan {
+namespace {
+
+/// In the form in which volumes are compared.
+std::vector<float> comparable(std::vector<float> volume, bool is_counts) {
+  return is_counts ? normalized(std::move(volume)) : volume;
+}
+
+/// A job as one configuration runs it.
+struct Runner {
+  JobManifest manifest;
+  SampleStages stages;
+
+  Runner(JobManifest job, const std::vector<std::unique_ptr<Dataset>>& datasets,
+         const Generator& generator)
+      : manifest(std::move(job)), stages(manifest, datasets, generator, /*in_flight=*/1) {}
+  Runner(const Runner&) = delete;
+  Runner& operator=(const Runner&) = delete;
+
+  /// The finished message's volume, [2 bins, y, x] of the whole volume, as it would be read back;
+  /// empty if it has failed.
+  std::vector<float> volume(SampleMessage message) const {
+    const VolumeShape shape{manifest.volume.bins, message.shard->volume_size};
+    stages.finish(message);
+    if (message.failed()) return {};
+    const StoredType type = manifest.output.dtype;
+    const auto bytes = decode_chunk(message.chunk, type, manifest.output.deflate_level,
+                                    shape.value_count() * stored_size(type));
+    return comparable(dequantize(bytes.value(), type, message.sample.scale),
+                      manifest.generator.kind != GeneratorKind::kNetwork &&
+                          manifest.volume.normalize == Normalization::kNone);
+  }
+};
+
+}  // namespace
+
+std::vector<std::vector<PairLoss>> measure_losses(ComparedPairs& pairs,
+                                                  const Computation& computation,
+                                                  std::span<const StoredType> dtypes, int threads,
+                                                  const std::function<void()>& each) {
+  const ComparedJob& job = pairs.job();
+  const Computation& reference_computation = pairs.reference_computation();
+  const SizedPairs& reference_pairs = pairs.reference();
+  const SizedPairs& sized = pairs.of(computation.size);
+  const LoadedGenerator reference =
+      load_generator(job.as(reference_computation, StoredType::kFloat32).manifest);
+  const LoadedGenerator own = load_generator(job.as(computation, StoredType::kFloat32).manifest);
+  const auto runner = [&](const Computation& of, StoredType dtype, const Generator& generator) {
+    JobManifest manifest = job.as(of, dtype).manifest;
+    manifest.output.deflate_level = 0;  // it loses nothing
+    return std::make_unique<Runner>(std::move(manifest), job.planned.datasets, generator);
+  };
+  const auto reference_runner =
+      runner(reference_computation, StoredType::kFloat32, *reference.generator);
+  std::vector<std::unique_ptr<Runner>> runners;
+  for (const StoredType dtype : dtypes) {
+    runners.push_back(runner(computation, dtype, *own.generator));
+  }
+  std::vector<const PlannedShard*> shards;
+  for (const PlannedShard& shard : reference_pairs.shards) shards.push_back(&shard);
+  const int at_once =
+      graph_limits(shards, *reference.generator, threads, memory_limit_bytes()).generators;
+
+  const std::size_t count = reference_pairs.pairs.size();
+  std::vector<std::vector<std::optional<PairLoss>>> by_pair(
+      dtypes.size(), std::vector<std::optional<PairLoss>>(count));
+  for_each_index(count, at_once, [&](std::size_t pair) {
+    job.check_stop();
+    SampleMessage wanted = reference_pairs.pairs[pair];
+    SampleMessage message = sized.pairs[pair];
+    if (wanted.failed() || message.failed()) return;
+    const Placement to = wanted.prepared.placement;
+    const Placement from = message.prepared.placement;
+    const VolumeShape shape{job.manifest.volume.bins, to.volume};
+    const std::vector<std::uint8_t> labelled = labelled_pixels(wanted.sample.labels, to.volume);
+    reference_runner->stages.generate(wanted);
+    const std::vector<float> truth = reference_runner->volume(std::move(wanted));
+    runners.front()->stages.generate(message);
+    for (std::size_t k = 0; k < dtypes.size() && !truth.empty(); ++k) {
+      std::vector<float> volume = runners[k]->volume(message);
+      if (volume.empty()) continue;
+      volume = on_grid(std::move(volume), shape.channels(), from, to);
+      by_pair[k][pair] = pair_loss(volume, truth, shape, labelled);
+    }
+    each();
+  });
+  std::vector<std::vector<PairLoss>> losses(dtypes.size());
+  for (std::size_t k = 0; k < dtypes.size(); ++k) {
+    for (const std::optional<PairLoss>& loss : by_pair[k]) {
+      if (loss) losses[k].push_back(*loss);
+    }
+  }
+  return losses;
+}
+
+std::vector<RoundCost> take_turn(ComparedPairs& pairs, const Computation& computation,
+                                 std::span<const StoredType> dtypes, int threads,
+                                 const std::function<void()>& each) {
+  const ComparedJob& job = pairs.job();
+  const SizedPairs& sized = pairs.of(computation.size);
+  const bool peak_is_known = restart_peak_memory();
+  const LoadedGenerator loaded = load_generator(job.as(computation, dtypes.front()).manifest);
+  std::vector<std::unique_ptr<Runner>> runners;
+  for (const StoredType dtype : dtypes) {
+    runners.push_back(std::make_unique<Runner>(job.as(computation, dtype).manifest,
+                                               job.planned.datasets, *loaded.generator));
+  }
+  std::vector<const SampleMessage*> read;
+  std::vector<const PlannedShard*> shards;
+  for (const SampleMessage& pair : sized.pairs) {
+    if (pair.failed()) continue;
+    read.push_back(&pair);
+    shards.push_back(pair.shard);
+  }
+  // The first pair of each size of pictures waits for the engine's plan.
+  std::set<std::pair<int, int>> warm;
+  for (const SampleMessage* pair : read) {
+    const ImageSize content = pair->prepared.content;
+    if (!warm.insert({content.height, content.width}).second) continue;
+    SampleMessage message = *pair;
+    runners.front()->stages.generate(message);
+  }
+
+  const auto seconds = [](const SampleMessage& message, Stage stage) {
+    return message.seconds[static_cast<std::size_t>(stage)];
+  };
+  std::vector<RoundCost> costs(dtypes.size());
+  std::mutex adding;
+  double generate_s = 0;
+  std::vector<double> finish_s(dtypes.size());
+  std::size_t handed_out = 0;
+  const auto start = std::chrono::steady_clock::now();
+  run_conversion_graph(
+      [&] { return handed_out < shards.size() ? shards[handed_out++] : nullptr; },
+      {[&](SampleMessage& message) {
+         const std::size_t number = message.number;
+         message = *read[number];
+         message.number = number;
+       },
+       [&](SampleMessage& message) { runners.front()->stages.generate(message); },
+       [&](SampleMessage& message) {
+         const double generated_s = seconds(message, Stage::kGenerate);
+         for (std::size_t k = 0; k < runners.size(); ++k) {
+           // The last takes the volume itself, so that one type alone needs no more than convert.
+           SampleMessage part = k + 1 < runners.size() ? message : std::move(message);
+           runners[k]->stages.finish(part);
+           const std::lock_guard lock(adding);
+           finish_s[k] += seconds(part, Stage::kFinish);
+           costs[k].stored_bytes += static_cast<double>(part.chunk.size());
+         }
+         const std::lock_guard lock(adding);
+         generate_s += generated_s;
+       },
+       [&](SampleMessage&) {
+         each();
+         return true;
+       }},
+      graph_limits(shards, *loaded.generator, threads, memory_limit_bytes()),
+      [&] {
+        return job.stop_requested && job.stop_requested() ? StopOrder::kAbort : StopOrder::kGoOn;
+      });
+  job.check_stop();
+  const double wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  const double peak_bytes = peak_is_known ? static_cast<double>(peak_memory_bytes()) : 0;
+  const auto count = static_cast<double>(read.size());
+  const double busy_cores = std::accumulate(finish_s.begin(), finish_s.end(), generate_s) / wall_s;
+  for (std::size_t k = 0; k < costs.size(); ++k) {
+    RoundCost& cost = costs[k];
+    cost.generator_s = generate_s / count;
+    cost.conversion_s = sized.read_s + (generate_s + finish_s[k]) / count;
+    cost.pairs_per_s = busy_cores / cost.conversion_s;
+    cost.peak_bytes = std::max(peak_bytes - pairs.held_bytes(), 0.0);
+    cost.stored_bytes /= count;
+  }
+  return costs;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "pipeline/tradeoff/compared_pairs.h"
+#include "pipeline/tradeoff/configuration.h"
+#include "pipeline/tradeoff/loss.h"
+#include "pipeline/tradeoff/tradeoff.h"
+
+namespace eventgan {
+
+// Both take pairs of the computation's size on up to `threads` threads. `each` is called after each
+// pair by the thread that worked on it. They throw Stopped on a request to stop, UsageError or
+// InputError as load_generator does, what `each` throws.
+
+/// Of each of `dtypes` the losses, as measure_tradeoff defines them, of the pairs that can be
+/// compared, in their order.
+std::vector<std::vector<PairLoss>> measure_losses(ComparedPairs& pairs,
+                                                  const Computation& computation,
+                                                  std::span<const StoredType> dtypes, int threads,
+                                                  const std::function<void()>& each);
+
+/// What each of `dtypes` costs in one turn of the computation, without `reference_s`: all pairs are
+/// generated once and finished for each type, in the graph of a conversion, without a disk. The
+/// first pair of each size of frames is generated once more before that, since it waits for the
+/// engine's plan.
+std::vector<RoundCost> take_turn(ComparedPairs& pairs, const Computation& computation,
+                                 std::span<const StoredType> dtypes, int threads,
+                                 const std::function<void()>& each);
+
+}  // namespace eventgan
