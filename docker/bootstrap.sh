@@ -70,8 +70,8 @@ demo() {
   "$program" report "$folder/events" >/dev/null
   say "done"
   echo "shards:    $folder/events/*.h5"
-  echo "pictures:  $folder/pictures/*.png"
-  echo "report:    $folder/events/report.html, for a browser"
+  echo "images:    $folder/pictures/*.png"
+  echo "report:    $folder/events/report.html, open it in a browser"
 }
 
 run_tests() {

@@ -19,13 +19,15 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
 
   CLI::App app(
-      "Turns labelled frame datasets (KITTI, MPII, Human3.6M) into event-camera training data");
+      "Turn labelled image datasets into event-camera training data\nReads KITTI, MPII, Human3.6M, "
+      "and folders of images and videos.");
   app.name("eventgan");
+  eventgan::wrap_help(app);
   app.set_version_flag("--version", eventgan::version_text);
   app.require_subcommand(1);
   app.footer(
-      "Exit codes: 0 complete; 1 failed; 64 usage or bad manifest; 65 too many bad samples; 66 "
-      "input missing; 75 stopped, run again.");
+      "Exit codes: 0 complete; 1 failed; 64 bad command line or manifest;\n65 too many quarantined "
+      "samples; 66 input missing; 75 stopped: run it again");
 
   int exit_code = eventgan::kFailed;
   eventgan::add_init_command(app, exit_code);

@@ -66,5 +66,5 @@ done
 # afterany: it says itself what is missing. One core for an hour is enough, whatever the workers take.
 finalize=$(submit --dependency="afterany$(printf ':%s' "${jobs[@]}")" --cpus-per-task=1 --time=01:00:00 \
   --output="$log/finalize-%j.log" "$here/finalize.sbatch" "$output")
-echo "finalize $finalize: after all of them"
+echo "finalize $finalize: runs after all arrays"
 printf 'logs: %q\nlook: %q status %q\n' "$logs" "$EVENTGAN" "$output"

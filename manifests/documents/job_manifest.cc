@@ -59,13 +59,13 @@ class SpecialKeys {
     if (!value || !dataset_) return value;
     if (std::find(owners.begin(), owners.end(), *dataset_) != owners.end()) return value;
     std::string expected =
-        "no such key for dataset \"" + std::string(to_string(*dataset_)) + "\" (of ";
+        "no such key for dataset \"" + std::string(to_string(*dataset_)) + "\" (only for ";
     std::string_view separator;
     for (const DatasetKind owner : owners) {
       expected.append(separator).append(to_string(owner));
       separator = ", ";
     }
-    value->fault(expected + " only)");
+    value->fault(expected + ")");
     return std::nullopt;
   }
 
@@ -99,7 +99,7 @@ SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
     const auto ends = fraction->elements(2);
     if (ends.size() == 2) {
       spec.fraction = {ends[0].number(0, 1), ends[1].number(0, 1)};
-      if (spec.fraction[1] <= spec.fraction[0]) ends[1].fault("a number above the one before it");
+      if (spec.fraction[1] <= spec.fraction[0]) ends[1].fault("a number above the previous one");
     } else if (!ends.empty()) {
       fraction->fault("an array of 2");
     }
@@ -118,7 +118,7 @@ WindowSpec read_window(SpecialKeys& keys, std::optional<DatasetKind> dataset) {
   const auto events = keys.find("window_events", {kRecording, kDhp19});
   if (duration) spec.duration_s = duration->number(1e-6, 1e3);
   if (events) spec.events = events->integer<std::int64_t>(1, 1'000'000'000);
-  if (duration && events) events->fault("no such key beside window_s, which decides it");
+  if (duration && events) events->fault("no such key together with window_s, which sets it");
   if (const auto place = keys.find("label_at", {kRecording})) {
     spec.label = place->choice(kLabelPlaceWords);
   }
@@ -154,7 +154,7 @@ SourceSpec read_source(const StrictValue& value) {
   if (const auto every = keys.find("every", {kHuman36m})) {
     spec.every = every->integer(1, 1000);
     if (spec.layout != Human36mLayout::kOfficial) {
-      every->fault("no such key for this layout (of official only)");
+      every->fault("no such key for this layout (only for official)");
     }
   }
   if (const auto rate = keys.find("frames_per_second", {kFrames})) {
@@ -267,8 +267,8 @@ ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& so
     spec.preset = chosen.name;
     spec.grey = chosen.grey;
     spec.blur = chosen.blur;
-    if (grey) grey->fault("no such key beside a preset, which decides it");
-    if (blur) blur->fault("no such key beside a preset, which decides it");
+    if (grey) grey->fault("no such key together with a preset, which sets it");
+    if (blur) blur->fault("no such key together with a preset, which sets it");
   } else {
     spec.grey = object.at("grey").choice(kGreyWords);
     spec.blur = read_blur(object.at("blur"));
@@ -320,8 +320,8 @@ class KindKeys {
     for (const GeneratorKind owner : owners) {
       listed.append(listed.empty() ? "" : ", ").append(to_string(owner));
     }
-    value->fault("no such key for kind \"" + std::string(to_string(*kind_)) + "\" (of " + listed +
-                 " only)");
+    value->fault("no such key for kind \"" + std::string(to_string(*kind_)) + "\" (only for " +
+                 listed + ")");
     return std::nullopt;
   }
 

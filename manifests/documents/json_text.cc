@@ -144,7 +144,7 @@ class Builder : public nlohmann::json_sax<Json> {
   bool key(std::string& value) override {
     const bool is_new = open_.back().keys.insert(value).second;
     open_.back().key = std::move(value);
-    if (!is_new) faults_.add(path(), "the key once", "it a second time");
+    if (!is_new) faults_.add(path(), "the key once", "it twice");
     return true;
   }
 

@@ -136,7 +136,7 @@ ShardMarker read_document(const nlohmann::json& document, FaultList& faults) {
   // A slot is either good or accounted for. Only worth saying if the numbers themselves are sound.
   const auto lost = static_cast<int>(marker.quarantined.size());
   if (faults.empty() && marker.valid + lost != marker.samples) {
-    valid.fault(std::to_string(marker.samples - lost) + " (samples less quarantined ones)");
+    valid.fault(std::to_string(marker.samples - lost) + " (samples minus quarantined ones)");
   }
   return marker;
 }

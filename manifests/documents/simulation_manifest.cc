@@ -29,7 +29,7 @@ void read_affine(StrictObject& source, std::optional<SimulationMethod> method,
     auto value = source.find(key);
     if (value && method && *method != SimulationMethod::kAffine) {
       value->fault("no such key for method \"" + std::string(to_string(*method)) +
-                   "\" (of affine only)");
+                   "\" (only for affine)");
       value.reset();
     }
     return value;
@@ -61,7 +61,7 @@ SimulationSource read_simulation_source(const StrictValue& value) {
   if (const auto count = object.find("frame_count")) {
     spec.frame_count = count->integer<std::int64_t>(0, kMostClipFrames);
     if (spec.frame_count == 1 && method && *method != SimulationMethod::kAffine) {
-      count->fault("0 (to the end) or 2 and more frames, since events lie between frames");
+      count->fault("0 (to the end) or at least 2 frames, since events lie between frames");
     }
   }
   if (const auto step = object.find("frame_step")) {

@@ -27,7 +27,7 @@ constexpr double kLargestFactor = 1e6;
 void read_camera(const StrictValue& value, RecordingSpec& spec) {
   if (spec.format != RecordingFormat::kMvsec) {
     value.fault("no such key for format \"" + std::string(to_string(spec.format)) +
-                "\" (of mvsec only)");
+                "\" (only for mvsec)");
     return;
   }
   spec.camera = value.text("\"left\" or \"right\"",
@@ -43,7 +43,7 @@ std::array<double, 2> read_range(const StrictValue& value, double lowest, double
     return {1, 1};
   }
   const std::array range{elements[0].number(lowest, highest), elements[1].number(lowest, highest)};
-  if (range[1] < range[0]) elements[1].fault("a number not below the one before it");
+  if (range[1] < range[0]) elements[1].fault("a number not below the previous one");
   return range;
 }
 
@@ -197,7 +197,7 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   const PhaseSteps& count = manifest.steps;
   const LossWeights& factor = manifest.losses;
   if (count.flow == 0 && count.reconstruction == 0 && count.generator == 0) {
-    steps.fault("more than 0 steps in some phase", "none");
+    steps.fault("at least one phase with more than 0 steps", "none");
   }
   if (count.generator == 0) return;
   const auto check = [&](std::int64_t phase_steps, double loss, const std::string& name) {

@@ -28,8 +28,8 @@ std::string limits_text(const ErrorSpec& errors) {
     return "no quarantined pair (errors.policy in the manifest is \"fail\")";
   }
   std::ostringstream text;
-  text << "at most " << errors.max_count << " quarantined pairs and " << errors.max_fraction
-       << " of all (errors in the manifest)";
+  text << "at most " << errors.max_count << " quarantined pairs and a share of "
+       << errors.max_fraction << " (errors in the manifest)";
   return text.str();
 }
 

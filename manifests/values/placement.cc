@@ -15,7 +15,7 @@ int scaled_side(int side, int from, int to) {
   const std::int64_t rounded = product / from + (product % from >= from - product % from ? 1 : 0);
   if (rounded > std::numeric_limits<int>::max()) {
     throw std::invalid_argument(
-        "expected a scaled picture of at most 2147483647 pixels a side, got " +
+        "expected a scaled image of at most 2147483647 pixels a side, got " +
         std::to_string(rounded));
   }
   return std::max(static_cast<int>(rounded), 1);
@@ -51,7 +51,7 @@ std::array<double, 6> Placement::source_to_volume() const {
 }
 
 Placement place(ImageSize source, const ImageSpec& spec) {
-  require_pixels(source, "source picture");
+  require_pixels(source, "source image");
   const ImageSize volume = spec.size.value_or(source);
   require_pixels(volume, "volume");
   Placement placement{source, scaled_size(source, volume, spec.fit), volume, 0, 0};

@@ -35,7 +35,7 @@ struct CalibrateArguments {
 std::string error_line(const CalibrationOutcome& outcome) {
   if (!outcome.unmeasured.empty()) return "int8 error: not measured, " + outcome.unmeasured;
   std::vector<double> sorted = outcome.distances;
-  if (sorted.empty()) return "int8 error: not measured, no other pairs to measure it on";
+  if (sorted.empty()) return "int8 error: not measured, the job has no other pairs";
   std::ranges::sort(sorted);
   const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
   return fmt::format(
@@ -59,11 +59,11 @@ CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobM
 }
 
 int run(const CalibrateArguments& arguments) {
-  const StopSignal signal(stopping_line("the pair under way is finished"));
+  const StopSignal signal(stopping_line("finishing the current pair"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   if (manifest.generator.kind != GeneratorKind::kNetwork) {
     throw UsageError(
-        "$.generator.kind: expected \"network\", which alone has weights to calibrate, got \"" +
+        "$.generator.kind: expected \"network\", the only kind with weights to calibrate, got \"" +
         std::string(to_string(manifest.generator.kind)) + "\"");
   }
   const LoadedWeights loaded = load_weights(manifest);
@@ -86,17 +86,18 @@ int run(const CalibrateArguments& arguments) {
 }  // namespace
 
 void add_calibrate_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("calibrate",
-                         "Makes weights ready for \"precision\": \"int8\": finds the ranges of "
-                         "activations on pairs of a manifest, measures what int8 costs on others, "
-                         "writes a weights file");
+  auto* command = app.add_subcommand(
+      "calibrate",
+      "Calibrate weights for int8\nMeasures the ranges of the activations on "
+      "pairs of the job, measures the int8 error on other pairs, and writes a weights file.");
   const auto arguments = std::make_shared<CalibrateArguments>();
-  command->add_option("MANIFEST", arguments->manifest, "The job, whose generator is calibrated")
+  command
+      ->add_option("MANIFEST", arguments->manifest,
+                   "The manifest of the job whose generator is calibrated")
       ->required();
   command
       ->add_option("--pairs", arguments->pairs,
-                   "Pairs to calibrate on, spread evenly over the job; default: 32")
+                   "Number of pairs to calibrate on, evenly spread over the job; default: 32")
       ->check(CLI::Range(1, 100000));
   command
       ->add_option("--out", arguments->out,

@@ -44,7 +44,7 @@ namespace fs = std::filesystem;
 
 /// What a trial leaves to do, for a person.
 std::string trial_text(const JobOptions& job, const ConversionReport& report) {
-  return fmt::format("a trial: {} pairs of the job. The whole:  eventgan convert {}\n",
+  return fmt::format("trial run: {} pairs of the job. For all pairs:  eventgan convert {}\n",
                      report.plan_pairs, job.manifest);
 }
 
@@ -100,27 +100,28 @@ int run(const ConvertArguments& arguments) {
 void add_convert_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "convert",
-      "Converts the frame pairs of a manifest into shards; run again, it goes on where it was. "
-      "Several workers may share the folder. On SIGTERM, SIGINT or SIGUSR1 it finishes the shard "
-      "under way or drops it, and exits with 75");
+      "Convert labelled frames into shards\nTurns each pair of frames into an event volume "
+      "(a voxel grid of events) with the labels of its labelled frame. Run the same command again "
+      "to resume. Several workers can share the output folder. On SIGTERM, SIGINT or SIGUSR1 the "
+      "current shard is finished or dropped, and the exit code is 75.");
   const auto arguments = std::make_shared<ConvertArguments>();
-  add_job_options(*command, arguments->job, "The job (manifests/examples has some)",
-                  "Discard what an earlier run of the same job left in the folder");
+  add_job_options(*command, arguments->job,
+                  "The manifest of the job (examples: manifests/examples)",
+                  "Discard the results of earlier runs of the same job");
   command
       ->add_option("--shards", arguments->shards,
-                   "This worker's part of the plan: I/N (0 <= I < N) or all; default: what "
-                   "SHARD_INDEX, Slurm, Kubernetes or Open MPI says in the environment, else all")
+                   "This worker's part of the plan: I/N (0 <= I < N) or all; default: as set in "
+                   "the environment by SHARD_INDEX, Slurm, Kubernetes or Open MPI, otherwise all")
       ->option_text("I/N");
   command
-      ->add_option(
-          "--limit", arguments->limit,
-          "A trial: N pairs alone, the first of each source, in the folder OUTPUT-trial-N, OUTPUT "
-          "being the manifest's folder; or in that of --output")
+      ->add_option("--limit", arguments->limit,
+                   "Trial run: convert only N pairs, the first ones of each source, into "
+                   "OUTPUT-trial-N beside the manifest's output folder, or into --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
   command
       ->add_option("--grace", arguments->grace_s,
-                   "Seconds after a signal to finish the shard under way; default: 20")
+                   "Seconds to finish the current shard after a signal; default: 20")
       ->check(CLI::Range(0.0, 1e9))
       ->option_text("SECONDS");
   add_profile_option(*command, arguments->profile);

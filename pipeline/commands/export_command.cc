@@ -61,8 +61,8 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   for (const OwnOption& option : kOwnOptions) {
     const bool has_it = std::ranges::find(option.of, options.to) != option.of.end();
     if (command.count(option.name) > 0 && !has_it) {
-      throw UsageError(fmt::format("{}: expected with --to {}, got another format", option.name,
-                                   option.formats));
+      throw UsageError(
+          fmt::format("{}: expected --to {}, got another format", option.name, option.formats));
     }
   }
   if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
@@ -70,7 +70,7 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
   if (command.count("--classes") > 0) options.classes = arguments.classes;
   if (command.count("--ignored") > 0) options.keep_ignored = arguments.keep_ignored;
   if (arguments.is_float32) options.dtype = StoredType::kFloat32;
-  const StopSignal signal(stopping_line("the samples under way are finished"));
+  const StopSignal signal(stopping_line("finishing the current samples"));
   options.stop = [&] { return signal.requested(); };
   options.make_progress = [&](std::int64_t total) {
     return show_progress(arguments.progress, total, {"samples", /*has_bytes=*/false});
@@ -86,48 +86,52 @@ int run(const CLI::App& command, const ExportArguments& arguments) {
 void add_export_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "export",
-      "Writes what other trainers read, from a finalized folder; run again, it does what "
-      "is left");
+      "Export a finalized folder for other trainers\nRun the same command again to resume.");
   const auto arguments = std::make_shared<ExportArguments>();
   ExportOptions& options = arguments->options;
-  command->add_option("DIR", arguments->folder, "A folder that finalize has completed")->required();
-  take_one_of(command->add_option("--to", options.to, "Format (manifests/guides/exports.md)"),
-              kFormats)
+  command->add_option("DIR", arguments->folder, "Output folder completed by finalize")->required();
+  take_one_of(
+      command->add_option("--to", options.to, "Format of the export (manifests/guides/exports.md)"),
+      kFormats)
       ->required();
-  command->add_option("--out", arguments->out, "Folder to write to")
+  command->add_option("--out", arguments->out, "Folder for the export")
       ->required()
       ->option_text("FOLDER");
-  command->add_option("--split", options.splits, "Only this split; may be given several times")
+  command->add_option("--split", options.splits, "Export only this split; can be repeated")
       ->option_text("NAME")
       ->allow_extra_args(false);
   command
       ->add_option("--classes", arguments->classes,
-                   "yolo, coco: JSON of class names and their numbers, null to leave one out")
+                   "yolo, coco: JSON file that maps each class name to a number, or to null to "
+                   "leave the class out")
       ->option_text("FILE");
   take_one_of(
       command->add_option("--ignored", arguments->keep_ignored,
-                          "keep or drop boxes to ignore (DontCare), yolo: as a class of their own, "
-                          "default drop; coco: as crowds, default keep"),
+                          "yolo, coco: keep or drop boxes to ignore (DontCare). yolo keeps them as "
+                          "a class of their own (default: drop), coco as crowds (default: keep)"),
       kIgnored);
   command
       ->add_option("--full-scale", options.full_scale,
-                   "yolo, mpii: the value that becomes 255; default: 1")
+                   "yolo, mpii: volume value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))
       ->option_text("VALUE");
+  take_one_of(command->add_option("--dtype", arguments->is_float32,
+                                  "davis: type of the values; default: float16"),
+              kIsFloat32);
   take_one_of(
-      command->add_option("--dtype", arguments->is_float32, "davis: float16 (default) or float32"),
-      kIsFloat32);
-  take_one_of(
-      command->add_option("--counts", options.counts, "events: poisson (default) or rounded"),
+      command->add_option(
+          "--counts", options.counts,
+          "events: draw the number of events from a Poisson distribution (default) or round it"),
       kCounts);
-  take_one_of(command->add_option("--layout", options.event_file,
-                                  "events: text, lines t x y p (default), or mvsec, HDF5"),
-              kEventFiles);
-  command->add_option("--seed", options.seed, "events: of all draws; default: 0")
+  take_one_of(
+      command->add_option("--layout", options.event_file,
+                          "events: lines of text, t x y p (default), or HDF5 as MVSEC has it"),
+      kEventFiles);
+  command->add_option("--seed", options.seed, "events: random seed; default: 0")
       ->option_text("NUMBER");
-  command->add_option("--threads", options.threads, "Threads to use; default: all cores")
+  command->add_option("--threads", options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
-  command->add_flag("--overwrite", options.overwrite, "Replace another export in FOLDER");
+  command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");
   add_progress_option(*command, arguments->progress);
   command->callback([command, arguments, &exit_code] { exit_code = run(*command, *arguments); });
 }

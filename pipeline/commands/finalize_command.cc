@@ -33,7 +33,7 @@ int run(const FinalizeArguments& arguments) {
   if (report.too_many_faults) {
     tell_error(
         fmt::format("expected no more quarantined samples than the manifest's errors allow, got {} "
-                    "(--manifest FILE: other limits)",
+                    "(--manifest FILE sets other limits)",
                     report.counts.quarantined()));
     return kTooManyFaults;
   }
@@ -45,18 +45,17 @@ int run(const FinalizeArguments& arguments) {
 void add_finalize_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "finalize",
-      "Completes a dataset: checks that every shard is there and whole and writes "
-      "dataset.json and dataset.h5, in which all shards read as one; exit "
-      "code 1 and a line for each missing shard, 65 beyond the manifest's "
-      "limits for quarantined samples");
+      "Check all shards and complete the dataset\nWrites dataset.json, and dataset.h5, which shows "
+      "all shards as one. Missing or damaged shards are listed and give exit code 1; more "
+      "quarantined samples than the manifest allows give exit code 65.");
   const auto arguments = std::make_shared<FinalizeArguments>();
-  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
+  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
   command->add_flag("--partial", arguments->partial,
-                    "Write what there is even if shards are missing (dataset.json says so)");
+                    "Complete the dataset even if shards are missing (dataset.json records it)");
   command
       ->add_option("--manifest", arguments->manifest,
-                   "Take the limits for quarantined samples from this manifest instead of the one "
-                   "that the plan was frozen with")
+                   "Take the limits for quarantined samples from this manifest, not from the one "
+                   "that was converted")
       ->option_text("FILE");
   command->add_flag("--json", arguments->json, "Print JSON");
   add_progress_option(*command, arguments->progress);

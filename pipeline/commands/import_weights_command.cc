@@ -34,7 +34,7 @@ int run(const ImportArguments& arguments) {
   try {
     weights = fold_generator(std::move(state), arguments.in);
   } catch (const std::runtime_error&) {
-    std::throw_with_nested(InputError("not the published generator's network"));
+    std::throw_with_nested(InputError("expected the published generator's network, got another"));
   }
   weights.training_gaps = kAuthorsGaps;
   weights.metadata["origin"] = "PyTorch checkpoint";
@@ -52,10 +52,10 @@ int run(const ImportArguments& arguments) {
 void add_import_weights_command(CLI::App& app, int& exit_code) {
   auto* command =
       app.add_subcommand("import-weights",
-                         "Converts a PyTorch checkpoint of the published generator (the zip format "
-                         "and the one before PyTorch 1.6); nothing in it is executed");
+                         "Convert the published PyTorch checkpoint\nReads the zip format and the "
+                         "one before PyTorch 1.6. Nothing in the checkpoint is executed.");
   const auto arguments = std::make_shared<ImportArguments>();
-  command->add_option("IN", arguments->in, "The checkpoint")->required();
+  command->add_option("IN", arguments->in, "The PyTorch checkpoint")->required();
   command->add_option("OUT", arguments->out, "The weights file to write, *.safetensors")
       ->required();
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

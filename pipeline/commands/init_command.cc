@@ -34,8 +34,8 @@ DatasetKind read_dataset(const std::string& word) {
   for (const Word<DatasetKind>& known : kDatasetWords) {
     if (known.value == DatasetKind::kRecording || known.value == DatasetKind::kDhp19) {
       if (known.word != word) continue;
-      throw UsageError("DATASET: expected frames with labels, got a camera's events, " + word +
-                       ", for which manifests/guides/real_events.md has a manifest");
+      throw UsageError("DATASET: expected labelled frames, got recorded events, " + word +
+                       " (manifests/guides/real_events.md has a manifest for them)");
     }
     if (known.word == word) return known.value;
     words.append(words.empty() ? "" : ", ").append(known.word);
@@ -44,9 +44,9 @@ DatasetKind read_dataset(const std::string& word) {
 }
 
 void refuse_to_overwrite(const InitArguments& arguments) {
-  const std::string got = "got one that is there, in " + arguments.out;
+  const std::string got = "got an existing one, in " + arguments.out;
   if (arguments.has_out) throw UsageError("--out: expected the name of a new file, " + got);
-  throw UsageError("expected no manifest yet, " + got + " (--out FILE writes to another)");
+  throw UsageError("expected no manifest yet, " + got + " (--out FILE gives another name)");
 }
 
 int run(const InitArguments& arguments) {
@@ -71,9 +71,8 @@ int run(const InitArguments& arguments) {
   for (const std::string& line : draft.findings) std::cout << escape_controls(line) << "\n";
   for (const std::string& note : draft.notes)
     std::cout << "note: " << escape_controls(note) << "\n";
-  std::cout << "the manifest is in " << out.string() << "\n"
-            << (draft.has_pairs ? "next:  "
-                                : "no pairs can be made of this; once that is mended:  ")
+  std::cout << "manifest written to " << out.string() << "\n"
+            << (draft.has_pairs ? "next:  " : "no pairs can be made yet; once that is fixed:  ")
             << "eventgan plan " << out.string() << std::endl;
   return kComplete;
 }
@@ -81,19 +80,17 @@ int run(const InitArguments& arguments) {
 }  // namespace
 
 void add_init_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "init", "Finds out which dataset lies in a folder, and writes a manifest for it");
+  auto* command = app.add_subcommand("init", "Detect a dataset and write a manifest for it");
   const auto arguments = std::make_shared<InitArguments>();
   command
       ->add_option("PATH", arguments->where,
-                   "The folder or video, and in front of it, where that is to be checked, which "
-                   "dataset it is: kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, "
-                   "human36m or frames")
+                   "The folder or video, optionally after the dataset that it should be: "
+                   "kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, human36m or frames")
       ->required()
       ->expected(-1)
       ->option_text("[DATASET] PATH");
   auto* out = command->add_option("--out", arguments->out,
-                                  "The manifest, a new file; default: manifest.json");
+                                  "The manifest to write, a new file; default: manifest.json");
   out->option_text("FILE");
   command->callback([arguments, out, &exit_code] {
     arguments->has_out = out->count() > 0;

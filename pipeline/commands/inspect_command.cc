@@ -43,8 +43,8 @@ void tell_sample(const InspectArguments& arguments) {
       files += (files.empty() ? "" : ", ") + shards.files[sample.shard].string();
     }
     throw UsageError("--sample: expected the id of one sample, got \"" + *arguments.sample +
-                     "\", which " + std::to_string(found.size()) + " have: in " + files +
-                     " (give one of these shards)");
+                     "\", the id of " + std::to_string(found.size()) + " samples, in " + files +
+                     " (name one of these shards)");
   }
   renew_time_limit();
   const ShardReader reader(shards.files[found[0].shard]);
@@ -66,12 +66,11 @@ int run(const InspectArguments& arguments) {
 }  // namespace
 
 void add_inspect_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "inspect", "Tells what is in a folder of shards, in a shard, or in one sample");
+  auto* command = app.add_subcommand("inspect", "Describe a folder of shards, a shard or a sample");
   const auto arguments = std::make_shared<InspectArguments>();
   command
       ->add_option("OUT", arguments->where,
-                   "A folder that convert has written, its dataset.h5, or a shard of one")
+                   "Output folder of convert, its dataset.h5, or one shard")
       ->required();
   command
       ->add_option("--sample", arguments->sample, std::string("Only this sample, ") + kSampleRule)

@@ -28,7 +28,7 @@ int run(const DemoOptions& options) {
     const StopSignal signal;
     write_demo_dataset(folder, options.seed, options.scenes, options.between, [&] {
       phase.advance();
-      if (signal.requested()) throw Stopped("stopped; nothing is left of the dataset");
+      if (signal.requested()) throw Stopped("stopped; the unfinished dataset was removed");
     });
   }
   std::cout << "a small KITTI, MPII and Human3.6M dataset is in " << folder
@@ -40,24 +40,24 @@ int run(const DemoOptions& options) {
 }  // namespace
 
 void add_make_demo_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("make-demo",
-                                     "Writes a small synthetic dataset with exact labels, and a "
-                                     "manifest, to try the program with");
+  auto* command = app.add_subcommand(
+      "make-demo",
+      "Write a small synthetic dataset and its manifest\nFor trying the program: synthetic "
+      "sequences of streets with cars and of walking figures, with exact labels.");
   const auto options = std::make_shared<DemoOptions>();
   command->add_option("DIR", options->folder, "A new or empty folder")->required();
   auto* scenes =
       command
           ->add_option(
               "--scenes", options->scenes,
-              "So many streets with cars and so many figures, a fifth of them for validation: "
-              "enough to train on; default: a drive of 12 labelled frames and 7 figures")
+              "Number of street sequences and of figure sequences, a fifth of them for validation: "
+              "enough to train on; default: one drive of 12 labelled frames and 7 figures")
           ->check(CLI::Range(1, 100000));
-  command->add_option("--seed", options->seed, "Other scenes for another number; default: 7");
+  command->add_option("--seed", options->seed, "Random seed; default: 7");
   command
-      ->add_option(
-          "--between", options->between,
-          "So many pictures between the frame before a labelled one and it, and for figures "
-          "the frame after it: what a camera of events sees, for eventgan simulate")
+      ->add_option("--between", options->between,
+                   "Number of intermediate frames between a labelled frame and the previous one "
+                   "(for figures also the next one), as input for eventgan simulate")
       ->check(CLI::Range(1, 1000))
       ->needs(scenes);
   add_progress_option(*command, options->progress);

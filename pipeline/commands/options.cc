@@ -28,11 +28,10 @@ const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressS
 }  // namespace
 
 void add_progress_option(CLI::App& command, ProgressStyle& style) {
-  take_one_of(
-      command.add_option("--progress", style,
-                         "auto (default): a bar on a terminal, lines elsewhere; json prints "
-                         "machine-readable lines and report"),
-      kProgressStyles);
+  take_one_of(command.add_option("--progress", style,
+                                 "auto (default): a bar on a terminal, lines elsewhere; json: "
+                                 "machine-readable lines and report"),
+              kProgressStyles);
 }
 
 std::unique_ptr<Progress> show_progress(ProgressStyle style, std::int64_t total,
@@ -58,8 +57,8 @@ std::optional<std::filesystem::path> JobOptions::output_folder() const {
 void add_job_options(CLI::App& command, JobOptions& options, const std::string& manifest_text,
                      const std::string& overwrite_text) {
   command.add_option("MANIFEST", options.manifest, manifest_text)->required();
-  command.add_option("--output", options.output, "Folder to write to, instead of the manifest's");
-  command.add_option("--threads", options.threads, "Threads to use; default: all cores")
+  command.add_option("--output", options.output, "Output folder; default: the manifest's");
+  command.add_option("--threads", options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
   command.add_flag("--overwrite", options.overwrite, overwrite_text);
   add_progress_option(command, options.progress);
@@ -74,7 +73,7 @@ void refuse_output_folder(const ProfiledCommand& command) {
   const fs::path file = fs::weakly_canonical(fs::absolute(command.file.value(), error), error);
   const fs::path output = fs::weakly_canonical(fs::absolute(command.output, error), error);
   if (error || file.parent_path() != output) return;
-  throw UsageError("--profile: expected a file outside the folder of the shards, got " +
+  throw UsageError("--profile: expected a file outside the output folder, got " +
                    command.file.value());
 }
 
@@ -84,7 +83,7 @@ void finish(TraceRecorder& trace, const ProfiledCommand& command) {
     tell("trace of every stage and thread: " + *command.file +
          " (open it in https://ui.perfetto.dev, chrome://tracing or https://www.speedscope.app)");
   } catch (const std::exception& error) {
-    tell_warning(std::string("no trace: ") + error.what());
+    tell_warning(std::string("no trace written: ") + error.what());
   }
 }
 
@@ -92,9 +91,9 @@ void finish(TraceRecorder& trace, const ProfiledCommand& command) {
 
 void add_profile_option(CLI::App& command, std::optional<std::string>& file) {
   command
-      .add_option("--profile", file,
-                  "Write a trace of every stage and thread, for Perfetto, chrome://tracing or "
-                  "speedscope")
+      .add_option(
+          "--profile", file,
+          "Write a trace of all stages and threads, for Perfetto, chrome://tracing or speedscope")
       ->option_text("FILE");
 }
 
@@ -116,7 +115,8 @@ int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRe
 }
 
 std::string shard_stopping_line(double grace_s) {
-  return stopping_line(fmt::format("this shard is finished if {:g} s are enough", grace_s));
+  return stopping_line(
+      fmt::format("finishing the current shard if it takes at most {:g} s", grace_s));
 }
 
 }  // namespace eventgan

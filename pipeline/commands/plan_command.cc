@@ -77,24 +77,24 @@ int run(const PlanArguments& arguments) {
 }  // namespace
 
 void add_plan_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "plan",
-      "Tells what convert would do: pairs, what is missing, shards, size and time. Writes nothing, "
-      "except with --freeze");
+  auto* command =
+      app.add_subcommand("plan",
+                         "Show what convert would do\nPrints pairs, missing frames, shards, size "
+                         "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
-  command->add_option("MANIFEST", arguments->manifest, "The job")->required();
+  command->add_option("MANIFEST", arguments->manifest, "The manifest of the job")->required();
   command
       ->add_option("--threads", arguments->threads,
-                   "Threads the estimate is for; default: all cores")
+                   "Number of threads to estimate for; default: all cores")
       ->check(CLI::Range(1, 4096));
   command->add_flag("--json", arguments->json, "Print JSON");
-  auto* freeze_flag = command->add_flag(
-      "--freeze", arguments->freeze,
-      "Freeze the plan in the output folder, as the first convert does, and tell its number of "
-      "shards; no trial is measured");
+  auto* freeze_flag =
+      command->add_flag("--freeze", arguments->freeze,
+                        "Freeze the plan in the output folder, as the first convert does, and "
+                        "print its number of shards, without measuring time and size");
   command
       ->add_option("--output", arguments->output,
-                   "Folder to freeze the plan in, instead of the manifest's")
+                   "Folder to freeze the plan in; default: the manifest's")
       ->needs(freeze_flag);
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

@@ -39,52 +39,54 @@ int run_guarded(const PreviewArguments& arguments) {
 }  // namespace
 
 void add_preview_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "preview",
-      "Draws samples: both frames and the average-timestamp picture, with boxes and joints");
+  auto* command = app.add_subcommand("preview",
+                                     "Draw samples with their labels\nDraws both frames and an "
+                                     "image of the average event times, with boxes and joints.");
   const auto arguments = std::make_shared<PreviewArguments>();
   PreviewOptions& options = arguments->options;
   command
       ->add_option("OUT", arguments->where,
-                   "A folder that convert has written, its dataset.h5, or a shard of one")
+                   "Output folder of convert, its dataset.h5, or one shard")
       ->required();
-  command->add_option("--out", options.out, "Folder for the pictures")->required();
-  auto* slots = command->add_option("--samples", options.slots, "Of a shard: slots such as 0,3-5")
-                    ->option_text("SLOTS");
-  auto* ids = command
-                  ->add_option("--sample", options.samples,
-                               std::string("A sample, ") + kSampleRule + ". May be repeated")
-                  ->option_text("SAMPLE")
-                  ->excludes(slots)
-                  ->expected(1)
-                  ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
+  command->add_option("--out", options.out, "Folder for the images")->required();
+  auto* slots =
+      command->add_option("--samples", options.slots, "For one shard: slots such as 0,3-5")
+          ->option_text("SLOTS");
+  auto* ids =
+      command
+          ->add_option("--sample", options.samples,
+                       std::string("Only this sample, ") + kSampleRule + ". Can be repeated")
+          ->option_text("SAMPLE")
+          ->excludes(slots)
+          ->expected(1)
+          ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll);
   command->add_option("--class", options.class_name, "Only samples with a box of this class")
       ->option_text("NAME")
       ->excludes(slots, ids);
   auto* worst = command
                     ->add_option("--worst", options.worst,
-                                 "The N emptiest, the N fullest, and the N whose gap is farthest "
-                                 "beyond those that the generator was trained on")
+                                 "The N emptiest volumes, the N fullest, and the N whose gaps "
+                                 "exceed those of the generator's training the most")
                     ->option_text("N")
                     ->check(CLI::Range(1, 1000))
                     ->excludes(slots, ids);
   command
       ->add_option("--count", options.count,
-                   "Number of samples, spread over all; default: 8, with --sheet 24")
+                   "Number of samples, evenly spread over all; default: 8, or 24 with --sheet")
       ->option_text("N")
       ->check(CLI::Range(1, 10000))
       ->excludes(slots, ids, worst);
   auto* sheet = command->add_flag("--sheet", options.sheet,
-                                  "One picture of all of them, small, instead of one for each");
+                                  "One contact sheet of all samples instead of an image for each");
   command
       ->add_flag("--video", options.video,
-                 "An MP4 of the sequence that the sample is of, frames beside events; without a "
-                 "sample of the longest one")
+                 "An MP4 of the sample's sequence, frames beside events; without --sample, of the "
+                 "longest sequence")
       ->excludes(sheet, worst);
   command
-      ->add_option(
-          "--frames", options.frames,
-          "The manifest's folder, where frame paths start; default: as convert recorded it")
+      ->add_option("--frames", options.frames,
+                   "The manifest's folder, which frame paths are relative to; default: as recorded "
+                   "by convert")
       ->option_text("DIR");
   command->callback([arguments, &exit_code] { exit_code = run_guarded(*arguments); });
 }

@@ -77,8 +77,8 @@ std::vector<RecordingSpec> wanted_parts(const RealismArguments& arguments) {
     if (argument.ends_with(".json")) {
       const TrainingManifest manifest = read_training_manifest(argument);
       if (manifest.validation.empty()) {
-        throw UsageError(
-            "expected a training manifest with recordings for validation, got none in " + argument);
+        throw UsageError("expected a training manifest with validation recordings, got none in " +
+                         argument);
       }
       for (RecordingSpec part : manifest.validation) {
         part.path = resolve(manifest, part.path).string();
@@ -120,7 +120,7 @@ int run_realism(const RealismArguments& arguments) {
     }
     const auto recording = open_recording(part.path, part.format, part.camera);
     if (parts.size() > 1 && is_too_short(part, *recording, options.gaps)) {
-      tell_note("left out, since it has no frames that far apart: " + recording->name());
+      tell_note("skipped, since it has too few frames for --gaps: " + recording->name());
       continue;
     }
     reports.push_back(measure_realism(*recording, options, [&](std::int64_t total) {
@@ -129,7 +129,7 @@ int run_realism(const RealismArguments& arguments) {
     for (const std::string& note : recording->notes()) tell_note(note);
   }
   if (reports.empty()) {
-    throw UsageError("--gaps: expected a recording with frames that far apart, got none");
+    throw UsageError("--gaps: expected a recording with enough frames, got none");
   }
   std::cout << (arguments.json ? to_json(reports) : to_text(reports)) << std::flush;
   return kComplete;
@@ -138,39 +138,46 @@ int run_realism(const RealismArguments& arguments) {
 void add_choices(CLI::App& command, RealismArguments& arguments) {
   command
       .add_option("RECORDING", arguments.recordings,
-                  "Recordings of events and frames; TRAINING.json: those of its validation")
+                  "Recordings of events and frames; a training manifest (*.json) stands for its "
+                  "validation recordings")
       ->required();
-  command
-      .add_option("--format", arguments.format, "mvsec, eventgan or ecd; default: what lies there")
+  command.add_option("--format", arguments.format, "mvsec, eventgan or ecd; default: detected")
       ->check(CLI::IsMember({"mvsec", "eventgan", "ecd"}));
-  command.add_option("--camera", arguments.camera, "mvsec: left or right")
+  command.add_option("--camera", arguments.camera, "For mvsec: left (default) or right")
       ->check(CLI::IsMember({"left", "right"}));
-  command.add_option("--frames", arguments.frames, "FIRST:LAST; default: all");
-  command.add_option("--gaps", arguments.options.gaps, "Frames apart, such as 1,2; default: 1")
+  command.add_option("--frames", arguments.frames, "Range of frames, FIRST:LAST; default: all");
+  command
+      .add_option("--gaps", arguments.options.gaps,
+                  "Gaps between the two frames of a pair, such as 1,2; default: 1")
       ->delimiter(',');
 }
 
 void add_methods(CLI::App& command, RealismArguments& arguments) {
   RealismOptions& options = arguments.options;
-  take_one_of(
-      command.add_option("--with", options.methods, "Of network,difference,esim; default: all")
-          ->delimiter(','),
-      kMethods)
+  take_one_of(command
+                  .add_option("--with", options.methods,
+                              "Methods to compare: network,difference,esim; default: all")
+                  ->delimiter(','),
+              kMethods)
       ->option_text("METHOD,...");
-  command.add_option("--weights", options.weights,
-                     "The network's: FILE.safetensors, shipped or shipped:WIDTH; default: shipped");
+  command.add_option(
+      "--weights", options.weights,
+      "Weights of the network: FILE.safetensors, shipped or shipped:WIDTH; default: shipped");
   command.add_option("--threshold", arguments.threshold,
-                     "Contrast threshold of difference and esim in 0.01..5; default: fit, the one "
-                     "that makes as many events as the camera did");
+                     "Contrast threshold of difference and esim, 0.01..5; default: fit, the one "
+                     "that gives as many events as the camera");
   command
       .add_option("--log-epsilon", options.log_epsilon,
-                  "Their log intensity is ln(u/255 + this), 1e-6..1; default: 0.02")
+                  "Epsilon in the log intensity of difference and esim, ln(u/255 + epsilon), "
+                  "1e-6..1; default: 0.02")
       ->check(CLI::Range(1e-6, 1.0));
   command
       .add_option("--esim-displacement", options.esim_displacement_px,
-                  "Largest displacement of esim's motions, px a frame; default: 5")
+                  "Largest displacement of esim's random motions, in pixels per frame; default: 5")
       ->check(CLI::Range(0.1, 100.0));
-  command.add_option("--esim-draws", options.esim_draws, "Motions of a pair; default: 5")
+  command
+      .add_option("--esim-draws", options.esim_draws,
+                  "Number of random motions per pair; default: 5")
       ->check(CLI::Range(1, 1000));
 }
 
@@ -179,16 +186,18 @@ void add_methods(CLI::App& command, RealismArguments& arguments) {
 void add_realism_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "realism",
-      "Compares volumes of the network and of two models with a camera's real events for the same "
-      "frames (manifests/guides/realism.md)");
+      "Compare generated events with a camera's\nCompares the event volumes (voxel grids of "
+      "events) of the network and of two sensor models with the events that a camera recorded for "
+      "the same frames (manifests/guides/realism.md).");
   const auto arguments = std::make_shared<RealismArguments>();
   add_choices(*command, *arguments);
   add_methods(*command, *arguments);
-  command->add_option("--seed", arguments->options.seed, "Of all random numbers; default: 0");
-  command->add_option("--threads", arguments->options.threads, "Threads to use; default: all cores")
+  command->add_option("--seed", arguments->options.seed, "Random seed; default: 0");
+  command
+      ->add_option("--threads", arguments->options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
-  command->add_flag("--json", arguments->json, "Print JSON, with the scores of each pair");
-  command->add_option("--out", arguments->out, "Folder for a picture of each pair");
+  command->add_flag("--json", arguments->json, "Print JSON with the scores of each pair");
+  command->add_option("--out", arguments->out, "Folder for an image of each pair");
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run_realism(*arguments); });
 }

@@ -52,18 +52,18 @@ int run(const ReportArguments& arguments) {
 }  // namespace
 
 void add_report_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "report",
-      "Writes one page about an output folder, for a browser: what was made of what, counts, "
-      "distributions, faults and pictures; it needs no network");
+  auto* command =
+      app.add_subcommand("report",
+                         "Write an HTML report about an output folder\nOne self-contained page "
+                         "with inputs, counts, distributions, faults and sample images.");
   const auto arguments = std::make_shared<ReportArguments>();
-  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
-  command->add_option("--out", arguments->out, "The page; default: DIR/report.html")
+  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  command->add_option("--out", arguments->out, "The page to write; default: DIR/report.html")
       ->option_text("FILE");
   command
-      ->add_option(
-          "--frames", arguments->frames,
-          "The manifest's folder, where frame paths start; default: as convert recorded it")
+      ->add_option("--frames", arguments->frames,
+                   "The manifest's folder, which frame paths are relative to; default: as recorded "
+                   "by convert")
       ->option_text("DIR");
   command->callback([arguments, &exit_code] {
     exit_code = read_apart(arguments->folder, [&] { return run(*arguments); });

@@ -70,21 +70,21 @@ int run(const RetryArguments& arguments, const StopSignal& signal, TraceRecorder
 }  // namespace
 
 void add_retry_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "retry",
-      "Redoes the quarantined samples of a folder after its inputs were mended; every "
-      "other byte of its shards stays");
+  auto* command =
+      app.add_subcommand("retry",
+                         "Make quarantined samples again\nFor use after their inputs have been "
+                         "fixed. All other bytes of the shards stay the same.");
   const auto arguments = std::make_shared<RetryArguments>();
-  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
+  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
   command
       ->add_option("--manifest", arguments->manifest,
-                   "The job, where its folder has moved; default: as recorded in DIR")
+                   "The job's manifest, if its folder has moved; default: as recorded in DIR")
       ->option_text("FILE");
-  command->add_option("--threads", arguments->threads, "Threads to use; default: all cores")
+  command->add_option("--threads", arguments->threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
   command
       ->add_option("--grace", arguments->grace_s,
-                   "Seconds after a signal to finish the shard under way; default: 20")
+                   "Seconds to finish the current shard after a signal; default: 20")
       ->check(CLI::Range(0.0, 1e9))
       ->option_text("SECONDS");
   add_progress_option(*command, arguments->progress);

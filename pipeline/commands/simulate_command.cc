@@ -28,11 +28,13 @@ int run_simulation(const JobOptions& arguments) {
 }  // namespace
 
 void add_simulate_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "simulate", "Makes event recordings of videos and pictures with a model of the sensor");
+  auto* command = app.add_subcommand("simulate",
+                                     "Simulate event recordings of videos and images\nUses a model "
+                                     "of the sensor (manifests/guides/simulation.md).");
   const auto arguments = std::make_shared<JobOptions>();
-  add_job_options(*command, *arguments, "The job (manifests/examples/simulate.json)",
-                  "Make anew the recordings that are there");
+  add_job_options(*command, *arguments,
+                  "The manifest of the job (example: manifests/examples/simulate.json)",
+                  "Make existing recordings again");
   command->callback([arguments, &exit_code] { exit_code = run_simulation(*arguments); });
 }
 

@@ -185,9 +185,7 @@ StandardStreams::~StandardStreams() = default;
 int StandardStreams::finish(int exit_code) const {
   std::cout.flush();
   if (std::cout.good() && std::fflush(stdout) == 0 && std::ferror(stdout) == 0) return exit_code;
-  tell_error(
-      "expected a standard output that takes what is written, got one that does not (closed, "
-      "or a full disk)");
+  tell_error("expected a writable standard output, got one that is closed or on a full disk");
   return exit_code == kComplete ? static_cast<int>(kFailed) : exit_code;
 }
 
@@ -200,7 +198,7 @@ void tell_note(const std::string& text) { tell("note", "note: ", text); }
 void tell(const std::string& text) { tell("note", "", text); }
 
 std::string stopping_line(const std::string& what) {
-  return line_of("note", "", "stopping: " + what + "; Ctrl-C again quits at once");
+  return line_of("note", "", "stopping: " + what + "; press Ctrl-C again to quit at once");
 }
 
 ProgressDisplay::Columns terminal_columns() {

@@ -32,9 +32,9 @@ fs::path output_folder_of(const fs::path& where) {
   fs::path folder = resolve(manifest, manifest.output.directory).lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "out/"
   if (!fs::exists(folder / "plan.json", unknown)) {
-    throw InputError("expected a job that eventgan convert has begun, got no " +
+    throw InputError("expected a job that eventgan convert has started, got no " +
                      (folder / "plan.json").string() + ", of " + where.string() +
-                     " (a trial is in " + folder.string() +
+                     " (a trial run is in " + folder.string() +
                      "-trial-N; for a folder given by --output, name that folder)");
   }
   return folder;
@@ -43,14 +43,15 @@ fs::path output_folder_of(const fs::path& where) {
 }  // namespace
 
 void add_status_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand(
-      "status",
-      "What stands in an output folder, from its files alone and on any machine: shards done, "
-      "running, missing and damaged, quarantined samples, rate, time left");
+  auto* command =
+      app.add_subcommand("status",
+                         "Show the progress of an output folder\nPrints shards done, running, "
+                         "missing and damaged, quarantined samples, rate and time left. Reads only "
+                         "the files in the folder, so it works on any machine.");
   const auto arguments = std::make_shared<StatusArguments>();
   command
       ->add_option("DIR", arguments->where,
-                   "A folder that convert writes; or a manifest, for the folder that it names")
+                   "Output folder of convert, or the manifest that names it")
       ->required();
   command->add_flag("--json", arguments->json, "Print JSON");
   command->callback([arguments, &exit_code] {

@@ -111,12 +111,12 @@ Computation reference_of(const std::string& text) {
 }
 
 int run(TradeoffArguments& arguments) {
-  const StopSignal signal(stopping_line("the pair under way is finished"));
+  const StopSignal signal(stopping_line("finishing the current pair"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
   if (manifest.generator.kind == GeneratorKind::kEvents) {
     throw UsageError(
-        "$.generator.kind: expected a generator of events from frames, got \"events\", of which "
-        "there is one configuration");
+        "$.generator.kind: expected a generator that makes events from frames, got \"events\", "
+        "which has only one configuration");
   }
   TradeoffOptions& options = arguments.options;
   options.axes = axes_of(arguments, manifest);
@@ -146,7 +146,7 @@ int run(TradeoffArguments& arguments) {
   if (arguments.progress == ProgressStyle::kJson) {
     std::cout << json << std::flush;
   } else {
-    std::cout << to_text(report, arguments.demand) << "\nAll that was measured: tradeoff.md, "
+    std::cout << to_text(report, arguments.demand) << "\nAll measurements: tradeoff.md, "
               << "tradeoff.json and tradeoff.png in " << options.out.string() << std::endl;
   }
   return kComplete;
@@ -155,40 +155,42 @@ int run(TradeoffArguments& arguments) {
 void add_axes(CLI::App& command, TradeoffArguments& arguments) {
   command
       .add_option("--widths", arguments.widths,
-                  "Weights: base widths of shipped ones, or names as the manifest writes them; "
-                  "default: all shipped, and the manifest's")
+                  "Weights to compare: base widths of shipped weights, or names as in the "
+                  "manifest; default: all shipped weights and the manifest's")
       ->delimiter(',')
       ->option_text("WEIGHTS,...");
   command
       .add_option("--precisions", arguments.precisions,
-                  "Of float32,bfloat16,int8; default: those that this processor has instructions "
-                  "for")
+                  "Precisions to compare: float32,bfloat16,int8; default: those that this "
+                  "processor has instructions for")
       ->delimiter(',')
       ->option_text("PRECISION,...");
   command
       .add_option("--sizes", arguments.sizes,
-                  "Of the volume's sides, 1 as in the manifest, 0.05..4; default: 1")
+                  "Scale factors of the volume's sides, 0.05..4, 1 as in the manifest; default: 1")
       ->delimiter(',')
       ->check(CLI::Range(0.05, 4.0))
       ->option_text("SIZE,...");
   command
       .add_option("--scopes", arguments.scopes,
-                  "Of whole,motion,labels,labels_only; default: the manifest's")
+                  "Scopes to compare: whole,motion,labels,labels_only; default: the manifest's")
       ->delimiter(',')
       ->option_text("SCOPE,...");
   command
-      .add_option("--methods", arguments.methods,
-                  "Of network,difference,esim; default: network, and the manifest's")
+      .add_option(
+          "--methods", arguments.methods,
+          "Methods to compare: network,difference,esim; default: network and the manifest's")
       ->delimiter(',')
       ->option_text("METHOD,...");
   command
-      .add_option("--dtypes", arguments.dtypes, "Of float32,float16,uint8; default: the manifest's")
+      .add_option("--dtypes", arguments.dtypes,
+                  "Stored types to compare: float32,float16,uint8; default: the manifest's")
       ->delimiter(',')
       ->option_text("TYPE,...");
   command
       .add_option("--reference", arguments.reference,
-                  "What the others are compared with, WEIGHTS[,PRECISION[,SIZE]]; default: the "
-                  "widest weights, float32, 1")
+                  "Configuration that the others are compared with, WEIGHTS[,PRECISION[,SIZE]]; "
+                  "default: the widest weights, float32, 1")
       ->option_text("CONFIGURATION");
 }
 
@@ -197,43 +199,47 @@ void add_axes(CLI::App& command, TradeoffArguments& arguments) {
 void add_tradeoff_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "tradeoff",
-      "Measures on pairs of a job what weights, precision, size, scope, method and stored type "
-      "cost, and what they lose against a reference; recommends, with the lines for the manifest "
-      "(manifests/guides/tradeoff.md). At most ten configurations unless told more; run again, it "
-      "does what is left");
+      "Measure the speed and accuracy of configurations\nMeasures on pairs of a job how fast each "
+      "combination of weights, precision, size, scope, method and stored type is and how much it "
+      "loses against a reference, and recommends configurations with their manifest lines "
+      "(manifests/guides/tradeoff.md). Compares at most ten configurations by default. Run the "
+      "same command again to resume.");
   const auto arguments = std::make_shared<TradeoffArguments>();
-  command->add_option("MANIFEST", arguments->manifest, "The job")->required();
+  command->add_option("MANIFEST", arguments->manifest, "The manifest of the job")->required();
   add_axes(*command, *arguments);
   command
       ->add_option("--real", arguments->real,
-                   "A recording of events and frames, to score the configurations by as realism "
-                   "does; may be given several times")
+                   "A recording of events and frames to score the configurations against, as "
+                   "realism does; can be repeated")
       ->option_text("RECORDING")
       ->allow_extra_args(false);
   command
       ->add_option("--pairs", arguments->options.pairs,
-                   "Pairs to take, spread evenly over the job; default: 32")
+                   "Number of pairs, evenly spread over the job; default: 32")
       ->check(CLI::Range(1, 100000));
   command
       ->add_option("--rounds", arguments->options.rounds,
-                   "Rounds of measuring cost, in which all configurations take turns; default: 5")
+                   "Rounds of timing, in which all configurations take turns; default: 5")
       ->check(CLI::Range(1, 1000));
   command
       ->add_option("--at-most-error", arguments->demand.at_most_error,
-                   "Print the manifest's lines for the fastest with this error (relative L2), too")
+                   "Also print the manifest lines of the fastest configuration with at most this "
+                   "error (relative L2)")
       ->check(CLI::NonNegativeNumber)
       ->option_text("ERROR");
   command
       ->add_option("--at-least-speed", arguments->demand.at_least_speed,
-                   "Print the manifest's lines for the nearest with so many pairs a second, too")
+                   "Also print the manifest lines of the most accurate configuration with at least "
+                   "this many pairs per second")
       ->check(CLI::NonNegativeNumber)
       ->option_text("SPEED");
   command
       ->add_option("--out", arguments->out,
-                   "Folder for tables, picture and what is kept for the next run; default: "
-                   "NAME-tradeoff beside the manifest")
+                   "Folder for the tables, the image and the measurements kept for the next run; "
+                   "default: NAME-tradeoff beside the manifest")
       ->option_text("FOLDER");
-  command->add_option("--threads", arguments->options.threads, "Threads to use; default: all cores")
+  command
+      ->add_option("--threads", arguments->options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });

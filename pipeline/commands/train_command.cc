@@ -20,7 +20,7 @@ struct TrainArguments {
 
 int run(const TrainArguments& arguments) {
   const TrainingManifest manifest = read_training_manifest(arguments.job.manifest);
-  const StopSignal signal(stopping_line("after this step the state is saved"));
+  const StopSignal signal(stopping_line("saving the state after this step"));
   TrainingOptions options;
   options.output = arguments.job.output_folder();
   options.threads = arguments.job.threads;
@@ -45,12 +45,13 @@ int run(const TrainArguments& arguments) {
 void add_train_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "train",
-      "Trains a generator on event recordings with frames (manifests/guides/training.md). Stopped "
-      "by SIGINT, SIGTERM or SIGUSR1 it saves its state; run again, it goes on from there");
+      "Train a generator on recordings of events and frames\nSee manifests/guides/training.md. "
+      "SIGINT, SIGTERM or SIGUSR1 save the state and stop; run the same command again to resume.");
   const auto arguments = std::make_shared<TrainArguments>();
-  add_job_options(*command, arguments->job, "The training (manifests/examples has one)",
-                  "Discard what an earlier run of the same training left in the folder");
-  command->add_option("--device", arguments->device, "cpu or cuda; default: cpu")
+  add_job_options(*command, arguments->job,
+                  "The manifest of the training (example: manifests/examples/train.json)",
+                  "Discard the results of earlier runs of the same training");
+  command->add_option("--device", arguments->device, "cpu (default) or cuda")
       ->check(CLI::IsMember({"cpu", "cuda"}));
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

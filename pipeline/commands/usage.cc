@@ -2,6 +2,7 @@
 #include <iostream>
 #include <memory>
 #include <numeric>
+#include <sstream>
 #include <utility>
 
 #include "manifests/values/faults.h"
@@ -81,11 +82,67 @@ std::string usage_text(const CLI::App& app, const CLI::ParseError& error) {
   return error.what() + help;
 }
 
+namespace {
+
+constexpr std::size_t kHelpColumns = 80;
+
+/// `text` with its lines broken between words, the first one beginning at column `indent` and all
+/// others indented to it. Its own line ends stay.
+std::string wrapped(const std::string& text, std::size_t indent) {
+  std::string lines;
+  std::istringstream paragraphs(text);
+  for (std::string paragraph; std::getline(paragraphs, paragraph);) {
+    std::size_t column = kHelpColumns;  // none is left: the first word begins a line
+    std::istringstream words(paragraph);
+    for (std::string word; words >> word;) {
+      const bool fits = column + 1 + word.size() <= kHelpColumns;
+      if (!fits && !lines.empty()) lines += "\n" + std::string(indent, ' ');
+      if (fits) lines += ' ';
+      lines += word;
+      column = (fits ? column + 1 : indent) + word.size();
+    }
+  }
+  return lines + "\n";
+}
+
+class WrappedHelp : public CLI::Formatter {
+ public:
+  std::string make_description(const CLI::App* app) const override {
+    return wrapped(app->get_description(), 0);
+  }
+
+  std::string make_footer(const CLI::App* app) const override {
+    return wrapped(app->get_footer(), 0);
+  }
+
+  std::string make_subcommand(const CLI::App* command) const override {
+    const std::string description = command->get_description();
+    return entry(command->get_name(), description.substr(0, description.find('\n')));
+  }
+
+  std::string make_option(const CLI::Option* option, bool is_positional) const override {
+    return entry(make_option_name(option, is_positional) + make_option_opts(option),
+                 make_option_desc(option));
+  }
+
+ private:
+  std::string entry(const std::string& name, const std::string& text) const {
+    const std::size_t indent = get_column_width();
+    const std::string start = "  " + name;
+    const std::string gap = start.size() < indent ? std::string(indent - start.size(), ' ')
+                                                  : "\n" + std::string(indent, ' ');
+    return start + gap + wrapped(text, indent);
+  }
+};
+
+}  // namespace
+
+void wrap_help(CLI::App& app) { app.formatter(std::make_shared<WrappedHelp>()); }
+
 void add_help_command(CLI::App& app, int& exit_code) {
-  auto* command =
-      app.add_subcommand("help", "Tells how the program or one of its commands is used");
+  auto* command = app.add_subcommand("help", "Show the help of the program or of a command");
   const auto name = std::make_shared<std::string>();
-  command->add_option("COMMAND", *name, "The command; default: all in short");
+  command->add_option("COMMAND", *name, "The command; default: list all commands");
   command->callback([&app, name, &exit_code] {
     const auto known =
         app.get_subcommands([&](const CLI::App* one) { return one->get_name() == *name; });

@@ -21,6 +21,11 @@ std::string did_you_mean(const std::string& word, const std::vector<std::string>
 /// else what CLI11 says of it. One line. `error` is what parsing with `app` threw.
 std::string usage_text(const CLI::App& app, const CLI::ParseError& error);
 
+/// Makes the help of `app`, and of the commands that are added to it from then on, break its lines
+/// between words at 80 columns. The first line of a command's description stands in the list of
+/// commands, all of it in the command's own help.
+void wrap_help(CLI::App& app);
+
 /// Adds `help [COMMAND]`.
 void add_help_command(CLI::App& app, int& exit_code);
 

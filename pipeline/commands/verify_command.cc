@@ -36,17 +36,17 @@ int run(const VerifyArguments& arguments) {
 void add_verify_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "verify",
-      "Checks every file of a folder: hashes, structure, counts, checksums, values; a line for "
-      "each shard, exit code 1 and a line for each fault");
+      "Check every file of an output folder\nChecks hashes, structure, counts, checksums and "
+      "values. Prints a line for each shard and for each fault; any fault gives exit code 1.");
   const auto arguments = std::make_shared<VerifyArguments>();
-  command->add_option("DIR", arguments->folder, "A folder that convert has written")->required();
-  command->add_flag(
-      "--deep", arguments->deep,
-      "Compare pairs and labels, column by column, with the plan and the sources, too, "
-      "where these are there");
+  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  command->add_flag("--deep", arguments->deep,
+                    "Also compare pairs and labels, column by column, with the plan and, where "
+                    "available, the sources");
   command
-      ->add_option("--manifest", arguments->manifest,
-                   "With --deep: the job, where its folder has moved; default: as recorded in DIR")
+      ->add_option(
+          "--manifest", arguments->manifest,
+          "With --deep: the job's manifest, if its folder has moved; default: as recorded in DIR")
       ->option_text("FILE")
       ->needs("--deep");
   command->add_flag("--json", arguments->json, "Print JSON");

@@ -59,10 +59,10 @@ std::string to_text(const ConversionReport& report) {
   }
   if (report.without_partner > 0) {
     text +=
-        fmt::format("\n{} labelled frames without a partner frame", report.frames_without_partner);
+        fmt::format("\n{} labelled frames without a paired frame", report.frames_without_partner);
     if (report.frames_without_partner != report.without_partner) {
       text +=
-          fmt::format(" for one of their gaps or more, {} pairs in all", report.without_partner);
+          fmt::format(" for at least one of their gaps, {} pairs in total", report.without_partner);
     }
     text += " (listed in plan.json)";
   }
@@ -71,13 +71,13 @@ std::string to_text(const ConversionReport& report) {
     text += "\nquarantined: " + escape_controls(report.quarantined[i].reason);
   }
   if (listed < report.quarantined.size()) {
-    text += fmt::format("\n... and {} more (in the shards' markers)",
+    text += fmt::format("\n... and {} more (in the shards' commit records)",
                         report.quarantined.size() - listed);
   }
-  if (report.stopped) text += "\nstopped on request; the same command goes on from here";
+  if (report.stopped) text += "\nstopped on request; run the same command again to resume";
   text += "\n" + notes_text(report.notes) + report.folder + "\n";
   if (!report.quarantined.empty()) {
-    text += "next, once the inputs are mended:  eventgan retry " + report.folder + "\n";
+    text += "next, once the inputs are fixed:  eventgan retry " + report.folder + "\n";
   }
   return text;
 }

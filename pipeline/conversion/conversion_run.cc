@@ -174,12 +174,11 @@ class BeyondCalibration {
 
   void warn(const std::function<void(const std::string&)>& warn) const {
     if (found_ == 0 || !warn) return;
-    warn(fmt::format(
-        "expected activations within the range that int8 was calibrated for, got {} of {} volumes "
-        "with more than {:g} % of them clipped, the worst with {:.2g} % ({}): calibrate again, "
-        "with "
-        "pictures like these",
-        found_, samples_, 100 * kMostSaturated, 100 * largest_share_, worst_));
+    warn(
+        fmt::format("expected activations within the calibrated range of int8, got {} of {} "
+                    "volumes with more than {:g} % of them clipped, the worst with {:.2g} % ({}): "
+                    "calibrate again with images like these",
+                    found_, samples_, 100 * kMostSaturated, 100 * largest_share_, worst_));
   }
 
  private:
@@ -298,7 +297,7 @@ void check_pairs_fit(const std::vector<const PlannedShard*>& shards, const Gener
         std::to_string(size.width) + "x" + std::to_string(size.height) + ", which take about " +
         std::to_string(needed) + ", in " + sample.pair.previous.path + " and " +
         sample.pair.next.path + " (" + sample.sample_id +
-        "): smaller $.image.width and height, or a machine with more memory");
+        "): set a smaller $.image.width and height, or use a machine with more memory");
   }
 }
 

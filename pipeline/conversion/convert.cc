@@ -50,7 +50,7 @@ FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, P
   const TraceSpan span(options.trace, "freeze plan", "job");
   if (options.overwrite && options.part.count != 1) {
     throw UsageError("expected --overwrite without parts, got " + options.part.origin +
-                     ": every worker would discard what the others have made");
+                     ": every worker would discard the others' shards");
   }
   std::error_code error;
   fs::create_directories(folder, error);
@@ -101,7 +101,7 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
                          options.trace, options.show_phase};
   EarlierShards earlier = check_earlier_shards(job.folder, job.frozen, own, scan);
   for (const std::string& fault : earlier.faults) {
-    tell(options.warn, fault + "; it is made again");
+    tell(options.warn, fault + "; making it again");
   }
   report.damaged = earlier.faults;
   for (const CommittedShard& done : earlier.done) {
@@ -141,8 +141,7 @@ void look_again(const ConversionJob& job, const ConversionOptions& options,
                    {.threads = thread_count(options.threads), .show_phase = options.show_phase})) {
     if (shard.done()) continue;
     report.lost.push_back((job.folder / shard.outline.name).string() +
-                          ": expected the shard that was committed, got it " +
-                          to_string(shard.condition));
+                          ": expected the committed shard, got " + to_string(shard.condition));
     tell(options.warn, report.lost.back() + "; run again");
   }
 }

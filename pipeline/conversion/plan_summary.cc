@@ -125,7 +125,7 @@ std::string without_partner_text(const SourceSpec& spec, const SourceSummary& su
   std::int64_t places = 0;
   for (const auto& [gap, count] : by_gap) places += count;
   std::string text =
-      fmt::format("  without partner  {} of {} labelled frames x gaps{}\n", places,
+      fmt::format("  no paired frame  {} of {} labelled frames x gaps{}\n", places,
                   summary.labelled_frames * std::ssize(spec.pairs.gaps), by_gap_text(by_gap));
   const std::vector<std::string>& ids = summary.without_partner_ids;
   if (ids.empty()) return text;
@@ -168,14 +168,14 @@ nlohmann::json by_gap_json(const std::map<int, std::int64_t>& counts) {
 }
 
 std::string estimate_text(const TrialEstimate& estimate, int threads, Device device) {
-  if (estimate.pairs_measured == 0) return "no pair could be tried: no estimate of size and time\n";
+  if (estimate.pairs_measured == 0)
+    return "no pair could be measured: no estimate of size and time\n";
   return fmt::format(
-      "about {:.1f} MB and {:.0f} s with {} thread{} ({:.3f} s a pair on one thread, measured on "
-      "{} "
-      "pair{}{})\n",
+      "about {:.1f} MB and {:.0f} s with {} thread{} ({:.3f} s per pair on one thread, measured on "
+      "{} pair{}{})\n",
       estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
       estimate.seconds_per_pair, estimate.pairs_measured, estimate.pairs_measured == 1 ? "" : "s",
-      device == Device::kCpu ? "" : " one by one; in batches the device takes less");
+      device == Device::kCpu ? "" : " one by one; the device is faster in batches");
 }
 
 }  // namespace
@@ -189,7 +189,7 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
                         shards_of(plan, static_cast<int>(i)));
   }
   return text +
-         fmt::format("in all {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
+         fmt::format("total: {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
          estimate_text(estimate, threads, manifest.generator.device);
 }
 

@@ -86,7 +86,7 @@ Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const F
   const auto differences = fingerprint_differences(accepted, now);
   if (differences.empty()) return changed;
   std::string message = "expected the job that " + (folder / "plan.json").string() +
-                        " was frozen by, its inputs mended, got another one:";
+                        " was frozen by, with at most its inputs fixed, got another one:";
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
 }
@@ -224,9 +224,8 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   // has mended.
   const FileLock lock(folder / "plan.json", FileLock::IfTaken::kGiveUp);
   if (lock.is_taken()) {
-    throw std::runtime_error(
-        "expected a folder that no other retry works on, got one at work, in " + folder.string() +
-        ": run it again once that is through");
+    throw std::runtime_error("expected a folder without another retry at work, got one, in " +
+                             folder.string() + ": run it again once the other has finished");
   }
   const FrozenOutline outline{outline_of(frozen.plan), frozen.hash};
   restore_shards(folder, outline);
@@ -275,23 +274,23 @@ std::string count(std::int64_t number, const std::string& what) {
 std::string to_text(const RetryReport& report) {
   std::string text;
   for (const std::string& fault : report.damaged_shards) {
-    text += fault + "; left to convert\n";
+    text += fault + "; eventgan convert makes it again\n";
   }
   if (report.shards_missing > 0) {
-    text += count(report.shards_missing, "shard") + " not made yet: left to convert\n";
+    text += count(report.shards_missing, "shard") + " not made yet: run eventgan convert\n";
   }
   if (!report.changed_inputs.empty()) {
     text += "inputs changed since the plan was frozen (";
     for (const std::string& field : report.changed_inputs) {
       text += (field == report.changed_inputs.front() ? "" : ", ") + field;
     }
-    text += "): recorded, convert goes on with them\n";
+    text += "): recorded, eventgan convert will accept them\n";
   }
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
     text +=
-        fmt::format("{} of {} mended, {} written again; {} of {} samples are quarantined still\n",
+        fmt::format("{} of {} fixed, {} rewritten; {} of {} samples are still quarantined\n",
                     report.mended, count(report.tried, "quarantined sample"),
                     count(report.shards_rewritten, "shard"), report.quarantined, report.planned);
   }
@@ -300,11 +299,11 @@ std::string to_text(const RetryReport& report) {
     text += "quarantined: " + escape_controls(report.failed[i].reason) + "\n";
   }
   if (listed < report.failed.size()) {
-    text +=
-        fmt::format("... and {} more (in the shards' markers)\n", report.failed.size() - listed);
+    text += fmt::format("... and {} more (in the shards' commit records)\n",
+                        report.failed.size() - listed);
   }
   if (report.dataset_outdated) {
-    text += "dataset.json tells of the shards as they were: eventgan finalize writes it anew\n";
+    text += "dataset.json is out of date: run eventgan finalize again\n";
   }
   if (report.stopped) text += "stopped before all were tried: run again\n";
   return text + report.folder + "\n";

@@ -153,8 +153,8 @@ void SampleStages::take_placement(SampleMessage& message) const {
   if (placement.volume == message.shard->volume_size) return;
   message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
                size_text(placement.volume) + ", in " + frame_names(message.planned().pair) +
-               " (a plan of today has it in another shard: convert into another folder, or "
-               "with --overwrite)");
+               " (a new plan would have it in another shard: convert into another folder, or with "
+               "--overwrite)");
 }
 
 void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) const {

@@ -75,9 +75,8 @@ bool ShardRewrite::commit() {
   copy_before(reader_.header().sample_count);
   const std::filesystem::path marker_file = folder_ / marker_name(marker_.shard);
   if (parse_marker(read_text_file(marker_file), marker_file.string()).sha256 != before_.sha256) {
-    throw std::runtime_error(
-        "expected the shard that the retry began with, got another in its place, " +
-        (folder_ / marker_.shard).string() + ": run retry again");
+    throw std::runtime_error("expected the shard that the retry started with, got another, in " +
+                             (folder_ / marker_.shard).string() + ": run retry again");
   }
   ShardBackup backup(folder_ / marker_.shard);
   ShardReceipt receipt = writer_->commit();

@@ -66,7 +66,7 @@ WorkerPart choose_part(const std::optional<std::string>& flag, const Environment
     return part_of_variable(name, counted ? count_of_variable(kCount, environment) : 0,
                             environment);
   }
-  if (counted) refuse("SHARD_INDEX", "the part of this worker beside SHARD_COUNT", "");
+  if (counted) refuse("SHARD_INDEX", "this worker's part, since SHARD_COUNT is set", "");
   if (environment("OMPI_COMM_WORLD_RANK") != nullptr) {
     return part_of_variable("OMPI_COMM_WORLD_RANK",
                             count_of_variable("OMPI_COMM_WORLD_SIZE", environment), environment);

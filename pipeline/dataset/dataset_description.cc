@@ -28,13 +28,14 @@ JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
   try {
     return parse_job_manifest(plan.manifest_text, folder, name);
   } catch (const UsageError&) {  // of whoever wrote the plan, not of who finalizes
-    std::throw_with_nested(std::runtime_error("expected a plan with a sound manifest"));
+    std::throw_with_nested(std::runtime_error("expected a plan with a valid manifest"));
   }
 }
 
 [[noreturn]] void refuse(const fs::path& file, const std::string& what) {
-  throw std::runtime_error("expected a shard as its plan and its marker say, got another " + what +
-                           ", in " + file.string() + " (eventgan convert makes it again)");
+  throw std::runtime_error(
+      "expected a shard that matches its plan and commit record, got another " + what + ", in " +
+      file.string() + " (eventgan convert makes it again)");
 }
 
 /// The header of a shard whose bytes are its marker's.
@@ -85,7 +86,7 @@ DatasetParts read_dataset_parts(const fs::path& folder) {
   DatasetParts parts = read_dataset_parts(folder, std::move(frozen), std::move(shards));
   lift_time_limit();
   if (parts.done.empty()) {
-    throw InputError("expected shards that are done, got none, in " + folder.string());
+    throw InputError("expected finished shards, got none, in " + folder.string());
   }
   return parts;
 }

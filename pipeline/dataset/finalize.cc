@@ -62,7 +62,7 @@ std::string to_text(const FinalizationReport& report) {
             "\n";
   }
   if (listed < report.missing.size()) {
-    text += fmt::format("... and {} more (all: --json)\n", report.missing.size() - listed);
+    text += fmt::format("... and {} more (--json lists them)\n", report.missing.size() - listed);
   }
   const DatasetCounts& counts = report.counts;
   text += fmt::format("{} of {} shards: {} samples, {} of them quarantined, {} boxes, {} persons\n",

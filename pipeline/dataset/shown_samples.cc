@@ -46,7 +46,7 @@ ShownShards find_shown_shards(const fs::path& where) {
     shards.sources.push_back(shard.outline.source);
   }
   if (shards.files.empty()) {
-    throw InputError("expected shards that are done, got none, in " + shards.folder.string());
+    throw InputError("expected finished shards, got none, in " + shards.folder.string());
   }
   return shards;
 }
@@ -90,7 +90,7 @@ std::vector<ShownSample> find_samples(const ShownShards& shards,
     }
     if (shards.is_folder) {
       throw UsageError("--sample: expected the id of a sample, got \"" + name + "\", in " +
-                       shards.folder.string() + " (slots are of a single shard)");
+                       shards.folder.string() + " (slots need a single shard)");
     }
     throw UsageError("--sample: expected the id of a sample, or a slot in 0.." +
                      std::to_string(shards.samples[0] - 1) + ", got \"" + name + "\", in " +

@@ -36,8 +36,7 @@ struct ShownSample {
 
 /// What --sample takes, for a help text; the rule is that of find_samples.
 inline constexpr char kSampleRule[] =
-    "by its id; or, in a shard that is given alone, by its slot (0, 1, 2, ...). A number that is "
-    "an id there is taken as the id";
+    "by id or, in a single shard, by slot (0, 1, 2, ...); a number that is an id means that id";
 
 /// The samples that `names` name, each once, in the order of shards and slots. A name is an id,
 /// which several samples of a folder can have: one of each source. Only a name that is no id is a

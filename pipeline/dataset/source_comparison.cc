@@ -164,7 +164,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
                                             ? std::optional(dataset.sensor_size(planned.label_key))
                                             : picture_size(stored.pair.next.path);
   if (size && *size != stored.source_size) {
-    return {"expected a source size of " + size_text(*size) + " as of " + stored.pair.next.path +
+    return {"expected a source size of " + size_text(*size) + " as in " + stored.pair.next.path +
             ", got " + size_text(stored.source_size)};
   }
   if (stored.source_size.height <= 0 || stored.source_size.width <= 0) {
@@ -175,13 +175,13 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   if (placement.volume != reader.header().volume.size ||
       !std::ranges::equal(map, stored.source_to_volume,
                           [](double a, double b) { return same(a, b); })) {
-    return {"expected source_to_volume of a picture of " + size_text(stored.source_size) +
+    return {"expected source_to_volume of an image of " + size_text(stored.source_size) +
             ", got another map"};
   }
   auto& annotation = std::get<Annotation>(read);
   Outcome<VolumeLabels> mapped = map_labels(annotation, placement, place);
   if (is_fault(mapped)) {
-    return {"expected the annotation that the shard holds, got an unsound one: " +
+    return {"expected the annotation that the shard holds, got an invalid one: " +
             std::get<SampleFault>(mapped).reason};
   }
   ShardSample expected;
@@ -192,7 +192,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   if (has_events(kind) && std::isnan(pair.previous.time_s)) {  // its events tell
     const Outcome<EventWindow> read_window = dataset.events(planned.label_key);
     if (is_fault(read_window)) {
-      return {"expected the events that the shard was made of, got none: " +
+      return {"expected the events that the shard was made from, got none: " +
               std::get<SampleFault>(read_window).reason};
     }
     take_times(std::get<EventWindow>(read_window), expected.pair);
@@ -272,8 +272,8 @@ std::vector<std::string> row_differences(const ShardHeader& header, const ShardT
         const Element want =
             expected_column.empty() ? no_value<Element>() : expected_column[k * width + i];
         if (same(want, got)) continue;
-        differences.push_back(fmt::format("expected {} in {}{} by {}, got {}", value_text(want),
-                                          spec.path,
+        differences.push_back(fmt::format("expected {} in {}{} according to {}, got {}",
+                                          value_text(want), spec.path,
                                           kind == nullptr ? "" : fmt::format(" of {} {}", kind, k),
                                           is_of_pair ? "the plan" : place, value_text(got)));
         break;  // one number of a row tells enough

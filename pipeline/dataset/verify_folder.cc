@@ -68,7 +68,7 @@ std::vector<std::string> stray_files(const fs::path& folder, const PlanOutline& 
 
 namespace {
 
-constexpr char kMendedBy[] = " (eventgan finalize writes both anew)";
+constexpr char kMendedBy[] = " (run eventgan finalize again)";
 
 /// A line of indented JSON as a part of a sentence.
 std::string as_value(std::string_view line) {
@@ -87,8 +87,8 @@ std::string first_difference(const std::string& expected, const std::string& got
   int number = 0;
   do {
     ++number;
-    if (!std::getline(expected_lines, expected_line)) expected_line = "its end";
-    if (!std::getline(got_lines, got_line)) got_line = "its end";
+    if (!std::getline(expected_lines, expected_line)) expected_line = "the end of the file";
+    if (!std::getline(got_lines, got_line)) got_line = "the end of the file";
   } while (expected_line == got_line && expected_lines && got_lines);
   return as_value(expected_line) + ", got " + as_value(got_line) + ", in line " +
          std::to_string(number);
@@ -117,16 +117,16 @@ std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline fr
       const bool is_known = shard.outline.volume_size != ImageSize{};
       if (is_known && parts.headers.contains(shard.outline.source)) continue;
       return {description.string() +
-              ": expected a sound shard of each source to compare it with, got damaged ones"};
+              ": expected an intact shard of each source to compare it with, got damaged ones"};
     }
     const ViewReceipt receipt{sha256_of_file(view), static_cast<std::int64_t>(fs::file_size(view))};
     const std::string expected = describe_dataset(parts, views_of(parts), receipt);
     const std::string got = read_text_file(description);
     if (got == expected) return {};
-    return {description.string() + ": expected what the markers and " + kViewName +
+    return {description.string() + ": expected what the commit records and " + kViewName +
             " give: " + first_difference(expected, got) + kMendedBy};
   } catch (const std::exception& error) {
-    return {description.string() + ": expected what the markers and " + kViewName +
+    return {description.string() + ": expected what the commit records and " + kViewName +
             " give, got neither: " + error_line(error)};
   }
 }
@@ -162,7 +162,7 @@ class Verification {
                     {.show_phase = options_.show_phase});
     if (const auto other = other_plan(shards, frozen.hash)) {
       fault(folder_ / "plan.json", "expected the plan with SHA-256 " + *other +
-                                       " that all markers name, got " + frozen.hash +
+                                       " that all commit records name, got " + frozen.hash +
                                        " (altered, or of another manifest)");
     }
     take_shards(shards);
@@ -221,8 +221,9 @@ class Verification {
     ShardCheck check{
         .name = shard.outline.name, .condition = shard.condition, .faults = shard.faults};
     if (shard.condition == ShardCondition::kMissing) {
-      check.faults.push_back((folder_ / marker_name(check.name)).string() +
-                             ": expected the shard and its marker, got neither (not made yet)");
+      check.faults.push_back(
+          (folder_ / marker_name(check.name)).string() +
+          ": expected the shard and its commit record, got neither (not made yet)");
     }
     if (!shard.done()) return check;
     check.size_bytes = shard.marker->size_bytes;

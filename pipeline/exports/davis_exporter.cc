@@ -60,7 +60,7 @@ std::size_t kitti_row(const std::string& sample_id) {
   std::size_t row = 0;
   const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), row);
   if (error != std::errc() || end != digits.data() + digits.size()) {
-    throw UsageError("expected a KITTI image id, digits alone, got " + sample_id);
+    throw UsageError("expected a KITTI image id, digits only, got " + sample_id);
   }
   return row;
 }

@@ -127,12 +127,12 @@ ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool ov
   if (found && !is_same) {
     if (job_of(*found) != job_of(identity)) {
       throw UsageError(
-          "expected a new folder, or one of this job's exports, got that of another, " +
-          folder_.string() + " (choose another --out, or remove that one yourself):\n" + *found +
+          "expected a new folder or an export of this job, got an export of another job, in " +
+          folder_.string() + " (choose another --out, or remove that folder yourself):\n" + *found +
           "instead of\n" + identity);
     }
     if (!overwrite) {
-      throw UsageError("expected a new folder, or one of the same export, got that of another, " +
+      throw UsageError("expected a new folder or the same export, got another export, in " +
                        folder_.string() + " (--overwrite starts again):\n" + *found +
                        "instead of\n" + identity);
     }
@@ -146,7 +146,7 @@ ExportFolder::ExportFolder(fs::path folder, const std::string& identity, bool ov
           return entry.path().filename() == kReceipts;
         });
     if (!is_empty) {
-      throw UsageError("expected a new or empty folder, or one of an export, got other files, in " +
+      throw UsageError("expected a new or empty folder or an export, got other files, in " +
                        folder_.string());
     }
   }

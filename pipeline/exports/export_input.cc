@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr char kWayOut[] = " (eventgan finalize writes it anew)";
+constexpr char kWayOut[] = " (run eventgan finalize again)";
 
 nlohmann::json read_dataset_json(const fs::path& folder) {
   const fs::path file = folder / kDescriptionName;
@@ -51,8 +51,8 @@ ShardState require_shard(const fs::path& folder, const ShardOutline& outline,
   }
   if (state.marker->sha256 != sha256) {
     throw InputError(
-        fmt::format("expected the shard that was finalized, SHA-256 {}, got {}, in "
-                    "{} (eventgan finalize takes it in)",
+        fmt::format("expected the shard that was finalized, SHA-256 {}, got {}, in {} (run "
+                    "eventgan finalize again)",
                     sha256, state.marker->sha256, (folder / outline.name).string()));
   }
   return state;

@@ -110,7 +110,7 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
   const auto json = parse_json_text(*text, faults);
   if (!json) throw UsageError(faults.text());
   if (!json->is_object())
-    faults.add("$", "class names with a number or null each", "another value");
+    faults.add("$", "class names, each with a number or null", "another value");
   for (const auto& [name, value] : json->items()) {
     if (std::ranges::find(known, name) == known.end()) {
       std::string names;
@@ -119,7 +119,7 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
     } else if (value.is_null()) {
       entries_[name] = {Fate::kLeftOut, 0};
     } else if (!value.is_number_integer() || value < first || value > 100000) {
-      faults.add(json_path("$", name), fmt::format("null or a whole number from {} on", first),
+      faults.add(json_path("$", name), fmt::format("null or a whole number of at least {}", first),
                  dump_json(value));
     } else {
       entries_[name] = {Fate::kKept, value};
@@ -133,7 +133,7 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
     }
   }
   if (names_.empty())
-    throw UsageError(file + ": expected a number for one class at least, got none");
+    throw UsageError(file + ": expected a number for at least one class, got none");
 }
 
 ClassNumbers::Entry ClassNumbers::of(const std::string& name) const {
@@ -274,12 +274,13 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
     report.quarantined += static_cast<std::int64_t>(shard.quarantined.size());
   }
   if (shards.empty()) {
-    throw UsageError(fmt::format("expected samples that --to {} has a use for, got none, in {}",
+    throw UsageError(fmt::format("expected samples that --to {} can use, got none, in {}",
                                  word_of(options.to), folder.string()));
   }
   const std::string identity = identity_text(input, options, *exporter);
   const auto check_stop = [&] {
-    if (options.stop && options.stop()) throw Stopped("stopped; the same command goes on");
+    if (options.stop && options.stop())
+      throw Stopped("stopped; run the same command again to resume");
   };
   if (!ExportFolder::is_of(options.out, identity)) exporter->check(input, check_stop);
   ExportFolder out(options.out, identity, options.overwrite);
@@ -320,7 +321,7 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
 
 std::string to_text(const ExportReport& report) {
   std::string text =
-      fmt::format("{}: {} samples, {} quarantined ones left out (export.json lists them)\n",
+      fmt::format("{}: {} samples, {} quarantined samples left out (listed in export.json)\n",
                   report.folder, report.samples, report.quarantined);
   for (const auto& [what, count] : report.left_out) {
     text += fmt::format("left out: {} {}\n", count, what);

@@ -169,7 +169,7 @@ std::string volume_npz(const OutgoingSample& sample) {
   const auto stored = decode_chunk(sample.reader.stored_chunk(sample.slot), header.dtype,
                                    header.deflate_level, size_bytes);
   if (!stored) {
-    throw std::runtime_error("expected a sound volume, got a damaged one, in " + header.name +
+    throw std::runtime_error("expected an intact volume, got a damaged one, in " + header.name +
                              " (" + sample.labels.sample_id + ")");
   }
   const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.channels()),

@@ -17,8 +17,8 @@ class YoloExporter : public Exporter {
         full_scale_(options.full_scale) {
     if (const auto entry = numbers_.of(kDontCare); entry.fate == ClassNumbers::Fate::kKept) {
       throw UsageError(fmt::format(
-          "--classes: expected no number for {}, whose boxes are all to be ignored, got {} "
-          "(without it in the map --ignored keep makes them a class of their own)",
+          "--classes: expected no number for {}, whose boxes are all to be ignored, got {} (leave "
+          "it out of the file: --ignored keep makes it a class of its own)",
           kDontCare, entry.number));
     }
     int next = 0;

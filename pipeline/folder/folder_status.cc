@@ -290,14 +290,14 @@ std::string shards_text(const FolderStatus& status) {
 
 std::string work_text(const FolderStatus& status) {
   const std::string at_work =
-      status.writers == 0 ? "nobody is at work"
-                          : fmt::format("{} {} at work", status.writers,
+      status.writers == 0 ? "no process is running"
+                          : fmt::format("{} {} running", status.writers,
                                         status.writers == 1 ? "process is" : "processes are");
   if (status.complete()) return at_work + ", and every shard is done";
-  if (status.writers == 0) return at_work + "; eventgan convert goes on from here";
+  if (status.writers == 0) return at_work + "; eventgan convert resumes from here";
   const auto rate = status.pairs_per_second();
   const auto left = status.seconds_left();
-  if (!rate || !left) return at_work + ", how fast is known after the first shard";
+  if (!rate || !left) return at_work + ", speed known after the first shard";
   return fmt::format("{}, {:.3g} pairs/s, about {} left", at_work, *rate,
                      duration_text(*left, "dhms"));
 }
@@ -306,7 +306,7 @@ std::string work_text(const FolderStatus& status) {
 std::string under_way_text(const FolderStatus& status) {
   return status.shards_running == 0
              ? ""
-             : fmt::format("{} more in shards under way, ", status.samples_under_way);
+             : fmt::format("{} more in unfinished shards, ", status.samples_under_way);
 }
 
 }  // namespace
@@ -322,7 +322,7 @@ std::string status_text(const FolderStatus& status) {
          section("left over by dead writers (deleted by the next convert)",
                  left_over_rows(status)) +
          section("damaged (made again by the next convert)", damaged_rows(status)) +
-         section("quarantined (eventgan retry makes them once their inputs are mended)",
+         section("quarantined (eventgan retry makes them once their inputs are fixed)",
                  reason_rows(status)) +
          notes_text(status.notes);
 }

@@ -108,10 +108,10 @@ Frozen read_plan_file(const fs::path& folder, const Read& read) {
     throw;  // the file system's trouble, not the plan's: starting again would be the wrong advice
   } catch (const std::runtime_error&) {
     if (const auto version = stated_version(file); version && *version > kPlanVersion) {
-      throw std::runtime_error(fmt::format(
-          "expected a plan of version {} (the one that this program reads), got version {}, in {}: "
-          "a newer eventgan has written it",
-          kPlanVersion, *version, file.string()));
+      throw std::runtime_error(
+          fmt::format("expected a plan of version {} (the one that this program reads), got "
+                      "version {}, in {}: it was written by a newer eventgan",
+                      kPlanVersion, *version, file.string()));
     }
     std::throw_with_nested(std::runtime_error("expected a whole plan, got a damaged one, in " +
                                               file.string() + " (--overwrite starts again)"));
@@ -235,7 +235,7 @@ void refuse_another_job(const fs::path& folder, const Fingerprint& now,
   const auto differences = job_differences(folder, frozen, now, manifest_folder, discards);
   if (differences.empty()) return;
   const auto name = frozen.find("manifest $.name");
-  std::string message = "expected the folder of this job, got that of another" +
+  std::string message = "expected the output folder of this job, got that of another job" +
                         (name == frozen.end() ? "" : ", " + name->second) + ", in " +
                         folder.string() +
                         " (choose another output folder, or remove that one yourself):";
@@ -249,8 +249,8 @@ const char* way_out(const Fingerprint& frozen, Fingerprint now) {
   for (const auto& [field, value] : frozen) {
     if (is_amendable(field)) now[field] = value;
   }
-  return frozen == now ? " (if inputs were mended, `eventgan retry` takes them and keeps what is "
-                         "done; --overwrite starts again):"
+  return frozen == now ? " (if inputs were fixed, `eventgan retry` accepts them and keeps finished "
+                         "shards; --overwrite starts again):"
                        : " (--overwrite starts again):";
 }
 
@@ -261,7 +261,7 @@ void require_same_fingerprint(const fs::path& folder, const Fingerprint& frozen,
   if (differences.empty()) return;
   refuse_another_job(folder, now, manifest_folder, /*discards=*/false);
   std::string message = (folder / kPlanName).string() +
-                        " was frozen by a run that would have written other bytes" +
+                        " was frozen by a run that would write different bytes" +
                         way_out(frozen, now);
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
@@ -314,9 +314,8 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_
     plan.sources[i].notes = std::move(frozen.plan.sources[i].notes);
   }
   if (hash_of(plan, show_phase) == frozen.hash) return {std::move(plan), frozen.hash};
-  throw UsageError(
-      "expected the plan that this manifest and these inputs give, got an altered one, in " +
-      file.string() + " (--overwrite starts again)");
+  throw UsageError("expected the plan of this manifest and these inputs, got an altered one, in " +
+                   file.string() + " (--overwrite starts again)");
 }
 
 void discard_output(const fs::path& folder, const Fingerprint& fingerprint,

@@ -60,11 +60,11 @@ std::optional<ShardMarker> marker_beside(const fs::path& shard) {
 void require_bytes_of(const ShardMarker& marker, const fs::path& shard) {
   const auto size_bytes = static_cast<std::int64_t>(fs::file_size(shard));
   if (size_bytes != marker.size_bytes) {
-    fail(shard, "its marker has size in bytes " + std::to_string(marker.size_bytes) +
-                    ", the file " + std::to_string(size_bytes));
+    fail(shard, "size in bytes in its commit record " + std::to_string(marker.size_bytes) +
+                    ", of the file " + std::to_string(size_bytes));
   }
   if (const std::string hash = sha256_of_file(shard); hash != marker.sha256) {
-    fail(shard, "its marker has SHA-256 " + marker.sha256 + ", the file " + hash);
+    fail(shard, "SHA-256 in its commit record " + marker.sha256 + ", of the file " + hash);
   }
 }
 
@@ -81,10 +81,9 @@ void limit_memory() {
 }
 
 void tell_of_memory(const fs::path& shard) {
-  std::cerr
-      << "error: expected a whole shard, got a damaged one (it asks for more memory than there "
-         "is), in "
-      << escape_controls(shard.string()) << std::endl;
+  std::cerr << "error: expected a whole shard, got a damaged one (it asks for more memory than is "
+               "available), in "
+            << escape_controls(shard.string()) << std::endl;
 }
 
 /// 0: none.
@@ -156,12 +155,12 @@ int in_child(const fs::path& shard, const std::function<int()>& read) {
   // What a library says that dies of it (glibc, of its heap) would only be in the way.
   const int signal = WTERMSIG(status);
   if (signal == SIGPROF) {
-    fail(shard, "HDF5 did not come to an end in " + std::to_string(kLimit_s) + " s");
+    fail(shard, "HDF5 did not finish within " + std::to_string(kLimit_s) + " s");
   }
   const std::string name = ::strsignal(signal);
   if (std::ranges::find(kCrashes, signal) != kCrashes.end()) fail(shard, "HDF5 ended with " + name);
   throw std::runtime_error("expected to read " + shard.string() +
-                           " to its end, got stopped from outside (" + name + ")");
+                           " to its end, got stopped by a signal from outside (" + name + ")");
 }
 
 }  // namespace

@@ -57,15 +57,14 @@ class Look {
     if (!fs::exists(marker_file_, unreadable) && !unreadable) {
       if (!fs::exists(shard_file_, unreadable) && !unreadable) return;  // missing
       return fail(ShardCondition::kUncommitted, shard_file_,
-                  "expected its marker " + marker_file_.filename().string() +
+                  "expected its commit record " + marker_file_.filename().string() +
                       " beside it, got no file (not committed)");
     }
     read_marker();
     if (!state_.done()) return;
     if (!fs::is_regular_file(shard_file_, unreadable)) {
-      return fail(
-          ShardCondition::kNoShard, shard_file_,
-          "expected the shard that " + marker_file_.filename().string() + " is of, got no file");
+      return fail(ShardCondition::kNoShard, shard_file_,
+                  "expected the shard of " + marker_file_.filename().string() + ", got no file");
     }
     const auto size_bytes = static_cast<std::int64_t>(fs::file_size(shard_file_, unreadable));
     if (unreadable || size_bytes != state_.marker->size_bytes) {
@@ -85,7 +84,7 @@ class Look {
     const ShardMarker& marker = *state_.marker;
     const auto foreign = [&](const std::string& expected, const std::string& got) {
       fail(ShardCondition::kForeignMarker, marker_file_,
-           "expected the marker of " + expected + ", got one of " + got);
+           "expected the commit record of " + expected + ", got one of " + got);
     };
     state_.named_plan = marker.plan_hash;
     if (marker.shard != state_.outline.name) return foreign(state_.outline.name, marker.shard);
@@ -120,7 +119,7 @@ class Look {
       if (!faults.empty()) fail(ShardCondition::kOtherCounts, marker_file_, faults.front());
     } catch (const std::runtime_error& error) {  // not std::bad_alloc: that is not of the shard
       fail(ShardCondition::kOtherCounts, marker_file_,
-           "expected the marker of a shard that can be read, got one whose " +
+           "expected the commit record of a readable shard, got one whose " +
                first_line(error.what()));
     }
   }
@@ -134,7 +133,7 @@ class Look {
 ProgressUnit phase_of(ScanDepth depth) {
   switch (depth) {
     case ScanDepth::kMarker:
-      return {"shards", /*has_bytes=*/false, "looking at"};
+      return {"shards", /*has_bytes=*/false, "checking"};
     case ScanDepth::kBytes:
     case ScanDepth::kRows:
       return {"shards", /*has_bytes=*/true, "hashing"};

@@ -80,7 +80,7 @@ class Watch {
 
   void before_pair() const {
     if (options_.stop_requested && options_.stop_requested()) {
-      throw Stopped("asked to stop while calibrating; nothing is written");
+      throw Stopped("stopped on request; nothing was written");
     }
   }
   void after_pair(bool skipped) const {
@@ -167,7 +167,7 @@ CalibrationOutcome calibrate(const JobManifest& manifest, const PlannedJob& job,
   const std::vector<PreparedPair> held_out =
       collect(stages, samples, watch, calibrator, outcome.skipped);
   if (calibrator.pairs() == 0) {
-    throw InputError("expected pairs to calibrate on, got none that can be read of " +
+    throw InputError("expected readable pairs to calibrate on, got none of " +
                      std::to_string(samples.size()) + ", in " + manifest.name +
                      (outcome.skipped.empty() ? "" : "\n  " + outcome.skipped.front()));
   }
@@ -198,7 +198,7 @@ fs::path given(const std::string& out) {
   }
   const fs::path file = fs::absolute(out);
   if (!fs::is_directory(file.parent_path())) {
-    throw UsageError("--out: expected a file in a folder that is there, got \"" + out + "\"");
+    throw UsageError("--out: expected a file in an existing folder, got \"" + out + "\"");
   }
   return file;
 }
@@ -221,7 +221,7 @@ fs::path calibrated_file(const JobManifest& manifest, int base_channels,
   std::error_code absent;
   if (fs::equivalent(file, resolve(manifest, name.path), absent)) {
     throw UsageError("--out: expected a file for the new calibration, got none, and the default, " +
-                     file.string() + ", is the file that is calibrated");
+                     file.string() + ", is the file to calibrate");
   }
   return file;
 }

@@ -111,12 +111,12 @@ EngineChoice on_cuda(const EngineRequest& request, const EngineSupport& support)
   if (request.engine == Engine::kOnednn) {
     throw UsageError(
         "$.generator.engine: expected \"auto\" or \"torch\" on device cuda, got \"onednn\", which "
-        "computes on processors alone");
+        "runs on the CPU only");
   }
   if (request.precision == Precision::kInt8) {
     throw UsageError(
         "$.generator.precision: expected \"float32\" or \"bfloat16\" on device cuda, got \"int8\", "
-        "which oneDNN alone has, on processors");
+        "which only oneDNN on the CPU has");
   }
   if (support.cuda.empty()) {
     throw UsageError("$.generator.device: expected \"cpu\", got \"cuda\": " + support.cuda_lack);

@@ -58,7 +58,7 @@ LoadedWeights load_weights(const JobManifest& manifest) {
   LoadedWeights loaded = named_weights(manifest);
   if (loaded.weights.bins != manifest.volume.bins) {
     throw UsageError("$.volume.bins: expected " + std::to_string(loaded.weights.bins) +
-                     " as the weights have, got " + std::to_string(manifest.volume.bins));
+                     " as in the weights, got " + std::to_string(manifest.volume.bins));
   }
   loaded.warning = are_untrained(loaded.weights) ? untrained_warning(manifest.generator.weights)
                                                  : weights_warning(manifest);

@@ -39,10 +39,10 @@ struct Habits {
 
 Habits habits_of(DatasetKind dataset) {
   constexpr std::string_view kKittiComment =
-      "The size that the generator's authors trained with; boxes follow the pictures into it.";
+      "The size that the generator's authors trained with; boxes are scaled with the images.";
   constexpr std::string_view kKittiSize = R"( "width": 861, "height": 260, "fit": "stretch" )";
   constexpr std::string_view kMpiiComment =
-      "Pictures are of many shapes; letterboxed, each keeps its own, with borders.";
+      "Images come in many shapes; letterboxing keeps each one's shape and adds borders.";
   constexpr std::string_view kMpiiSize = R"( "width": 640, "height": 480, "fit": "letterbox" )";
   switch (dataset) {
     case DatasetKind::kKittiObject:
@@ -60,13 +60,13 @@ Habits habits_of(DatasetKind dataset) {
           "h36m-events",
           PairSide::kAfter,
           {1, 2},
-          "The size of a DAVIS346 camera; letterboxed, pictures keep their shape, with borders.",
+          "The size of a DAVIS346 camera; letterboxing keeps the images' shape and adds borders.",
           R"( "width": 346, "height": 260, "fit": "letterbox" )"};
     case DatasetKind::kFrames:
       return {"frames-events",
               PairSide::kBefore,
               {1},
-              "No width and height: volumes are as large as the pictures.",
+              "No width and height: volumes are as large as the images.",
               ""};
     case DatasetKind::kRecording:
     case DatasetKind::kDhp19:
@@ -146,11 +146,11 @@ std::vector<int> gaps_to_take(const Survey& survey, const Habits& habits) {
 std::string where_text(PairSide side) {
   switch (side) {
     case PairSide::kBefore:
-      return "before it";
+      return "before them";
     case PairSide::kAfter:
-      return "after it";
+      return "after them";
     case PairSide::kAround:
-      return "around it";
+      return "around them";
   }
   throw std::logic_error("where_text: not a side");
 }
@@ -168,7 +168,7 @@ std::vector<std::string> findings_of(const FoundSource& found, const Survey& sur
   lines.push_back(
       fmt::format("labelled frames with a pair of frames {}, by gap: {}", where_text(side), gaps));
   if (survey.holes > 0) {
-    lines.push_back(fmt::format("pairs of which a frame is missing or at fault: {}", survey.holes));
+    lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.holes));
   }
   lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
   return lines;
@@ -241,11 +241,11 @@ void compare_sizes(const Dataset& dataset, const fs::path& folder,
     const auto size = std::get<ImageSize>(probed);
     const auto [known, is_new] = first.try_emplace(frames[i].sequence, size, path);
     if (is_new || known->second.first == size) continue;
-    warnings.push_back(fmt::format(
-        "warning: images of several sizes in one folder, {}x{} in {} and {}x{} in {}: is it a "
-        "sequence? Pairs of frames of two sizes are faults",
-        known->second.first.width, known->second.first.height, known->second.second, size.width,
-        size.height, path));
+    warnings.push_back(
+        fmt::format("warning: images of several sizes in one folder, {}x{} in {} and {}x{} in {}: "
+                    "is it a sequence? Two frames of different sizes make no pair",
+                    known->second.first.width, known->second.first.height, known->second.second,
+                    size.width, size.height, path));
     return;
   }
 }
@@ -277,8 +277,8 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder,
   }
   if (2 * unrelated <= pairs) return;
   warnings.push_back(
-      fmt::format("warning: {} of {} neighbouring images that were compared do not show the same "
-                  "scene, {} the first: is it a sequence? Events between them mean nothing",
+      fmt::format("warning: {} of {} compared pairs of neighbouring images do not show the same "
+                  "scene, first {}: is it a sequence? Events between unrelated images mean nothing",
                   unrelated, pairs, example));
 }
 
@@ -304,7 +304,7 @@ class Draft {
   "sources": [
     {{
       "dataset": "{}",
-{}      // One pair for a labelled frame, its gap drawn from these; "choose": "all" makes one for each.
+{}      // One pair per labelled frame, its gap drawn from these; "choose": "all" makes one per gap.
       "pairs": {{ "gaps": [{}], "side": "{}", "choose": "one" }}
     }}
   ],

@@ -118,9 +118,9 @@ void visit_samples(const ShownShards& shards, const PreviewOptions& options, Vis
   if (any || options.class_name.empty()) return;
   std::string list;
   for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
-  throw UsageError("--class: expected a class that a box has" +
-                   (list.empty() ? ", of samples without boxes" : " (" + list + ")") + ", got \"" +
-                   options.class_name + "\"");
+  throw UsageError("--class: expected a class of the boxes" +
+                   (list.empty() ? " (none of the samples has boxes)" : " (" + list + ")") +
+                   ", got \"" + options.class_name + "\"");
 }
 
 std::vector<ShownSample> worst_samples(const ShownShards& shards, const PreviewOptions& options) {
@@ -147,8 +147,8 @@ std::vector<ShownSample> worst_samples(const ShownShards& shards, const PreviewO
 std::vector<ShownSample> choose(const ShownShards& shards, const PreviewOptions& options) {
   if (!options.slots.empty()) {
     if (shards.is_folder) {
-      throw UsageError("--samples: expected a shard to have these slots, got the folder " +
-                       shards.folder.string() + " (--sample ID)");
+      throw UsageError("--samples: expected one shard, got the folder " + shards.folder.string() +
+                       " (use --sample ID)");
     }
     std::vector<ShownSample> chosen;
     for (const int slot : parse_slots(options.slots, shards.samples[0])) {

@@ -51,8 +51,9 @@ std::vector<std::uint8_t> frame_picture(const Outcome<ColourFrame>& decoded, con
   const ColourFrame& colour = std::get<ColourFrame>(decoded);
   const Placement placement = place(sample.source_size, image);
   if (colour.size != placement.source) {
-    warnings.push_back("expected the frame's size of when it was converted, got another, in " +
-                       frame.path + " (" + sample.sample_id + ")");
+    warnings.push_back(
+        "expected the size that the frame had when it was converted, got another, in " +
+        frame.path + " (" + sample.sample_id + ")");
     return {};
   }
   return place_colour(colour, placement);

@@ -229,8 +229,8 @@ std::string to_text(std::span<const RealismReport> reports) {
   text += column_heads(reports.front());
   text += reports.size() == 1 ? one_recording(reports.front()) : several_recordings(reports);
   return text +
-         "↑ higher is better, ↓ lower, ≈ nearer to the real one; * best. Means over the pairs of "
-         "normalised volumes; ± half of the range that holds the mean with a probability of 95 % "
+         "↑ higher is better, ↓ lower is better, ≈ closer to the real one is better; * best. Means "
+         "over the pairs of normalised volumes; ± half the width of the 95 % confidence interval "
          "(bootstrap over the pairs).\n";
 }
 

@@ -294,15 +294,14 @@ std::string head(const Survey& survey, const PageContext& context) {
   const DatasetParts& parts = survey.parts;
   const std::size_t missing = parts.missing.size();
   std::string html = fmt::format(
-      "<header><h1>{}</h1><p>Event volumes of labelled frames, made by {}. "
+      "<header><h1>{}</h1><p>Event volumes (voxel grids of events) of labelled frames, made by {}. "
       "{}</p></header>",
       escaped(parts.frozen.plan.name), escaped(survey.header.program_version),
-      missing == 0
-          ? "All shards are done."
-          : fmt::format("<strong class=bad>{} of {} shards are missing or damaged</strong>: "
-                        "the numbers are those of the rest.",
-                        grouped(std::ssize(parts.missing)),
-                        grouped(std::ssize(parts.frozen.plan.shards))));
+      missing == 0 ? "All shards are done."
+                   : fmt::format("<strong class=bad>{} of {} shards are missing or "
+                                 "damaged</strong>: the numbers cover the rest.",
+                                 grouped(std::ssize(parts.missing)),
+                                 grouped(std::ssize(parts.frozen.plan.shards))));
   if (!context.warning.empty()) {
     html += "<p class=warning data-key=warning>Warning: " + escaped(context.warning, 1000) + "</p>";
   }
@@ -310,13 +309,13 @@ std::string head(const Survey& survey, const PageContext& context) {
     const SourceSurvey& source = survey.sources[i];
     if (source.counts.valid == 0 || source.events_per_pixel.zeros < source.counts.valid) continue;
     html += fmt::format(
-        "<p class=warning data-key=source.{}.warning>Warning: all {} volumes of {} are without any "
-        "event.</p>",
+        "<p class=warning data-key=source.{}.warning>Warning: all {} volumes of {} contain no "
+        "events.</p>",
         i, grouped(source.counts.valid), escaped(source_name(survey, i)));
   }
   const DatasetCounts& counts = survey.counts;
   html += "<div class=tiles>" + tile("samples", counts.samples, "samples") +
-          tile("quarantined", counts.quarantined(), "of them in quarantine") +
+          tile("quarantined", counts.quarantined(), "of them quarantined") +
           tile("boxes", counts.boxes, "boxes") + tile("persons", counts.persons, "persons") +
           tile("shards", counts.shards, "shards") +
           tile("size_bytes", counts.size_bytes, "on disk", bytes_text(counts.size_bytes)) +
@@ -334,7 +333,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
   const JobManifest& manifest = parts.manifest;
   const ShardHeader& header = survey.header;
   const ImageSize size = header.volume.size;
-  std::string html = "<section><h2>What it was made of</h2><div class=scroll><table class=facts>";
+  std::string html = "<section><h2>Inputs and settings</h2><div class=scroll><table class=facts>";
   for (std::size_t i = 0; i < std::min(manifest.sources.size(), kMostRows); ++i) {
     const SourceSpec& source = manifest.sources[i];
     if (has_events(source.dataset)) {
@@ -361,7 +360,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
       fmt::format(
           "2 polarities × {} bins × {} × {} (height × width{}), {}{}, values {}",
           header.volume.bins, size.height, size.width,
-          manifest.image.size ? "" : "; of the first shard, each picture has its own",
+          manifest.image.size ? "" : "; of the first shard, each image has its own",
           to_string(header.dtype), header.scope.empty() ? "" : ", scope " + escaped(header.scope),
           header.unit == VolumeUnit::kEvents ? "count events" : "are dimensionless, about 0–1"));
   html += fact("preprocessing", "<code>" + escaped(header.preprocessing) + "</code>");
@@ -396,12 +395,11 @@ std::string counts_of(const std::map<std::string, DatasetCounts>& by_name,
     rows.push_back(text_cell(escaped(name)) + counts_cells(what + "." + name, counts));
   }
   return "<h3>By " + what + "</h3>" +
-         table({what, "#samples", "#in quarantine", "#boxes", "#persons", "#shards", "#size"},
-               rows);
+         table({what, "#samples", "#quarantined", "#boxes", "#persons", "#shards", "#size"}, rows);
 }
 
 std::string counts(const Survey& survey) {
-  std::string html = "<section><h2>What there is</h2>";
+  std::string html = "<section><h2>Contents</h2>";
   std::vector<std::string> rows;
   for (std::size_t i = 0; i < survey.sources.size(); ++i) {
     const SourceSummary& summary = survey.parts.frozen.plan.sources.at(i);
@@ -412,10 +410,10 @@ std::string counts(const Survey& survey) {
         cell(fmt::format("source.{}.empty", i), survey.sources[i].events_per_pixel.zeros) +
         counts_cells(fmt::format("source.{}", i), survey.sources[i].counts));
   }
-  html += "<h3>By source</h3>" + table({"source", "#labelled frames", "#pairs without a partner",
-                                        "#volumes without events", "#samples", "#in quarantine",
-                                        "#boxes", "#persons", "#shards", "#size"},
-                                       rows);
+  html += "<h3>By source</h3>" +
+          table({"source", "#labelled frames", "#without paired frame", "#volumes without events",
+                 "#samples", "#quarantined", "#boxes", "#persons", "#shards", "#size"},
+                rows);
   if (survey.datasets.size() > 1) html += counts_of(survey.datasets, "dataset");
   if (survey.splits.size() > 1) html += counts_of(survey.splits, "split");
 
@@ -430,8 +428,8 @@ std::string counts(const Survey& survey) {
                                   ? fmt::format("{:.3g}", *gap.least_s)
                                   : fmt::format("{:.3g} – {:.3g}", *gap.least_s, *gap.most_s)));
   }
-  html += "<div><h3>By gap</h3>" +
-          table({"#frames apart", "#samples", "#extrapolated", "#seconds"}, rows) + "</div>";
+  html += "<div><h3>By gap</h3>" + table({"#gap", "#samples", "#extrapolated", "#seconds"}, rows) +
+          "</div>";
   std::vector<std::pair<std::string, std::int64_t>> classes(survey.counts.classes.begin(),
                                                             survey.counts.classes.end());
   std::ranges::stable_sort(classes, std::greater(), &std::pair<std::string, std::int64_t>::second);
@@ -459,17 +457,17 @@ std::string counts(const Survey& survey) {
 std::string of_volumes(const Survey& survey) {
   return survey.volumes == survey.counts.valid
              ? fmt::format("all {} volumes", grouped(survey.volumes))
-             : fmt::format("{} of {} volumes, drawn by the manifest's seed",
+             : fmt::format("{} of {} volumes, drawn with the manifest's seed",
                            grouped(survey.volumes), grouped(survey.counts.valid));
 }
 
 std::string histograms(const Survey& survey) {
   const bool is_counted = survey.header.unit == VolumeUnit::kEvents;
-  const std::string unit = is_counted ? "events a pixel, mean of the volume"
-                                      : "sum of a pixel's values, mean of the volume";
-  std::string html = "<section><h2>How it is distributed</h2><div class=charts>";
+  const std::string unit = is_counted ? "events per pixel, mean over the volume"
+                                      : "sum of a pixel's values, mean over the volume";
+  std::string html = "<section><h2>Distributions</h2><div class=charts>";
 
-  BarChart density{"events_per_pixel", "Events a pixel", unit, "samples", {}, {}, true};
+  BarChart density{"events_per_pixel", "Events per pixel", unit, "samples", {}, {}, true};
   std::vector<std::pair<std::string, const LogHistogram*>> of;
   LogHistogram rest;
   std::int64_t zeros = 0;
@@ -487,10 +485,10 @@ std::string histograms(const Survey& survey) {
   if (survey.sources.size() > kMostSeries) of.emplace_back("others", &rest);
   fill(density, of);
   if (zeros > 0)
-    density.title += fmt::format(" ({} volumes without any are left out)", grouped(zeros));
+    density.title += fmt::format(" ({} volumes without events are left out)", grouped(zeros));
   html += draw(density);
 
-  BarChart gaps{"gaps",    "Gaps", "frames from the first of the pair to the second",
+  BarChart gaps{"gaps",    "Gaps", "frames from the pair's first frame to its second",
                 "samples", {},     {{"", {}}}};
   for (const auto& [number, gap] : survey.gaps) {
     gaps.labels.push_back(std::to_string(number));
@@ -500,8 +498,8 @@ std::string histograms(const Survey& survey) {
 
   BarChart bins{"time_bins",
                 "Time bins by polarity, " + of_volumes(survey),
-                "time bin, first to last of the pair",
-                "mean value of a pixel",
+                "time bin, first to last",
+                "mean pixel value",
                 {},
                 {}};
   for (std::size_t bin = 0; bin < survey.positive_bins.size(); ++bin) {
@@ -512,8 +510,7 @@ std::string histograms(const Survey& survey) {
   html += draw(bins);
 
   if (survey.counts.boxes > 0) {
-    BarChart sides{"box_sides", "Box sizes", "√(width × height) in pixels of the volume",
-                   "boxes",     {},          {}};
+    BarChart sides{"box_sides", "Box sizes", "√(width × height) in volume pixels", "boxes", {}, {}};
     fill(sides, {{"", &survey.box_sides}});
     if (survey.box_sides.zeros > 0) {
       sides.title +=
@@ -540,17 +537,16 @@ std::string label_table(const std::string& what, const std::map<std::string, Lab
                    cell(what + "." + name + ".without_events", label.without_events) +
                    right_cell(percent(label.without_events, label.looked_at)));
   }
-  return "<div class=tall>" + table({what, "#looked at", "#without events", "#share"}, rows) +
+  return "<div class=tall>" + table({what, "#checked", "#without events", "#share"}, rows) +
          "</div>";
 }
 
 std::string labels_without_events(const Survey& survey) {
   if (survey.classes.empty() && survey.joints.empty()) return "";
   return fmt::format(
-      "<section><h2>Labels without events</h2><p class=note>Of {}. A pixel has events where its "
-      "values sum to {:g} or more; a box has none if that is so for less than {:g} % of its "
-      "pixels, "
-      "a joint if for no pixel within {} px.</p><div class=columns>{}{}</div></section>",
+      "<section><h2>Labels without events</h2><p class=note>Based on {}. A pixel has events if its "
+      "values sum to at least {:g}. A box is without events if less than {:g} % of its pixels have "
+      "any, a joint if no pixel within {} px has any.</p><div class=columns>{}{}</div></section>",
       of_volumes(survey), Survey::kEventSum, 100 * Survey::kBoxShare, Survey::kJointRadius,
       label_table("class", survey.classes), label_table("joint", survey.joints));
 }
@@ -558,7 +554,7 @@ std::string labels_without_events(const Survey& survey) {
 std::string pictures(const Survey& survey, const PageContext& context) {
   std::string html =
       "<section><h2>Samples</h2><p class=note>The labelled frame and the events between the pair's "
-      "two frames: early is blue, late is red, bright is many. Random ones are drawn by the "
+      "two frames: blue is early, red is late, bright is many. Random samples are drawn with the "
       "manifest's seed.</p>";
   for (std::size_t i = 0; i < survey.sources.size(); ++i) {
     if (survey.sources[i].picked.empty()) continue;
@@ -599,7 +595,7 @@ std::string quarantine(const Survey& survey, const PageContext& context) {
           table({"sample", "shard", "#slot", "reason"}, rows) + "</details>";
   return html +
          "<p class=note><code>eventgan retry</code> makes them once their inputs are "
-         "mended.</p></section>";
+         "fixed.</p></section>";
 }
 
 std::string time(const Survey& survey) {
@@ -614,21 +610,18 @@ std::string time(const Survey& survey) {
   }
   rows.push_back(text_cell("<b>all stages</b>") + right_cell(seconds_text(busy)) + right_cell("") +
                  right_cell(fmt::format("{:.3g} ms", 1e3 * busy / samples)));
-  std::string html =
-      "<section><h2>Time and memory</h2>" + table({"stage", "#busy", "#share", "#a sample"}, rows);
+  std::string html = "<section><h2>Time and memory</h2>" +
+                     table({"stage", "#busy", "#share", "#per sample"}, rows);
   html += fmt::format(
-      "<p class=note>Busy time of all threads, of the runs that committed the shards. From commit "
-      "to "
-      "commit the workers took {} together, {:.3g} samples a second of one worker. The stages "
-      "share "
-      "one process: {}.</p></section>",
+      "<p class=note>Busy time of all threads in the runs that committed the shards. From commit "
+      "to commit the workers took {} in total, {:.3g} samples per second and worker. All stages "
+      "run in one process: {}.</p></section>",
       seconds_text(survey.wall_seconds),
       survey.wall_seconds > 0 ? samples / survey.wall_seconds : 0.0,
-      survey.peak_bytes > 0
-          ? fmt::format("the worker that took most memory had <span data-key=peak_bytes "
-                        "data-value={}>{}</span> resident",
-                        survey.peak_bytes, bytes_text(survey.peak_bytes))
-          : "how much memory it took was not recorded");
+      survey.peak_bytes > 0 ? fmt::format("the largest worker had <span data-key=peak_bytes "
+                                          "data-value={}>{}</span> of resident memory",
+                                          survey.peak_bytes, bytes_text(survey.peak_bytes))
+                            : "its memory was not recorded");
   return html;
 }
 
@@ -652,8 +645,8 @@ std::string shards(const Survey& survey, const PageContext& context) {
   const auto all = std::ssize(parts.missing) + std::ssize(parts.done);
   const auto shown = std::min<std::ptrdiff_t>(std::ssize(rows), kMostRows);
   rows.resize(static_cast<std::size_t>(shown));
-  std::string html = "<section><h2>Shards</h2>" +
-                     table({"shard", "", "#samples", "#in quarantine", "#size"}, rows);
+  std::string html =
+      "<section><h2>Shards</h2>" + table({"shard", "", "#samples", "#quarantined", "#size"}, rows);
   if (shown < all) html += fmt::format("<p class=note>… and {} more</p>", grouped(all - shown));
   const std::vector<std::string> notes = notes_of(parts.frozen.plan.sources);
   if (!notes.empty()) {

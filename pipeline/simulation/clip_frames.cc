@@ -83,7 +83,7 @@ ListedClip list_pictures(const fs::path& path, std::optional<double> rate_hz) {
 
 ListedClip list_clip(const fs::path& path, std::optional<double> rate_hz, std::int64_t enough) {
   if (!fs::exists(path)) {
-    throw InputError("expected a video or a folder of pictures, got none, in " + path.string());
+    throw InputError("expected a video or a folder of images, got none, in " + path.string());
   }
   return is_video_name(path) ? list_video(path, rate_hz, enough) : list_pictures(path, rate_hz);
 }
@@ -112,8 +112,8 @@ ClipFrames::ClipFrames(const SimulationSource& source, const SimulationManifest&
                              : source.method == SimulationMethod::kAffine ? 1
                                                                           : 2;
   if (count() < least) {
-    throw InputError("expected " + std::to_string(least) + " frames or more from frame " +
-                     std::to_string(source.first_frame) + " on by steps of " +
+    throw InputError("expected " + std::to_string(least) + " or more frames from frame " +
+                     std::to_string(source.first_frame) + " on in steps of " +
                      std::to_string(source.frame_step) + ", got " + std::to_string(count()) +
                      " of a clip of " + std::to_string(length) + ", in " + path_.string());
   }

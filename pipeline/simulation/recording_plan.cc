@@ -84,7 +84,7 @@ void check_same_settings(const std::filesystem::path& file, const std::string& f
   check_same_clip(file, found, expected);
   std::string message =
       file.string() +
-      " was made by a run that would have written other events (--overwrite makes it anew):";
+      " was made by a run that would write different events (--overwrite makes it again):";
   for (const std::string& difference :
        fingerprint_differences(manifest_fields(found), manifest_fields(expected))) {
     message += "\n  " + difference;

@@ -87,7 +87,8 @@ TrialJob ComparedJob::as(const Computation& computation, StoredType dtype) const
 
 void ComparedJob::check_stop() const {
   if (stop_requested && stop_requested()) {
-    throw Stopped("asked to stop; what is measured is kept, and the same command goes on");
+    throw Stopped(
+        "stopped on request; the measurements are kept: run the same command again to resume");
   }
 }
 

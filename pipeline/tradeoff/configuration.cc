@@ -74,8 +74,8 @@ TrialJob trial_job(const JobManifest& manifest, const Configuration& configurati
     if (manifest.image.size) whole = manifest.image.size;
     if (!whole) {
       throw UsageError(
-          "size: expected pictures of one size, or $.image.width and height in the manifest, got "
-          "pictures of several sizes");
+          "size: expected images of one size, or $.image.width and height in the manifest, got "
+          "images of several sizes");
     }
     json["image"]["width"] = scaled(whole->width, computation.size);
     json["image"]["height"] = scaled(whole->height, computation.size);

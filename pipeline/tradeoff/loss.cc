@@ -45,7 +45,7 @@ std::vector<float> on_grid(std::vector<float> values, int channels, const Placem
   const std::size_t plane = from.volume.pixel_count();
   if (values.size() != static_cast<std::size_t>(channels) * plane || from.source != to.source) {
     throw std::invalid_argument("expected " + std::to_string(channels) + " channels of " +
-                                std::to_string(plane) + " pixels of one source picture, got " +
+                                std::to_string(plane) + " pixels of one source image, got " +
                                 std::to_string(values.size()) + " values");
   }
   if (from == to) return values;

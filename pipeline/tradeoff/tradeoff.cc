@@ -372,10 +372,8 @@ TradeoffReport Comparison::run() {
   }
   report_.pairs = std::ssize(job_.samples) - std::ssize(report_.skipped);
   if (report_.pairs == 0) {
-    throw InputError(
-        fmt::format("expected pairs to compare, got none that can be read of {}, in "
-                    "{}\n  {}",
-                    job_.samples.size(), manifest_.name, report_.skipped.front()));
+    throw InputError(fmt::format("expected readable pairs to compare, got none of {}, in {}\n  {}",
+                                 job_.samples.size(), manifest_.name, report_.skipped.front()));
   }
   choose_trials();
   for (const auto& recording : options_.real) {

@@ -105,18 +105,17 @@ struct Digest {
 };
 
 constexpr const char* kNotes[] = {
-    "pairs/s: on all threads, reading included, writing the file (1 to 2 % of a pair) not, as busy "
-    "as the machine was; times: the reference's processor time of a pair over its own, in the same "
-    "round; the front goes by it. MB peak: of the "
-    "whole program; MB stored: a pair's volume, compressed. Medians over the rounds, (the middle "
-    "half).",
-    "error: ‖V - R‖ / ‖R‖, R the reference's volume, median over the pairs; F1 and times: as "
-    "realism has them, means over the pairs; lost: share of R's events in labelled boxes and in "
-    "persons' crops that V does not have.",
-    "Volumes of another size are laid on the reference's grid: each pixel takes the mean, by area, "
-    "of those it covers. That keeps the events per pixel of every part of the picture, and so its "
-    "events times the area of a pixel. A simulator's counts are divided by their 98th percentile "
-    "and clipped first."};
+    "pairs/s: on all threads, with reading but without writing the file (1 to 2 % of a pair), "
+    "under the machine's load at the time; times: the reference's processor time per pair divided "
+    "by the configuration's, in the same round; the Pareto front uses it. MB peak: memory of the "
+    "whole program; MB stored: one pair's compressed volume. Medians over the rounds (with the "
+    "middle half).",
+    "error: ‖V - R‖ / ‖R‖ with the reference's volume R, median over the pairs; F1 and times: as "
+    "in realism, means over the pairs; lost: the share of R's events in labelled boxes and crops "
+    "of persons that V lacks.",
+    "Volumes of another size are resampled to the reference's grid by area: each pixel is the mean "
+    "of the pixels it covers. That keeps the events per pixel in every part of the image. A "
+    "simulator's counts are divided by their 98th percentile and clipped first."};
 
 std::string with_spread(const Spread& spread, double factor, int digits) {
   if (std::isnan(spread.median)) return "-";
@@ -185,7 +184,7 @@ std::vector<std::string> left_out(const TradeoffReport& report) {
   for (const std::string& pair : report.skipped) lines.push_back("skipped pair: " + pair);
   for (const Trial& trial : report.trials) {
     if (trial.quarantined == 0) continue;
-    lines.push_back(fmt::format("{}: {} of {} pairs have no sound volume",
+    lines.push_back(fmt::format("{}: {} of {} pairs have no valid volume",
                                 name_of(trial.configuration), trial.quarantined, report.pairs));
   }
   return lines;
@@ -295,10 +294,10 @@ std::string to_text(const TradeoffReport& report, const TradeoffDemand& demand) 
     text += "\n";
   }
   text +=
-      "\n* Pareto front: nothing measured is as fast and nearer to the reference.\n"
-      "times: the speed, in the reference's. error: ‖V - R‖ / ‖R‖, the distance to the\n"
-      "reference's volumes R, not to a camera. MB: a pair's volume, compressed.\n";
-  if (has_labels) text += "lost: the share of R's events at labels that V does not have.\n";
+      "\n* Pareto front: nothing measured is as fast and closer to the reference.\ntimes: the "
+      "speed relative to the reference. error: ‖V - R‖ / ‖R‖, the distance\nto the reference's "
+      "volumes R, not to a camera. MB: one pair's compressed volume.\n";
+  if (has_labels) text += "lost: the share of R's events at labels that V lacks.\n";
   if (digest.has_real()) text += "camera: F1 over time, against the camera's events.\n";
   for (const std::string& line : left_out(report)) text += line + "\n";
   return text + answers_text(report, digest, demand, "");
@@ -321,7 +320,7 @@ std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& dema
     text += "\n";
   }
   text +=
-      "\nBold: on the Pareto front, nothing measured is as fast and nearer to the reference (by 1 "
+      "\nBold: on the Pareto front: nothing measured is as fast and closer to the reference (by 1 "
       "% of its error).\n";
   for (const char* note : kNotes) text += "\n" + std::string(note) + "\n";
   for (const std::string& line : left_out(report)) text += "\n" + line + "\n";

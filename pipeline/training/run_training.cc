@@ -174,7 +174,7 @@ void TrainingRun::resume() {
   if (!checkpoint) return;
   check_resumable(checkpoint->settings, settings_, checkpoint->position, manifest_);
   for (const auto& difference : fingerprint_differences(checkpoint->environment, environment_)) {
-    warn("the last bits may differ from those of a training that was never stopped: " + difference);
+    warn("the last bits may differ from those of an uninterrupted training: " + difference);
   }
   try {
     trainer_.load(checkpoint->state);
@@ -240,11 +240,10 @@ StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
   } catch (const UnsoundLoss&) {
     const fs::path good = last_checkpoint(folder_.checkpoints());
     std::throw_with_nested(std::runtime_error(
-        "the training broke down in phase " + std::string(to_string(position_.phase)) + ", step " +
+        "training diverged in phase " + std::string(to_string(position_.phase)) + ", step " +
         std::to_string(position_.step) +
         "; last good checkpoint: " + (good.empty() ? "none" : good.string()) +
-        " (a lower learning rate and --overwrite start again; so do other recordings in another "
-        "folder)"));
+        " (try a lower learning rate with --overwrite, or other recordings in another folder)"));
   }
 }
 
@@ -344,7 +343,7 @@ std::string to_text(const TrainingReport& report) {
       "{}: {}\n"
       "  next step   {} {}\n"
       "  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs\n",
-      report.complete ? "complete" : "stopped, run again to go on", report.folder,
+      report.complete ? "complete" : "stopped, run again to resume", report.folder,
       to_string(report.position.phase), report.position.step, report.steps_made, report.run_seconds,
       report.total_seconds);
   for (const auto& [name, value] : report.losses) {

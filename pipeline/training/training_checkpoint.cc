@@ -78,8 +78,8 @@ void check_same_training(const std::map<std::string, std::string>& before,
   const auto differences = fingerprint_differences(told(before), told(now));
   if (differences.empty()) return;
   std::string message =
-      "expected the folder of this training, got that of another (choose another output folder, or "
-      "remove that one yourself):";
+      "expected the output folder of this training, got that of another training (choose another "
+      "output folder, or remove that one yourself):";
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
 }
@@ -103,7 +103,8 @@ void check_resumable(std::map<std::string, std::string> before,
   const auto differences = fingerprint_differences(before, now);
   if (differences.empty()) return;
   std::string message =
-      "the training in the output folder began with other settings (--overwrite starts again):";
+      "the training in the output folder was started with other settings (--overwrite starts "
+      "again):";
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
 }
@@ -238,12 +239,13 @@ std::optional<TrainingCheckpoint> load_checkpoint(
     } catch (const std::runtime_error& error) {
       if (!fs::exists(previous)) {
         std::throw_with_nested(std::runtime_error(
-            "expected a whole checkpoint, got a damaged one and none before it, in " +
+            "expected a whole checkpoint, got a damaged one and no earlier one, in " +
             latest.string() + " (--overwrite starts again)"));
       }
       const fs::path damaged = folder / kDamaged;
       warn("the checkpoint " + latest.string() + " cannot be read (" + error.what() +
-           "); it is now " + damaged.string() + ", and the one before it is gone on from");
+           "); it was renamed to " + damaged.string() +
+           ", and training resumes from the one before");
       // Else the next save would put it in the good one's place.
       fs::rename(latest, damaged);
     }

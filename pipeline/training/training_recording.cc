@@ -22,7 +22,7 @@ std::string fault_of(const RecordingSpec& spec, const TrainingRecording& opened,
   const ImageSize size = recording.size();
   const std::string where = ", in " + opened.file.string();
   if (size.height < smallest.height || size.width < smallest.width) {
-    return "expected pictures of at least " + size_text(smallest) + " (crop), got " +
+    return "expected images of at least " + size_text(smallest) + " (crop), got " +
            size_text(size) + where;
   }
   if (spec.last_frame && *spec.last_frame >= recording.frame_count()) {

@@ -161,7 +161,7 @@ void complete_mpii_list(FoundSource& found) {
   }
   if (!found.sequences) {
     found.remarks.push_back(
-        "no sequences (MPII's video frames; \"sequences\" says where): no pairs");
+        "no sequences (MPII's video frames; set \"sequences\" to their folder): no pairs");
   }
 }
 
@@ -169,7 +169,7 @@ void complete_frames(FoundSource& found) {
   if (has_file(found.root)) return;
   const PictureFolder top = list_picture_folder(found.root);
   if (top.frames.empty() && std::ranges::any_of(top.left_out, is_video_name)) return;
-  found.remarks.push_back("no times, since pictures tell none (\"frames_per_second\" gives them)");
+  found.remarks.push_back("no times, since images have none (set \"frames_per_second\")");
 }
 
 /// A dataset in one of the ways in which it lies on disk.
@@ -191,13 +191,13 @@ constexpr std::array kLayouts{
     DatasetLayout{DatasetKind::kMpii, "", "MPII Human Pose", is_mpii, complete_mpii},
     DatasetLayout{DatasetKind::kHuman36m, "fetch", "Human3.6M as h36m-fetch unpacks it",
                   is_human36m_fetch},
-    DatasetLayout{DatasetKind::kHuman36m, "official", "Human3.6M as it is downloaded",
+    DatasetLayout{DatasetKind::kHuman36m, "official", "Human3.6M as downloaded",
                   is_human36m_official},
-    DatasetLayout{DatasetKind::kHuman36m, "extracted", "Human3.6M as extracted pictures",
+    DatasetLayout{DatasetKind::kHuman36m, "extracted", "Human3.6M as extracted images",
                   is_human36m_extracted},
     DatasetLayout{DatasetKind::kMpiiList, "", "MPII as a list of people", is_mpii_list,
                   complete_mpii_list},
-    DatasetLayout{DatasetKind::kFrames, "", "pictures or videos", is_frames, complete_frames}};
+    DatasetLayout{DatasetKind::kFrames, "", "images or videos", is_frames, complete_frames}};
 
 struct Place {
   const DatasetLayout* layout;
@@ -246,11 +246,11 @@ void note_dataset_above(FoundSource& found) {
     const fs::path above = part.parent_path();
     const auto whole = look_at(above, std::nullopt, /*frames_too=*/false);
     if (!whole) continue;
-    std::string remark = "warning: a part of " + std::string(whole->layout->title) +
-                         ", whose labels and pairs it does not have alone: eventgan init \"" +
-                         above.string() + "\"";
+    std::string remark = "warning: this is only a part of " + std::string(whole->layout->title) +
+                         ", without its labels and pairs: run eventgan init \"" + above.string() +
+                         "\"";
     if (whole->layout->dataset == DatasetKind::kKittiObject && !has_folder(above / "image_2")) {
-      remark += " takes them, once the images are in image_2";
+      remark += " once the images are in image_2";
     }
     found.remarks.insert(found.remarks.begin(), remark);
     return;
@@ -273,7 +273,7 @@ FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
     const std::string expected =
         dataset ? std::string(to_string(*dataset))
-                : "KITTI object, tracking or raw, MPII, Human3.6M, pictures or videos";
+                : "KITTI object, tracking or raw, MPII, Human3.6M, images or videos";
     throw InputError("expected " + expected + ", got " +
                      (other ? std::string(to_string(other->layout->dataset)) : "none of these") +
                      ", in " + path.string());

@@ -163,7 +163,7 @@ Complaint check(const Box& box, ImageSize picture) {
     return text("expected left <= right and top <= bottom, got ", box.xyxy);
   }
   if (!box.ignore && !overlaps(box.xyxy, picture)) {
-    return text("expected an overlap with the picture of ", picture, ", got ", box.xyxy);
+    return text("expected an overlap with the image of ", picture, ", got ", box.xyxy);
   }
   return std::nullopt;
 }
@@ -181,7 +181,7 @@ Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
     }
   }
   if (any_inside || !outside) return std::nullopt;
-  return text("expected a joint inside the picture of ", picture,
+  return text("expected a joint inside the image of ", picture,
               ", got all annotated ones outside it, the first at ", *outside);
 }
 

@@ -85,7 +85,7 @@ EcdImageList list_of_present_images(const std::filesystem::path& folder) {
   for (std::size_t i = 0; i < images.paths.size(); ++i) {
     const std::filesystem::path picture = folder / images.paths[i];
     if (std::filesystem::is_regular_file(picture, ignored)) continue;
-    throw InputError("expected a picture, got none, in " + picture.string() + " (frame " +
+    throw InputError("expected an image, got none, in " + picture.string() + " (frame " +
                      std::to_string(i) + ")");
   }
   return images;

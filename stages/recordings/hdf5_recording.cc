@@ -42,15 +42,15 @@ Hdf5Table open_events(hid_t file, const Hdf5Layout& layout, const std::string& n
 Hdf5Table open_frames(hid_t file, const Hdf5Layout& layout, const std::string& name) {
   Hdf5Table frames(file, layout.frames, name);
   if (frames.dims().size() == 4) {
-    frames.refuse("grey pictures, uint8 [frames, height, width], and no colour");
+    frames.refuse("grey images, uint8 [frames, height, width], and no colour");
   }
   if (!frames.is_uint8() || frames.dims().size() != 3) {
-    frames.refuse("grey pictures, uint8 [frames, height, width]");
+    frames.refuse("grey images, uint8 [frames, height, width]");
   }
   const hsize_t height = frames.dims()[1];
   const hsize_t width = frames.dims()[2];
   if (height == 0 || width == 0 || height > kMaxPicturePixels / width) {
-    frames.refuse("pictures of 1 to " + std::to_string(kMaxPicturePixels) + " pixels");
+    frames.refuse("images of 1 to " + std::to_string(kMaxPicturePixels) + " pixels");
   }
   return frames;
 }

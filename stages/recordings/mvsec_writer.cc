@@ -155,7 +155,7 @@ void MvsecWriter::File::check_frame(const GreyImage& frame, double time_s,
 
 MvsecWriter::MvsecWriter(const std::filesystem::path& file, ImageSize size,
                          const std::string& settings) {
-  require(size.height > 0 && size.width > 0, "expected a picture size of at least 1x1");
+  require(size.height > 0 && size.width > 0, "expected an image size of at least 1x1");
   naming(file, [&] { file_ = std::make_unique<File>(file, size); });
   file_->write([&] { file_->create_objects(settings); });
 }

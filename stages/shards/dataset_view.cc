@@ -26,13 +26,14 @@ RowRange append_offsets(const ShardMarker& marker, const std::vector<std::int32_
   if (std::ssize(rows) != marker.samples) {
     throw std::runtime_error("expected numbers of " + std::string(what) + " for " +
                              std::to_string(marker.samples) + " samples, got " +
-                             std::to_string(rows.size()) + ", in the marker of " + marker.shard);
+                             std::to_string(rows.size()) + ", in the commit record of " +
+                             marker.shard);
   }
   const std::int64_t first = offsets.back();
   for (const std::int32_t count : rows) {
     if (count < 0) {
       throw std::runtime_error("expected 0 or more " + std::string(what) + " of a sample, got " +
-                               std::to_string(count) + ", in the marker of " + marker.shard);
+                               std::to_string(count) + ", in the commit record of " + marker.shard);
     }
     offsets.push_back(offsets.back() + count);
   }
@@ -45,8 +46,8 @@ RowRange append_valid(const ShardMarker& marker, std::vector<std::uint8_t>& vali
   for (const QuarantinedSample& sample : marker.quarantined) {
     if (sample.slot < 0 || sample.slot >= marker.samples) {
       throw std::runtime_error("expected a slot below " + std::to_string(marker.samples) +
-                               ", got " + std::to_string(sample.slot) + ", in the marker of " +
-                               marker.shard);
+                               ", got " + std::to_string(sample.slot) +
+                               ", in the commit record of " + marker.shard);
     }
     valid[first + static_cast<std::size_t>(sample.slot)] = 0;
   }

@@ -291,8 +291,8 @@ std::optional<std::string> volume_fault(const ShardHeader& header, const ShardSa
   const bool vanished = found.nonzero == 0 && recorded.max > 0;
   if (((recorded.flags & kFlagVanished) != 0) != vanished) {
     return std::string(
-               "expected the flag \"vanished\" of a volume of zeros alone that was not "
-               "generated so, and of no other, got it ") +
+               "expected the flag \"vanished\" exactly where a volume was stored as zeros alone "
+               "but not generated so, got it ") +
            (vanished ? "not set" : "set");
   }
 

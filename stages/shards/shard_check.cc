@@ -173,7 +173,9 @@ class Check {
     const int samples = marker_.samples;
     expect("number of valid samples", marker_.valid, samples - static_cast<int>(invalid.size()));
     if (!are_quarantined(marker_, invalid)) {
-      fault("expected the samples with valid = 0 to be those that the marker lists, got others");
+      fault(
+          "expected the samples with valid = 0 to be those that the commit record lists, got "
+          "others");
     }
   }
 

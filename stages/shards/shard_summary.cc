@@ -165,7 +165,8 @@ std::string describe_sample(const ShardReader& reader, int slot) {
   const FramePair& pair = sample.pair;
   Lines line(fmt::format("sample {} of {}", slot, reader.header().name));
   line("id", "{}, sequence {}", sample.sample_id, sample.sequence);
-  line.add("valid", sample.valid ? "yes" : "no: quarantined, the marker beside the shard says why");
+  line.add("valid",
+           sample.valid ? "yes" : "no: quarantined, the commit record beside the shard says why");
   line.add("previous", text_of(pair.previous));
   line.add("next", text_of(pair.next));
   const bool is_window = pair.gap_frames == 0;  // of events

@@ -203,8 +203,8 @@ constexpr double kC2 = 0.03 * 0.03;
 }  // namespace
 
 at::Tensor ssim(const at::Tensor& first, const at::Tensor& second) {
-  require_sides(first, {-1, 1, -1, -1}, "a picture to compare");
-  require_sides(second, first.sizes().vec(), "the picture to compare with");
+  require_sides(first, {-1, 1, -1, -1}, "an image to compare");
+  require_sides(second, first.sizes().vec(), "the image to compare with");
   // Apart, since the backward pass skips it for a target that needs no gradient.
   const at::Tensor mean = gaussian_blur(second);
   const auto blurred =
@@ -224,12 +224,12 @@ at::Tensor image_loss(const at::Tensor& image, const at::Tensor& target) {
 at::Tensor multi_scale_reconstruction_loss(const std::vector<at::Tensor>& images,
                                            const at::Tensor& target) {
   if (images.empty())
-    throw std::invalid_argument("expected pictures of at least one scale, got none");
-  require_sides(target, {-1, 1, -1, -1}, "the picture to reconstruct");
+    throw std::invalid_argument("expected images of at least one scale, got none");
+  require_sides(target, {-1, 1, -1, -1}, "the image to reconstruct");
   at::Tensor loss = at::zeros({}, target.options());
   double scale = std::ldexp(1.0, 1 - static_cast<int>(images.size()));
   for (const at::Tensor& image : images) {
-    require_sides(image, {target.size(0), 1, -1, -1}, "a reconstructed picture");
+    require_sides(image, {target.size(0), 1, -1, -1}, "a reconstructed image");
     const bool fits = image.sizes() == target.sizes();
     const at::Tensor full =
         fits ? image : at::upsample_nearest2d(image, {target.size(2), target.size(3)});

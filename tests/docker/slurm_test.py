@@ -87,9 +87,9 @@ class Slurm(unittest.TestCase):
         log = {task: (self.folder / "manifest-logs" / f"convert-{array}_{task}.log").read_text() for task in range(SHARDS)}
         for task, restarted in [(0, False), (1, True), (2, True), (3, False)]:
             self.assertEqual(re.findall(r"exit code (\d+)", log[task]), ["75", "0"] if restarted else ["0"], log[task])
-        self.assertIn("passes USR1 on", log[2])
-        self.assertIn("is requeued", log[2])
-        self.assertNotIn("is requeued", log[1])  # who cancels a task does not want it back
+        self.assertIn("forwards USR1", log[2])
+        self.assertIn(": requeued", log[2])
+        self.assertNotIn(": requeued", log[1])  # who cancels a task does not want it back
 
         self.assertEqual(state(finalize), "PENDING")
         command("scontrol", "release", finalize)

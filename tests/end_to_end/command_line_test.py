@@ -85,7 +85,7 @@ class CommandLine(program.InFolder):
         (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
         out = run("convert", path)[0]
         last = out.splitlines()[-1]
-        self.assertEqual(last, f"next, once the inputs are mended:  eventgan retry {path.parent / 'out'}")
+        self.assertEqual(last, f"next, once the inputs are fixed:  eventgan retry {path.parent / 'out'}")
         run(*last.split("eventgan ")[1].split())  # which runs
 
     def test_no_name_steers_the_terminal(self):
@@ -276,7 +276,7 @@ class CommandLine(program.InFolder):
     def test_status_of_a_manifest_is_that_of_its_output(self):
         path = small_job(self.folder / "small", output={"directory": "shards/"})
         _, err = run("status", path, expect=66)  # nothing has begun
-        self.assertIn("a trial is in " + str(path.parent / "shards") + "-trial-N", err)
+        self.assertIn("a trial run is in " + str(path.parent / "shards") + "-trial-N", err)
         run("convert", path)
         run("finalize", path.parent / "shards")
         told = run("status", path.parent / "shards")

@@ -179,7 +179,7 @@ class Damage(program.InFolder):
         manifest = small_job(self.folder / "other", cars=6)
         for command in [["convert", manifest], ["convert", manifest, "--overwrite"], ["plan", "--freeze", manifest]]:
             _, err = run(*command, "--output", self.out, expect=64)
-            self.assertIn(f'got that of another, "small", in {self.out} '
+            self.assertIn(f'got that of another job, "small", in {self.out} '
                           "(choose another output folder, or remove that one yourself):", err)
             self.assertIn(f"sources[0].root: expected {job / 'cars'}, got {self.folder / 'other' / 'cars'}\n", err)
             self.assertNotIn("--overwrite", err)

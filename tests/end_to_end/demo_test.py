@@ -72,7 +72,7 @@ class Demo(program.InFolder):
             time.sleep(0.01)
         making.send_signal(signal.SIGINT)
         _, err = making.communicate(timeout=60)
-        self.assertEqual((making.returncode, err), (75, "error: stopped; nothing is left of the dataset\n"))
+        self.assertEqual((making.returncode, err), (75, "error: stopped; the unfinished dataset was removed\n"))
         self.assertFalse(folder.exists())
 
     def test_plan_writes_nothing_and_agrees_with_convert(self):

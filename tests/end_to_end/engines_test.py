@@ -329,7 +329,7 @@ class Engines(program.InFolder):
         self.assertIn("skipped 000000", err)
         with broken_cars(self.job, range(PAIRS)):
             _, err = self.calibrate("--out", self.folder / "none.safetensors", expect=66)
-        self.assertIn("expected pairs to calibrate on, got none that can be read", err)
+        self.assertIn("expected readable pairs to calibrate on, got none", err)
         self.assertFalse((self.folder / "none.safetensors").exists())
 
     def test_a_simulator_has_nothing_to_calibrate(self):

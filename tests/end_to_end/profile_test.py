@@ -162,7 +162,7 @@ class Profile(program.InFolder):
                                     "--profile", self.file)
         self.assertTrue(outcome.struck)
         self.assertEqual(outcome.code, 0, outcome.err)
-        self.assertIn("no trace: ", outcome.err)
+        self.assertIn("no trace written: ", outcome.err)
         self.assertEqual(os.listdir(self.file.parent), [])
         same_folder(self.out, self.plain)
 

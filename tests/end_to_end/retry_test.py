@@ -265,7 +265,7 @@ class UnknownSizes(program.InFolder):
             PIL.Image.fromarray(random.integers(0, 256, size, dtype=np.uint8)).save(path)
         plan = (out / "plan.json").read_bytes()
         text, _ = run("retry", out)
-        self.assertIn("3 of 3 quarantined samples mended", text)
+        self.assertIn("3 of 3 quarantined samples fixed", text)
         self.assertEqual((out / "plan.json").read_bytes(), plan)
         run("convert", manifest, "--output", out)
         run("finalize", out)

@@ -65,7 +65,7 @@ class SharedData(program.InFolder):
         out, (shard,) = self.convert(manifest(
             [{"dataset": "kitti_object", "root": str(root), "pairs": pairs([1, 2, 3], choose="all")}],
             image={"width": 861, "height": 260, "fit": "stretch", "preset": "kitti"}))
-        self.assertIn("without a partner", out)  # 000000, 000001, 000008 have no previous frames
+        self.assertIn("without a paired frame", out)  # 000000, 000001, 000008 have no previous frames
         self.assertEqual([text(s) for s in shard["pairs/sample_id"]], ["001497@before1", "001497@before2", "001497@before3"])
         np.testing.assert_array_equal(shard["pairs/gap_frames"], [1, 2, 3])
         np.testing.assert_array_equal(shard["pairs/label_position"], [1, 1, 1])

@@ -85,7 +85,7 @@ class Init(program.InFolder):
         shutil.rmtree(self.folder / "training" / "prev_2")
         told, manifest = self.init(self.folder)
         self.assertIn("no prev_2", told)
-        self.assertIn("no pairs can be made of this", told)
+        self.assertIn("no pairs can be made yet", told)
         self.assertIn("expected at least 1 pairs", run("plan", manifest, expect=66)[1])
 
     def test_gaps_without_partner_are_left_out(self):
@@ -137,7 +137,7 @@ class Init(program.InFolder):
             for dataset in [[], ["frames"]]:
                 with self.subTest(path=path, dataset=dataset):
                     told, manifest = self.init(*dataset, self.folder / path)
-                    self.assertIn(f"pictures or videos: {frames} labelled frames", told)
+                    self.assertIn(f"images or videos: {frames} labelled frames", told)
                     self.assertIn(f"gap 1: {gap_1}, ", told)
                     self.assertEqual("frames_per_second" in told, path.startswith("clips"))
             self.trial(manifest, gap_1, limit=100)
@@ -161,7 +161,7 @@ class Init(program.InFolder):
         manifest = self.folder / "manifest.json"
         manifest.write_text("mine")
         _, errors = run("init", self.folder / "one.mp4", "--out", manifest, expect=64)
-        self.assertIn(f"expected the name of a new file, got one that is there, in {manifest}", errors)
+        self.assertIn(f"expected the name of a new file, got an existing one, in {manifest}", errors)
         self.assertEqual(manifest.read_text(), "mine")
 
     def test_a_second_one_in_a_folder_is_told_of_its_file_alone(self):
@@ -171,8 +171,8 @@ class Init(program.InFolder):
         self.addCleanup(os.chdir, here)
         run("init", "one.mp4")
         _, errors = run("init", "one.mp4", expect=64)
-        self.assertEqual(errors, "error: expected no manifest yet, got one that is there, in manifest.json "
-                                 "(--out FILE writes to another)\n")
+        self.assertEqual(errors, "error: expected no manifest yet, got an existing one, in manifest.json "
+                                 "(--out FILE gives another name)\n")
 
     def test_each_is_named_after_what_was_shown(self):
         """Two of one name would have one output folder, and the second's shards would want the first's place."""
@@ -223,11 +223,11 @@ class Init(program.InFolder):
         root = self.folder / "training"
         write_cars(root, 9, random)
         told, manifest = self.init(root / "image_2")
-        part = f"warning: a part of KITTI object, whose labels and pairs it does not have alone: eventgan init \"{root}\"\n"
+        part = f"warning: this is only a part of KITTI object, without its labels and pairs: run eventgan init \"{root}\"\n"
         self.assertIn(part, told)
         self.assertIn(f"// {part}", manifest.read_text())
-        self.assertRegex(told, r"warning: 8 of 8 neighbouring images that were compared do not show the same scene, "
-                               r"\S*image_2/000000.png and \S*image_2/000001.png the first")
+        self.assertRegex(told, r"warning: 8 of 8 compared pairs of neighbouring images do not show the same scene, "
+                               r"first \S*image_2/000000.png and \S*image_2/000001.png: is it")
         self.assertNotIn("several sizes", told)
         cv2.imwrite(str(root / "image_2" / "000004.png"), np.zeros((20, 30), np.uint8))
         self.assertIn("warning: images of several sizes in one folder, 32x24 in ", self.init(root / "image_2")[0])
@@ -261,7 +261,7 @@ class Init(program.InFolder):
         empty.mkdir()
         (self.folder / "notes.txt").write_text("notes")
         for path in [empty, self.folder / "notes.txt", pathlib.Path("/proc/self/fd")]:
-            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, pictures or videos, got none of these, "
+            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
         self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
@@ -318,12 +318,12 @@ class Trial(program.InFolder):
         out, _ = self.convert("--limit", 4)
         self.assertEqual([path.name for path in self.folder.glob("out*")], ["out-trial-4"])
         self.assertIn("4 of 4 pairs written", out)
-        self.assertTrue(out.endswith(f"a trial: 4 pairs of the job. The whole:  eventgan convert {self.manifest}\n"), out)
+        self.assertTrue(out.endswith(f"trial run: 4 pairs of the job. For all pairs:  eventgan convert {self.manifest}\n"), out)
         self.assertEqual(self.ids("out-trial-4"), ["000000", "000001", "000000000", "000000001"])  # two of each source
         trial = shard_bytes(self.folder / "out-trial-4")
         self.assertIn("in 2 of 2 shards (2 done before)", self.convert("--limit", 4)[0])
         self.assertEqual(shard_bytes(self.folder / "out-trial-4"), trial)
-        self.assertNotIn("a trial", self.convert()[0])
+        self.assertNotIn("trial run", self.convert()[0])
         self.assertEqual(len(self.ids("out")), 9)
         self.assertEqual(shard_bytes(self.folder / "out-trial-4"), trial)
         for command in ["status", "verify", "finalize", "retry"]:
@@ -347,7 +347,7 @@ class Trial(program.InFolder):
         self.assertIn("1 quarantined", self.convert("--limit", 4)[0])
         picture.write_bytes(whole)
         out, _ = run("retry", self.folder / "out-trial-4")
-        self.assertIn("1 of 1 quarantined sample mended", out)
+        self.assertIn("1 of 1 quarantined sample fixed", out)
         self.assertIn("4 of 4 pairs written, 0 quarantined", self.convert("--limit", 4)[0])
 
     def test_a_limit_beyond_the_job_is_the_job(self):

@@ -168,7 +168,7 @@ class SlowShard(program.InFolder):
             samples = json.loads(run("status", out, "--json")[0])["samples"]
             self.assertEqual((samples["written"], samples["quarantined"]), (0, 0))
         self.assertLessEqual(samples["under_way"], 100)
-        self.assertRegex(run("status", out)[0], r"samples  0 of 100 written, \d+ more in shards under way, 0 quarantined")
+        self.assertRegex(run("status", out)[0], r"samples  0 of 100 written, \d+ more in unfinished shards, 0 quarantined")
 
     def slow_job(self):
         return small_job(self.folder / "job", cars=100, people=0, samples_per_shard=100,

@@ -141,7 +141,7 @@ class Terminal(program.InFolder):
         marker = sorted((self.folder / "out").glob("*-of-*.json"))[0]
         marker.write_text("torn")
         text = on_terminal("convert", self.manifest, "--output", self.folder / "out", NO_COLOR="1")
-        self.assertRegex(text, re.escape(WIPE) + r"warning: [^\r\n]*it is made again\r\n")
+        self.assertRegex(text, re.escape(WIPE) + r"warning: [^\r\n]*making it again\r\n")
 
     def test_ctrl_c_is_answered_at_once(self):
         one_shard = program.json.loads(self.manifest.read_text())
@@ -149,16 +149,28 @@ class Terminal(program.InFolder):
         manifest = self.job / "one_shard.json"
         manifest.write_text(program.json.dumps(one_shard))
         command = ["convert", manifest, "--output", self.folder / "out", "--overwrite", "--threads", 1, "--grace", 3600]
-        told = "stopping: this shard is finished if 3600 s are enough; Ctrl-C again quits at once"
+        told = "stopping: finishing the current shard if it takes at most 3600 s; press Ctrl-C again to quit at once"
         begun = (r"\] [1-9]\d*/24 pairs", b"\x03")
         text = on_terminal(*command, typed=[begun])  # that shard is all there is
         before, _, after = text.partition(f"{WIPE}{told}\r\n")
         self.assertNotIn("24/24 pairs", before)
         self.assertGreater(len([row for row in bars(after) if "/24 pairs" in row]), 1, "the bar goes on below")
         self.assertIn("24 of 24 pairs written", after)
-        text = on_terminal(*command, typed=[begun, ("again quits at once", b"\x03")], expect=-signal.SIGINT)
+        text = on_terminal(*command, typed=[begun, ("again to quit at once", b"\x03")], expect=-signal.SIGINT)
         self.assertEqual(text.count(told), 1)
         self.assertNotIn("pairs written", text)
+
+    def test_help_fits_80_columns_without_cutting_words(self):
+        out, _ = program.run("help")
+        commands = re.findall(r"(?m)^  ([a-z-]+) {2,}", out.split("Subcommands:")[1])
+        self.assertIn("convert", commands)
+        for command in [None, *commands]:
+            with self.subTest(command=command):
+                out, _ = program.run("help", *([command] if command else []))
+                self.assertLessEqual(max(map(len, out.splitlines())), 80)
+        texts = re.sub(r"\s+", " ", program.run("help", "convert")[0])  # lines are broken between words
+        for words in ["Number of threads; default: all cores", "a bar on a terminal, lines elsewhere; json: machine-readable lines and report"]:
+            self.assertIn(words, texts)
 
     def test_verify_says_how_far_it_is(self):
         large = program.json.loads(self.manifest.read_text())  # there must be something to read

@@ -122,7 +122,7 @@ class Samples:
             is_known = isinstance(name, str) and name in self._of_name
             if not is_known or name in self._twice:
                 raise ValueError(f"expected the image_id of {'one' if is_known else 'a'} sample of {len(self._of_number)}, got {_brief(name)}"
-                                 f"{', which two have' if is_known else ''}, in {path} (entry {number})")
+                                 f"{', which two samples have' if is_known else ''}, in {path} (entry {number})")
             found[number] = self._of_name[name]
         return found
 
@@ -239,9 +239,9 @@ def _text(value: float | str, digits: int) -> str:
 
 def detection_tables(result: Mapping[str, Any]) -> str:
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
-    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} boxes to find, "
-             f"{counts['ignored']} to be ignored; average precisions of all {counts['predictions']} predictions, precision, recall and F1 of "
-             f"{counts['after_suppression']}, by confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
+    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} ground-truth boxes, "
+             f"{counts['ignored']} ignored; average precisions use all {counts['predictions']} predictions; precision, recall and F1 use "
+             f"{counts['after_suppression']}, after confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
     if counts["not_of_these_samples"]:
         first += f"; {counts['not_of_these_samples']} are of other samples"
     tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", **PAPER_COLUMNS}),
@@ -254,10 +254,10 @@ def detection_tables(result: Mapping[str, Any]) -> str:
 
 def pose_tables(result: Mapping[str, Any]) -> str:
     counts = result["counts"]
-    hidden = f"{counts['hidden']} hidden ones scored, too" if result["settings"]["hidden"] else f"{counts['hidden']} hidden"
+    hidden = f"{counts['hidden']} hidden ones also scored" if result["settings"]["hidden"] else f"{counts['hidden']} hidden"
     first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {hidden}; "
-             f"PCKh without {counts['without_head']} persons whose head or shoulders are not annotated, MPII's without {counts['without_head_box']} that have "
-             "no head box")
+             f"PCKh leaves out {counts['without_head']} persons without annotated head or shoulders, MPII's {counts['without_head_box']} without "
+             "a head box")
     return first + "\n\n" + table("", result["joints"], {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px",
                                                           "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
 
@@ -310,21 +310,21 @@ def _without_nan(value: Any) -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python3 -m eventgan_shards.evaluate", description="Scores of what a network found in shards.")
+    parser = argparse.ArgumentParser(prog="python3 -m eventgan_shards.evaluate", description="Scores the predictions of a network against the labels of shards.")
     parser.add_argument("what", choices=["detections", "poses"])
-    parser.add_argument("predictions", help="JSON, a list: image_id, category_id, bbox, score; or image_id, person, joints")
-    parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one")
-    parser.add_argument("--split", help="score the samples of this split alone")
-    parser.add_argument("--dataset", help="score samples of this kind of source alone, such as kitti_object")
-    parser.add_argument("--ids", metavar="FILE", help="score these samples alone, an id a line")
+    parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with image_id, person, joints")
+    parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one shard")
+    parser.add_argument("--split", help="score only samples of this split")
+    parser.add_argument("--dataset", help="score only samples of this kind of source, such as kitti_object")
+    parser.add_argument("--ids", metavar="FILE", help="score only the samples listed in this file, one id per line")
     parser.add_argument("--classes", type=lambda text: text.split(","),
-                        help="detections: names with commas between them (default: all that have a box or a prediction)")
-    parser.add_argument("--confidence", type=float, default=0.2, help="detections: least score of what precision, recall and F1 are of; average precisions are of all (default: %(default)s)")
-    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression before precision, recall and F1; 1: none (default: %(default)s)")
-    parser.add_argument("--iou", type=float, default=0.5, help="detections: IoU from which on a box is found (default: %(default)s)")
-    parser.add_argument("--hidden", action="store_true", help="poses: score joints that are annotated and hidden, too, as MPII's own evaluation does")
+                        help="detections: class names, separated by commas (default: all that have a box or a prediction)")
+    parser.add_argument("--confidence", type=float, default=0.2, help="detections: lowest score that counts for precision, recall and F1; average precisions use all predictions (default: %(default)s)")
+    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression for precision, recall and F1; 1 switches it off (default: %(default)s)")
+    parser.add_argument("--iou", type=float, default=0.5, help="detections: lowest IoU at which a detection matches a box (default: %(default)s)")
+    parser.add_argument("--hidden", action="store_true", help="poses: also score hidden joints that are annotated, as MPII's own evaluation does")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    parser.add_argument("--pictures", metavar="DIR", help="draw precision and recall, and what was found in some samples, into this folder; needs OpenCV")
+    parser.add_argument("--pictures", metavar="DIR", help="folder for plots of precision and recall and for images of some samples with their predictions; needs OpenCV")
     args = parser.parse_args(arguments)
     try:
         samples = Samples(args.truth, args.split, args.dataset, args.ids)

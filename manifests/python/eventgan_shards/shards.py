@@ -213,7 +213,7 @@ class Shards(Sequence):
         What is outside is the border that a letterbox adds and never holds events."""
         maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
         if np.isnan(maps).all():
-            raise ValueError(f"expected samples with pictures, got none, in {self._described_as}")
+            raise ValueError(f"expected samples with images, got none, in {self._described_as}")
         scale = maps[:, [0, 1], [0, 1]]
         low = maps[:, :, 2] - scale / 2 + 0.5
         volumes = self._gathered(lambda file: np.tile(file.size[::-1], (len(file.column("valid")), 1)))
@@ -244,7 +244,7 @@ class Shards(Sequence):
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
         names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
         if len(names) < 2:
-            raise ValueError(f"expected two or more values of {by} to divide by, got {len(names)}, in {self._described_as}")
+            raise ValueError(f"expected at least two values of {by} to divide by, got {len(names)}, in {self._described_as}")
         order = np.random.default_rng(seed).permutation(len(names))
         ends = np.cumsum(counts[order])[:-1]
         cut = 1 + int(np.abs(ends - fraction * len(self)).argmin())
@@ -331,7 +331,7 @@ class Shards(Sequence):
         chosen = np.array([name in wanted or frame in wanted for name, frame in names], bool)
         skipped = [names[i][0] for i in np.flatnonzero(chosen & ~sound)]
         if skipped:
-            warnings.warn(f"{len(skipped)} samples that {source} names are quarantined and skipped ({_first(skipped)}), in {self._described_as}",
+            warnings.warn(f"{len(skipped)} samples named by {source} are quarantined and skipped ({_first(skipped)}), in {self._described_as}",
                           stacklevel=3)
         return chosen
 
@@ -523,7 +523,7 @@ class _Shard(NamedTuple):
 def _find_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Shard]:
     shards = _listed_shards(paths, partial)
     if not shards:
-        raise ValueError(f"expected shards that are done, got none, in {paths}")
+        raise ValueError(f"expected finished shards, got none, in {paths}")
     return shards
 
 
@@ -563,8 +563,8 @@ def _is_marker(path: pathlib.Path) -> bool:
 
 def _require_whole(done: Sequence[str], missing: Sequence[str], folder: pathlib.Path) -> None:
     if missing:
-        raise ValueError(f"expected {len(done) + len(missing)} shards that are done, got {len(missing)} that are not ({_first(missing)}), in {folder} "
-                         "(partial=True takes the others)")
+        raise ValueError(f"expected {len(done) + len(missing)} finished shards, got {len(missing)} unfinished ({_first(missing)}), in {folder} "
+                         "(partial=True uses the others)")
 
 
 def read_description(folder: PathLike) -> dict[str, Any]:
@@ -588,7 +588,7 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
         path = folder / entry["name"]
         if not _is_same(path, entry):
             raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
-                             "(eventgan convert and eventgan finalize put it right)")
+                             "(run eventgan convert, then eventgan finalize)")
         shards.append(_Shard(path, entry["split"], np.ones(entry["samples"], bool)))
     valid = {shard.path.name: shard.valid for shard in shards}
     for sample in description["quarantined"]:

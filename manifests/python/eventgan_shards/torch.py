@@ -269,7 +269,7 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
             if suggested or _NAMELESS.fullmatch(name):
                 alone.append(name)
     if alone:
-        raise ValueError(f"expected joints whose names come in pairs of left and right, to be mirrored, got {', '.join(alone)} without a partner "
+        raise ValueError(f"expected joints whose names come in pairs of left and right, to be mirrored, got {', '.join(alone)} without a counterpart "
                          "(flip=0 mirrors nothing)")
     return pairs
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The EventGAN paper's experiments, in small, with a stand-in for the camera: networks trained on made events, tested on "real" ones.
+"""The EventGAN paper's experiments on a small scale: networks trained on generated events, tested on those of a simulated camera.
 
     experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
     experiment.py pose --program build/release/eventgan --trainer ../shared/trainers/pose_resnet --out poses
@@ -47,7 +47,7 @@ BETWEEN = 15  # moments between two frames that the "camera" sees
 OTHERS = ("--seed", 1_000_000, "--between", BETWEEN)  # scenes for the "camera"
 SENSOR = {"threshold_spread": 0.03, "refractory_s": 0.0005, "leak_rate_hz": 0.1, "shot_noise_rate_hz": 0.2}  # of the "camera"
 CATEGORIES = {0: {"category": "easy"}, 1: {"category": "hard"}, 2: {"category": "hard"}, -1: {}}  # by difficulty
-TRADE_COLUMNS = {"error": "error of volumes"} | PAPER_COLUMNS
+TRADE_COLUMNS = {"error": "volume error"} | PAPER_COLUMNS
 POSE_COLUMNS = {"mpjpe_volume": "MPJPE, volume px", "pckh": "PCKh@0.5"}  # of the EventGAN paper's Table 2
 STEPS = {"detection": 200, "pose": 250, "trade": 200}
 
@@ -56,13 +56,13 @@ def read_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=["detection", "pose", "trade"])
     parser.add_argument("--program", default="eventgan", help="the eventgan program")
-    parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3; pose: of microsoft/human-pose-estimation.pytorch")
-    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for everything; the same line again goes on")
-    parser.add_argument("--scenes", type=int, default=400, help="to learn; a quarter as many, others, for the camera, and at least 8")
-    parser.add_argument("--steps", type=int, help=f"that each network learns (default: {STEPS})")
+    parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3, for pose of microsoft/human-pose-estimation.pytorch")
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for all results; run the same command again to resume")
+    parser.add_argument("--scenes", type=int, default=400, help="synthetic sequences to train on; the camera sees a quarter as many others, at least 8")
+    parser.add_argument("--steps", type=int, help=f"training steps of each network (default: {STEPS})")
     parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, in place of the stand-in")
-    parser.add_argument("--small", action="store_true", help="16 scenes, one seed, 5 steps: whether it runs, not what comes out")
+    parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, instead of the simulated camera")
+    parser.add_argument("--small", action="store_true", help="16 sequences, one seed, 5 steps: tests that it runs; the scores mean nothing")
     args = parser.parse_args()
     args.steps = args.steps or STEPS[args.what]
     if args.small:

@@ -21,11 +21,11 @@ def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=16, lr=1e-3, dataset="mpii")
     parser.add_argument("--trainer", required=True, help="folder of microsoft/human-pose-estimation.pytorch")
     parser.add_argument("--size", type=int, default=128, help="height and width of the input, a multiple of 32")
-    parser.add_argument("--layers", type=int, default=18, help="of the ResNet: 18, 34, 50, 101, 152")
-    parser.add_argument("--filters", type=int, default=128, help="of each of the three deconvolutions")
-    parser.add_argument("--rotation", type=float, default=15.0, help="deviation of the crops' angles in degrees; Simple Baselines': 30")
-    parser.add_argument("--sigma", type=float, default=1.5, help="of the heatmaps, in their pixels")
-    parser.add_argument("--last-layer", action="store_true", help="learn the last layer alone, with --pretrained")
+    parser.add_argument("--layers", type=int, default=18, help="layers of the ResNet: 18, 34, 50, 101 or 152")
+    parser.add_argument("--filters", type=int, default=128, help="filters of each of the three deconvolutions")
+    parser.add_argument("--rotation", type=float, default=15.0, help="standard deviation of the crops' angles in degrees; Simple Baselines uses 30")
+    parser.add_argument("--sigma", type=float, default=1.5, help="standard deviation of the heatmap peaks, in heatmap pixels")
+    parser.add_argument("--last-layer", action="store_true", help="train only the last layer, with --pretrained")
     return training.begin(parser)
 
 
@@ -63,9 +63,9 @@ def main() -> None:
     persons = persons.rows(checked.annotated(learn.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
     check.persons = persons.place
     if not len(check) or persons.names != learn.joint_names:
-        raise SystemExit(f"expected persons with head boxes and the joints that are learnt to check, got {len(check)} with {len(persons.names)} joints, in "
+        raise SystemExit(f"expected validation persons with head boxes and the trained joints, got {len(check)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")
-    print(f"{len(learn)} persons to learn, {len(check)} to check")
+    print(f"{len(learn)} persons for training, {len(check)} for validation")
 
     config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = len(learn.joint_names), list(size), args.layers
     config.MODEL.EXTRA.NUM_DECONV_FILTERS = [args.filters] * 3

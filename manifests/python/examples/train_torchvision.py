@@ -22,9 +22,9 @@ from torch.utils.data import Dataset
 def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=4, lr=2e-4)
     parser.add_argument("--task", choices=["detection", "keypoints"], default="detection")
-    parser.add_argument("--classes", help="detection: names with commas between them (default: all); the first one's AP is the result")
-    parser.add_argument("--scale", type=float, default=1.5, help="input pixels for a pixel of the volume")
-    parser.add_argument("--regions", type=int, default=64, help="proposals of a volume that the heads learn from: their cost")
+    parser.add_argument("--classes", help="detection: class names, separated by commas (default: all); the first one's AP is the result")
+    parser.add_argument("--scale", type=float, default=1.5, help="input pixels per volume pixel")
+    parser.add_argument("--regions", type=int, default=64, help="region proposals per volume that the heads are trained on; more cost more time")
     return training.begin(parser)
 
 

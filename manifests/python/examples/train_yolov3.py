@@ -22,9 +22,9 @@ from eventgan_shards.torch import DetectionDataset, EventAugmentation, collate_y
 def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=8, lr=1e-3)
     parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3")
-    parser.add_argument("--cfg", default="yolov3-tiny.cfg", help="of the trainer's cfg/, or a path")
-    parser.add_argument("--classes", default="Car", help="names with commas between them; the first one's AP is the result")
-    parser.add_argument("--scale", type=float, default=2.0, help="input pixels for a pixel of the volume: small objects need it")
+    parser.add_argument("--cfg", default="yolov3-tiny.cfg", help="name of a file in the trainer's cfg/, or a path")
+    parser.add_argument("--classes", default="Car", help="class names, separated by commas; the first one's AP is the result")
+    parser.add_argument("--scale", type=float, default=2.0, help="input pixels per volume pixel; small objects need more than 1")
     return training.begin(parser)
 
 

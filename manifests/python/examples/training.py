@@ -37,28 +37,28 @@ MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     """The options that all examples have. The first limit that is reached ends the training."""
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", required=True, help="folder that eventgan finalize has completed")
-    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and pictures; the same line again goes on")
-    parser.add_argument("--dataset", help="take samples of this kind of source only, such as kitti_object")
-    parser.add_argument("--test", help="folder of shards whose labelled samples (of its split for checking, if it has one) predictions.json is of at the end; "
-                        "default: those that are checked")
-    parser.add_argument("--as-bright", action="store_true", help="multiply the volumes that predictions.json is of by one number that gives them the mean of "
-                        "those that are learnt, and clip them at 1: a camera's may be fainter than generated ones, of which more are not 0")
-    parser.add_argument("--without-noise", action="store_true", help="leave out what stands alone in the volumes that predictions.json is of: pixels with "
-                        "events that have fewer than two such neighbours")
-    parser.add_argument("--frames", action="store_true", help="take the labelled frames, grey in the first channel, in place of events; "
-                        "their paths are the shards' (next_path)")
-    parser.add_argument("--overfit", action="store_true", help="check on the samples that are learnt, to see whether they can be")
-    parser.add_argument("--epochs", type=int, help="limit")
-    parser.add_argument("--steps", type=int, help="limit, in batches")
-    parser.add_argument("--minutes", type=float, help="limit, of training steps: checks come on top (default: 30 if there is no other limit)")
-    parser.add_argument("--every", type=int, default=1, help="check after each such number of epochs, and at the end")
+    parser.add_argument("--data", required=True, help="output folder completed by eventgan finalize")
+    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the same command again to resume")
+    parser.add_argument("--dataset", help="use only samples of this kind of source, such as kitti_object")
+    parser.add_argument("--test", help="folder of shards whose labelled samples (of its validation split, if it has one) are predicted at the "
+                        "end, into predictions.json; default: the validation samples")
+    parser.add_argument("--as-bright", action="store_true", help="scale the volumes of predictions.json by one factor to the mean of the training "
+                        "samples, and clip them at 1: a camera's are often fainter than generated ones, which have fewer zeros")
+    parser.add_argument("--without-noise", action="store_true", help="drop isolated events from the volumes of predictions.json: pixels with events that "
+                        "have fewer than two such neighbours")
+    parser.add_argument("--frames", action="store_true", help="train on the labelled frames instead of events, grey in the first channel; "
+                        "their paths come from the shards (next_path)")
+    parser.add_argument("--overfit", action="store_true", help="validate on the training samples, to see whether the network can fit them")
+    parser.add_argument("--epochs", type=int, help="stop after this many epochs")
+    parser.add_argument("--steps", type=int, help="stop after this many batches")
+    parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation (default: 30 if there is no other limit)")
+    parser.add_argument("--every", type=int, default=1, help="validate every so many epochs, and at the end")
     parser.add_argument("--batch", type=int)
-    parser.add_argument("--lr", type=float, help="highest learning rate: it rises for 5 %% of the way and falls to 1 %% as a cosine")
-    parser.add_argument("--pretrained", help=".pt file of weights to begin with; those that do not fit begin anew")
+    parser.add_argument("--lr", type=float, help="peak learning rate: it rises during the first 5 %% and decays to 1 %% along a cosine")
+    parser.add_argument("--pretrained", help=".pt file of initial weights; layers that do not fit are initialised at random")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
-    parser.add_argument("--threads", type=int, help="default: all cores")
+    parser.add_argument("--threads", type=int, help="number of threads (default: all cores)")
     parser.add_argument("--workers", type=int, default=0, help="processes that read samples")
     parser.add_argument("--pictures", type=int, default=6)
     parser.set_defaults(**defaults)
@@ -131,17 +131,17 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
             by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
             parts, how = ([shards, shards], "the same") if args.overfit or not len(shards) else (shards.divide(0.8, by, args.seed), f"of another {by}")
     except FileNotFoundError as error:
-        sys.exit(f"expected a folder that eventgan finalize has completed, got no {error.filename}")
+        sys.exit(f"expected a folder completed by eventgan finalize, got no {error.filename}")
     except ValueError as error:
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
-        sys.exit(f"expected labelled samples to learn and to check, got {len(parts[0])} and {len(parts[1])}, in {args.data} (--dataset {args.dataset}; it has "
+        sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in {args.data} (--dataset {args.dataset}; it has "
                  f"samples of {', '.join(description['counts']['by_dataset'])})")
     if description.get("missing"):
-        print(f"{len(description['missing'])} shards are missing in {args.data}, as finalize --partial was told")
+        print(f"{len(description['missing'])} shards are missing in {args.data} (finalize --partial)")
     if description["quarantined"]:
-        print(f"{len(description['quarantined'])} samples are in quarantine and left out")
-    print(f"{len(parts[0])} samples to learn, {len(parts[1])} to check, {how}")
+        print(f"{len(description['quarantined'])} quarantined samples are left out")
+    print(f"{len(parts[0])} samples for training, {len(parts[1])} for validation, {how}")
     learnt, checked = (part.changed(labelled_frame) if args.frames else part for part in parts)
     return learnt, checked
 
@@ -153,7 +153,7 @@ def tested(args: argparse.Namespace, learnt: Shards, checked: Shards, usable: Ca
         shards = shards.changed(without_noise)
     if args.as_bright:
         factor = _mean(learnt) / _mean(shards)
-        print(f"the volumes of {args.test or args.data} times {factor:.2f}, as bright as those of {args.data}")
+        print(f"the volumes of {args.test or args.data} are scaled by {factor:.2f}, to the brightness of those of {args.data}")
         shards = shards.changed(functools.partial(_brighter, factor=factor))
     return shards
 
@@ -222,14 +222,14 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
     try:
         weights = torch.load(path, map_location="cpu", weights_only=True)  # runs nothing that the file holds
     except (OSError, pickle.UnpicklingError) as error:
-        sys.exit(f"expected a .pt file of tensors and nothing else, got {str(error).splitlines()[0]}, in {path}")
+        sys.exit(f"expected a .pt file that contains only tensors, got {str(error).splitlines()[0]}, in {path}")
     weights = next((weights[key] for key in ("model", "state_dict") if key in weights), weights)
     own = model.state_dict()
     fitting = {name: value for name, value in weights.items() if name in own and own[name].shape == value.shape}
     if not fitting:
         sys.exit(f"expected weights that fit the model, such as {next(iter(own))}, got none, in {path}")
     model.load_state_dict(fitting, strict=False)
-    print(f"{len(fitting)} of the model's {len(own)} tensors are those of {path}")
+    print(f"{len(fitting)} of the model's {len(own)} tensors loaded from {path}")
 
 
 def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,
@@ -244,10 +244,10 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
         state = torch.load(out / "checkpoint.pt", map_location=args.device)  # its own: a pickle, not to be had from others
         for name, value in settings.items():
             if state["settings"].get(name) != value:
-                sys.exit(f"expected --{name} {state['settings'].get(name)}, with which this run began, got {value}, in {out / 'checkpoint.pt'}")
+                sys.exit(f"expected --{name} {state['settings'].get(name)}, as when this run started, got {value}, in {out / 'checkpoint.pt'}")
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
-        print(f"goes on after epoch {state['epoch']}")
+        print(f"resuming after epoch {state['epoch']}")
     for group in optimizer.param_groups:
         group.setdefault("initial_lr", group["lr"])
     began = time.monotonic()
@@ -281,7 +281,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
                 group["lr"] = group["initial_lr"] * min(at / 0.05 + 0.01, 1) * (0.505 + 0.495 * math.cos(math.pi * min(at, 1)))
             loss = loss_of(batch, at)
             if not torch.isfinite(loss):
-                sys.exit(f"expected a finite loss, got {loss.item()}, at step {state['step']} (a smaller --lr?)")
+                sys.exit(f"expected a finite loss, got {loss.item()}, at step {state['step']} (try a smaller --lr)")
             optimizer.zero_grad()
             loss.backward()
             nn.utils.clip_grad_norm_(model.parameters(), 10)

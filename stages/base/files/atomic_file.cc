@@ -83,7 +83,7 @@ void require_no_link(const fs::path& folder, const fs::path& relative) {
   for (const fs::path& part : relative) {
     path /= part;
     if (!fs::is_symlink(fs::symlink_status(path))) continue;
-    throw std::runtime_error("expected nothing that leads out of " + folder.string() +
+    throw std::runtime_error("expected no link out of " + folder.string() +
                              ", got a symbolic link, in " + path.string());
   }
 }

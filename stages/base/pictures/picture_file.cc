@@ -86,7 +86,7 @@ bool opencv_knows(const std::filesystem::path& file) {
 Format format_of(std::FILE* file, const std::filesystem::path& path) {
   std::array<char, 8> start{};
   const std::size_t length = std::fread(start.data(), 1, start.size(), file);
-  if (length == 0) throw std::runtime_error("expected a picture, got an empty file");
+  if (length == 0) throw std::runtime_error("expected an image, got an empty file");
   std::rewind(file);
   const std::string_view bytes(start.data(), length);
   if (bytes.starts_with("\xff\xd8\xff")) return Format::kJpeg;
@@ -114,16 +114,14 @@ auto read_by_format(const std::filesystem::path& path, Jpeg jpeg, Png png, Other
   const OpenFile file = open_file(path);
   const Format format = format_of(file.get(), path);
   if (format == Format::kNone) {
-    throw std::runtime_error("expected a picture, got a file of another kind");
+    throw std::runtime_error("expected an image, got a file of another kind");
   }
   try {
     if (format == Format::kJpeg) return jpeg(file.get());
     if (format == Format::kPng) return png(file.get());
     return other(path);
   } catch (const std::runtime_error& error) {
-    const char* name = format == Format::kJpeg  ? "JPEG"
-                       : format == Format::kPng ? "PNG"
-                                                : "picture";
+    const char* name = format == Format::kJpeg ? "JPEG" : format == Format::kPng ? "PNG" : "image";
     throw std::runtime_error(std::string("expected a whole ") + name + ", got " + error.what());
   }
 }

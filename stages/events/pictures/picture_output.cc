@@ -46,7 +46,7 @@ std::string jpeg_of(const ColourFrame& picture, std::size_t most_bytes) {
       }
     }
   } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot encode a picture: " + exception.err);
+    throw std::runtime_error("cannot encode an image: " + exception.err);
   }
 }
 
@@ -96,7 +96,7 @@ int write_video(const fs::path& path, double frames_per_second,
     writer.write(padded);
     ++frames;
   }
-  if (frames == 0) throw std::runtime_error("cannot write " + path.string() + ": no pictures");
+  if (frames == 0) throw std::runtime_error("cannot write " + path.string() + ": no images");
   writer.release();
   require_frames(part.path, frames, path);
   fs::rename(part.path, file.temporary());

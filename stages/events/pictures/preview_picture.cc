@@ -468,7 +468,7 @@ std::string time_picture_png(std::span<const float> volume, const VolumeShape& s
     cv::imencode(".png", time_panel(volume, shape), png);
     return {png.begin(), png.end()};
   } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot draw a picture of times: " + exception.err);
+    throw std::runtime_error("cannot draw an image of times: " + exception.err);
   }
 }
 

@@ -15,7 +15,7 @@ namespace eventgan {
 std::vector<float> linear_intensity(const GreyImage& picture) {
   const ImageSize& size = picture.size;
   if (size.height < 1 || size.width < 1 || picture.pixels.size() != size.pixel_count()) {
-    throw std::invalid_argument("expected a picture, got " + std::to_string(size.height) + " x " +
+    throw std::invalid_argument("expected an image, got " + std::to_string(size.height) + " x " +
                                 std::to_string(size.width) + " with " +
                                 std::to_string(picture.pixels.size()) + " pixels");
   }

@@ -87,8 +87,8 @@ class BatchedGenerator final : public Generator {
       std::throw_with_nested(std::runtime_error(
           "expected memory on the device for " + std::to_string(pairs_in_batch(size)) +
           " pairs of " + std::to_string(size.width) + "x" + std::to_string(size.height) +
-          " at once, got less: smaller $.image.width and height, \"bfloat16\", or \"device\": "
-          "\"cpu\""));
+          " at once, got less: set a smaller $.image.width and height, \"bfloat16\", or "
+          "\"device\": \"cpu\""));
     } catch (const c10::Error&) {
       std::throw_with_nested(std::runtime_error("the generator failed in LibTorch"));
     }

@@ -190,7 +190,7 @@ TEST(JobManifest, ReportsADoubleKeyBesideOtherFaults) {
   std::string text = kSoundManifest;
   text.insert(text.rfind('}'), R"(, "seed": -1, "seed": 2, "sed": 1)");
   EXPECT_EQ(faults_of(text),
-            "m.json: $.seed: expected the key once, got it a second time\n"
+            "m.json: $.seed: expected the key once, got it twice\n"
             "m.json: $.sed: expected the key \"seed\" or none, got an unknown key");
 }
 

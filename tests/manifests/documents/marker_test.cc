@@ -156,7 +156,7 @@ TEST(Marker, EveryRuleIsChecked) {
       {"/size_bytes", "1.5", "$.size_bytes: expected an integer 0..9223372036854775807, got 1.5"},
       {"/samples", "65537", "$.samples: expected an integer 0..65536, got 65537"},
       {"/valid", "5", "$.valid: expected an integer 0..4, got 5"},
-      {"/valid", "3", "$.valid: expected 2 (samples less quarantined ones), got 3"},
+      {"/valid", "3", "$.valid: expected 2 (samples minus quarantined ones), got 3"},
       {"/quarantined/1/slot", "4", "$.quarantined[1].slot: expected an integer 0..3, got 4"},
       {"/quarantined/1/slot", "1",
        "$.quarantined[1].slot: expected slots in ascending order, got 1"},

@@ -47,12 +47,12 @@ const ManifestCase kSimulationCases[] = {
       R"($.sources[0].frame_cont: expected the key "frame_count" or none, got an unknown key)"}},
     {"keys of affine elsewhere",
      {{"/sources/0/frames_per_picture", "7"}, {"/sources/0/max_displacement_px", "1"}},
-     {R"($.sources[0].frames_per_picture: expected no such key for method "clip" (of affine only), got 7)",
-      R"($.sources[0].max_displacement_px: expected no such key for method "clip" (of affine only), got 1)"}},
+     {R"($.sources[0].frames_per_picture: expected no such key for method "clip" (only for affine), got 7)",
+      R"($.sources[0].max_displacement_px: expected no such key for method "clip" (only for affine), got 1)"}},
     {"one picture", {{"/sources/1/frame_count", "1"}}, {}},
     {"a clip of one frame",
      {{"/sources/0/frame_count", "1"}},
-     {"$.sources[0].frame_count: expected 0 (to the end) or 2 and more frames, since events lie "
+     {"$.sources[0].frame_count: expected 0 (to the end) or at least 2 frames, since events lie "
       "between frames, got 1"}},
     {"a path whose stem is no name",
      {{"/sources/0/path", R"("my clip.mp4")"}},

@@ -575,7 +575,7 @@ def test_what_is_no_list_and_ids_that_two_have_are_refused(two_shards, tmp_path)
         with pytest.raises(ValueError, match=error):
             evaluate_detections(tmp_path / "found.json", Samples(two_shards, None, None, None))
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3, 3])])
-    with pytest.raises(ValueError, match='expected the image_id of one sample of 8, got "000000", which two have'):
+    with pytest.raises(ValueError, match='expected the image_id of one sample of 8, got "000000", which two samples have'):
         evaluate_detections(found, Samples(two_shards, None, None, None))
     with pytest.raises(ValueError, match="expected classes of Car, DontCare, got Bus"):
         evaluate_detections(found, Samples(two_shards, None, None, None), ["Bus"])
@@ -613,7 +613,7 @@ def evaluate(*arguments, expect=0):
 def test_the_command_prints_tables_json_and_pictures(folder, tmp_path):
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
     said = evaluate("detections", found, "--truth", folder)
-    assert "4 samples (3 without a prediction), 2 boxes to find" in said
+    assert "4 samples (3 without a prediction), 2 ground-truth boxes" in said
     assert "average precisions of all 2 predictions, precision, recall and F1 of 1, by confidence 0.2 and non-maximum" in said
     heading, car = said.split("\n\n")[1].splitlines()[:2]
     assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500", "0.500", "0.667"] and heading.split()[-1] == "F1"

@@ -80,15 +80,15 @@ def assert_trained(out, steps, pictures):
 def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     options = ["--dataset", "kitti_object", "--batch", "2", "--scale", "0.5", "--regions", "16", "--every", "9"]
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
-    assert "10 samples to learn, 2 to check, of another sequence" in said and "(untrained)" in said
-    assert "goes on after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
+    assert "10 samples for training, 2 for validation, of another sequence" in said and "(untrained)" in said
+    assert "resuming after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
     assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
     (tmp_path / "ids.txt").write_text("\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
     scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--classes", "Car")
     assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
-    assert "expected --lr 0.0002, with which this run began, got 0.5, in" in said
+    assert "expected --lr 0.0002, as when this run started, got 0.5, in" in said
 
 
 def test_keypoint_rcnn_learns(data, tmp_path):
@@ -107,7 +107,7 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
         while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
             time.sleep(0.01)
         process.kill()
-    assert "goes on after epoch" in train("train_pose", data, tmp_path / "killed", *options)
+    assert "resuming after epoch" in train("train_pose", data, tmp_path / "killed", *options)
     predictions = json.loads((tmp_path / "whole" / "predictions.json").read_text())
     (tmp_path / "ids.txt").write_text("\n".join(entry["image_id"] for entry in predictions))
     scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "ids.txt", "--hidden")

@@ -157,7 +157,7 @@ def test_ids_from_a_list_or_a_file(two_shards, tmp_path):
 
 
 def test_ids_in_quarantine_are_skipped_with_a_word(folder):
-    with pytest.warns(UserWarning, match="1 samples that ids names are quarantined and skipped .000002., in"):
+    with pytest.warns(UserWarning, match="1 samples named by ids are quarantined and skipped .000002., in"):
         assert ids_of(Shards(folder, ids=["000001", "000002"])) == ["000001"]
     assert len(Shards(folder, ids=["000002"], invalid="keep")) == 1
 
@@ -239,7 +239,7 @@ def test_divided_parts_share_no_sequence(two_shards):
         assert all(sequences) and not sequences[0] & sequences[1]
         assert ids_of(first) == ids_of(shards.divide(0.5, seed=seed)[0])
     assert {ids_of(shards.divide(0.4, seed=seed)[0])[0] for seed in range(8)} == {"000000", "000003", "000004"}
-    with pytest.raises(ValueError, match="two or more values of sequence"):
+    with pytest.raises(ValueError, match="at least two values of sequence"):
         first[:1].divide(0.5)
     with pytest.raises(ValueError, match="between 0 and 1"):
         shards.divide(1)
@@ -280,26 +280,26 @@ def test_what_pictures_cover(folder):
         del file["pairs/source_to_volume"]
         file["pairs/source_to_volume"] = [[[0.25, 0, 1.625], [0, 0.25, 0.625]]] * 5
     assert Shards(folder / NAME).picture_area().tolist() == [2, 1, 6, 4]
-    with pytest.raises(ValueError, match="expected samples with pictures, got none"):
+    with pytest.raises(ValueError, match="expected samples with images, got none"):
         shards[:0].picture_area()
 
 
 def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
     (two_shards / SECOND).with_suffix(".json").unlink()
-    with pytest.raises(ValueError, match=f"expected 2 shards that are done, got 1 that are not .{SECOND}., in"):
+    with pytest.raises(ValueError, match=f"expected 2 finished shards, got 1 unfinished .{SECOND}., in"):
         Shards(two_shards)
     assert len(Shards(two_shards, partial=True)) == 4
     (two_shards / SECOND).unlink()
     assert len(Shards(two_shards)) == 4
     (two_shards / "plan.json").write_text(json.dumps({"shards": [{"name": NAME}, {"name": "demo-train-00001-of-00003.h5"}]}))
-    with pytest.raises(ValueError, match="expected 2 shards that are done, got 1 that are not .demo-train-00001-of-00003.h5."):
+    with pytest.raises(ValueError, match="expected 2 finished shards, got 1 unfinished .demo-train-00001-of-00003.h5."):
         Shards(two_shards)
     (two_shards / "plan.json").unlink()
     (two_shards / NAME).rename(two_shards / "other")  # a marker alone
-    with pytest.raises(ValueError, match=f"expected 1 shards that are done, got 1 that are not .{NAME}."):
+    with pytest.raises(ValueError, match=f"expected 1 finished shards, got 1 unfinished .{NAME}."):
         Shards(two_shards)
     for none in (two_shards, two_shards.parent, []):
-        with pytest.raises(ValueError, match="expected shards that are done, got none"):
+        with pytest.raises(ValueError, match="expected finished shards, got none"):
             Shards(none, partial=True)
 
 
@@ -309,7 +309,7 @@ def test_a_description_that_misses_shards(folder):
     quarantined = [{"shard": NAME, "slot": 2}]
     (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "missing": [SECOND],
                                                      "quarantined": quarantined}))
-    with pytest.raises(ValueError, match=f"expected 2 shards that are done, got 1 that are not .{SECOND}."):
+    with pytest.raises(ValueError, match=f"expected 2 finished shards, got 1 unfinished .{SECOND}."):
         Shards(folder)
     assert len(Shards(folder, partial=True)) == 4
 

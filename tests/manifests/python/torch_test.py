@@ -239,7 +239,7 @@ def test_a_mirror_exchanges_the_sides_of_every_list_that_the_program_writes(name
     assert {(names[i], names[j]) for i, j in flip_pairs(names)} == set(zip(left, right)) and len(flip_pairs(names)) == len(left)
     for i in range(len(names)):  # and nothing is left where it is if one is missing
         if names[i] in left and name != "MPII's short names":
-            with pytest.raises(ValueError, match=f"got {right[left.index(names[i])]} without a partner"):
+            with pytest.raises(ValueError, match=f"got {right[left.index(names[i])]} without a counterpart"):
                 flip_pairs(names[:i] + names[i + 1:])
 
 
@@ -250,16 +250,16 @@ def test_a_mirror_exchanges_the_sides_of_every_list_that_the_program_writes(name
 def test_sides_in_names_of_one_s_own(left, right):
     assert flip_pairs([right, "nose", left]) == [(2, 0)]
     for alone in (left, right):
-        with pytest.raises(ValueError, match=f"got {re.escape(alone)} without a partner"):
+        with pytest.raises(ValueError, match=f"got {re.escape(alone)} without a counterpart"):
             flip_pairs(["nose", alone])
 
 
 def test_names_that_suggest_no_side():
     middle = ["root (pelvis)", "Spine1", "neck_base", "ROOT", "L5", "Head_Site", "lower back", "rib", "tail", "C7", "nostril"]
     assert flip_pairs(middle) == []
-    with pytest.raises(ValueError, match="got joint_0, joint_1 without a partner"):  # of which nothing is known
+    with pytest.raises(ValueError, match="got joint_0, joint_1 without a counterpart"):  # of which nothing is known
         flip_pairs(["joint_0", "joint_1"])
-    with pytest.raises(ValueError, match="got left_hip, RAnkle, kneeR without a partner .flip=0 mirrors nothing."):
+    with pytest.raises(ValueError, match="got left_hip, RAnkle, kneeR without a counterpart .flip=0 mirrors nothing."):
         flip_pairs(["left_hip", "RAnkle", "kneeR", "l_knee", "r_knee"])
 
 
@@ -274,7 +274,7 @@ def test_persons_of_dhp19_s_names_are_mirrored(folder):
     np.testing.assert_allclose(persons[1][3]["joints"][:, 0], 63 - persons[0][3]["joints"][[0, 2, 1], 0])
     assert PoseDataset(shards).flip_pairs == [(1, 2)]
     for dataset, augmentation in ((KeypointDataset, EventAugmentation()), (PoseDataset, PoseAugmentation())):
-        with pytest.raises(ValueError, match="got handL without a partner"):  # at once
+        with pytest.raises(ValueError, match="got handL without a counterpart"):  # at once
             dataset(shards, joints=["head", "handL"], augmentation=augmentation)
         dataset(shards, joints=["head", "handL"], augmentation=dataclasses.replace(augmentation, flip=0))[0]
         dataset(shards, joints=["head", "handL"])[0]

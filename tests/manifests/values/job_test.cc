@@ -98,7 +98,7 @@ TEST(BeyondLimits, PolicyFailAllowsNone) {
 
 TEST(LimitsText, SaysWhatThePolicyAllows) {
   EXPECT_EQ(limits_text({ErrorPolicy::kQuarantine, 3, 0.25}),
-            "at most 3 quarantined pairs and 0.25 of all (errors in the manifest)");
+            "at most 3 quarantined pairs and a share of 0.25 (errors in the manifest)");
   EXPECT_EQ(limits_text({ErrorPolicy::kFail, 3, 0.25}),
             "no quarantined pair (errors.policy in the manifest is \"fail\")");
 }

@@ -343,7 +343,7 @@ TEST_P(Extremes, CalibrationsThatDoNotFit) {
   std::vector<float> volume(VolumeShape{weights_.bins, kSize}.value_count());
   EXPECT_LT(engine(fitting)->generate(natural(kSize), kSize, volume).saturated_share,
             kMostSaturated)
-      << "pictures like those of the calibration";
+      << "images like these";
   for (const CalibrationCase& one : kCalibrations) {
     Weights weights = fitting;
     const auto calibration = std::make_shared<Calibration>(*fitting.calibration);

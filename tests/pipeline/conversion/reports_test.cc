@@ -18,7 +18,7 @@ ConversionReport report() {
   result.folder = "out";
   result.planned = 10;
   result.written = 9;
-  result.quarantined = {{3, "id", "expected a picture, got rubbish, in a.png (id)"}};
+  result.quarantined = {{3, "id", "expected an image, got rubbish, in a.png (id)"}};
   result.without_partner = result.frames_without_partner = 2;
   result.shards_planned = result.shards_done = result.plan_shards = 2;
   result.stored_bytes = 2'000'000;
@@ -34,20 +34,20 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
   EXPECT_THAT(text,
               ::testing::HasSubstr(
                   "2.0 MB, volumes compressed 4.5x, 3.0 s; busy seconds: read 1.2 write 0.5"));
-  EXPECT_THAT(text, ::testing::HasSubstr("2 labelled frames without a partner"));
+  EXPECT_THAT(text, ::testing::HasSubstr("2 labelled frames without a paired frame"));
   EXPECT_THAT(text,
-              ::testing::HasSubstr("quarantined: expected a picture, got rubbish, in a.png (id)"));
+              ::testing::HasSubstr("quarantined: expected an image, got rubbish, in a.png (id)"));
 }
 
 TEST(ReportText, TellsPairsWithoutPartnerFromTheirFrames) {
   ConversionReport all = report();
   EXPECT_THAT(
       to_text(all),
-      ::testing::HasSubstr("\n2 labelled frames without a partner frame (listed in plan.json)"));
+      ::testing::HasSubstr("\n2 labelled frames without a paired frame (listed in plan.json)"));
   all.without_partner = 7;
-  EXPECT_THAT(to_text(all), ::testing::HasSubstr(
-                                "\n2 labelled frames without a partner frame for one of their gaps "
-                                "or more, 7 pairs in all (listed in plan.json)"));
+  EXPECT_THAT(to_text(all),
+              ::testing::HasSubstr("\n2 labelled frames without a paired frame for at least one of "
+                                   "their gaps, 7 pairs in total (listed in plan.json)"));
   EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"without_partner\":7"));
   EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"frames_without_partner\":2"));
 }
@@ -114,7 +114,7 @@ RetryReport example() {
   report.planned = 1000;
   report.tried = 3;
   report.mended = 2;
-  report.failed = {{"job-train-00000-of-00002.h5", 4, "000007", "expected a picture (000007)"}};
+  report.failed = {{"job-train-00000-of-00002.h5", 4, "000007", "expected an image (000007)"}};
   report.quarantined = 5;
   report.shards_rewritten = 1;
   report.damaged_shards = {"/out/x.h5: expected size in bytes 5, got 4"};
@@ -124,11 +124,11 @@ RetryReport example() {
 
 TEST(RetryText, SaysWhatWasMendedAndWhatIsLeft) {
   EXPECT_EQ(to_text(example()),
-            "/out/x.h5: expected size in bytes 5, got 4; left to convert\n"
-            "7 shards not made yet: left to convert\n"
-            "2 of 3 quarantined samples mended, 1 shard written again; 5 of 1000 samples are "
-            "quarantined still\n"
-            "quarantined: expected a picture (000007)\n"
+            "/out/x.h5: expected size in bytes 5, got 4; eventgan convert makes it again\n"
+            "7 shards not made yet: run eventgan convert\n"
+            "2 of 3 quarantined samples fixed, 1 shard rewritten; 5 of 1000 samples are still "
+            "quarantined\n"
+            "quarantined: expected an image (000007)\n"
             "/out\n");
 }
 
@@ -175,7 +175,7 @@ TEST(RetryJson, HasEveryField) {
   EXPECT_EQ(json["failed"][0]["sample_id"], "000007");
   EXPECT_EQ(json["failed"][0]["shard"], "job-train-00000-of-00002.h5");
   EXPECT_EQ(json["failed"][0]["slot"], 4);
-  EXPECT_EQ(json["failed"][0]["reason"], "expected a picture (000007)");
+  EXPECT_EQ(json["failed"][0]["reason"], "expected an image (000007)");
   EXPECT_EQ(json["shards_rewritten"], 1);
   EXPECT_EQ(json["damaged_shards"].size(), 1u);
   EXPECT_EQ(json["shards_missing"], 7);

@@ -302,7 +302,7 @@ TEST_F(Retry, APictureOfUnknownSizeMendedWithinItsBytesIsTaken) {
   testing::write_file(picture(5), sound);
   testing::write_file(picture(6), next);
   EXPECT_THAT([&] { run(); },
-              ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` takes them")));
+              ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` accepts them")));
   EXPECT_EQ(again().mended, 3);
   EXPECT_TRUE(run().complete());
   expect_sound_after_finalize();
@@ -397,7 +397,7 @@ TEST_F(Retry, OfTwoAtOnceTheSecondIsRefused) {
   options_.make_progress = [&](std::int64_t) {
     EXPECT_THAT([&] { retry(out_, manifest_, generator_, "weights", others); },
                 ThrowsMessage<std::runtime_error>(
-                    AllOf(HasSubstr("no other retry"), HasSubstr(out_.string()))));
+                    AllOf(HasSubstr("without another retry"), HasSubstr(out_.string()))));
     return nullptr;
   };
   EXPECT_EQ(again().mended, 2);

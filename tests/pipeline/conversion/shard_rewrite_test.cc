@@ -170,7 +170,7 @@ TEST_F(ShardRewriteTest, NothingIsTouchedIfAllFailAsBefore) {
 }
 
 TEST_F(ShardRewriteTest, AnotherReasonIsRecorded) {
-  broken_.samples[2].fault = "expected a picture, got text";
+  broken_.samples[2].fault = "expected an image, got text";
   ShardRewrite rewrite(folder_.path(), before_);
   rewrite.redo(0, message(broken_, 0));
   rewrite.redo(2, message(broken_, 2));
@@ -178,7 +178,7 @@ TEST_F(ShardRewriteTest, AnotherReasonIsRecorded) {
   EXPECT_EQ(testing::read_file(shard()), bytes_before_) << "reasons stand in the marker alone";
   EXPECT_THAT(marker().quarantined,
               ElementsAre(QuarantinedSample{0, "000000", "no such picture"},
-                          QuarantinedSample{2, "000002", "expected a picture, got text"}));
+                          QuarantinedSample{2, "000002", "expected an image, got text"}));
   EXPECT_THAT(check_shard(shard(), marker()), IsEmpty());
 }
 

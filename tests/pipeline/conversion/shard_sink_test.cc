@@ -99,7 +99,7 @@ TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
   warned.warn = [&](const std::string& text) { warnings.push_back(text); };
   const ConversionReport report = run(warned);
   ASSERT_EQ(warnings.size(), 3u);
-  EXPECT_THAT(warnings, ::testing::Each(::testing::EndsWith("; it is made again")));
+  EXPECT_THAT(warnings, ::testing::Each(::testing::EndsWith("; making it again")));
   EXPECT_THAT(warnings[0], HasSubstr("SHA-256"));
   EXPECT_EQ(report.damaged.size(), 3u);
   EXPECT_TRUE(report.complete());

@@ -71,10 +71,12 @@ TEST_F(RowDifferences, NameTheColumnAndBothValues) {
   expected_.sequence = "drive_7";
   EXPECT_THAT(
       found(expected_),
-      ElementsAre(R"(expected "drive_7" in /pairs/sequence by the plan, got "drive_0")",
-                  "expected 8 in /labels/boxes/track_id of box 1 by labels/0.txt, got -1",
-                  "expected 5.5 in /labels/poses/joints_source of person 0 by labels/0.txt, got 5",
-                  "expected -1 in /labels/poses/head_box of person 1 by labels/0.txt, got 0.5"));
+      ElementsAre(
+          R"(expected "drive_7" in /pairs/sequence according to the plan, got "drive_0")",
+          "expected 8 in /labels/boxes/track_id of box 1 according to labels/0.txt, got -1",
+          "expected 5.5 in /labels/poses/joints_source of person 0 according to labels/0.txt, got "
+          "5",
+          "expected -1 in /labels/poses/head_box of person 1 according to labels/0.txt, got 0.5"));
 }
 
 TEST_F(RowDifferences, AnotherNumberOfLabelsIsTold) {
@@ -201,7 +203,7 @@ TEST_F(SourceComparisonTest, OfAQuarantinedSampleTheBytesThatWereKeptMustBeRight
 
 TEST_F(SourceComparisonTest, NamesASampleWhosePictureHasAnotherSize) {
   testing::write_flat_picture(picture(0), {24, 48}, 10);
-  EXPECT_THAT(faults(), ElementsAre("expected a source size of 48x24 as of "
+  EXPECT_THAT(faults(), ElementsAre("expected a source size of 48x24 as in "
                                     "kitti/image_2/000000.png, got 36x24 (sample 0, 000000)"));
   fs::remove(picture(0));
   EXPECT_THAT(faults(), IsEmpty()) << "labels can be compared without pictures";
@@ -222,7 +224,7 @@ TEST_F(SourceComparisonTest, NamesASampleOfOtherFramesThanPlannedUnlessAHoleWasF
 
 TEST_F(SourceComparisonTest, NamesAPlacementThatTheSettingsDoNotGive) {
   manifest_.image.fit = ImageFit::kStretch;
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected source_to_volume of a picture of 36x24"),
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected source_to_volume of an image of 36x24"),
                                     HasSubstr("(sample 1, 000001)")));
 }
 

@@ -128,7 +128,7 @@ TEST_F(DatasetFaults, AShardThatHasChangedSinceIsNamed) {
 TEST_F(DatasetFaults, WithoutASoundShardThereIsNothingToCompareWith) {
   EXPECT_THAT(faults(false),
               ElementsAre(AllOf(HasSubstr(description_.string()),
-                                HasSubstr("expected a sound shard of each source"))));
+                                HasSubstr("expected an intact shard of each source"))));
 }
 
 class VerifyFolder : public ::testing::Test {
@@ -194,7 +194,7 @@ TEST_F(VerifyFolder, NamesAPlanThatIsNotTheMarkers) {
   plan.replace(plan.find("f_10.png"), 8, "f_11.png");
   testing::write_file(out_ / "plan.json", plan);
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr((out_ / "plan.json").string()),
-                                          HasSubstr("that all markers name")),
+                                          HasSubstr("that all commit records name")),
                                     HasSubstr("00000-of-00002.json"), HasSubstr(marker_.string())));
   testing::write_file(out_ / "plan.json", plan.substr(0, plan.size() / 2));
   EXPECT_THAT([&] { faults(); }, ::testing::ThrowsMessage<std::runtime_error>(

@@ -22,8 +22,8 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 TEST(FaultKind, IsWhatIsWrongWithoutWhere) {
-  EXPECT_EQ(fault_kind("expected a picture, got an empty file, in a/b.png"),
-            "expected a picture, got an empty file");
+  EXPECT_EQ(fault_kind("expected an image, got an empty file, in a/b.png"),
+            "expected an image, got an empty file");
   EXPECT_EQ(fault_kind("expected 15 columns, got 5, in label_2/000007.txt, in line 3 (KITTI)"),
             "expected 15 columns, got 5");
   EXPECT_EQ(fault_kind("broken\n  because: expected a box, got none, in a.txt"), "broken");
@@ -149,7 +149,7 @@ TEST_F(FolderStatusTest, SamplesOfShardsUnderWayAreThoseThatTheirWritersTell) {
 }
 
 TEST_F(FolderStatusTest, TheRateIsThatOfEveryoneAtWork) {
-  commit(kA, 4, {{1, "a1", "expected a picture, got none, in x.png"}});
+  commit(kA, 4, {{1, "a1", "expected an image, got none, in x.png"}});
   write_temporary(kB, host_name(), ::getppid());
   write_temporary(kC, "node7-1", 4242);
   const FolderStatus now = status();
@@ -252,7 +252,7 @@ FolderStatus half_done() {
   status.left_over = {file("a-00006.h5", 5, WriterLife::kDead, 9000)};
   status.damaged = {"/data/out/a-00007.h5: expected size in bytes 5, got 3"};
   status.quarantined = {
-      {"a-00000.h5", 3, "x", "expected a picture, got none, in x.png"},
+      {"a-00000.h5", 3, "x", "expected an image, got none, in x.png"},
       {"a-00001.h5", 8, "y", "expected 15 columns, got 5, in y.txt"},
       {"a-00002.h5", 0, "z", "expected 15 columns, got 5, in z.txt"},
   };
@@ -274,8 +274,8 @@ TEST(StatusText, TellsWhereARunStands) {
             "folder   /data/out\n"
             "plan     cccccccccccccccc\n"
             "shards   4 of 10 done, 2 running, 4 missing (1 of them damaged)\n"
-            "samples  397 of 1000 written, 100 more in shards under way, 3 quarantined\n"
-            "work     2 processes are at work, 5 pairs/s, about 1m40s left\n"
+            "samples  397 of 1000 written, 100 more in unfinished shards, 3 quarantined\n"
+            "work     2 processes are running, 5 pairs/s, about 1m40s left\n"
             "running\n"
             "  a-00004.h5  node7-1  pid 7     alive    last wrote 2s ago\n"
             "  a-00005.h5  node7-1  pid 4242  unknown  last wrote 3m20s ago\n"
@@ -283,9 +283,9 @@ TEST(StatusText, TellsWhereARunStands) {
             "  .a-00006.h5.node7-1.5.0.tmp  dead  last wrote 2h30m ago\n"
             "damaged (made again by the next convert)\n"
             "  /data/out/a-00007.h5: expected size in bytes 5, got 3\n"
-            "quarantined (eventgan retry makes them once their inputs are mended)\n"
+            "quarantined (eventgan retry makes them once their inputs are fixed)\n"
             "  2  expected 15 columns, got 5 (first: y, a-00001.h5 slot 8)\n"
-            "  1  expected a picture, got none (x, a-00000.h5 slot 3)\n");
+            "  1  expected an image, got none (x, a-00000.h5 slot 3)\n");
 }
 
 TEST(StatusText, TellsOfAFileThatIsDatedAhead) {
@@ -298,9 +298,9 @@ TEST(StatusText, TellsOfAFileThatIsDatedAhead) {
 TEST(StatusText, SaysWhatItDoesNotKnow) {
   FolderStatus status = half_done();
   status.pairs_per_second_of_one.reset();
-  EXPECT_THAT(status_text(status), HasSubstr("how fast is known after the first shard\n"));
+  EXPECT_THAT(status_text(status), HasSubstr("speed known after the first shard\n"));
   status.writers = 0;
-  EXPECT_THAT(status_text(status), HasSubstr("nobody is at work; eventgan convert goes on"));
+  EXPECT_THAT(status_text(status), HasSubstr("no process is running; eventgan convert resumes"));
 }
 
 TEST(StatusText, ACompleteFolderIsFiveLines) {
@@ -314,7 +314,7 @@ TEST(StatusText, ACompleteFolderIsFiveLines) {
             "plan     cccccccccccccccc\n"
             "shards   1 of 1 done, 0 running, 0 missing\n"
             "samples  9 of 9 written, 0 quarantined\n"
-            "work     nobody is at work, and every shard is done\n");
+            "work     no process is running, and every shard is done\n");
 }
 
 TEST(StatusText, LongListsAreCut) {
@@ -341,7 +341,7 @@ TEST(StatusJson, HasEverything) {
   EXPECT_EQ(json["damaged"].size(), 1u);
   EXPECT_EQ(json["quarantined_by_reason"],
             nlohmann::json::parse(
-                R"({"expected 15 columns, got 5": 2, "expected a picture, got none": 1})"));
+                R"({"expected 15 columns, got 5": 2, "expected an image, got none": 1})"));
   EXPECT_EQ(json["quarantined"][2], nlohmann::json::parse(R"({"sample_id": "z",
       "shard": "a-00002.h5", "slot": 0, "reason": "expected 15 columns, got 5, in z.txt"})"));
   EXPECT_EQ(json["pairs_per_second"], 5);

@@ -311,7 +311,7 @@ class DiscardOutputOfAnotherJob : public ::testing::Test {
     const auto before = names_in(out_);
     const fs::path manifest_folder = folder_ / where;
     const auto refused = ThrowsMessage<UsageError>(
-        AllOf(HasSubstr("got that of another, \"job\", in " + out_.string()),
+        AllOf(HasSubstr("got that of another job, \"job\", in " + out_.string()),
               HasSubstr("choose another output folder, or remove that one yourself"),
               HasSubstr(text), Not(HasSubstr("--overwrite"))));
     EXPECT_THAT([&] { discard_output(out_, other.fingerprint, manifest_folder); }, refused);

@@ -77,9 +77,9 @@ TEST_F(ReadGuarded, ACrashIsDamage) {
 TEST_F(ReadGuarded, WhatEndsTheChildFromOutsideIsNoDamage) {
   for (const int signal : {SIGKILL, SIGXCPU}) {
     EXPECT_THAT([&] { read_apart(folder_.path(), [&] { return ::raise(signal); }); },
-                ThrowsMessage<std::runtime_error>(AllOf(HasSubstr("stopped from outside"),
-                                                        HasSubstr(folder_.path().string()),
-                                                        Not(HasSubstr("damaged")))));
+                ThrowsMessage<std::runtime_error>(
+                    AllOf(HasSubstr("stopped by a signal from outside"),
+                          HasSubstr(folder_.path().string()), Not(HasSubstr("damaged")))));
   }
 }
 

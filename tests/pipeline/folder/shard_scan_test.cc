@@ -84,7 +84,7 @@ TEST_F(ShardStateTest, AShardWithoutMarkerIsNotCommitted) {
   std::filesystem::remove(marker_file_);
   expect(ShardCondition::kUncommitted,
          shard_file_.string() +
-             ": expected its marker job-train-00000-of-00001.json beside it, got no file");
+             ": expected its commit record job-train-00000-of-00001.json beside it, got no file");
 }
 
 TEST_F(ShardStateTest, AMarkerWithoutShardIsNotDone) {
@@ -112,7 +112,8 @@ TEST_F(ShardStateTest, AMarkerOfAnotherPlanShardOrLengthIsForeign) {
   ShardMarker other = marker_;
   other.plan_hash = std::string(64, 'b');
   write_marker(to_json(other));
-  expect(ShardCondition::kForeignMarker, "expected the marker of plan " + kPlan + ", got one of");
+  expect(ShardCondition::kForeignMarker,
+         "expected the commit record of plan " + kPlan + ", got one of");
   other = marker_;
   other.shard = "job-train-00007-of-00008.h5";
   write_marker(to_json(other));
@@ -122,7 +123,8 @@ TEST_F(ShardStateTest, AMarkerOfAnotherPlanShardOrLengthIsForeign) {
   other.quarantined.clear();
   other.contents.boxes = other.contents.persons = {0};
   write_marker(to_json(other));
-  expect(ShardCondition::kForeignMarker, "expected the marker of 2 samples, got one of 1 samples");
+  expect(ShardCondition::kForeignMarker,
+         "expected the commit record of 2 samples, got one of 1 samples");
 }
 
 TEST_F(ShardStateTest, TruncatedAndEmptiedShardsHaveAnotherSize) {

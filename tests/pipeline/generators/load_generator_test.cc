@@ -171,10 +171,10 @@ TEST(ChooseEngine, OnCudaItIsLibtorch) {
   }
   EXPECT_EQ(refusal(on_cuda(kOnednn, kFloat32), support),
             "$.generator.engine: expected \"auto\" or \"torch\" on device cuda, got \"onednn\", "
-            "which computes on processors alone");
+            "which runs on the CPU only");
   EXPECT_EQ(refusal(on_cuda({}, kInt8), support),
             "$.generator.precision: expected \"float32\" or \"bfloat16\" on device cuda, got "
-            "\"int8\", which oneDNN alone has, on processors");
+            "\"int8\", which only oneDNN on the CPU has");
 }
 
 TEST(ChooseEngine, RefusesCudaWhereThereIsNoneAndBfloat16WhereTheDeviceHasNone) {

@@ -146,7 +146,7 @@ TEST_F(ClipFramesTest, RefusesWhatIsNoClipOrTooShort) {
   EXPECT_THAT(refusal(R"({"path": "nowhere"})"), ::testing::HasSubstr("got none, in"));
   write_frame(0);
   EXPECT_THAT(refusal(R"({"path": "clip"})"),
-              ::testing::HasSubstr("expected 2 frames or more from frame 0 on by steps of 1, got 1 "
+              ::testing::HasSubstr("expected 2 or more frames from frame 0 on in steps of 1, got 1 "
                                    "of a clip of 1, in"));
   EXPECT_EQ(refusal(R"({"path": "clip", "method": "affine"})"), "");
   write_frame(1);

@@ -249,7 +249,8 @@ TEST(SimulationReport, GivesEventsPerPixelAndSecond) {
   EXPECT_THAT(text, ::testing::HasSubstr("3000"));
   // 3000 events in 100 x 10 + 500 x 2 pixel seconds.
   EXPECT_THAT(text, ::testing::ContainsRegex("all +16 +3000 +1.500 +2.5"));
-  EXPECT_THAT(text, ::testing::HasSubstr("2 recordings made, 1 kept from before; 8.0 s, 0.50 s a"));
+  EXPECT_THAT(
+      text, ::testing::HasSubstr("2 recordings made, 1 kept from earlier runs; 8.0 s, 0.50 s per"));
 }
 
 TEST(SimulationReport, IsOneLineOfJson) {

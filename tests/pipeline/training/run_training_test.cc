@@ -327,7 +327,7 @@ TEST_F(SmallTraining, SaysWhereALossIsNotFinite) {
   } catch (const std::runtime_error& error) {
     EXPECT_THAT(
         error_text(error),
-        AllOf(HasSubstr("broke down in phase flow, step 1; last good checkpoint: "),
+        AllOf(HasSubstr("diverged in phase flow, step 1; last good checkpoint: "),
               HasSubstr("out/checkpoints/latest.safetensors"), HasSubstr("bar.hdf5 frames ")));
   }
 }

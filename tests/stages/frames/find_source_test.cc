@@ -143,7 +143,7 @@ TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
     EXPECT_EQ(found.root, at(part.frames));
     ASSERT_FALSE(found.remarks.empty()) << part.frames;
     EXPECT_THAT(found.remarks.front(),
-                AllOf(HasSubstr("warning: a part of "),
+                AllOf(HasSubstr("warning: this is only a part of "),
                       ::testing::EndsWith("eventgan init \"" + at(part.root).string() + "\"")));
   }
   write("mini/label_2/000000.txt");

@@ -239,7 +239,7 @@ TEST_F(PicturesDatasetTest, ALabelThatIsNoSoundJsonFileIsAFault) {
   testing::write_file(label, deep);
   EXPECT_THAT(reason(), HasSubstr("expected at most 32 levels of nesting, got more"));
   testing::write_file(label, R"({"a": 1, "a": 2})");
-  EXPECT_EQ(reason(), "clip/1.json: $.a: expected the key once, got it a second time");
+  EXPECT_EQ(reason(), "clip/1.json: $.a: expected the key once, got it twice");
   testing::write_file(label, "{} // a comment is no JSON");
   EXPECT_THAT(reason(), HasSubstr("clip/1.json:1:4: expected JSON, got"));
   testing::write_file(label, "\xef\xbb\xbf{}");

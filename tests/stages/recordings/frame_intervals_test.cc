@@ -179,7 +179,7 @@ TEST(EventCheckTest, RefusesPixelsOutsideThePicture) {
         [&] {
           check().take({x, 0, 1.5, 1});
         },
-        ThrowsMessage<EventFault>(HasSubstr("expected a pixel of a picture of 4x3")));
+        ThrowsMessage<EventFault>(HasSubstr("expected a pixel of an image of 4x3")));
   }
   EXPECT_THAT(
       [&] {

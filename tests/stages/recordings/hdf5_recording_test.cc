@@ -285,12 +285,11 @@ TEST_F(Hdf5RecordingTest, NamesTheDatasetThatIsMissing) {
 
 TEST_F(Hdf5RecordingTest, RefusesColourAndFloatFrames) {
   datasets_[kFrames] = {{3, 3, 4, 3}, std::vector<std::uint8_t>(108)};
-  expect_refused("grey pictures, uint8 [frames, height, width], and no colour",
-                 "uint8 [3, 3, 4, 3]");
+  expect_refused("grey images, uint8 [frames, height, width], and no colour", "uint8 [3, 3, 4, 3]");
   datasets_[kFrames] = {{3, 3, 4}, std::vector<float>(36)};
-  expect_refused("grey pictures, uint8", "float32 [3, 3, 4]");
+  expect_refused("grey images, uint8", "float32 [3, 3, 4]");
   datasets_[kFrames] = {{3, 3, 4}, std::vector<std::int64_t>(36)};
-  expect_refused("grey pictures, uint8", "int64 [3, 3, 4]");
+  expect_refused("grey images, uint8", "int64 [3, 3, 4]");
 }
 
 TEST_F(Hdf5RecordingTest, RefusesOtherShapesAndTypes) {

@@ -239,7 +239,7 @@ TEST_F(ShardCheck, CountsThatDifferAreFound) {
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected number of valid samples 5, got 4")));
   marker_.valid = 4;
   marker_.quarantined[0].slot = 1;
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the marker lists")));
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the commit record lists")));
 }
 
 TEST_F(ShardCheck, RowsOtherThanTheMarkerSaysAreFound) {

@@ -119,17 +119,17 @@ TEST(FrameDecoder, FaultsSayWhatIsWrongAndNameTheFile) {
   std::filesystem::resize_file(folder / "cut.bmp", 300);
 
   EXPECT_EQ(fault(decoder.decode(picture_ref("sub/empty.png"))),
-            "expected a picture, got an empty file, in sub/empty.png");
+            "expected an image, got an empty file, in sub/empty.png");
   EXPECT_EQ(fault(decoder.decode(picture_ref("none.png"))),
             "expected a file, got none, in none.png");
   EXPECT_EQ(fault(decoder.decode(picture_ref("text.png"))),
-            "expected a picture, got a file of another kind, in text.png");
+            "expected an image, got a file of another kind, in text.png");
   EXPECT_EQ(fault(decoder.decode(picture_ref("folder.png"))),
             "expected a file, got a folder or device, in folder.png");
   EXPECT_THAT(fault(decoder.decode(picture_ref("short.jpg"))),
               AllOf(HasSubstr("expected a whole JPEG, got "), HasSubstr(", in short.jpg")));
   EXPECT_EQ(fault(decoder.decode(picture_ref("cut.bmp"))),
-            "expected a whole picture, got a damaged one, in cut.bmp");
+            "expected a whole image, got a damaged one, in cut.bmp");
 }
 
 TEST(FrameDecoder, OpencvTellsNobodyElseWhatIsWrong) {

@@ -114,7 +114,7 @@ TEST_F(MpiiListFileTest, RefusesWhatIsNeither) {
 
 TEST_F(MpiiListFileTest, RefusesDoubleKeysAndNestingWithoutEnd) {
   expect_refused(R"([{"image": "a.jpg", "scale": 1, "scale": 2}])",
-                 "$[0].scale: expected the key once, got it a second time");
+                 "$[0].scale: expected the key once, got it twice");
   expect_refused("[{\"image\": \"a.jpg\", \"center\": " + std::string(100'000, '[') +
                      std::string(100'000, ']') + "}]",
                  "expected at most 32 levels of nesting, got more");

@@ -86,9 +86,10 @@ TEST(ViewLayout, MarkersThatContradictThemselvesAreRefused) {
   const auto message_of = [](const ViewShard& bad) {
     return [bad] { lay_out_view({shard("a", "good", {1}, {1}), bad}); };
   };
-  EXPECT_THAT(message_of(shard("a", "bad", {1, 1}, {1})),
-              ThrowsMessage<std::runtime_error>(HasSubstr(
-                  "expected numbers of persons for 2 samples, got 1, in the marker of bad")));
+  EXPECT_THAT(
+      message_of(shard("a", "bad", {1, 1}, {1})),
+      ThrowsMessage<std::runtime_error>(HasSubstr(
+          "expected numbers of persons for 2 samples, got 1, in the commit record of bad")));
   EXPECT_THAT(message_of(shard("a", "bad", {-1}, {0})),
               ThrowsMessage<std::runtime_error>(HasSubstr("0 or more boxes of a sample, got -1")));
   ViewShard slot = shard("a", "bad", {1}, {0});
