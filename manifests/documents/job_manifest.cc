@@ -1,9 +1,12 @@
 #include "manifests/documents/job_manifest.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
+#include <ranges>
 #include <stdexcept>
 
 #include "manifests/documents/job_manifest_internal.h"
@@ -316,12 +319,9 @@ class KindKeys {
                                   std::initializer_list<GeneratorKind> owners) {
     std::optional<StrictValue> value = object_.find(key);
     if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
-    std::string listed;
-    for (const GeneratorKind owner : owners) {
-      listed.append(listed.empty() ? "" : ", ").append(to_string(owner));
-    }
-    value->fault("no such key for kind \"" + std::string(to_string(*kind_)) + "\" (only for " +
-                 listed + ")");
+    const auto word = [](GeneratorKind owner) { return to_string(owner); };
+    value->fault(fmt::format("no such key for kind \"{}\" (only for {})", to_string(*kind_),
+                             fmt::join(owners | std::views::transform(word), ", ")));
     return std::nullopt;
   }
 

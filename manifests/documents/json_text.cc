@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <utf8.h>
 
 #include <algorithm>
@@ -96,8 +97,7 @@ void FaultList::add_line(std::string line) {
 }
 
 std::string FaultList::text() const {
-  std::string text;
-  for (const std::string& line : lines_) text += (text.empty() ? "" : "\n") + line;
+  std::string text = fmt::format("{}", fmt::join(lines_, "\n"));
   if (left_out_ > 0)
     text += "\n" + document_ + ": and " + std::to_string(left_out_) + " more faults";
   return text;

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
@@ -209,13 +211,12 @@ bool StrictObject::has_format(std::string_view format, int version) {
 
 void StrictObject::finish() const {
   if (node_ == nullptr) return;
-  std::string known;
-  for (const std::string_view key : known_) known.append(known.empty() ? "" : ", ").append(key);
   for (const auto& [key, value] : node_->items()) {
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
     const std::string_view meant = near_word(key, known_);
-    const std::string expected = meant.empty() ? "one of the keys " + known
-                                               : "the key \"" + std::string(meant) + "\" or none";
+    const std::string expected = meant.empty()
+                                     ? fmt::format("one of the keys {}", fmt::join(known_, ", "))
+                                     : fmt::format("the key \"{}\" or none", meant);
     faults_->add(json_path(path_, key), expected, "an unknown key");
   }
 }

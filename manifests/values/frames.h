@@ -19,6 +19,11 @@ struct ImageSize {
   }
 };
 
+/// "640x480", width first.
+inline std::string to_string(ImageSize size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
 /// A grey picture: [y, x] uint8, C order, 0..255.
 struct GreyImage {
   ImageSize size;

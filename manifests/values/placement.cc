@@ -24,7 +24,7 @@ int scaled_side(int side, int from, int to) {
 void require_pixels(ImageSize size, const char* what) {
   if (size.height >= 1 && size.width >= 1) return;
   throw std::invalid_argument(std::string("expected a ") + what + " of at least 1x1 pixels, got " +
-                              std::to_string(size.width) + "x" + std::to_string(size.height));
+                              to_string(size));
 }
 
 ImageSize scaled_size(ImageSize source, ImageSize volume, ImageFit fit) {

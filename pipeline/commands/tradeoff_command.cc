@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
@@ -6,6 +8,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <ranges>
 #include <string>
 #include <vector>
 
@@ -44,12 +47,12 @@ std::string weights_name(const std::string& text) {
 
 template <class T, std::size_t N>
 T value_of(const std::array<Word<T>, N>& words, const std::string& text, const char* option) {
-  std::string known;
   for (const Word<T>& entry : words) {
     if (entry.word == text) return entry.value;
-    known.append(known.empty() ? "" : ", ").append(entry.word);
   }
-  throw UsageError(std::string(option) + ": expected one of " + known + ", got \"" + text + "\"");
+  throw UsageError(fmt::format("{}: expected one of {}, got \"{}\"", option,
+                               fmt::join(words | std::views::transform(&Word<T>::word), ", "),
+                               text));
 }
 
 /// Replaces an axis by what the user names, if that is anything.

@@ -1,18 +1,18 @@
 #include "pipeline/conversion/conversion_report.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/marker.h"
+#include "manifests/values/text.h"
 
 namespace eventgan {
 namespace {
 
 constexpr std::size_t kListedFaults = 20;
-constexpr double kMegabyte = 1e6;
 
 double ratio(const ConversionReport& report) {
   return report.stored_bytes == 0 ? 0.0 : double(report.volume_bytes) / double(report.stored_bytes);
@@ -27,13 +27,13 @@ std::string shards_text(const ConversionReport& report) {
   const std::string text = fmt::format("{} of {} pairs written, {} quarantined, in {} of {} shards",
                                        report.written, report.planned, report.quarantined.size(),
                                        report.shards_done, report.shards_planned);
-  std::string how;
+  std::vector<std::string> how;
   const auto add = [&](int count, const char* what) {
-    if (count > 0) how += fmt::format("{}{} done {}", how.empty() ? "" : ", ", count, what);
+    if (count > 0) how.push_back(fmt::format("{} done {}", count, what));
   };
   add(report.shards_done_before, "before");
   add(report.shards_done_by_others, "by others");
-  return how.empty() ? text : text + " (" + how + ")";
+  return how.empty() ? text : fmt::format("{} ({})", text, fmt::join(how, ", "));
 }
 
 }  // namespace
@@ -49,8 +49,8 @@ void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionR
 
 std::string to_text(const ConversionReport& report) {
   std::string text = part_text(report) + shards_text(report);
-  text += fmt::format("\n{:.1f} MB, volumes compressed {:.1f}x, {:.1f} s",
-                      double(report.stored_bytes) / kMegabyte, ratio(report), report.wall_seconds);
+  text += fmt::format("\n{}, volumes compressed {:.1f}x, {:.1f} s", bytes_text(report.stored_bytes),
+                      ratio(report), report.wall_seconds);
   if (!report.stage_seconds.empty()) {
     text += "; busy seconds:";
     for (const auto& [stage, seconds] : report.stage_seconds) {

@@ -294,9 +294,8 @@ void check_pairs_fit(const std::vector<const PlannedShard*>& shards, const Gener
     const PlannedSample& sample = shard->samples.front();
     throw std::runtime_error(
         "expected pairs that fit into memory, " + std::to_string(memory_bytes) + " bytes, got " +
-        std::to_string(size.width) + "x" + std::to_string(size.height) + ", which take about " +
-        std::to_string(needed) + ", in " + sample.pair.previous.path + " and " +
-        sample.pair.next.path + " (" + sample.sample_id +
+        to_string(size) + ", which take about " + std::to_string(needed) + ", in " +
+        sample.pair.previous.path + " and " + sample.pair.next.path + " (" + sample.sample_id +
         "): set a smaller $.image.width and height, or use a machine with more memory");
   }
 }

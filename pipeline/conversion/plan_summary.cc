@@ -1,16 +1,18 @@
 #include "pipeline/conversion/plan_summary.h"
 
 #include <fmt/core.h>
-#include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <utility>
 
 #include "manifests/documents/json_text_internal.h"
+#include "manifests/values/text.h"
 #include "pipeline/conversion/sample_stages.h"
+#include "pipeline/runtime/progress.h"
 
 namespace eventgan {
 namespace {
@@ -98,8 +100,6 @@ TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
 
 namespace {
 
-constexpr std::ptrdiff_t kListedIds = 5;
-
 std::int64_t shards_of(const Plan& plan, int source) {
   return std::count_if(plan.shards.begin(), plan.shards.end(),
                        [&](const PlannedShard& shard) { return shard.source == source; });
@@ -113,31 +113,22 @@ std::int64_t pairs_of(const SourceSummary& summary) {
 
 /// "  (gap 1: 7, gap 2: 5)"; nothing where there is none.
 std::string by_gap_text(const std::map<int, std::int64_t>& counts) {
-  std::string text;
-  for (const auto& [gap, count] : counts) {
-    text += fmt::format("{}gap {}: {}", text.empty() ? "  (" : ", ", gap, count);
-  }
-  return text.empty() ? text : text + ")";
+  return counts.empty() ? "" : "  (" + counts_text(counts, "gap ") + ")";
 }
 
 std::string without_partner_text(const SourceSpec& spec, const SourceSummary& summary,
                                  const std::map<int, std::int64_t>& by_gap) {
   std::int64_t places = 0;
   for (const auto& [gap, count] : by_gap) places += count;
-  std::string text =
+  const std::string text =
       fmt::format("  no paired frame  {} of {} labelled frames x gaps{}\n", places,
                   summary.labelled_frames * std::ssize(spec.pairs.gaps), by_gap_text(by_gap));
   const std::vector<std::string>& ids = summary.without_partner_ids;
   if (ids.empty()) return text;
   const bool draws = spec.pairs.choose == PairChoice::kOne;
-  text += fmt::format(
-      "  {:<15}  {} of {} labelled frames  ({}", draws ? "no pair at all" : "lacking a gap",
-      ids.size(), summary.labelled_frames,
-      escape_controls(fmt::format(
-          "{}",
-          fmt::join(ids.begin(),
-                    ids.begin() + std::min<std::ptrdiff_t>(kListedIds, std::ssize(ids)), ", "))));
-  return text + (std::ssize(ids) > kListedIds ? ", ...)\n" : ")\n");
+  return text + fmt::format("  {:<15}  {} of {} labelled frames  ({})\n",
+                            draws ? "no pair at all" : "lacking a gap", ids.size(),
+                            summary.labelled_frames, escape_controls(some_of(ids, 5)));
 }
 
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
@@ -171,10 +162,10 @@ std::string estimate_text(const TrialEstimate& estimate, int threads, Device dev
   if (estimate.pairs_measured == 0)
     return "no pair could be measured: no estimate of size and time\n";
   return fmt::format(
-      "about {:.1f} MB and {:.0f} s with {} thread{} ({:.3f} s per pair on one thread, measured on "
-      "{} pair{}{})\n",
-      estimate.stored_bytes / 1e6, estimate.seconds, threads, threads == 1 ? "" : "s",
-      estimate.seconds_per_pair, estimate.pairs_measured, estimate.pairs_measured == 1 ? "" : "s",
+      "about {} and {} with {} ({:.3f} s per pair on one thread, measured on {}{})\n",
+      bytes_text(std::llround(estimate.stored_bytes)), duration_text(estimate.seconds, "dhms"),
+      count_text(threads, "thread"), estimate.seconds_per_pair,
+      count_text(estimate.pairs_measured, "pair"),
       device == Device::kCpu ? "" : " one by one; the device is faster in batches");
 }
 

@@ -1,6 +1,6 @@
 #include "pipeline/conversion/retry.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <chrono>
@@ -17,6 +17,7 @@
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/conversion/shard_rewrite.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/folder/shard_backup.h"
@@ -265,10 +266,6 @@ namespace {
 
 constexpr std::size_t kListedSamples = 20;
 
-std::string count(std::int64_t number, const std::string& what) {
-  return fmt::format("{} {}{}", number, what, number == 1 ? "" : "s");
-}
-
 }  // namespace
 
 std::string to_text(const RetryReport& report) {
@@ -277,22 +274,21 @@ std::string to_text(const RetryReport& report) {
     text += fault + "; eventgan convert makes it again\n";
   }
   if (report.shards_missing > 0) {
-    text += count(report.shards_missing, "shard") + " not made yet: run eventgan convert\n";
+    text += count_text(report.shards_missing, "shard") + " not made yet: run eventgan convert\n";
   }
   if (!report.changed_inputs.empty()) {
-    text += "inputs changed since the plan was frozen (";
-    for (const std::string& field : report.changed_inputs) {
-      text += (field == report.changed_inputs.front() ? "" : ", ") + field;
-    }
-    text += "): recorded, eventgan convert will accept them\n";
+    text += fmt::format(
+        "inputs changed since the plan was frozen ({}): recorded, eventgan convert will accept "
+        "them\n",
+        fmt::join(report.changed_inputs, ", "));
   }
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
-    text +=
-        fmt::format("{} of {} fixed, {} rewritten; {} of {} samples are still quarantined\n",
-                    report.mended, count(report.tried, "quarantined sample"),
-                    count(report.shards_rewritten, "shard"), report.quarantined, report.planned);
+    text += fmt::format("{} of {} fixed, {} rewritten; {} of {} samples are still quarantined\n",
+                        report.mended, count_text(report.tried, "quarantined sample"),
+                        count_text(report.shards_rewritten, "shard"), report.quarantined,
+                        report.planned);
   }
   const std::size_t listed = std::min(report.failed.size(), kListedSamples);
   for (std::size_t i = 0; i < listed; ++i) {

@@ -1,6 +1,5 @@
 #include "pipeline/conversion/sample_stages.h"
 
-#include <cmath>
 #include <limits>
 #include <new>
 #include <optional>
@@ -35,10 +34,6 @@ std::string frame_names(const FramePair& pair) {
   return pair.previous.path + " and " + pair.next.path;
 }
 
-std::string size_text(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// `values = {}` would keep it.
 template <class T>
 void free_memory(std::vector<T>& values) {
@@ -49,7 +44,7 @@ void free_memory(std::vector<T>& values) {
 [[noreturn]] void name_sample(const SampleMessage& message, const char* work) {
   const PlannedSample& planned = message.planned();
   std::throw_with_nested(std::runtime_error(
-      std::string("cannot ") + work + " a pair of " + size_text(message.shard->volume_size) +
+      std::string("cannot ") + work + " a pair of " + to_string(message.shard->volume_size) +
       ", in " + frame_names(planned.pair) + " (" + planned.sample_id + ")"));
 }
 
@@ -121,12 +116,7 @@ void SampleStages::read_events(SampleMessage& message, const Dataset& dataset) c
     return;
   }
   EventWindow& window = std::get<EventWindow>(outcome);
-  // Of so many events, which alone tell when their window begins and ends.
-  FramePair& pair = message.sample.pair;
-  if (std::isnan(pair.previous.time_s) && !window.events.empty()) {
-    pair.previous.time_s = window.events.front().t_s;
-    pair.next.time_s = window.events.back().t_s;
-  }
+  window.tell_times(message.sample.pair);
   PreparedPair& prepared = message.prepared;
   prepared.placement = place(window.sensor, manifest_.image);
   const VisiblePart part = visible_part(prepared.placement);
@@ -151,8 +141,8 @@ void SampleStages::take_placement(SampleMessage& message) const {
   message.sample.source_size = placement.source;
   message.sample.source_to_volume = placement.source_to_volume();
   if (placement.volume == message.shard->volume_size) return;
-  message.fail("expected frames of " + size_text(message.shard->volume_size) + ", got " +
-               size_text(placement.volume) + ", in " + frame_names(message.planned().pair) +
+  message.fail("expected frames of " + to_string(message.shard->volume_size) + ", got " +
+               to_string(placement.volume) + ", in " + frame_names(message.planned().pair) +
                " (a new plan would have it in another shard: convert into another folder, or with "
                "--overwrite)");
 }

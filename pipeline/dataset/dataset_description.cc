@@ -15,6 +15,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "pipeline/folder/shard_guard.h"
 #include "stages/shards/shard_reader.h"
 
@@ -319,15 +320,6 @@ std::string describe_dataset(const DatasetParts& parts) { return text_of(descrip
 
 namespace {
 
-template <class Key>
-std::string joined(const std::map<Key, std::int64_t>& counts) {
-  std::string all;
-  for (const auto& [key, count] : counts) {
-    all += fmt::format("{}{}: {}", all.empty() ? "" : ", ", key, count);
-  }
-  return all;
-}
-
 std::string counts_text(const DatasetCounts& counts) {
   return fmt::format("{}, {} of them quarantined, {} boxes, {} persons", counts.samples,
                      counts.quarantined(), counts.boxes, counts.persons);
@@ -341,10 +333,9 @@ std::string dataset_text(const DatasetParts& parts) {
   std::map<int, DatasetCounts> sources;
   std::set<std::string> sizes;
   for (const ShardState& shard : parts.done) {
-    const ImageSize& size = shard.outline.volume_size;
     add(*shard.marker, total);
     add(*shard.marker, sources[shard.outline.source]);
-    sizes.insert(fmt::format("{} x {}", size.height, size.width));
+    sizes.insert(to_string(shard.outline.volume_size));
   }
   const ShardHeader& header = parts.headers.begin()->second;
   const std::vector<std::string> few(sizes.begin(), sizes.end());
@@ -362,13 +353,12 @@ std::string dataset_text(const DatasetParts& parts) {
                                spec.split, counts_text(counts)));
   }
   line("volumes",
-       fmt::format("2 polarities x {} bins, {}{} (height x width), {}, normalization {}",
-                   header.volume.bins,
+       fmt::format("2 polarities x {} bins, {}{} pixels, {}, normalization {}", header.volume.bins,
                    fmt::join(few.begin(), few.begin() + std::ptrdiff_t(shown), ", "),
                    shown < few.size() ? fmt::format(" and {} more", few.size() - shown) : "",
                    to_string(header.dtype), to_string(header.normalization)));
-  line("gaps", joined(total.gaps) + " (frames: samples)");
-  if (total.boxes > 0) line("boxes", joined(total.classes));
+  line("gaps", counts_text(total.gaps) + " (frames: samples)");
+  if (total.boxes > 0) line("boxes", counts_text(total.classes));
   line("generator", header.generator);
   line("weights",
        header.weights.empty() ? header.weights_hash : header.weights + ", " + header.weights_hash);

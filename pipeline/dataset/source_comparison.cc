@@ -56,17 +56,6 @@ Element no_value() {
   return Element();
 }
 
-/// Of a window of so many events these tell when it begins and ends.
-void take_times(const EventWindow& window, FramePair& pair) {
-  if (window.events.empty()) return;
-  pair.previous.time_s = window.events.front().t_s;
-  pair.next.time_s = window.events.back().t_s;
-}
-
-std::string size_text(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// What the stored numbers of classes and joints mean by today's source, which may have gained
 /// classes.
 std::vector<std::string> schema_faults(const LabelSchema& stored, const LabelSchema& source) {
@@ -164,18 +153,18 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
                                             ? std::optional(dataset.sensor_size(planned.label_key))
                                             : picture_size(stored.pair.next.path);
   if (size && *size != stored.source_size) {
-    return {"expected a source size of " + size_text(*size) + " as in " + stored.pair.next.path +
-            ", got " + size_text(stored.source_size)};
+    return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
+            ", got " + to_string(stored.source_size)};
   }
   if (stored.source_size.height <= 0 || stored.source_size.width <= 0) {
-    return {"expected a source size, got " + size_text(stored.source_size)};
+    return {"expected a source size, got " + to_string(stored.source_size)};
   }
   const Placement placement = eventgan::place(stored.source_size, manifest_.image);
   const std::array<double, 6> map = placement.source_to_volume();
   if (placement.volume != reader.header().volume.size ||
       !std::ranges::equal(map, stored.source_to_volume,
                           [](double a, double b) { return same(a, b); })) {
-    return {"expected source_to_volume of an image of " + size_text(stored.source_size) +
+    return {"expected source_to_volume of an image of " + to_string(stored.source_size) +
             ", got another map"};
   }
   auto& annotation = std::get<Annotation>(read);
@@ -195,7 +184,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
       return {"expected the events that the shard was made from, got none: " +
               std::get<SampleFault>(read_window).reason};
     }
-    take_times(std::get<EventWindow>(read_window), expected.pair);
+    std::get<EventWindow>(read_window).tell_times(expected.pair);
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;

@@ -17,6 +17,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/documents/marker.h"
+#include "manifests/values/text.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/dataset/source_comparison.h"
 #include "pipeline/folder/amendments.h"
@@ -278,9 +279,9 @@ std::string line_of(const ShardCheck& shard, bool deep) {
     return shard.name + ": " + to_string(shard.condition);
   }
   std::string text =
-      fmt::format("{}: {}, {:.1f} MB hashed, {} samples read, {} quarantined", shard.name,
+      fmt::format("{}: {}, {} hashed, {} samples read, {} quarantined", shard.name,
                   shard.faults.empty() ? "sound" : fmt::format("{} faults", shard.faults.size()),
-                  static_cast<double>(shard.size_bytes) / 1e6, shard.samples, shard.quarantined);
+                  bytes_text(shard.size_bytes), shard.samples, shard.quarantined);
   if (deep) text += fmt::format(", labels of {} compared", shard.compared);
   return text;
 }

@@ -1,6 +1,6 @@
 #include "pipeline/exports/export_job.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
@@ -113,9 +113,8 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
     faults.add("$", "class names, each with a number or null", "another value");
   for (const auto& [name, value] : json->items()) {
     if (std::ranges::find(known, name) == known.end()) {
-      std::string names;
-      for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
-      faults.add(json_path("$", name), "one of the classes " + names, "another name");
+      faults.add(json_path("$", name), fmt::format("one of the classes {}", fmt::join(known, ", ")),
+                 "another name");
     } else if (value.is_null()) {
       entries_[name] = {Fate::kLeftOut, 0};
     } else if (!value.is_number_integer() || value < first || value > 100000) {

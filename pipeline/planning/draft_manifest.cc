@@ -19,7 +19,9 @@
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
+#include "pipeline/planning/spread.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
@@ -161,12 +163,8 @@ std::vector<std::string> findings_of(const FoundSource& found, const Survey& sur
   lines.push_back(fmt::format("{}: {} labelled frames", found.title, survey.labelled_frames));
   if (survey.sequences > 0) lines.back() += fmt::format(" of {} sequences", survey.sequences);
   lines.back() += fmt::format(", {} annotation files", survey.annotation_files);
-  std::string gaps;
-  for (const auto& [gap, count] : survey.pairs_by_gap) {
-    gaps += fmt::format("{}gap {}: {}", gaps.empty() ? "" : ", ", gap, count);
-  }
-  lines.push_back(
-      fmt::format("labelled frames with a pair of frames {}, by gap: {}", where_text(side), gaps));
+  lines.push_back(fmt::format("labelled frames with a pair of frames {}, by gap: {}",
+                              where_text(side), counts_text(survey.pairs_by_gap, "gap ")));
   if (survey.holes > 0) {
     lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.holes));
   }
@@ -221,31 +219,23 @@ std::optional<double> likeness(const ColourFrame& first, const ColourFrame& seco
   return *middle;
 }
 
-/// At most so many of a number of things, spread evenly: their places.
-std::vector<std::size_t> spread(std::size_t count, std::size_t most) {
-  std::vector<std::size_t> places(std::min(count, most));
-  for (std::size_t i = 0; i < places.size(); ++i) places[i] = i * count / places.size();
-  return places;
-}
-
 /// A line if images that are taken as one sequence have several sizes, as far as some tell.
 void compare_sizes(const Dataset& dataset, const fs::path& folder,
                    std::vector<std::string>& warnings) {
   constexpr std::size_t kMost = 200;
   const auto& frames = dataset.labelled_frames();
   std::map<std::string_view, std::pair<ImageSize, std::string_view>> first;  // of a sequence
-  for (const std::size_t i : spread(frames.size(), kMost)) {
+  for (const std::size_t i : spread(kMost, frames.size())) {
     const std::string& path = frames[i].frame.path;
     const Outcome<ImageSize> probed = probe_image_size(folder / path);
     if (is_fault(probed)) continue;
     const auto size = std::get<ImageSize>(probed);
     const auto [known, is_new] = first.try_emplace(frames[i].sequence, size, path);
     if (is_new || known->second.first == size) continue;
-    warnings.push_back(
-        fmt::format("warning: images of several sizes in one folder, {}x{} in {} and {}x{} in {}: "
-                    "is it a sequence? Two frames of different sizes make no pair",
-                    known->second.first.width, known->second.first.height, known->second.second,
-                    size.width, size.height, path));
+    warnings.push_back(fmt::format(
+        "warning: images of several sizes in one folder, {} in {} and {} in {}: is it a "
+        "sequence? Two frames of different sizes make no pair",
+        to_string(known->second.first), known->second.second, to_string(size), path));
     return;
   }
 }
@@ -260,7 +250,7 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder,
   const auto& frames = dataset.labelled_frames();
   std::size_t pairs = 0, unrelated = 0;
   std::string example;
-  std::vector<std::size_t> places = spread(frames.size(), kTries);
+  std::vector<std::size_t> places = spread(kTries, frames.size());
   for (std::size_t turn = 0; turn < kPairs && pairs < kPairs; ++turn) {
     for (std::size_t i = turn; i < places.size() && pairs < kPairs; i += kPairs) {
       const FrameRef& frame = frames[places[i]].frame;

@@ -1,5 +1,6 @@
 #include "pipeline/planning/fingerprint.h"
 
+#include <fmt/format.h>
 #include <link.h>
 #include <png.h>
 #include <zlib.h>
@@ -175,16 +176,16 @@ std::string instruction_sets() {
 std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSION; }
 
 std::string version_text() {
-  std::string engines;
+  std::vector<std::string> engines;
   for (const char* name : {"libtorch_cpu", "libtorch_cuda", "libdnnl", "libtbb"}) {
     std::filesystem::path file = library_file(name);
     if (file.empty()) continue;
     std::error_code unknown;  // the name that has the whole version is behind a link
     if (const auto whole = std::filesystem::canonical(file, unknown); !unknown) file = whole;
-    engines += (engines.empty() ? "" : ", ") + file.filename().string();
+    engines.push_back(file.filename().string());
   }
-  return program_version() + "\nlibraries: " + libraries(/*with_videos=*/true) +
-         "\nengines: " + engines + "\nprocessor: " + instruction_sets();
+  return fmt::format("{}\nlibraries: {}\nengines: {}\nprocessor: {}", program_version(),
+                     libraries(/*with_videos=*/true), fmt::join(engines, ", "), instruction_sets());
 }
 
 std::map<std::string, std::string> make_fingerprint(

@@ -15,6 +15,7 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace.h"
 #include "stages/frames/dataset.h"
@@ -307,30 +308,23 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
 /// Says of each source which samples' size is unknown: what becomes of them is worth a look before
 /// anything is converted.
 void note_unknown_sizes(Plan& plan) {
-  constexpr std::size_t kNamed = 5;
   struct Unknown {
-    std::size_t samples = 0;
+    std::vector<std::string> samples;
     std::size_t shards = 0;
-    std::string names;
   };
   std::vector<Unknown> sources(plan.sources.size());
   for (const PlannedShard& shard : plan.shards) {
     if (!shard.size_unknown) continue;
     Unknown& unknown = sources[static_cast<std::size_t>(shard.source)];
     ++unknown.shards;
-    for (const PlannedSample& sample : shard.samples) {
-      if (++unknown.samples <= kNamed) {
-        unknown.names += (unknown.names.empty() ? "" : ", ") + sample.sample_id;
-      }
-    }
+    for (const PlannedSample& sample : shard.samples) unknown.samples.push_back(sample.sample_id);
   }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const Unknown& unknown = sources[i];
-    if (unknown.samples == 0) continue;
+    if (unknown.samples.empty()) continue;
     plan.sources[i].notes.push_back(
-        "planned without knowing the size of " + std::to_string(unknown.samples) +
-        (unknown.samples == 1 ? " sample" : " samples") + ", no picture of which can be read (" +
-        unknown.names + (unknown.samples > kNamed ? ", ..." : "") + "): quarantined in " +
+        "planned without knowing the size of " + count_text(std::ssize(unknown.samples), "sample") +
+        ", no picture of which can be read (" + some_of(unknown.samples, 5) + "): quarantined in " +
         std::to_string(unknown.shards) +
         (unknown.shards == 1 ? " shard of its own" : " shards of their own") +
         " until the pictures are mended and eventgan retry has run");

@@ -1,5 +1,7 @@
 #include "pipeline/preview/preview.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -11,6 +13,7 @@
 #include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
+#include "pipeline/planning/spread.h"
 #include "pipeline/preview/preview_reader.h"
 #include "stages/events/pictures/picture_output.h"
 #include "stages/events/pictures/preview_picture.h"
@@ -116,11 +119,10 @@ void visit_samples(const ShownShards& shards, const PreviewOptions& options, Vis
     }
   }
   if (any || options.class_name.empty()) return;
-  std::string list;
-  for (const std::string& name : known) list += (list.empty() ? "" : ", ") + name;
-  throw UsageError("--class: expected a class of the boxes" +
-                   (list.empty() ? " (none of the samples has boxes)" : " (" + list + ")") +
-                   ", got \"" + options.class_name + "\"");
+  throw UsageError(fmt::format(
+      "--class: expected a class of the boxes ({}), got \"{}\"",
+      known.empty() ? "none of the samples has boxes" : fmt::format("{}", fmt::join(known, ", ")),
+      options.class_name));
 }
 
 std::vector<ShownSample> worst_samples(const ShownShards& shards, const PreviewOptions& options) {
@@ -169,8 +171,8 @@ std::vector<ShownSample> choose(const ShownShards& shards, const PreviewOptions&
     }
   }
   std::vector<ShownSample> chosen;
-  for (const std::int64_t at : spread(count, std::ssize(all))) {
-    chosen.push_back(all[static_cast<std::size_t>(at)]);
+  for (const std::size_t at : spread(static_cast<std::size_t>(count), all.size())) {
+    chosen.push_back(all[at]);
   }
   return chosen;
 }

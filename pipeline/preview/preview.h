@@ -45,9 +45,6 @@ std::vector<std::filesystem::path> preview(const std::filesystem::path& where,
 /// anything else, or a slot that a shard of `sample_count` samples does not have.
 std::vector<int> parse_slots(const std::string& text, int sample_count);
 
-/// `count` places spread evenly over `all`, the first included.
-std::vector<std::int64_t> spread(std::int64_t count, std::int64_t all);
-
 /// The kinds of samples that are worth a look first.
 enum class Extreme { kEmptiest, kFullest, kExtrapolated };
 

@@ -1,5 +1,7 @@
 #include "pipeline/realism/real_interval.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -84,10 +86,9 @@ void check_range(const Recording& recording, std::int64_t first, std::int64_t la
 void check_gaps(const std::vector<int>& gaps) {
   const std::set<int> distinct(gaps.begin(), gaps.end());
   if (gaps.empty() || *distinct.begin() < 1 || distinct.size() != gaps.size()) {
-    std::string list;
-    for (const int gap : gaps) list += (list.empty() ? "" : ",") + std::to_string(gap);
-    throw UsageError("--gaps: expected different numbers of frames, 1 or more, got \"" + list +
-                     "\"");
+    throw UsageError(
+        fmt::format("--gaps: expected different numbers of frames, 1 or more, got \"{}\"",
+                    fmt::join(gaps, ",")));
   }
 }
 

@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/documents/json_text_internal.h"
+#include "manifests/values/text.h"
 #include "stages/events/realism/realism_scores.h"
 
 namespace eventgan {
@@ -118,21 +119,16 @@ std::string direction_rows(const RealismReport& report) {
 }
 
 std::string head(const RealismReport& report) {
-  std::map<int, int> by_gap;
+  std::map<int, std::int64_t> by_gap;
   long long events = 0;
   for (const IntervalSummary& interval : report.intervals) {
     ++by_gap[interval.interval.gap()];
     events += interval.event_count;
   }
-  std::string text = fmt::format("{}: {}x{} pixels, {} pair{} of frames (", report.recording,
-                                 report.size.width, report.size.height, report.intervals.size(),
-                                 report.intervals.size() == 1 ? "" : "s");
-  const char* separator = "";
-  for (const auto& [gap, count] : by_gap) {
-    text += fmt::format("{}gap {}: {}", separator, gap, count);
-    separator = ", ";
-  }
-  text += fmt::format("), {} real events, {} bins\n", events, report.bins);
+  std::string text =
+      fmt::format("{}: {} pixels, {} of frames ({}), {} real events, {} bins\n", report.recording,
+                  to_string(report.size), count_text(std::ssize(report.intervals), "pair"),
+                  counts_text(by_gap, "gap "), events, report.bins);
   for (const MethodSummary& method : report.methods) {
     text += fmt::format("  {}: {}\n", method.name, method.settings);
   }

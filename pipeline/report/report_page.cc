@@ -1,6 +1,6 @@
 #include "pipeline/report/report_page.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 #include <openssl/evp.h>
 #include <utf8.h>
 
@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/runtime/progress.h"
 
 namespace eventgan {
@@ -62,17 +63,6 @@ std::string grouped(std::int64_t number) {
     digits.insert(static_cast<std::size_t>(at), "\u202F");
   }
   return digits;
-}
-
-std::string bytes_text(std::int64_t bytes) {
-  constexpr std::pair<double, const char*> kUnits[] = {
-      {1e12, "TB"}, {1e9, "GB"}, {1e6, "MB"}, {1e3, "kB"}};
-  for (const auto& [size, unit] : kUnits) {
-    if (static_cast<double>(bytes) >= size) {
-      return fmt::format("{:.3g} {}", static_cast<double>(bytes) / size, unit);
-    }
-  }
-  return fmt::format("{} bytes", bytes);
 }
 
 std::string percent(std::int64_t part, std::int64_t whole) {
@@ -332,7 +322,6 @@ std::string origin(const Survey& survey, const PageContext& context) {
   const DatasetParts& parts = survey.parts;
   const JobManifest& manifest = parts.manifest;
   const ShardHeader& header = survey.header;
-  const ImageSize size = header.volume.size;
   std::string html = "<section><h2>Inputs and settings</h2><div class=scroll><table class=facts>";
   for (std::size_t i = 0; i < std::min(manifest.sources.size(), kMostRows); ++i) {
     const SourceSpec& source = manifest.sources[i];
@@ -341,14 +330,11 @@ std::string origin(const Survey& survey, const PageContext& context) {
                                          escaped(source_name(survey, i)), escaped(source.root)));
       continue;
     }
-    std::string gaps;
-    for (const int gap : source.pairs.gaps) {
-      gaps += (gaps.empty() ? "" : ", ") + std::to_string(gap);
-    }
     html += fact("source",
                  fmt::format("{} from <code>{}</code>, gaps {} {} the labelled frame, {} of them",
-                             escaped(source_name(survey, i)), escaped(source.root), gaps,
-                             to_string(source.pairs.side), to_string(source.pairs.choose)));
+                             escaped(source_name(survey, i)), escaped(source.root),
+                             fmt::join(source.pairs.gaps, ", "), to_string(source.pairs.side),
+                             to_string(source.pairs.choose)));
   }
   html += fact("generator", escaped(header.generator));
   if (manifest.generator.kind == GeneratorKind::kNetwork) {
@@ -358,9 +344,9 @@ std::string origin(const Survey& survey, const PageContext& context) {
   html += fact(
       "volumes",
       fmt::format(
-          "2 polarities × {} bins × {} × {} (height × width{}), {}{}, values {}",
-          header.volume.bins, size.height, size.width,
-          manifest.image.size ? "" : "; of the first shard, each image has its own",
+          "2 polarities × {} bins, {} pixels{}, {}{}, values {}", header.volume.bins,
+          to_string(header.volume.size),
+          manifest.image.size ? "" : " (of the first shard, each image has its own)",
           to_string(header.dtype), header.scope.empty() ? "" : ", scope " + escaped(header.scope),
           header.unit == VolumeUnit::kEvents ? "count events" : "are dimensionless, about 0–1"));
   html += fact("preprocessing", "<code>" + escaped(header.preprocessing) + "</code>");

@@ -128,11 +128,8 @@ GreyImage ClipFrames::frame(std::int64_t position) {
   const auto& frame = std::get<ColourFrame>(decoded);
   if (!frame_size_) frame_size_ = frame.size;
   if (frame.size != *frame_size_) {
-    const auto text = [](ImageSize size) {
-      return std::to_string(size.width) + "x" + std::to_string(size.height);
-    };
-    throw InputError("expected a frame of " + text(*frame_size_) + " as the first one, got " +
-                     text(frame.size) + ", in " + ref.path);
+    throw InputError("expected a frame of " + to_string(*frame_size_) + " as the first one, got " +
+                     to_string(frame.size) + ", in " + ref.path);
   }
   return sensor_picture(frame, size_);
 }

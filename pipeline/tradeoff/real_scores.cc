@@ -2,11 +2,11 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 
 #include "pipeline/generators/load_generator.h"
+#include "pipeline/planning/spread.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/tradeoff/loss.h"
 #include "stages/base/files/sha256.h"
@@ -21,10 +21,11 @@ namespace eventgan {
 RealPart part_of(const Recording& recording, int most, int bins, int threads) {
   RealPart part{recording, {}, {}};
   const std::vector<FrameInterval> all = choose_intervals(recording, 0, std::nullopt, {1});
-  const std::size_t count = std::min(static_cast<std::size_t>(most), all.size());
-  for (std::size_t i = 0; i < count; ++i) part.intervals.push_back(all[i * all.size() / count]);
-  std::vector<std::string> hashes(count);
-  for_each_index(count, threads, [&](std::size_t i) {
+  for (const std::size_t place : spread(static_cast<std::size_t>(most), all.size())) {
+    part.intervals.push_back(all[place]);
+  }
+  std::vector<std::string> hashes(part.intervals.size());
+  for_each_index(hashes.size(), threads, [&](std::size_t i) {
     const RealInterval real = read_interval(recording, part.intervals[i], bins);
     Sha256 hash;
     hash.update(std::as_bytes(std::span(real.frames.previous.pixels)));

@@ -174,13 +174,14 @@ std::string head(const TradeoffReport& report) {
 
 /// What was left out, and why: a line a reason.
 std::vector<std::string> left_out(const TradeoffReport& report) {
-  std::map<std::string, std::string> names;  // by reason
+  std::map<std::string, std::vector<std::string>> names;  // by reason
   for (const RefusedComputation& refused : report.refused) {
-    std::string& list = names[refused.reason];
-    list += (list.empty() ? "" : ", ") + name_of(refused.computation);
+    names[refused.reason].push_back(name_of(refused.computation));
   }
   std::vector<std::string> lines;
-  for (const auto& [reason, list] : names) lines.push_back("not run: " + list + ": " + reason);
+  for (const auto& [reason, refused] : names) {
+    lines.push_back(fmt::format("not run: {}: {}", fmt::join(refused, ", "), reason));
+  }
   for (const std::string& pair : report.skipped) lines.push_back("skipped pair: " + pair);
   for (const Trial& trial : report.trials) {
     if (trial.quarantined == 0) continue;

@@ -1,6 +1,6 @@
 #include "pipeline/training/csv_table.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <cerrno>
 #include <charconv>
@@ -14,11 +14,7 @@
 namespace eventgan {
 namespace {
 
-std::string joined(const CsvTable::Row& row) {
-  std::string line;
-  for (const std::string& cell : row) line += (&cell == &row.front() ? "" : ",") + cell;
-  return line + '\n';
-}
+std::string joined(const CsvTable::Row& row) { return fmt::format("{}\n", fmt::join(row, ",")); }
 
 CsvTable::Row split(const std::string& line) {
   CsvTable::Row row(1);

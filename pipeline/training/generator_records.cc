@@ -1,5 +1,7 @@
 #include "pipeline/training/generator_records.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
@@ -10,6 +12,7 @@
 #include <vector>
 
 #include "pipeline/planning/fingerprint.h"
+#include "pipeline/planning/spread.h"
 #include "pipeline/training/csv_table.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
@@ -41,16 +44,15 @@ std::string recording_hash(const fs::path& path) {
 }
 
 std::string steps_text(const TrainingManifest& manifest, const TrainingPosition& position) {
-  std::string text;
+  std::vector<std::string> parts;
   for (const auto phase :
        {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
     const std::int64_t steps = phase < position.phase    ? steps_of(manifest.steps, phase)
                                : phase == position.phase ? position.step
                                                          : 0;
-    text +=
-        (text.empty() ? "" : ", ") + std::string(to_string(phase)) + ' ' + std::to_string(steps);
+    parts.push_back(fmt::format("{} {}", to_string(phase), steps));
   }
-  return text;
+  return fmt::format("{}", fmt::join(parts, ", "));
 }
 
 }  // namespace
@@ -182,9 +184,8 @@ constexpr std::size_t kMostRows = 4;
 void write_generator_picture(const Generator& generator, std::span<const TrainingSample> samples,
                              const std::filesystem::path& file) {
   std::vector<ComparedPair> pairs;
-  const std::size_t rows = std::min(samples.size(), kMostRows);
-  for (std::size_t i = 0; i < rows; ++i) {
-    const TrainingSample& sample = samples[i * samples.size() / rows];
+  for (const std::size_t place : spread(kMostRows, samples.size())) {
+    const TrainingSample& sample = samples[place];
     pairs.push_back({sample.shape,
                      sample.network_frames,
                      {{"real", sample.volume}, {"network", generated_volume(generator, sample)}},

@@ -35,12 +35,11 @@ std::uintmax_t bytes_of(const fs::path& path) {
 }
 
 std::string description(const TrainingRecording& opened) {
-  const ImageSize size = opened.recording->size();
   std::error_code absent;
   const bool there = fs::exists(opened.file, absent);
   return std::to_string(there ? bytes_of(opened.file) : 0) + " bytes, " +
          std::to_string(opened.recording->frame_count()) + " frames of " +
-         std::to_string(size.width) + "x" + std::to_string(size.height);
+         to_string(opened.recording->size());
 }
 
 }  // namespace

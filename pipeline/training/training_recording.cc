@@ -1,5 +1,7 @@
 #include "pipeline/training/training_recording.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <string>
 
@@ -11,10 +13,6 @@
 namespace eventgan {
 namespace {
 
-std::string size_text(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// What is wrong with the recording; empty if nothing is.
 std::string fault_of(const RecordingSpec& spec, const TrainingRecording& opened, ImageSize smallest,
                      int smallest_gap) {
@@ -22,8 +20,8 @@ std::string fault_of(const RecordingSpec& spec, const TrainingRecording& opened,
   const ImageSize size = recording.size();
   const std::string where = ", in " + opened.file.string();
   if (size.height < smallest.height || size.width < smallest.width) {
-    return "expected images of at least " + size_text(smallest) + " (crop), got " +
-           size_text(size) + where;
+    return "expected images of at least " + to_string(smallest) + " (crop), got " +
+           to_string(size) + where;
   }
   if (spec.last_frame && *spec.last_frame >= recording.frame_count()) {
     return "expected last_frame below the number of frames, " +
@@ -44,7 +42,7 @@ std::vector<TrainingRecording> open_training_recordings(std::span<const Recordin
                                                         const std::filesystem::path& directory,
                                                         ImageSize smallest, int smallest_gap) {
   std::vector<TrainingRecording> recordings;
-  std::string faults;
+  std::vector<std::string> faults;
   for (const RecordingSpec& spec : specs) {
     TrainingRecording opened;
     opened.file = directory / spec.path;
@@ -53,10 +51,10 @@ std::vector<TrainingRecording> open_training_recordings(std::span<const Recordin
     opened.first_frame = spec.first_frame;
     opened.last_frame = spec.last_frame.value_or(opened.recording->frame_count() - 1);
     const std::string fault = fault_of(spec, opened, smallest, smallest_gap);
-    if (!fault.empty()) faults += (faults.empty() ? "" : "\n  ") + fault;
+    if (!fault.empty()) faults.push_back(fault);
     recordings.push_back(std::move(opened));
   }
-  if (!faults.empty()) throw UsageError(faults);
+  if (!faults.empty()) throw UsageError(fmt::format("{}", fmt::join(faults, "\n  ")));
   return recordings;
 }
 

@@ -15,10 +15,9 @@ void check_event(const Event& event, std::size_t number, const VolumeShape& shap
       event.x >= 0 && event.x < shape.size.width && event.y >= 0 && event.y < shape.size.height;
   if (!inside || !std::isfinite(event.t_s)) {
     throw std::invalid_argument(
-        "expected an event with a finite time inside " + std::to_string(shape.size.width) + "x" +
-        std::to_string(shape.size.height) + " pixels, got x=" + std::to_string(event.x) +
-        " y=" + std::to_string(event.y) + " t=" + std::to_string(event.t_s) + " as event " +
-        std::to_string(number));
+        "expected an event with a finite time inside " + to_string(shape.size) +
+        " pixels, got x=" + std::to_string(event.x) + " y=" + std::to_string(event.y) +
+        " t=" + std::to_string(event.t_s) + " as event " + std::to_string(number));
   }
 }
 

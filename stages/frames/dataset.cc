@@ -1,5 +1,6 @@
 #include "stages/frames/dataset.h"
 
+#include <cmath>
 #include <stdexcept>
 
 #include "manifests/documents/json_text_internal.h"
@@ -15,6 +16,12 @@
 #include "stages/frames/sequences/frames_dataset.h"
 
 namespace eventgan {
+
+void EventWindow::tell_times(FramePair& pair) const {
+  if (!std::isnan(pair.previous.time_s) || events.empty()) return;
+  pair.previous.time_s = events.front().t_s;
+  pair.next.time_s = events.back().t_s;
+}
 
 ImageSize Dataset::sensor_size(const std::string& label_key) const {
   throw std::logic_error("expected a dataset of events, got one of frames (" + label_key + ")");

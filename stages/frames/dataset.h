@@ -41,6 +41,10 @@ struct Neighbour {
 struct EventWindow {
   ImageSize sensor;           ///< the source picture that coordinates and labels are in
   std::vector<Event> events;  ///< in time order; none: nothing happened
+
+  /// Gives a pair without times those of the first and the last event, if there are any: they alone
+  /// tell when a window of so many events begins and ends.
+  void tell_times(FramePair& pair) const;
 };
 
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what

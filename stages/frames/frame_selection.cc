@@ -7,22 +7,11 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
-
-/// Up to five of some names, and how many more there are.
-std::string some_of(const std::set<std::string>& names) {
-  constexpr std::size_t kNamed = 5;
-  std::string text;
-  std::size_t count = 0;
-  for (const std::string& name : names) {
-    if (++count > kNamed) return text + ", ...";
-    text += (text.empty() ? "" : ", ") + name;
-  }
-  return text;
-}
 
 /// A line each; blank ones, white space around, and a byte order mark are passed over.
 std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) {
@@ -54,7 +43,8 @@ void keep(std::vector<LabelledFrame>& frames, const std::set<std::string>& named
   });
   if (missing.empty()) return;
   throw InputError("expected " + what + " of the source, got " + std::to_string(missing.size()) +
-                   " that it does not have (" + some_of(missing) + "), in " + where);
+                   " that it does not have (" + some_of({missing.begin(), missing.end()}, 5) +
+                   "), in " + where);
 }
 
 /// What `fraction` keeps together: a sequence; of Human3.6M all cameras' of one take, which show

@@ -4,17 +4,14 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
 
 namespace eventgan {
 
 std::string counted(const std::vector<std::string>& names, const std::string& what) {
-  constexpr std::size_t kNamed = 20;
-  std::string text = std::to_string(names.size()) + " " + what;
-  for (std::size_t i = 0; i < std::min(names.size(), kNamed); ++i) {
-    text += (i == 0 ? ": " : ", ") + names[i];
-  }
-  return names.size() > kNamed ? text + ", ..." : text;
+  const std::string text = std::to_string(names.size()) + " " + what;
+  return names.empty() ? text : text + ": " + some_of(names, 20);
 }
 
 FolderListing list_folder(const std::filesystem::path& folder) {

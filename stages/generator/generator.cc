@@ -37,10 +37,10 @@ void check_generator_spans(std::span<const float> frames, ImageSize size,
       volume.size() == 2 * bins * plane) {
     return;
   }
-  throw std::invalid_argument(
-      "expected frames [2, H, W] and a volume [" + std::to_string(2 * bins) + ", H, W] of " +
-      std::to_string(size.width) + "x" + std::to_string(size.height) + ", got " +
-      std::to_string(frames.size()) + " and " + std::to_string(volume.size()) + " values");
+  throw std::invalid_argument("expected frames [2, H, W] and a volume [" +
+                              std::to_string(2 * bins) + ", H, W] of " + to_string(size) +
+                              ", got " + std::to_string(frames.size()) + " and " +
+                              std::to_string(volume.size()) + " values");
 }
 
 }  // namespace eventgan

@@ -1,5 +1,7 @@
 #include "stages/generator/shipped_weights.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstdint>
 #include <string>
@@ -30,11 +32,8 @@ std::span<const ShippedFile> shipped_files() {
 }
 
 std::string width_list() {
-  std::string text;
-  for (const int width : shipped_widths()) {
-    text += (text.empty() ? "" : ", ") + std::to_string(width);
-  }
-  return text.empty() ? "none" : text;
+  const std::vector<int> widths = shipped_widths();
+  return widths.empty() ? "none" : fmt::format("{}", fmt::join(widths, ", "));
 }
 
 }  // namespace

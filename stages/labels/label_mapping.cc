@@ -139,10 +139,6 @@ std::ostream& operator<<(std::ostream& out, const LensDistortion& lens) {
              << ", p2 " << lens.p2;
 }
 
-std::ostream& operator<<(std::ostream& out, ImageSize size) {
-  return out << size.width << " x " << size.height << " pixels";
-}
-
 template <class... Parts>
 std::string text(const Parts&... parts) {
   std::ostringstream out;
@@ -163,7 +159,8 @@ Complaint check(const Box& box, ImageSize picture) {
     return text("expected left <= right and top <= bottom, got ", box.xyxy);
   }
   if (!box.ignore && !overlaps(box.xyxy, picture)) {
-    return text("expected an overlap with the image of ", picture, ", got ", box.xyxy);
+    return text("expected an overlap with the image of ", to_string(picture), " pixels, got ",
+                box.xyxy);
   }
   return std::nullopt;
 }
@@ -181,8 +178,8 @@ Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
     }
   }
   if (any_inside || !outside) return std::nullopt;
-  return text("expected a joint inside the image of ", picture,
-              ", got all annotated ones outside it, the first at ", *outside);
+  return text("expected a joint inside the image of ", to_string(picture),
+              " pixels, got all annotated ones outside it, the first at ", *outside);
 }
 
 Complaint check(const Person& person, ImageSize picture) {

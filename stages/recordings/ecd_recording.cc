@@ -91,10 +91,6 @@ EcdImageList list_of_present_images(const std::filesystem::path& folder) {
   return images;
 }
 
-std::string describe_size(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// Decoding gives colour; of a grey picture all three channels are one, and stay what they are.
 GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
   GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
@@ -125,9 +121,8 @@ GreyImage EcdRecording::frame(std::int64_t index) const {
   const std::size_t position = frame_position(index, frame_count(), name_);
   GreyImage image = read_frame(position);
   if (image.size == size_) return image;
-  throw InputError("expected frames of one size, " + describe_size(size_) + ", got " +
-                   describe_size(image.size) + ", in " +
-                   (folder_ / images_.paths[position]).string());
+  throw InputError("expected frames of one size, " + to_string(size_) + ", got " +
+                   to_string(image.size) + ", in " + (folder_ / images_.paths[position]).string());
 }
 
 GreyImage EcdRecording::read_frame(std::size_t position) const {

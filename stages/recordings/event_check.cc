@@ -41,8 +41,8 @@ Event EventCheck::take(const StoredEvent& stored) {
 
 void EventCheck::refuse(const StoredEvent& stored) const {
   if (!is_index(stored.x, size_.width) || !is_index(stored.y, size_.height)) {
-    throw EventFault(fmt::format("expected a pixel of an image of {}x{}, got x = {}, y = {}",
-                                 size_.width, size_.height, number(stored.x), number(stored.y)));
+    throw EventFault(fmt::format("expected a pixel of an image of {}, got x = {}, y = {}",
+                                 to_string(size_), number(stored.x), number(stored.y)));
   }
   check_event_time(last_s_, stored.t_s);
   if (first_ && stored.t_s == last_s_) {

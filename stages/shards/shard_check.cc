@@ -1,5 +1,7 @@
 #include "stages/shards/shard_check.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <exception>
 #include <sstream>
@@ -8,6 +10,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/base/files/sha256.h"
 #include "stages/shards/sample_check.h"
 #include "stages/shards/shard_reader.h"
@@ -16,23 +19,16 @@
 namespace eventgan {
 namespace {
 
-std::string text_of(const std::string& key) { return key; }
 std::string text_of(std::int64_t number) { return std::to_string(number); }
 
 /// "Car: 3, Van: 1", or "none".
 template <class Key>
 std::string text_of(const std::map<Key, std::int64_t>& counts) {
-  std::string text;
-  for (const auto& [key, count] : counts) {
-    text += (text.empty() ? "" : ", ") + text_of(key) + ": " + text_of(count);
-  }
-  return text.empty() ? "none" : text;
+  return counts.empty() ? "none" : counts_text(counts);
 }
 
 std::string text_of(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text.empty() ? "none" : text;
+  return names.empty() ? "none" : fmt::format("{}", fmt::join(names, ", "));
 }
 
 class Comparison {

@@ -1,5 +1,7 @@
 #include "stages/shards/shard_reader.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
@@ -192,9 +194,7 @@ namespace {
 /// With a line for each fault.
 void throw_if_any(const std::vector<std::string>& faults) {
   if (faults.empty()) return;
-  std::string message;
-  for (const std::string& fault : faults) message += (message.empty() ? "" : "\n") + fault;
-  throw std::runtime_error(message);
+  throw std::runtime_error(fmt::format("{}", fmt::join(faults, "\n")));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "stages/shards/shard_summary.h"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
@@ -15,6 +15,7 @@
 
 #include "manifests/documents/json_text_internal.h"
 #include "manifests/values/events.h"
+#include "manifests/values/text.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {
@@ -71,25 +72,6 @@ class Lines {
   std::string text_;
 };
 
-std::string joined(const std::vector<std::string>& texts) {
-  std::string all;
-  for (const std::string& text : texts) all += (all.empty() ? "" : ", ") + text;
-  return all;
-}
-
-template <class Key>
-std::string joined(const std::map<Key, std::int64_t>& counts) {
-  std::string all;
-  for (const auto& [key, count] : counts) {
-    all += fmt::format("{}{}: {}", all.empty() ? "" : ", ", key, count);
-  }
-  return all;
-}
-
-std::string text_of(const ImageSize& size) {
-  return fmt::format("{} x {} (height x width)", size.height, size.width);
-}
-
 std::string text_of(const Rectangle& r) {
   return fmt::format("[{:g} {:g} {:g} {:g}]", r.left, r.top, r.right, r.bottom);
 }
@@ -141,16 +123,16 @@ std::string describe_shard(const ShardReader& reader) {
   line("dataset", "{}, split {}", header.dataset, header.split);
   line("samples", "{}, valid {}, without any event {}", header.sample_count, counts.valid,
        counts.empty_volumes);
-  if (!counts.quarantined.empty()) line.add("quarantined", joined(counts.quarantined));
-  line("volume", "2 polarities x {} bins, {}, {}, deflate {}, normalization {}", header.volume.bins,
-       text_of(header.volume.size), to_string(header.dtype), header.deflate_level,
-       to_string(header.normalization));
-  line("gaps", "{} (frames: samples)", joined(counts.gaps));
+  if (!counts.quarantined.empty()) line("quarantined", "{}", fmt::join(counts.quarantined, ", "));
+  line("volume", "2 polarities x {} bins, {} pixels, {}, deflate {}, normalization {}",
+       header.volume.bins, to_string(header.volume.size), to_string(header.dtype),
+       header.deflate_level, to_string(header.normalization));
+  line("gaps", "{} (frames: samples)", counts_text(counts.gaps));
   line("boxes", "{}{}", counts.boxes,
-       counts.boxes > 0 ? fmt::format(" ({})", joined(counts.classes)) : "");
+       counts.boxes > 0 ? fmt::format(" ({})", counts_text(counts.classes)) : "");
   line("persons", "{}", counts.persons);
   if (!header.label_schema.joint_names.empty()) {
-    line.add("joints", joined(header.label_schema.joint_names));
+    line("joints", "{}", fmt::join(header.label_schema.joint_names, ", "));
   }
   line.add("preprocessing", header.preprocessing);
   line.add("generator", header.generator);
@@ -177,7 +159,7 @@ std::string describe_sample(const ShardReader& reader, int slot) {
        is_window || seconds.empty() ? "" : ", ", seconds);
   line("label", "frame {}, at {:g} of the way from previous to next", pair.label_index,
        pair.label_position);
-  line.add("source size", text_of(sample.source_size));
+  line("source size", "{} pixels", to_string(sample.source_size));
   if (sample.valid) {
     const VolumeStatistics& statistics = sample.statistics;
     line("volume", "largest {:g}, 98th percentile {:g}, non-zero {:g} %, sums +{:g} -{:g}",
@@ -185,7 +167,7 @@ std::string describe_sample(const ShardReader& reader, int slot) {
          statistics.sum_positive, statistics.sum_negative);
     if (!sample.tiles.empty())
       line("generated", "{:.3g} % of its tiles", 100 * generated_fraction(sample));
-    if (statistics.flags != 0) line.add("flags", joined(flag_names(statistics.flags)));
+    if (statistics.flags != 0) line("flags", "{}", fmt::join(flag_names(statistics.flags), ", "));
   }
   line("original", "{} bytes", sample.annotation.original.size());
   describe_boxes(reader.header(), sample, line);

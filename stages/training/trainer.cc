@@ -2,11 +2,13 @@
 
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
+#include <fmt/format.h>
 #include <torch/nn/module.h>
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 #include <string>
 #include <vector>
 
@@ -28,9 +30,8 @@ void check_batch(const TrainingManifest& manifest) {
   const auto deepest = [](int side) { return (side + 15) / 16; };
   if (manifest.batch > 1 || deepest(manifest.crop.height) * deepest(manifest.crop.width) > 1)
     return;
-  throw UsageError("expected a batch of at least 2 for a crop of " +
-                   std::to_string(manifest.crop.width) + "x" +
-                   std::to_string(manifest.crop.height) + ", got 1, in " + manifest.name);
+  throw UsageError("expected a batch of at least 2 for a crop of " + to_string(manifest.crop) +
+                   ", got 1, in " + manifest.name);
 }
 
 /// The manifest's reader refuses these too; a manifest may also be made in code.
@@ -46,9 +47,8 @@ void check_generator_phase(const TrainingManifest& manifest) {
   constexpr int kSmallest = PatchDiscriminatorImpl::smallest_side();
   if (manifest.crop.height < kSmallest || manifest.crop.width < kSmallest) {
     throw UsageError("expected a crop of at least " + std::to_string(kSmallest) +
-                     " pixels a side for the adversarial loss, got " +
-                     std::to_string(manifest.crop.width) + "x" +
-                     std::to_string(manifest.crop.height) + ", in " + manifest.name);
+                     " pixels a side for the adversarial loss, got " + to_string(manifest.crop) +
+                     ", in " + manifest.name);
   }
   if (manifest.batch % 2 != 0) {
     throw UsageError("expected an even batch for the adversarial loss, got " +
@@ -112,23 +112,20 @@ bool gradients_are_finite(const torch::nn::Module& network) {
   return sums.empty() || at::isfinite(at::stack(sums)).all().item<bool>();
 }
 
-std::string origins(std::span<const TrainingSample> samples) {
-  std::string text;
-  for (const TrainingSample& sample : samples) text += (text.empty() ? "" : "; ") + sample.origin;
-  return text;
-}
-
 /// The losses' values; throws UnsoundLoss with those that are not finite.
 StepLosses values(const UpdateLoss& loss, const std::string& where) {
   StepLosses result;
-  std::string faults;
+  std::vector<std::string> faults;
   for (const auto& [name, tensor] : loss.parts) {
     const double value = tensor.item<double>();
     result[name] = value;
     if (std::isfinite(value)) continue;
-    faults += (faults.empty() ? "" : ", ") + name + " " + std::to_string(value);
+    faults.push_back(fmt::format("{} {}", name, value));
   }
-  if (!faults.empty()) throw UnsoundLoss("expected finite losses, got " + faults + where);
+  if (!faults.empty()) {
+    throw UnsoundLoss(
+        fmt::format("expected finite losses, got {}{}", fmt::join(faults, ", "), where));
+  }
   return result;
 }
 
@@ -194,8 +191,9 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   networks.generator->set_output_slope(
       output_slope(manifest.network.output_slope, step, manifest.steps.generator));
 
-  const std::string where = ", in " + std::string(to_string(phase)) + " step " +
-                            std::to_string(step) + " of " + origins(samples);
+  const std::string where =
+      fmt::format(", in {} step {} of {}", to_string(phase), step,
+                  fmt::join(samples | std::views::transform(&TrainingSample::origin), "; "));
   const UpdateLoss update_loss = loss(learner, batch, step);
   StepLosses result = values(update_loss, where);
   update_loss.total.backward();

@@ -14,10 +14,6 @@ enum AugmentationDraw : std::uint64_t { kTop, kLeft, kFlipX, kFlipY, kGain, kGam
 
 constexpr std::size_t kFrames = 2;
 
-std::string text(ImageSize size) {
-  return std::to_string(size.height) + "x" + std::to_string(size.width);
-}
-
 void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument(message);
 }
@@ -28,8 +24,8 @@ void require_within(int top, int left, ImageSize crop, ImageSize picture,
   require(crop.height > 0 && crop.width > 0 && top >= 0 && left >= 0 &&
               crop.height <= picture.height && crop.width <= picture.width &&
               top <= picture.height - crop.height && left <= picture.width - crop.width,
-          "expected a crop within " + text(picture) + " pixels, got " + text(crop) + " at row " +
-              std::to_string(top) + ", column " + std::to_string(left) +
+          "expected a crop within " + to_string(picture) + " pixels, got " + to_string(crop) +
+              " at row " + std::to_string(top) + ", column " + std::to_string(left) +
               (origin.empty() ? "" : ", in " + origin) + " (augmentation)");
 }
 
@@ -103,7 +99,7 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
   require_within(augmentation.top, augmentation.left, augmentation.crop, size, sample.origin);
   require(sample.frames.size() == kFrames * size.pixel_count() &&
               sample.volume.size() == sample.shape.value_count(),
-          "expected 2 frames and a volume of " + text(size) + " pixels, got " +
+          "expected 2 frames and a volume of " + to_string(size) + " pixels, got " +
               std::to_string(sample.frames.size()) + " and " +
               std::to_string(sample.volume.size()) + " values, in " + sample.origin +
               " (augmentation)");
@@ -122,7 +118,7 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
     for (float& x : result.network_frames) x = relight(x, augmentation.gain, augmentation.gamma);
   }
   result.origin =
-      sample.origin + ", crop " + text(augmentation.crop) + " at row " +
+      sample.origin + ", crop " + to_string(augmentation.crop) + " at row " +
       std::to_string(augmentation.top) + ", column " + std::to_string(augmentation.left) +
       (augmentation.flip_x ? ", flipped in x" : "") +
       (augmentation.flip_y ? ", flipped in y" : "") + (augmentation.reverse ? ", reversed" : "");

@@ -183,7 +183,7 @@ class Terminal(program.InFolder):
         self.assertRegex(text, r"\[[#.]+\] verifying \d/4 shards, ")
         self.assertIn(WIPE, text)
         report = text[text.rindex(WIPE) + len(WIPE):]  # nothing is left of the bar
-        self.assertRegex(report, r"^job-train-00000-of-00004.h5: sound, [\d.]+ MB hashed, 6 samples read, 0 quarantined\r\n")
+        self.assertRegex(report, r"^job-train-00000-of-00004.h5: sound, [\d.]+ [kM]B hashed, 6 samples read, 0 quarantined\r\n")
 
     @unittest.skipUnless(shutil.which("tmux"), "no tmux")
     def test_one_row_of_a_real_terminal_which_wraps_its_rows_anew(self):

@@ -78,7 +78,7 @@ def main() -> None:
     except ValueError as error:
         raise SystemExit(str(error))
     classes = list(learn.classes)
-    print(f"input {height} x {width}, classes " + ", ".join(classes))
+    print(f"input {width}x{height}, classes " + ", ".join(classes))
     model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), (height, width), args.regions)
     model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)

@@ -121,7 +121,7 @@ def main() -> None:
     for name, weight in model.named_parameters():
         groups["Conv2d.weight" in name].append(weight)
     optimizer = torch.optim.AdamW([{"params": groups[True], "weight_decay": 0.01}, {"params": groups[False], "weight_decay": 0}], lr=args.lr)
-    print(f"input {height} x {width}, anchors " + ", ".join(f"{w:.0f}x{h:.0f}" for w, h in anchors))
+    print(f"input {width}x{height}, anchors " + ", ".join(f"{w:.0f}x{h:.0f}" for w, h in anchors))
     training.fit(args, model, optimizer, training.batches(args, learn, collate, learn=True), loss_of, measure, f"AP50 {classes[0]}")
 
     def picture_of(i: int) -> tuple[str, np.ndarray]:

@@ -1,3 +1,4 @@
+#include <fmt/format.h>
 #include <utf8.h>
 
 #include <algorithm>
@@ -128,9 +129,9 @@ void PickleMachine::build() {
 void PickleMachine::push_global(const std::string& module, const std::string& name) {
   const std::string global = module + "." + name;
   if (!allowed_globals_.contains(global)) {
-    std::string allowed;
-    for (const std::string& one : allowed_globals_) allowed += (allowed.empty() ? "" : ", ") + one;
-    cursor_.fail(allowed.empty() ? "no global" : "a global out of {" + allowed + "}",
+    cursor_.fail(allowed_globals_.empty()
+                     ? "no global"
+                     : fmt::format("a global out of {{{}}}", fmt::join(allowed_globals_, ", ")),
                  "\"" + printable(global) + "\"");
   }
   push(Kind::kGlobal).text = global;

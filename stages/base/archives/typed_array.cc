@@ -1,5 +1,7 @@
 #include "stages/base/archives/typed_array.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <stdexcept>
 #include <type_traits>
@@ -31,11 +33,7 @@ const std::string& TypedArray::text(std::size_t index) const {
   return elements->at(index);
 }
 
-std::string TypedArray::shape_text() const {
-  std::string text;
-  for (const std::size_t size : shape) text += (text.empty() ? "" : ", ") + std::to_string(size);
-  return "[" + text + "]";
-}
+std::string TypedArray::shape_text() const { return fmt::format("[{}]", fmt::join(shape, ", ")); }
 
 namespace {
 

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cassert>
 #include <functional>
@@ -199,11 +201,7 @@ Hdf5Handle number_type(std::size_t size, bool is_float, bool is_signed) {
   }
 }
 
-std::string shape_text(const Dims& dims) {
-  std::string text;
-  for (const hsize_t dim : dims) text += (text.empty() ? "" : ", ") + std::to_string(dim);
-  return "[" + text + "]";
-}
+std::string shape_text(const Dims& dims) { return fmt::format("[{}]", fmt::join(dims, ", ")); }
 
 std::size_t element_count(const Dims& dims) {
   return std::accumulate(dims.begin(), dims.end(), std::size_t{1}, std::multiplies<>());

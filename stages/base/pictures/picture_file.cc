@@ -20,8 +20,7 @@ namespace eventgan {
 
 void check_picture_size(ImageSize size) {
   if (size.height > 0 && size.width > 0 && size.pixel_count() <= kMaxPicturePixels) return;
-  throw std::runtime_error("a size of " + std::to_string(size.width) + "x" +
-                           std::to_string(size.height) + ", not 1 to " +
+  throw std::runtime_error("a size of " + to_string(size) + ", not 1 to " +
                            std::to_string(kMaxPicturePixels) + " pixels");
 }
 

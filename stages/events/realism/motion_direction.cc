@@ -76,9 +76,8 @@ void check_arguments(std::span<const float> volume, const VolumeShape& shape,
       flow_x.size() != plane || flow_y.size() != plane) {
     throw std::invalid_argument(
         "expected a volume [" + std::to_string(shape.channels()) + ", H, W] and flows of " +
-        std::to_string(shape.size.width) + "x" + std::to_string(shape.size.height) +
-        " pixels, got " + std::to_string(volume.size()) + ", " + std::to_string(flow_x.size()) +
-        " and " + std::to_string(flow_y.size()) + " values");
+        to_string(shape.size) + " pixels, got " + std::to_string(volume.size()) + ", " +
+        std::to_string(flow_x.size()) + " and " + std::to_string(flow_y.size()) + " values");
   }
   if (settings.window < 1 || settings.window % 2 == 0) {
     throw std::invalid_argument("expected an odd window, got " + std::to_string(settings.window));

@@ -102,15 +102,13 @@ void check_sizes(std::size_t values, const VolumeShape& shape) {
     return;
   }
   throw std::invalid_argument("expected a volume [" + std::to_string(shape.channels()) +
-                              ", H, W] of " + std::to_string(shape.size.width) + "x" +
-                              std::to_string(shape.size.height) + " pixels, got " +
+                              ", H, W] of " + to_string(shape.size) + " pixels, got " +
                               std::to_string(values) + " values");
 }
 
 void check_frame(const GreyImage& frame, ImageSize size) {
   if (frame.size == size && frame.pixels.size() == size.pixel_count()) return;
-  throw std::invalid_argument("expected a frame of " + std::to_string(size.width) + "x" +
-                              std::to_string(size.height) + " pixels, got " +
+  throw std::invalid_argument("expected a frame of " + to_string(size) + " pixels, got " +
                               std::to_string(frame.pixels.size()) + " pixels");
 }
 

@@ -15,8 +15,7 @@ namespace eventgan {
 std::vector<float> linear_intensity(const GreyImage& picture) {
   const ImageSize& size = picture.size;
   if (size.height < 1 || size.width < 1 || picture.pixels.size() != size.pixel_count()) {
-    throw std::invalid_argument("expected an image, got " + std::to_string(size.height) + " x " +
-                                std::to_string(size.width) + " with " +
+    throw std::invalid_argument("expected an image, got " + to_string(size) + " with " +
                                 std::to_string(picture.pixels.size()) + " pixels");
   }
   std::vector<float> intensity(picture.pixels.size());
@@ -129,11 +128,11 @@ void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
   if (needed <= static_cast<double>(memory_bytes)) return;
   throw std::runtime_error(fmt::format(
       "expected a sensor whose events fit into memory ({:.3g} bytes), got about {:.3g} events "
-      "({:.3g} bytes) without any motion from {}x{} pixels in {:g} s: shot_noise_rate_hz {:g}, "
+      "({:.3g} bytes) without any motion from {} pixels in {:g} s: shot_noise_rate_hz {:g}, "
       "hot_pixel_rate_hz {:g} of a share of {:g}, leak_rate_hz {:g}, refractory_s {:g}",
-      static_cast<double>(memory_bytes), needed / (2 * sizeof(Event)), needed, size.width,
-      size.height, duration_s, spec.shot_noise_rate_hz, spec.hot_pixel_rate_hz,
-      spec.hot_pixel_fraction, spec.leak_rate_hz, spec.refractory_s));
+      static_cast<double>(memory_bytes), needed / (2 * sizeof(Event)), needed, to_string(size),
+      duration_s, spec.shot_noise_rate_hz, spec.hot_pixel_rate_hz, spec.hot_pixel_fraction,
+      spec.leak_rate_hz, spec.refractory_s));
 }
 
 /// The time from one picture to the next. Times within are parts of it, 0..1, so that neither a

@@ -51,10 +51,6 @@ namespace {
 constexpr int kLongestGap = 6;
 constexpr int kMargin = 2;
 
-std::string text_of(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// What `prepare` returns or, if it throws a std::runtime_error, why not.
 template <class Prepare>
 SharedFrame frame_or_fault(Prepare prepare) {
@@ -125,9 +121,9 @@ Outcome<PreparedPair> PairReader::read(const FramePair& pair) const {
   const auto& before = std::get<PreparedFrame>(*previous);
   const auto& after = std::get<PreparedFrame>(*next);
   if (before.placement.source != after.placement.source) {
-    return SampleFault{"expected two frames of one size, got " + text_of(before.placement.source) +
-                       " in " + pair.previous.path + " and " + text_of(after.placement.source) +
-                       ", in " + pair.next.path};
+    return SampleFault{"expected two frames of one size, got " +
+                       to_string(before.placement.source) + " in " + pair.previous.path + " and " +
+                       to_string(after.placement.source) + ", in " + pair.next.path};
   }
 
   PreparedPair prepared;

@@ -1,4 +1,4 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <algorithm>
 #include <cctype>
@@ -197,14 +197,13 @@ struct Annotations {
 Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::path& base,
                                const SourceRoot& root) {
   if (spec.annotations) return {*spec.annotations, base / *spec.annotations};
-  std::string candidates;
-  std::vector<std::string> fitting, left_out;
+  std::vector<std::string> candidates, fitting, left_out;
   for (const std::string& name : root.files_in("")) {
     if (!name.ends_with(".npz")) continue;
     const std::string reason = why_no_human36m_npz(root.on_disk(name));
     if (reason.empty()) fitting.push_back(name);
     const std::string shown = reason.empty() ? name : name + " (not usable: " + reason + ")";
-    candidates += (candidates.empty() ? "; there is " : ", ") + shown;
+    candidates.push_back(shown);
     if (!reason.empty()) left_out.push_back(shown);
   }
   if (fitting.size() == 1) {
@@ -213,7 +212,8 @@ Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::pa
   const std::string message =
       "expected one .npz with imgname, center, scale, part [N, 17, 3] and S [N, 17, 4], got " +
       std::to_string(fitting.size()) + ", in " + root.written("") +
-      ": name one under \"annotations\"" + candidates;
+      ": name one under \"annotations\"" +
+      (candidates.empty() ? "" : fmt::format("; there is {}", fmt::join(candidates, ", ")));
   if (fitting.empty()) throw InputError(message);  // absent or damaged
   throw UsageError(message);
 }

@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "stages/base/archives/typed_array_internal.h"
@@ -12,11 +15,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 std::string wanted_text(const std::vector<std::optional<std::size_t>>& shape) {
-  std::string text;
-  for (const auto& size : shape) {
-    text += (text.empty() ? "" : ", ") + (size ? std::to_string(*size) : "at least 1");
-  }
-  return "[" + text + "]";
+  const auto text = [](const auto& size) { return size ? std::to_string(*size) : "at least 1"; };
+  return fmt::format("[{}]", fmt::join(shape | std::views::transform(text), ", "));
 }
 
 bool fits(const std::vector<std::size_t>& shape,

@@ -1,5 +1,7 @@
 #include "stages/frames/kitti/kitti_label.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <optional>
 
@@ -83,14 +85,6 @@ class ColumnReader {
   std::optional<std::string> complaint_;
 };
 
-std::string class_list() {
-  std::string list;
-  for (const std::string& name : kitti_label_schema().class_names) {
-    list += (list.empty() ? "" : ", ") + name;
-  }
-  return list;
-}
-
 }  // namespace
 
 const LabelSchema& kitti_label_schema() {
@@ -147,8 +141,9 @@ Outcome<Box> parse_kitti_object(std::span<const std::string_view> columns, Kitti
   Box box;
   box.class_id = kitti_class_id(columns[0]);
   if (box.class_id < 0) {
-    return SampleFault{"expected one of " + class_list() + ", got " + in_quotes(columns[0]) +
-                       ", in " + where};
+    return SampleFault{fmt::format("expected one of {}, got {}, in {}",
+                                   fmt::join(kitti_label_schema().class_names, ", "),
+                                   in_quotes(columns[0]), where)};
   }
 
   ColumnReader numbers(columns.subspan(1));

@@ -1,11 +1,14 @@
 #include "stages/frames/mpii/mpii_frames.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <fstream>
 #include <iterator>
 #include <optional>
+#include <ranges>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -37,11 +40,9 @@ std::vector<std::string> annotation_folders(const SourceRoot& root) {
 
 [[noreturn]] void refuse_missing(const char* name, const std::vector<std::string>& folders,
                                  const fs::path& base) {
-  std::string places;
-  for (const std::string& folder : folders) {
-    places += (places.empty() ? "" : " or ") + (base / folder).string();
-  }
-  throw InputError(std::string("expected ") + name + ", got none, in " + places);
+  const auto place = [&](const std::string& folder) { return (base / folder).string(); };
+  throw InputError(fmt::format("expected {}, got none, in {}", name,
+                               fmt::join(folders | std::views::transform(place), " or ")));
 }
 
 }  // namespace
@@ -124,10 +125,6 @@ Outcome<ImageSize> size_of(const fs::path& base, const std::string& picture) {
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + picture};
   }
-}
-
-std::string size_text(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
 bool have_one_shape(ImageSize a, ImageSize b) {
@@ -214,7 +211,7 @@ Outcome<LabelScale> MpiiFrames::label_scale(const std::string& image,
   const auto& to = std::get<ImageSize>(stored);
   if (!have_one_shape(from, to)) {
     return SampleFault{"expected a frame of the shape of " + picture->second + ", " +
-                       size_text(from) + ", where it was annotated, got " + size_text(to) +
+                       to_string(from) + ", where it was annotated, got " + to_string(to) +
                        ", in " + frame};
   }
   return LabelScale{static_cast<double>(to.width) / from.width,

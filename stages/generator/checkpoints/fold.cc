@@ -1,5 +1,7 @@
 #include "stages/generator/checkpoints/fold.h"
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <stdexcept>
 #include <utility>
@@ -11,9 +13,7 @@ constexpr double kPowerEpsilon = 1e-12;
 constexpr double kBatchNormEpsilon = 1e-5;
 
 std::string shape_text(const std::vector<std::int64_t>& shape) {
-  std::string text;
-  for (const std::int64_t side : shape) text += (text.empty() ? "" : ", ") + std::to_string(side);
-  return "[" + text + "]";
+  return fmt::format("[{}]", fmt::join(shape, ", "));
 }
 
 /// The state dict with messages: every look-up states what it needs.

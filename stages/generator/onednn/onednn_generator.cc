@@ -188,8 +188,7 @@ class OnednnGenerator final : public Generator {
       std::throw_with_nested(std::runtime_error("the generator failed in oneDNN"));
     } catch (const std::bad_alloc&) {
       std::throw_with_nested(
-          std::runtime_error("expected memory for an image of " + std::to_string(size.width) + "x" +
-                             std::to_string(size.height) + ", about " +
+          std::runtime_error("expected memory for an image of " + to_string(size) + ", about " +
                              std::to_string(working_bytes(size)) + " bytes, got none"));
     }
   }

@@ -86,7 +86,7 @@ class BatchedGenerator final : public Generator {
     } catch (const c10::OutOfMemoryError&) {
       std::throw_with_nested(std::runtime_error(
           "expected memory on the device for " + std::to_string(pairs_in_batch(size)) +
-          " pairs of " + std::to_string(size.width) + "x" + std::to_string(size.height) +
+          " pairs of " + to_string(size) +
           " at once, got less: set a smaller $.image.width and height, \"bfloat16\", or "
           "\"device\": \"cpu\""));
     } catch (const c10::Error&) {

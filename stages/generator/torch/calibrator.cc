@@ -80,8 +80,7 @@ namespace {
 
 void check_frames(std::span<const float> frames, ImageSize size) {
   if (size.height < 1 || size.width < 1 || frames.size() != 2 * size.pixel_count()) {
-    throw std::invalid_argument("expected frames [2, H, W] of " + std::to_string(size.width) + "x" +
-                                std::to_string(size.height) + ", got " +
+    throw std::invalid_argument("expected frames [2, H, W] of " + to_string(size) + ", got " +
                                 std::to_string(frames.size()) + " values");
   }
 }

@@ -48,7 +48,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 pictures without labels\n"
       "  shards           1\n"
-      "in all 3 pairs in 1 shards, about 4.0 MB and 90 s with 2 threads (0.500 s a pair on one "
+      "in all 3 pairs in 1 shards, about 4 MB and 1m30s with 2 threads (0.500 s a pair on one "
       "thread, measured on 2 pairs)\n");
 }
 

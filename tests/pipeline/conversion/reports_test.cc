@@ -31,9 +31,8 @@ ConversionReport report() {
 TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
   const std::string text = to_text(report());
   EXPECT_THAT(text, ::testing::HasSubstr("9 of 10 pairs written, 1 quarantined, in 2 of 2 shards"));
-  EXPECT_THAT(text,
-              ::testing::HasSubstr(
-                  "2.0 MB, volumes compressed 4.5x, 3.0 s; busy seconds: read 1.2 write 0.5"));
+  EXPECT_THAT(text, ::testing::HasSubstr(
+                        "2 MB, volumes compressed 4.5x, 3.0 s; busy seconds: read 1.2 write 0.5"));
   EXPECT_THAT(text, ::testing::HasSubstr("2 labelled frames without a paired frame"));
   EXPECT_THAT(text,
               ::testing::HasSubstr("quarantined: expected an image, got rubbish, in a.png (id)"));

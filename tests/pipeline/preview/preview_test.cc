@@ -35,12 +35,6 @@ TEST(ParseSlots, RefusesWhatIsNoSlot) {
   EXPECT_THROW(parse_slots("0", 0), UsageError);
 }
 
-TEST(Spread, EvenlyFromTheFirst) {
-  EXPECT_THAT(spread(3, 9), ElementsAre(0, 3, 6));
-  EXPECT_THAT(spread(8, 3), ElementsAre(0, 1, 2));
-  EXPECT_THAT(spread(8, 0), ElementsAre());
-}
-
 /// Six samples, 11 to 16, in two shards of four and two: pictures 10 to 16, of which 13 is as
 /// bright as 12, and 15 is 60 levels brighter than 14. So the emptiest sample is 13, and the
 /// fullest 15.

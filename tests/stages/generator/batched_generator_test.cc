@@ -56,7 +56,7 @@ TEST_P(BatchedGenerator, EqualsTheReferenceOfEachPairAlone) {
       const auto expected = generated(*reference, natural_frames(size, i), size);
       EXPECT_LE(largest_difference(volumes[std::size_t(i)], expected),
                 largest * std::ranges::max(expected))
-          << testing::size_text(size) << " " << i;
+          << to_string(size) << " " << i;
     }
   }
 }

@@ -57,10 +57,6 @@ float largest_difference(const std::vector<float>& a, const std::vector<float>& 
   return largest;
 }
 
-std::string size_text(ImageSize size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 Weights calibrated(const Weights& weights, ImageSize size) {
   Calibrator calibrator(weights);
   for (std::uint64_t pair = 0; pair < 4; ++pair) {

@@ -27,7 +27,6 @@ double relative_error(const std::vector<float>& a, const std::vector<float>& exp
 float largest_difference(const std::vector<float>& a, const std::vector<float>& b);
 
 /// "37x1", width first.
-std::string size_text(ImageSize size);
 
 /// The weights with a calibration from a few natural_frames of this size.
 Weights calibrated(const Weights& weights, ImageSize size);

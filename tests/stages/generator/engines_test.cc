@@ -96,8 +96,7 @@ TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
       const auto frames = natural_frames(size, 11);
       const auto volume = generated(*generator, frames, size);
       const auto expected = testing::plain_network(weights, frames, size);
-      const std::string what =
-          testing::size_text(size) + ", width " + std::to_string(base_channels);
+      const std::string what = to_string(size) + ", width " + std::to_string(base_channels);
       if (whole_numbers) {
         EXPECT_LE(largest_difference(volume, expected), 0.1f * usual_largest) << what;
       } else {
@@ -172,7 +171,7 @@ TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
         generator->generate_tiles(frames, wanted, volume);
         EXPECT_LE(largest_difference(volume, expected),
                   largest.at(GetParam().precision) * std::ranges::max(expected))
-            << testing::size_text(size) << " " << origin << ", width " << base_channels;
+            << to_string(size) << " " << origin << ", width " << base_channels;
         for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_GE(volume[i], 0.0f) << i;
       }
     }

@@ -111,7 +111,7 @@ TEST(MapLabels, BoxesAtAndSlightlyBeyondTheBorderAreFine) {
 TEST(MapLabels, ABoxOutsideThePictureIsAFaultThatNamesIt) {
   const std::string reason = fault(Annotation{"", {box(0, 0, 1, 1), box(1300, 20, 1400, 90)}, {}});
   EXPECT_EQ(reason,
-            "expected an overlap with the image of 1242 x 375 pixels, got left 1300, top 20, "
+            "expected an overlap with the image of 1242x375 pixels, got left 1300, top 20, "
             "right 1400, bottom 90, in box 2 of 2, in label_2/001497.txt");
   EXPECT_NE(fault(box(-10, 20, 0, 90)), "");
   EXPECT_NE(fault(box(10, 375, 20, 380)), "");
@@ -169,7 +169,7 @@ TEST(MapLabels, ScaleHeadBoxCentreAndCameraFollowThePicture) {
 
 TEST(MapLabels, APersonWithAllJointsOutsideIsAFault) {
   EXPECT_EQ(fault(person({{kMissingPoint, 0}, {{1300, 10}, 1}, {{10, 400}, 1}})),
-            "expected a joint inside the image of 1242 x 375 pixels, got all annotated ones "
+            "expected a joint inside the image of 1242x375 pixels, got all annotated ones "
             "outside it, the first at (1300, 10), in person 1 of 1, in label_2/001497.txt");
 }
 

@@ -128,7 +128,7 @@ TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
   EXPECT_THAT(text, HasSubstr("demo-train-00000-of-00001.h5\n"));
   EXPECT_THAT(text, HasSubstr("5, valid 4"));
   EXPECT_THAT(text, HasSubstr("quarantined    000002\n"));
-  EXPECT_THAT(text, HasSubstr("2 polarities x 2 bins, 6 x 8 (height x width), float16, deflate 1"));
+  EXPECT_THAT(text, HasSubstr("2 polarities x 2 bins, 8x6 pixels, float16, deflate 1"));
   EXPECT_THAT(text, HasSubstr("3 (Car: 2, DontCare: 1)"));
 }
 

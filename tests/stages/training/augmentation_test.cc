@@ -204,7 +204,7 @@ TEST(Augment, KeepsANan) {
 TEST(Augment, NamesTheCropInItsOrigin) {
   const TrainingSample result =
       augment(marked_sample(1, {6, 9}), {.top = 2, .left = 3, .crop = {3, 5}, .flip_x = true});
-  EXPECT_EQ(result.origin, "recording, frames 3 and 4, crop 3x5 at row 2, column 3, flipped in x");
+  EXPECT_EQ(result.origin, "recording, frames 3 and 4, crop 5x3 at row 2, column 3, flipped in x");
 }
 
 TEST(Augment, RefusesACropThatLeavesTheSampleOrASampleThatIsNotWhole) {

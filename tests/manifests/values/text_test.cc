@@ -1,0 +1,43 @@
+#include "manifests/values/text.h"
+
+#include <gtest/gtest.h>
+
+#include "manifests/values/frames.h"
+
+namespace eventgan {
+namespace {
+
+TEST(Text, HasWidthBeforeHeight) { EXPECT_EQ(to_string(ImageSize{480, 640}), "640x480"); }
+
+TEST(Text, CountsOneAndMany) {
+  EXPECT_EQ(count_text(0, "pair"), "0 pairs");
+  EXPECT_EQ(count_text(1, "pair"), "1 pair");
+  EXPECT_EQ(count_text(12, "pair"), "12 pairs");
+}
+
+TEST(Text, HasBytesWithThreeDigits) {
+  EXPECT_EQ(bytes_text(0), "0 bytes");
+  EXPECT_EQ(bytes_text(999), "999 bytes");
+  EXPECT_EQ(bytes_text(1000), "1 kB");
+  EXPECT_EQ(bytes_text(1'234'567), "1.23 MB");
+  EXPECT_EQ(bytes_text(999'400'000), "999 MB");
+  EXPECT_EQ(bytes_text(999'600'000), "1 GB");
+  EXPECT_EQ(bytes_text(25'000'000'000'000), "25 TB");
+}
+
+TEST(Text, HasCountsByKey) {
+  using Classes = std::map<std::string, std::int64_t>;
+  using Gaps = std::map<int, std::int64_t>;
+  EXPECT_EQ(counts_text(Classes{{"Van", 1}, {"Car", 3}}), "Car: 3, Van: 1");
+  EXPECT_EQ(counts_text(Gaps{{1, 3}, {2, 1}}, "gap "), "gap 1: 3, gap 2: 1");
+  EXPECT_EQ(counts_text(Gaps{}, "gap "), "");
+}
+
+TEST(Text, NamesTheFirst) {
+  EXPECT_EQ(some_of({"a", "b"}, 2), "a, b");
+  EXPECT_EQ(some_of({"a", "b", "c"}, 2), "a, b, ...");
+  EXPECT_EQ(some_of({}, 2), "");
+}
+
+}  // namespace
+}  // namespace eventgan
