@@ -57,13 +57,6 @@ std::vector<int> parse_slots(const std::string& text, int sample_count) {
   return {slots.begin(), slots.end()};
 }
 
-std::vector<std::int64_t> spread(std::int64_t count, std::int64_t all) {
-  std::vector<std::int64_t> places;
-  const std::int64_t taken = std::min(count, all);
-  for (std::int64_t i = 0; i < taken; ++i) places.push_back(i * all / taken);
-  return places;
-}
-
 std::optional<double> rank(Extreme extreme, const ShardOverview& shard, int slot) {
   const auto at = static_cast<std::size_t>(slot);
   const EventColumns& events = shard.tables.events;
