@@ -1,8 +1,12 @@
-"""The pages against the program: commands, options, exit codes, links, Python, and the tests that the pages of guarantees and of numbers name."""
+"""The pages against the program: commands, options, paths, exit codes, links, Python, and the tests that the pages of guarantees and of numbers name."""
 
 import functools
+import itertools
+import json
 import os
+import pathlib
 import re
+import shlex
 import subprocess
 import sys
 import tempfile
@@ -13,9 +17,13 @@ from program import SOURCE, run
 
 PAGES = [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", SOURCE / "docker" / "running.md", SOURCE / "manifests" / "weights" / "README.md",
          *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
+MEASURED = sorted((SOURCE / "tests" / "benchmarks" / "measured").glob("*.md"))  # written by tests/benchmarks
 GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
 NUMERICS = SOURCE / "manifests" / "guides" / "numerics.md"
-COMMAND = re.compile(r"\beventgan ([a-z][a-z-]*)([^#|;&]*)")
+OPTION = r"--[a-z][a-z0-9-]*"
+OWN_PATH = re.compile(r"(\.ci|docker|manifests|pipeline|stages|tests)/[\w./*-]*")
+BLOCK = re.compile(r"(?:^    .*\n|^\n(?=    ))+", re.M)
+PYTHON_PATH = {**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")}
 
 
 def exit_codes():
@@ -23,30 +31,91 @@ def exit_codes():
     return set(re.findall(r"= (\d+)", (SOURCE / "pipeline" / "runtime" / "errors.h").read_text()))
 
 
+def blocks_of(page):
+    return [re.sub("(?m)^    ", "", block) for block in BLOCK.findall(page.read_text(encoding="utf-8"))]
+
+
+def commands_of(code):
+    """The words of each command of shell code."""
+    for line in code.replace("\\\n", " ").splitlines():
+        lexer = shlex.shlex(line, posix=True, punctuation_chars=";&|<>()")
+        lexer.whitespace_split = True
+        try:
+            words = list(lexer)
+        except ValueError:  # a text of several lines begins or ends
+            words = line.split()
+        yield from (list(group) for divides, group in itertools.groupby(words, lambda word: set(word) <= set(";&|<>()")) if not divides)
+
+
 @functools.cache
-def options_of(command):
-    return set(re.findall(r"--[a-z][a-z-]*", run(command, "--help")[0]))
+def commands():
+    return set(re.findall(r"(?m)^  ([a-z-]+) {2,}", run("--help")[0].split("Subcommands:")[1]))
 
 
-def code_of(page):
-    """Code blocks and code in lines of text, a piece each."""
-    text = page.read_text(encoding="utf-8")
-    return re.findall(r"(?m)^    (.+)$", text) + re.findall(r"`([^`\n]+)`", text)
+@functools.cache
+def options_of(*command):
+    """Those that the help of a command of `eventgan`, or of a Python script, names."""
+    if command[0] in commands():
+        text = run(command[0], "--help")[0]
+    else:
+        done = subprocess.run([sys.executable, *command, "--help"], cwd=SOURCE, env=PYTHON_PATH, capture_output=True, text=True)
+        if "ModuleNotFoundError" in done.stderr:
+            raise unittest.SkipTest(done.stderr.splitlines()[-1])
+        text = done.stdout
+    return set(re.findall(OPTION, text))
+
+
+def unknown_options(words, *command):
+    given = {re.match(OPTION, word)[0] for word in words if re.match(OPTION, word)}
+    return given - options_of(*command) if given else set()
+
+
+def unknown_words(words):
+    """Those that the program which is called does not know; None if it is none of this repository, nor CMake."""
+    if len(words) > 1 and words[0] in commands() and words[1].startswith("--"):  # in a line of text, without the program's name
+        words = ["eventgan", *words]
+    for i, word in enumerate(words):
+        name, rest = pathlib.PurePath(word).name, words[i + 1:]
+        if name == "eventgan" and rest and re.fullmatch("[a-z-]+", rest[0]):
+            return unknown_options(rest, rest[0]) if rest[0] in commands() else {rest[0]} - {"--version"}
+        if name == "submit.sh" and "--" in rest:
+            return unknown_options(rest[rest.index("--"):], "convert")
+        if name == "bootstrap.sh" and rest:
+            lists = {path.stem for path in (SOURCE / "docker" / "packages").glob("*.txt")}
+            known = re.findall(r"(?m)^  (\w+)\) ", (SOURCE / "docker" / "bootstrap.sh").read_text())
+            return {rest[0]}.difference(known) | (set(rest[1:]) - lists if rest[0] == "packages" else set())
+        if name in ("cmake", "ctest") and "--preset" in rest:
+            kind = "testPresets" if name == "ctest" else "buildPresets" if "--build" in rest else "configurePresets"
+            presets = json.loads((SOURCE / "CMakePresets.json").read_text())[kind]
+            return {rest[rest.index("--preset") + 1]} - {preset["name"] for preset in presets if not preset.get("hidden")}
+        if word == "-m" and rest and rest[0].startswith("eventgan_shards."):
+            return unknown_options(rest, "-m", *rest[:2])
+        for script in (word, f"manifests/python/examples/{word}"):
+            if name.endswith(".py") and (SOURCE / script).is_file():
+                return unknown_options(rest, script)
+    return None
 
 
 class Documentation(unittest.TestCase):
-    def test_commands_and_options_are_the_programs(self):
-        commands = set(re.findall(r"(?m)^  ([a-z-]+) {2,}", run("--help")[0].split("Subcommands:")[1]))
-        self.assertIn("make-demo", commands)
+    def test_commands_options_and_paths_are_there(self):
         seen = set()
-        for page in PAGES:
-            for code in code_of(page):
-                for command, arguments in COMMAND.findall(code):
-                    with self.subTest(page=page.name, code=code):
-                        self.assertIn(command, commands)
-                        self.assertLessEqual(set(re.findall(r"--[a-z][a-z-]*", arguments)), options_of(command))
-                        seen.add(command)
-        self.assertLessEqual({"plan", "convert", "status", "retry", "finalize", "verify"}, seen)
+        for page in PAGES + MEASURED:
+            code = [*blocks_of(page), *re.findall(r"`([^`]+)`", page.read_text(encoding="utf-8"))]
+            for words in (words for piece in code for words in commands_of(piece)):
+                with self.subTest(page=page.name, command=" ".join(words)):
+                    unknown = unknown_words(words)
+                    self.assertFalse(unknown)
+                    self.assertEqual([word for word in words if OWN_PATH.fullmatch(word) and not any(SOURCE.glob(word))], [])
+                    seen.update(() if unknown is None else words)
+        self.assertLessEqual({"plan", "convert", "status", "retry", "finalize", "verify", "docker/bootstrap.sh", "ctest", "submit.sh",
+                              "eventgan_shards.evaluate", "train_pose.py"}, {pathlib.PurePath(word).name for word in seen} | seen)
+
+    def test_shell_blocks_parse(self):
+        shell = [(page, block) for page in PAGES for block in blocks_of(page) if any(unknown_words(words) is not None for words in commands_of(block))]
+        self.assertGreater(len(shell), 30)
+        for page, block in shell:
+            done = subprocess.run(["bash", "-n"], input=block, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, f"{page}:\n{block}{done.stderr}")
 
     def test_exit_codes(self):
         codes = exit_codes()
@@ -67,9 +136,8 @@ class Documentation(unittest.TestCase):
 
     def test_the_python_page_runs(self):
         """Its blocks one after the other in one process, as somebody who pastes them, on a small demo dataset."""
-        page = (SOURCE / "manifests" / "guides" / "python.md").read_text(encoding="utf-8")
-        blocks = re.findall(r"(?:^    .*\n|^\n(?=    ))+", page, re.M)
-        code = "\n".join(re.sub(r"(?m)^    ", "", block) for block in blocks if re.search(r"\b(import|Shards\()", block))
+        page = SOURCE / "manifests" / "guides" / "python.md"
+        code = "\n".join(block for block in blocks_of(page) if re.search(r"\b(import|Shards\()", block))
         self.assertGreater(code.count("import"), 4)
         try:
             import matplotlib
@@ -80,13 +148,13 @@ class Documentation(unittest.TestCase):
             for command in (["make-demo", "demo", "--scenes", "10"], ["convert", "demo/manifest.json", "--output", "out", "--progress", "none"], ["finalize", "out"]):
                 subprocess.run([program.PROGRAM, *command], cwd=folder, check=True, capture_output=True)
             ids = subprocess.run([sys.executable, "-c", "from eventgan_shards import Shards; print(Shards('out').column('sample_id')[0])"],
-                                 cwd=folder, env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")}, check=True, capture_output=True)
+                                 cwd=folder, env=PYTHON_PATH, check=True, capture_output=True)
             with open(os.path.join(folder, "wanted.txt"), "wb") as file:
                 file.write(ids.stdout)
             shard = next(name for name in sorted(os.listdir(os.path.join(folder, "out"))) if name.endswith(".h5") and "-train-" in name)
             code = code.replace("kitti-events-train-00000-of-00117.h5", shard)
             run = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True,
-                                 env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python"), "MPLBACKEND": "agg", "OMP_NUM_THREADS": "1"})
+                                 env={**PYTHON_PATH, "MPLBACKEND": "agg", "OMP_NUM_THREADS": "1"})
             self.assertEqual(run.returncode, 0, run.stderr)
             self.assertTrue(os.path.exists(os.path.join(folder, "volume.png")))
 
