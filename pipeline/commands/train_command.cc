@@ -45,7 +45,7 @@ int run(const TrainArguments& arguments) {
 void add_train_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand(
       "train",
-      "Train a generator on recordings of events and frames\nSee manifests/guides/training.md. "
+      "Train a generator on recorded events\nSee manifests/guides/training.md. "
       "SIGINT, SIGTERM or SIGUSR1 save the state and stop; run the same command again to resume.");
   const auto arguments = std::make_shared<TrainArguments>();
   add_job_options(*command, arguments->job,

@@ -33,7 +33,7 @@ bool is_number(std::string_view text) {
 ExtractedName parse_extracted_name(std::string_view name) {
   const auto fail = [name] {
     throw std::invalid_argument(
-        "expected a picture below the root, named like S1_Directions_1.54138969_000001.jpg, got "
+        "expected an image below the root, named like S1_Directions_1.54138969_000001.jpg, got "
         "\"" +
         std::string(name) + "\"");
   };
@@ -230,7 +230,7 @@ std::map<std::string, Video> videos_of(const NpzTable& table, const std::string&
     const ExtractedName& name = table.name(row);
     Video& video = videos.try_emplace(name.sequence, Video{name.folder, {}}).first->second;
     if (video.folder != name.folder) {
-      throw InputError("expected the pictures of " + name.sequence + " in one folder, got " +
+      throw InputError("expected the images of " + name.sequence + " in one folder, got " +
                        video.folder + " and " + name.folder + ", in " + file);
     }
     video.labelled.push_back(name.number);

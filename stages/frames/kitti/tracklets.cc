@@ -192,7 +192,7 @@ Point3 rotate(const std::array<double, 9>& m, const Point3& x) {
 ImageSize to_size(const std::array<double, 2>& width_height, const std::string& path) {
   for (const double side : width_height) {
     if (side < 1 || side > std::numeric_limits<int>::max()) {
-      throw InputError("expected a picture size for S_rect_02, got " + std::to_string(side) +
+      throw InputError("expected an image size for S_rect_02, got " + std::to_string(side) +
                        ", in " + path);
     }
   }

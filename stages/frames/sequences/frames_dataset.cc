@@ -51,7 +51,7 @@ class PicturesDataset final : public Dataset {
       note(without_pictures, "folders without pictures");
     }
     if (labelled_.empty()) {
-      throw InputError("expected pictures, folders of pictures, or videos, got none, in " +
+      throw InputError("expected images, folders of images, or videos, got none, in " +
                        root_.on_disk("").string());
     }
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
@@ -392,7 +392,7 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
     return open_videos_dataset(spec, base);
   }
   throw InputError(
-      "expected a video (mp4, avi, mov, mkv), a folder of pictures, of such folders, or of "
+      "expected a video (mp4, avi, mov, mkv), a folder of images, of such folders, or of "
       "videos, got " +
       std::string(std::filesystem::exists(status) ? "something else" : "nothing") + ", in " +
       root.string());

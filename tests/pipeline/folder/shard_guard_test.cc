@@ -59,7 +59,8 @@ TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
   write_marker_of("bytez");
   expect_damaged([]() -> int { throw std::logic_error("was read"); }, "SHA-256");
   write_marker_of("byte");
-  expect_damaged([]() -> int { throw std::logic_error("was read"); }, "size in bytes 4");
+  expect_damaged([]() -> int { throw std::logic_error("was read"); },
+                 "size in bytes in its commit record 4");
 }
 
 TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {

@@ -59,7 +59,7 @@ TEST(ImageSizeProbe, FaultsNameTheFile) {
   for (const std::string name : {"empty.png", "words.txt", "zeros.mp4", "none.jpg"}) {
     const auto outcome = probe_image_size(folder / name);
     ASSERT_TRUE(is_fault(outcome)) << name;
-    EXPECT_THAT(std::get<SampleFault>(outcome).reason, StartsWith("expected a "));
+    EXPECT_THAT(std::get<SampleFault>(outcome).reason, StartsWith("expected a"));
     EXPECT_THAT(std::get<SampleFault>(outcome).reason,
                 EndsWith(", in " + (folder / name).string()));
   }

@@ -218,7 +218,7 @@ TEST(RawCalibration, AMalformedFileIsAnErrorThatNamesTheKey) {
   expect_error(kVeloToCam,
                "S_rect_02: 0 40\nR_rect_00: 1 0 0 0 1 0 0 0 1\n"
                "P_rect_02: 100 0 50 0 0 100 20 0 0 0 1 0\n",
-               "expected a picture size");
+               "expected an image size");
 }
 
 // Every object would lie in one place then, or nowhere, and no box be found of it.
