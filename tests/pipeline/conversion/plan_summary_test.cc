@@ -48,12 +48,12 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 pictures without labels\n"
       "  shards           1\n"
-      "in all 3 pairs in 1 shards, about 4 MB and 1m30s with 2 threads (0.500 s a pair on one "
+      "total: 3 pairs in 1 shards, about 4 MB and 1m30s with 2 threads (0.500 s per pair on one "
       "thread, measured on 2 pairs)\n");
 }
 
 TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
-  EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be tried"));
+  EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be measured"));
 }
 
 TEST_F(PlanSummary, SaysThatADeviceIsFasterThanItsTrial) {
