@@ -614,7 +614,7 @@ def test_the_command_prints_tables_json_and_pictures(folder, tmp_path):
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
     said = evaluate("detections", found, "--truth", folder)
     assert "4 samples (3 without a prediction), 2 ground-truth boxes" in said
-    assert "average precisions of all 2 predictions, precision, recall and F1 of 1, by confidence 0.2 and non-maximum" in said
+    assert "average precisions use all 2 predictions; precision, recall and F1 use 1, after confidence 0.2 and non-maximum" in said
     heading, car = said.split("\n\n")[1].splitlines()[:2]
     assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500", "0.500", "0.667"] and heading.split()[-1] == "F1"
     assert json.loads(evaluate("detections", found, "--truth", folder, "--json"))["classes"]["Car"]["recall_easy"] is None
