@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 
-#include "manifests/values/counter_random.h"
+#include "manifests/values/gaussian_random.h"
 
 namespace eventgan {
 namespace {
@@ -94,10 +93,7 @@ Weights untrained_weights(int base_channels, int bins, std::uint64_t seed) {
     const double deviation = std::sqrt(2.0 / fan_in);
     layer.weight.resize(std::size_t(layer.out_channels) * fan_in);
     for (std::size_t i = 0; i < layer.weight.size(); ++i) {
-      // Box-Muller; 1 - u keeps the logarithm's argument above 0.
-      const double radius = std::sqrt(-2.0 * std::log(1.0 - random.uniform(2 * i)));
-      const double angle = 2.0 * std::numbers::pi * random.uniform(2 * i + 1);
-      layer.weight[i] = static_cast<float>(deviation * radius * std::cos(angle));
+      layer.weight[i] = static_cast<float>(gaussian(random, i, deviation));
     }
     layer.bias.assign(layer.out_channels, 0.0f);
   }

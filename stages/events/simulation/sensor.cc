@@ -5,10 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <stdexcept>
 #include <string>
 #include <tuple>
+
+#include "manifests/values/gaussian_random.h"
 
 namespace eventgan {
 
@@ -23,16 +24,6 @@ std::vector<float> linear_intensity(const GreyImage& picture) {
                          [](std::uint8_t value) { return static_cast<float>(value) / 255.0f; });
   return intensity;
 }
-
-namespace {
-
-double gaussian(CounterRandom random, std::size_t pixel) {
-  // 1 - uniform lies in (0, 1]: its logarithm is finite.
-  const double radius = std::sqrt(-2.0 * std::log(1.0 - random.uniform(2 * pixel)));
-  return radius * std::cos(2.0 * std::numbers::pi * random.uniform(2 * pixel + 1));
-}
-
-}  // namespace
 
 std::vector<float> draw_thresholds(double mean, double spread, std::size_t pixel_count,
                                    CounterRandom random) {

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "manifests/values/counter_random.h"
+#include "manifests/values/gaussian_random.h"
 #include "stages/training/networks/network_state_internal.h"
 
 namespace eventgan {
@@ -27,11 +26,7 @@ void fill(at::Tensor& tensor, const Draw& draw) {
 }
 
 Draw normal(CounterRandom random, double deviation) {
-  return [=](std::uint64_t i) {
-    // Box-Muller; 1 - u keeps the logarithm's argument above 0.
-    const double radius = std::sqrt(-2 * std::log(1 - random.uniform(2 * i)));
-    return deviation * radius * std::cos(2 * std::numbers::pi * random.uniform(2 * i + 1));
-  };
+  return [=](std::uint64_t i) { return gaussian(random, i, deviation); };
 }
 
 Draw uniform(CounterRandom random, double limit) {
