@@ -7,10 +7,10 @@
 #include <utility>
 
 #include "pipeline/exports/exporter_internal.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/pictures/skeleton.h"
-#include "stages/exports/array_files.h"
 #include "stages/exports/detection_labels.h"
 #include "stages/exports/pose_list.h"
 #include "stages/labels/label_mapping.h"

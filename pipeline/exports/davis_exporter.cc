@@ -8,6 +8,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/exports/exporter_internal.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/exports/array_files.h"
 #include "stages/exports/davis_file.h"
 #include "stages/exports/pose_list.h"

@@ -12,11 +12,11 @@
 #include "manifests/values/faults.h"
 #include "pipeline/exports/exporter_internal.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/pictures/preview_picture.h"
-#include "stages/exports/array_files.h"
 #include "stages/exports/export_name.h"
 
 namespace eventgan {

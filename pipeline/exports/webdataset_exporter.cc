@@ -7,6 +7,7 @@
 #include "manifests/documents/json_text_internal.h"
 #include "pipeline/exports/exporter_internal.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/exports/array_files.h"
 #include "stages/shards/codec/volume_codec.h"

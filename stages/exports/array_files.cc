@@ -1,66 +1,13 @@
 #include "stages/exports/array_files.h"
 
 #include <fmt/core.h>
-#include <utf8.h>
 #include <zip.h>
 
-#include <algorithm>
-#include <charconv>
 #include <cstdint>
-#include <functional>
-#include <iterator>
 #include <memory>
-#include <numeric>
 #include <stdexcept>
 
 namespace eventgan {
-
-std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
-                     std::span<const std::byte> values) {
-  std::size_t item_bytes = 0;
-  std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), item_bytes);
-  if (dtype[1] == 'U') item_bytes *= sizeof(char32_t);
-  const std::size_t count =
-      std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
-  if (values.size() != count * item_bytes) {
-    throw std::invalid_argument(
-        fmt::format("expected {} bytes of an array, got {}", count * item_bytes, values.size()));
-  }
-  std::string sides;
-  for (const std::size_t side : shape) sides += std::to_string(side) + ", ";
-  if (shape.size() > 1) sides.erase(sides.size() - 2);
-  if (shape.size() == 1) sides.pop_back();  // "(4,)"
-  std::string header =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", dtype, sides);
-  constexpr std::size_t kPreamble = 10;
-  constexpr std::size_t kAlignment = 64;
-  header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
-  header += '\n';
-  std::string file("\x93NUMPY\x01\x00", 8);
-  file += static_cast<char>(header.size() & 0xff);
-  file += static_cast<char>(header.size() >> 8);
-  file += header;
-  return file.append(reinterpret_cast<const char*>(values.data()), values.size());
-}
-
-std::string npy_texts(const std::vector<std::string>& texts) {
-  std::vector<std::u32string> wide;
-  std::size_t longest = 1;
-  for (const std::string& text : texts) {
-    std::string sound;
-    utf8::replace_invalid(text.begin(), text.end(), std::back_inserter(sound));
-    wide.emplace_back();
-    utf8::utf8to32(sound.begin(), sound.end(), std::back_inserter(wide.back()));
-    longest = std::max(longest, wide.back().size());
-  }
-  std::vector<char32_t> values;
-  for (std::u32string& text : wide) {
-    text.resize(longest, U'\0');
-    values.insert(values.end(), text.begin(), text.end());
-  }
-  return npy_file(fmt::format("<U{}", longest), {texts.size()}, values);
-}
-
 namespace {
 
 struct FreeSource {

@@ -1,12 +1,16 @@
 #include "stages/base/archives/numpy_arrays.h"
 
+#include <fmt/core.h>
 #include <utf8.h>
 
 #include <algorithm>
 #include <bit>
 #include <charconv>
 #include <cstring>
+#include <functional>
+#include <iterator>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -272,10 +276,11 @@ class HeaderReader {
   const std::string& name_;
 };
 
+constexpr std::string_view kMagic = "\x93NUMPY";
+
 }  // namespace
 
 TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) {
-  constexpr std::string_view kMagic = "\x93NUMPY";
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!text.starts_with(kMagic) || text.size() < 8) {
     refuse_numpy("a .npy file", std::to_string(text.size()) + " bytes without its magic", name);
@@ -294,6 +299,53 @@ TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) 
   }
   const NumpyLayout layout = HeaderReader(text.substr(start, length), name).read();
   return decode_numpy_elements(layout, bytes.subspan(start + length), name);
+}
+
+std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
+                     std::span<const std::byte> values) {
+  std::size_t item_bytes = 0;
+  std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), item_bytes);
+  if (dtype[1] == 'U') item_bytes *= sizeof(char32_t);
+  const std::size_t count =
+      std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
+  if (values.size() != count * item_bytes) {
+    throw std::invalid_argument(
+        fmt::format("expected {} bytes of an array, got {}", count * item_bytes, values.size()));
+  }
+  std::string sides;
+  for (const std::size_t side : shape) sides += std::to_string(side) + ", ";
+  if (shape.size() > 1) sides.erase(sides.size() - 2);
+  if (shape.size() == 1) sides.pop_back();  // "(4,)"
+  std::string header =
+      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", dtype, sides);
+  constexpr std::size_t kPreamble = 10;
+  constexpr std::size_t kAlignment = 64;
+  header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
+  header += '\n';
+  std::string file(kMagic);
+  file += {'\x01', '\x00'};
+  file += static_cast<char>(header.size() & 0xff);
+  file += static_cast<char>(header.size() >> 8);
+  file += header;
+  return file.append(reinterpret_cast<const char*>(values.data()), values.size());
+}
+
+std::string npy_texts(const std::vector<std::string>& texts) {
+  std::vector<std::u32string> wide;
+  std::size_t longest = 1;
+  for (const std::string& text : texts) {
+    std::string sound;
+    utf8::replace_invalid(text.begin(), text.end(), std::back_inserter(sound));
+    wide.emplace_back();
+    utf8::utf8to32(sound.begin(), sound.end(), std::back_inserter(wide.back()));
+    longest = std::max(longest, wide.back().size());
+  }
+  std::vector<char32_t> values;
+  for (std::u32string& text : wide) {
+    text.resize(longest, U'\0');
+    values.insert(values.end(), text.begin(), text.end());
+  }
+  return npy_file(fmt::format("<U{}", longest), {texts.size()}, values);
 }
 
 namespace {

@@ -4,6 +4,8 @@
 #include <set>
 #include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "stages/base/archives/pickle.h"
 #include "stages/base/archives/typed_array.h"
@@ -15,6 +17,22 @@ namespace eventgan {
 /// arrays, which are pickles, are refused. Thread safe. Throws std::runtime_error "expected X, got
 /// Y, in NAME".
 TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name);
+
+/// A .npy file of format version 1: `dtype` is numpy's ("<f2", "|u1"), `values` the array in C
+/// order, little endian. Throws std::invalid_argument if there are not as many bytes as shape and
+/// dtype say. Thread safe, as the others.
+std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
+                     std::span<const std::byte> values);
+
+/// The same of a vector of numbers.
+template <class Number>
+std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
+                     const std::vector<Number>& values) {
+  return npy_file(dtype, shape, std::as_bytes(std::span(values)));
+}
+
+/// A list of text, "<U" of the longest one; what is not UTF-8 becomes U+FFFD.
+std::string npy_texts(const std::vector<std::string>& texts);
 
 /// The globals that a pickle of numpy arrays names, for PickleDocument; numpy 1 and 2, Python 2
 /// and 3.

@@ -19,6 +19,7 @@ namespace eventgan {
 namespace {
 
 using namespace std::string_literals;
+using eventgan::npy_file;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -269,6 +270,41 @@ TEST(NpyArrayTest, ReadsHuman36mLists) {
   EXPECT_THAT(joints.shape, ElementsAre(4, 17, 3));
   // The same joint stands in h36m_coco.json as 473.6835632324219.
   EXPECT_NEAR(joints.number(0), 473.6835632324219, 1e-9);
+}
+
+TEST(NpyFile, IsReadBack) {
+  const std::vector<double> values{1, 2.5, -3, 4, 5, 6};
+  const TypedArray array = parse(npy_file("<f8", {2, 3}, values));
+  EXPECT_EQ(array.shape, (std::vector<std::size_t>{2, 3}));
+  EXPECT_EQ(std::get<std::vector<double>>(array.values), values);
+}
+
+TEST(NpyFile, IsAsNumpyWritesIt) {
+  const std::string file = npy_file("|u1", {3}, std::vector<std::uint8_t>{7, 8, 9});
+  EXPECT_EQ(file.substr(0, 10), std::string("\x93NUMPY\x01\x00\x76\x00", 10));
+  EXPECT_EQ(file.substr(10, 59), "{'descr': '|u1', 'fortran_order': False, 'shape': (3,), }  ");
+  EXPECT_EQ(file.size(), 128u + 3);  // the values begin at a multiple of 64
+  EXPECT_EQ(file.substr(127), "\n\x07\x08\x09");
+}
+
+TEST(NpyFile, ASingleValueHasNoSides) {
+  const TypedArray array = parse(npy_file("<f4", {}, std::vector<float>{0.5f}));
+  EXPECT_TRUE(array.shape.empty());
+  EXPECT_EQ(array.number(0), 0.5);
+}
+
+TEST(NpyFile, RefusesAnotherNumberOfValues) {
+  EXPECT_THROW(npy_file("<f4", {2}, std::vector<float>{1}), std::invalid_argument);
+}
+
+TEST(NpyTexts, AreReadBack) {
+  const std::vector<std::string> texts{"S1/a", "", "\xc3\xa9t\xc3\xa9"};
+  const TypedArray array = parse(npy_texts(texts));
+  EXPECT_EQ(std::get<std::vector<std::string>>(array.values), texts);
+}
+
+TEST(NpyTexts, WhatIsNotUtf8IsReplaced) {
+  EXPECT_EQ(parse(npy_texts({"a\xff"})).text(0), "a\xef\xbf\xbd");
 }
 
 PickleDocument read(const std::string& pickle) {
