@@ -120,7 +120,7 @@ class CocoExporter : public Exporter {
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     for_each_box(
-        sample, [](int, const Rectangle&, bool) {},
+        sample, numbers_, keep_ignored_, [](const auto&, const auto&) {},
         [&](const std::string& why) { ++left_out[why]; });
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
@@ -141,24 +141,19 @@ class CocoExporter : public Exporter {
     return persons ? source.has_joints() : source.has_boxes();
   }
 
-  /// `take(category, box, is_crowd)`; `leave(why)`.
-  template <class Take, class Leave>
-  void for_each_box(const OutgoingSample& sample, Take take, Leave leave) const {
-    for_each_class_box(sample, [&](const VolumeBox& box, const std::string& name) {
-      const ClassNumbers::Entry entry = numbers_.of(name);
-      if (is_empty(box.clipped)) {
-        leave("boxes of which nothing is left in the volume");
-      } else if (entry.fate == ClassNumbers::Fate::kKept && (!box.ignore || keep_ignored_)) {
-        take(entry.number, box.clipped, box.ignore);
-      } else if (entry.fate == ClassNumbers::Fate::kUnmapped && box.ignore && keep_ignored_) {
-        // Of no class, and COCO ignores by class.
-        for (const auto& [number, _] : numbers_.names()) take(number, box.clipped, true);
-      } else if (box.ignore && entry.fate != ClassNumbers::Fate::kLeftOut) {
-        leave("boxes to ignore");
-      } else {
-        leave("boxes of class " + name);
+  void add_boxes(const OutgoingSample& sample, std::int64_t image_id, std::int64_t& id,
+                 CocoFile& file) const {
+    const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
+      const auto add = [&](int category) {
+        file.add(coco_box({++id, image_id, category}, box.clipped, box.ignore));
+      };
+      if (entry.fate == ClassNumbers::Fate::kKept) {
+        add(entry.number);
+      } else {  // to be ignored and of no class, and COCO ignores by class
+        for (const auto& [number, _] : numbers_.names()) add(number);
       }
-    });
+    };
+    for_each_box(sample, numbers_, keep_ignored_, take, [](const std::string&) {});
   }
 
   /// The joints' names of each category of persons.
@@ -203,16 +198,11 @@ class CocoExporter : public Exporter {
     work.walk(shards, [&](const OutgoingSample& sample) {
       ++image_id;
       if (!is_for(sample.shard, work, persons)) return;
-      if (!persons) {
-        for_each_box(
-            sample,
-            [&](int category, const Rectangle& box, bool is_crowd) {
-              file.add(coco_box({++id, image_id, category}, box, is_crowd));
-            },
-            [](const std::string&) {});
-        return;
+      if (persons) {
+        add_persons(sample, image_id, id, skeletons, file);
+      } else {
+        add_boxes(sample, image_id, id, file);
       }
-      add_persons(sample, image_id, id, skeletons, file);
     });
     file.begin_list("categories");
     if (!persons) {

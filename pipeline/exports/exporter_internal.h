@@ -11,6 +11,7 @@
 #include "pipeline/exports/export_folder.h"
 #include "pipeline/exports/export_input.h"
 #include "pipeline/exports/export_job.h"
+#include "stages/labels/label_mapping.h"
 
 namespace eventgan {
 
@@ -105,16 +106,6 @@ void write_picture_pair(const OutgoingSample& sample, const std::string& folder,
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
 
-/// Calls visit(VolumeBox, name of its class) for each box of a sample.
-template <class Visit>
-void for_each_class_box(const OutgoingSample& sample, Visit&& visit) {
-  const std::vector<Box>& boxes = sample.labels.annotation.boxes;
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    visit(sample.labels.labels.boxes[i],
-          sample.source.class_names.at(static_cast<std::size_t>(boxes[i].class_id)));
-  }
-}
-
 /// values [channel, pixel] as [pixel, channel].
 template <class Value>
 std::vector<Value> channels_last(const std::vector<Value>& values, std::size_t channels) {
@@ -153,5 +144,29 @@ class ClassNumbers {
   std::map<std::string, Entry> entries_;
   std::map<int, std::string> names_;
 };
+
+/// Calls take(ClassNumbers::Entry, VolumeBox) for each box of a sample that is exported, or
+/// leave(why). The class of a box that is taken is kept, or unmapped if the box is to be ignored.
+template <class Take, class Leave>
+void for_each_box(const OutgoingSample& sample, const ClassNumbers& numbers, bool keep_ignored,
+                  const Take& take, const Leave& leave) {
+  using Fate = ClassNumbers::Fate;
+  const std::vector<Box>& boxes = sample.labels.annotation.boxes;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const VolumeBox& box = sample.labels.labels.boxes[i];
+    const std::string& name =
+        sample.source.class_names.at(static_cast<std::size_t>(boxes[i].class_id));
+    const ClassNumbers::Entry entry = numbers.of(name);
+    if (is_empty(box.clipped)) {
+      leave("boxes of which nothing is left in the volume");
+    } else if (entry.fate == Fate::kLeftOut || (entry.fate == Fate::kUnmapped && !box.ignore)) {
+      leave("boxes of class " + name);
+    } else if (box.ignore && !keep_ignored) {
+      leave("boxes to ignore");
+    } else {
+      take(entry, box);
+    }
+  }
+}
 
 }  // namespace eventgan

@@ -3,7 +3,6 @@
 #include "manifests/values/faults.h"
 #include "pipeline/exports/exporter_internal.h"
 #include "stages/exports/detection_labels.h"
-#include "stages/labels/label_mapping.h"
 
 namespace eventgan {
 namespace {
@@ -71,37 +70,19 @@ class YoloExporter : public Exporter {
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     account_full_scale(sample, full_scale_, left_out);
     for_each_box(
-        sample, [](int, const Rectangle&) {}, [&](const std::string& why) { ++left_out[why]; });
+        sample, numbers_, keep_ignored_, [](const auto&, const auto&) {},
+        [&](const std::string& why) { ++left_out[why]; });
   }
 
  private:
-  template <class Take, class Leave>
-  void for_each_box(const OutgoingSample& sample, Take take, Leave leave) const {
-    for_each_class_box(sample, [&](const VolumeBox& box, const std::string& name) {
-      const ClassNumbers::Entry entry = numbers_.of(name);
-      if (is_empty(box.clipped)) {
-        leave("boxes of which nothing is left in the volume");
-      } else if (entry.fate == ClassNumbers::Fate::kLeftOut) {
-        leave("boxes of class " + name);
-      } else if (box.ignore && keep_ignored_) {
-        take(static_cast<int>(names_.size()) - 1, box.clipped);
-      } else if (box.ignore) {
-        leave("boxes to ignore");
-      } else if (entry.fate == ClassNumbers::Fate::kUnmapped) {
-        leave("boxes of class " + name);
-      } else {
-        take(entry.number, box.clipped);
-      }
-    });
-  }
-
   std::string labels_of(const OutgoingSample& sample) const {
     std::string text;
     const ImageSize size = sample.reader.header().volume.size;
-    for_each_box(
-        sample,
-        [&](int number, const Rectangle& box) { text += yolo_line(number, box, size) + "\n"; },
-        [](const std::string&) {});
+    const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
+      const int number = box.ignore ? static_cast<int>(names_.size()) - 1 : entry.number;
+      text += yolo_line(number, box.clipped, size) + "\n";
+    };
+    for_each_box(sample, numbers_, keep_ignored_, take, [](const std::string&) {});
     return text;
   }
 
