@@ -15,6 +15,7 @@
 #include "manifests/documents/manifest_fields.h"
 #include "stages/base/files/sha256.h"
 #include "stages/base/hdf5/hdf5_internal.h"
+#include "stages/base/processor/processor.h"
 
 namespace eventgan {
 namespace {
@@ -155,22 +156,6 @@ std::string preprocessing_json(const ImageSpec& image) {
                          {"blur", image.blur},
                          {"preset", image.preset}};
   return json.dump();
-}
-
-std::string instruction_sets() {
-  std::string sets = "x86-64";
-#if defined(__x86_64__)
-  __builtin_cpu_init();
-  if (__builtin_cpu_supports("sse4.2")) sets += " sse4.2";
-  if (__builtin_cpu_supports("avx2")) sets += " avx2";
-  if (__builtin_cpu_supports("fma")) sets += " fma";
-  if (__builtin_cpu_supports("avx512f")) sets += " avx512f";
-  if (__builtin_cpu_supports("avx512vnni")) sets += " avx512vnni";
-  if (__builtin_cpu_supports("avx512bf16")) sets += " avx512bf16";
-#else
-  sets = "other";
-#endif
-  return sets;
 }
 
 std::string program_version() { return std::string("eventgan ") + EVENTGAN_VERSION; }

@@ -27,10 +27,6 @@ std::map<std::string, std::string> make_fingerprint(
 /// How frames are prepared, as compact JSON; stands in the fingerprint and in every shard.
 std::string preprocessing_json(const ImageSpec& image);
 
-/// The processor's instruction sets that the numeric libraries choose their kernels by: "x86-64
-/// avx2 fma"; "other" where it is no x86-64.
-std::string instruction_sets();
-
 /// Name and version of this program: "eventgan 0.2.0".
 std::string program_version();
 

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <fstream>
 #include <map>
 #include <mutex>
 #include <span>
@@ -20,6 +19,7 @@
 #include "pipeline/tradeoff/measure_computation.h"
 #include "pipeline/tradeoff/real_scores.h"
 #include "stages/base/files/sha256.h"
+#include "stages/base/processor/processor.h"
 #include "stages/generator/shipped_weights.h"
 
 namespace eventgan {
@@ -48,14 +48,7 @@ namespace {
 
 /// "Intel(R) Xeon(R) Processor, avx512_core_vnni".
 std::string processor_text() {
-  std::string name = "unknown processor";
-  std::ifstream file("/proc/cpuinfo");
-  for (std::string line; std::getline(file, line);) {
-    if (!line.starts_with("model name")) continue;
-    name = line.substr(line.find(':') + 2);
-    break;
-  }
-  return name + ", " + engine_support(Precision::kFloat32).processor;
+  return processor_name() + ", " + engine_support(Precision::kFloat32).processor;
 }
 
 class Comparison {

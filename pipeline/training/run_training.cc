@@ -23,6 +23,7 @@
 #include "pipeline/training/sample_source.h"
 #include "pipeline/training/training_checkpoint.h"
 #include "pipeline/training/training_folder.h"
+#include "stages/base/processor/processor.h"
 #include "stages/training/trainer.h"
 
 namespace eventgan {

@@ -17,6 +17,7 @@
 #include "pipeline/planning/fingerprint.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
+#include "stages/base/processor/processor.h"
 #include "stages/generator/safetensors.h"
 
 namespace eventgan {
