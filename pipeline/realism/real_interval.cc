@@ -11,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
 namespace {
@@ -116,13 +117,10 @@ std::vector<FrameInterval> choose_intervals(const Recording& recording, std::int
 }
 
 std::vector<float> network_input(const IntervalFrames& frames) {
-  std::vector<float> input;
-  input.reserve(frames.previous.pixels.size() + frames.next.pixels.size());
-  for (const GreyImage* frame : {&frames.previous, &frames.next}) {
-    for (const std::uint8_t value : frame->pixels) {
-      input.push_back((static_cast<float>(value) / 255.0f - 0.5f) * 2.0f);
-    }
-  }
+  const std::size_t first = frames.previous.pixels.size();
+  std::vector<float> input(first + frames.next.pixels.size());
+  to_input(frames.previous.pixels, std::span(input).first(first));
+  to_input(frames.next.pixels, std::span(input).subspan(first));
   return input;
 }
 

@@ -8,6 +8,7 @@
 #include "manifests/values/faults.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/frames/decoding/prepared_frame.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -64,12 +65,11 @@ constexpr std::size_t kFrameBytes = std::size_t{128} << 20;
 constexpr std::size_t kEventBytes = std::size_t{512} << 20;
 
 void append_cut(const GreyImage& frame, const CropBox& box, std::vector<float>& values) {
+  const auto width = static_cast<std::size_t>(box.size.width);
   for (int y = 0; y < box.size.height; ++y) {
     const auto row = static_cast<std::size_t>(box.top + y) * frame.size.width;
-    for (int x = 0; x < box.size.width; ++x) {
-      const float u = frame.pixels[row + box.left + x];
-      values.push_back((u / 255.0f - 0.5f) * 2.0f);
-    }
+    values.resize(values.size() + width);
+    to_input(std::span(frame.pixels).subspan(row + box.left, width), std::span(values).last(width));
   }
 }
 
