@@ -1,8 +1,6 @@
 #include "pipeline/realism/compare_volumes.h"
 
 #include <fmt/core.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <filesystem>
 #include <mutex>
@@ -12,6 +10,7 @@
 #include <vector>
 
 #include "pipeline/realism/real_interval.h"
+#include "pipeline/runtime/threads.h"
 #include "stages/events/pictures/comparison_picture.h"
 
 namespace eventgan {
@@ -134,13 +133,11 @@ RealismReport compare_volumes(const Recording& recording, std::span<const FrameI
                               const ComparisonRun& run) {
   std::vector<IntervalResult> results(intervals.size());
   std::mutex telling;
-  oneapi::tbb::task_arena(run.threads).execute([&] {
-    oneapi::tbb::parallel_for(std::size_t{0}, intervals.size(), [&](std::size_t i) {
-      results[i] = compare_interval(recording, intervals[i], methods, run);
-      if (!run.on_interval) return;
-      const std::lock_guard lock(telling);
-      run.on_interval();
-    });
+  for_each_index(intervals.size(), run.threads, [&](std::size_t i) {
+    results[i] = compare_interval(recording, intervals[i], methods, run);
+    if (!run.on_interval) return;
+    const std::lock_guard lock(telling);
+    run.on_interval();
   });
 
   RealismReport report;

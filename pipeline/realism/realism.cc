@@ -1,7 +1,5 @@
 #include "pipeline/realism/realism.h"
 
-#include <oneapi/tbb/task_arena.h>
-
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -54,8 +52,8 @@ std::vector<IntervalFrames> frames_to_fit(const Recording& recording,
 class MethodMaker {
  public:
   MethodMaker(const Recording& recording, const std::vector<FrameInterval>& intervals,
-              const RealismOptions& options)
-      : recording_(recording), intervals_(intervals), options_(options) {}
+              const RealismOptions& options, int threads)
+      : recording_(recording), intervals_(intervals), options_(options), threads_(threads) {}
 
   int bins() const { return bins_; }
 
@@ -89,7 +87,7 @@ class MethodMaker {
     double threshold = options_.threshold.value_or(0);
     if (!options_.threshold) {
       if (frames_.empty()) frames_ = frames_to_fit(recording_, intervals_);
-      threshold = fitted_threshold(scene, frames_, options_.log_epsilon, options_.seed);
+      threshold = fitted_threshold(scene, frames_, options_.log_epsilon, options_.seed, threads_);
     }
     return make_simulated_method(std::move(scene), realism_sensor(threshold, options_.log_epsilon),
                                  !options_.threshold, bins_, options_.seed);
@@ -98,6 +96,7 @@ class MethodMaker {
   const Recording& recording_;
   const std::vector<FrameInterval>& intervals_;
   const RealismOptions& options_;
+  const int threads_;
   std::vector<IntervalFrames> frames_;
   int bins_ = kDefaultBins;
 };
@@ -111,10 +110,9 @@ RealismReport measure_realism(
   check_options(options);
   const std::vector<FrameInterval> intervals =
       choose_intervals(recording, options.first_frame, options.last_frame, options.gaps);
-  MethodMaker maker(recording, intervals, options);
   const int threads = thread_count(options.threads);
-  std::vector<std::unique_ptr<VolumeMethod>> methods;
-  oneapi::tbb::task_arena(threads).execute([&] { methods = maker.make(); });
+  MethodMaker maker(recording, intervals, options, threads);
+  const std::vector<std::unique_ptr<VolumeMethod>> methods = maker.make();
   if (!options.pictures.empty()) std::filesystem::create_directories(options.pictures);
 
   const auto progress =

@@ -1,7 +1,6 @@
 #include "pipeline/realism/volume_method.h"
 
 #include <fmt/core.h>
-#include <oneapi/tbb/parallel_for.h>
 
 #include <cmath>
 #include <numeric>
@@ -11,6 +10,7 @@
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
+#include "pipeline/runtime/threads.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/events/volume_statistics.h"
@@ -148,7 +148,7 @@ std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const 
 }
 
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
-                        double log_epsilon, std::uint64_t seed) {
+                        double log_epsilon, std::uint64_t seed, int threads) {
   double wanted = 0;
   for (const IntervalFrames& interval : frames) {
     wanted += static_cast<double>(interval.event_count);
@@ -157,7 +157,7 @@ double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFra
     const SensorSpec sensor = realism_sensor(threshold, log_epsilon);
     const auto draws = static_cast<std::size_t>(scene.draws);
     std::vector<std::size_t> counts(frames.size() * draws);
-    oneapi::tbb::parallel_for(std::size_t{0}, counts.size(), [&](std::size_t i) {
+    for_each_index(counts.size(), threads, [&](std::size_t i) {
       counts[i] =
           draw_events(scene, frames[i / draws], static_cast<int>(i % draws), sensor, seed).size();
     });

@@ -62,9 +62,8 @@ std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const 
 
 /// The threshold in 0.01..5 with which the model makes as many events as the camera did, over all
 /// of `frames` and the mean of the draws, within 0.5 % or as near as it gets: by bisection, since
-/// a higher threshold makes fewer events. Runs in the
-/// calling thread's TBB arena; the result does not depend on its threads.
+/// a higher threshold makes fewer events. The result does not depend on `threads`.
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
-                        double log_epsilon, std::uint64_t seed);
+                        double log_epsilon, std::uint64_t seed, int threads);
 
 }  // namespace eventgan

@@ -1,9 +1,6 @@
 #include "pipeline/simulation/simulate.h"
 
 #include <fmt/core.h>
-#include <oneapi/tbb/global_control.h>
-#include <oneapi/tbb/parallel_for.h>
-#include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
 #include <chrono>
@@ -171,19 +168,8 @@ SimulationReport simulate(const SimulationManifest& manifest, const SimulationOp
     const std::lock_guard lock(showing);
     progress->advance(/*quarantined=*/false, /*bytes=*/0);
   };
-  const int threads = thread_count(options.threads);
-  const tbb::global_control budget(tbb::global_control::max_allowed_parallelism,
-                                   static_cast<std::size_t>(threads));
-  tbb::task_arena(threads).execute([&] {
-    tbb::parallel_for(
-        tbb::blocked_range<std::size_t>(0, works.size(), 1),
-        [&](const tbb::blocked_range<std::size_t>& range) {
-          for (std::size_t i = range.begin(); i != range.end(); ++i) {
-            run(works[i], manifest, on_frame);
-          }
-        },
-        tbb::simple_partitioner());
-  });
+  for_each_index(works.size(), thread_count(options.threads),
+                 [&](std::size_t i) { run(works[i], manifest, on_frame); });
   if (progress) progress->finish();
 
   for (const SourceWork& work : works) {

@@ -133,6 +133,7 @@ BatchPrefetch::Batch BatchPrefetch::next() {
 
 void BatchPrefetch::fill() {
   while (waiting_.size() < ahead_ && started_ < end_) {
+    // A thread of its own: the caller computes a step meanwhile.
     waiting_.push_back(std::async(std::launch::async, make_, started_++));
   }
 }

@@ -59,16 +59,16 @@ std::vector<IntervalFrames> intervals_of(const std::vector<std::int64_t>& event_
 
 TEST(FittedThreshold, MakesAsManyEventsAsTheCamera) {
   // Two intervals of 1000 / threshold events each against 1000 and 7000: threshold 1/4.
-  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1000, 7000}), 0.02, 0), 0.25,
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1000, 7000}), 0.02, 0, 2), 0.25,
               0.25 * 0.006);
-  EXPECT_NEAR(fitted_threshold(inverse_scene(1000, 3), intervals_of({4000}), 0.02, 0), 0.25,
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000, 3), intervals_of({4000}), 0.02, 0, 2), 0.25,
               0.25 * 0.006);
 }
 
 TEST(FittedThreshold, StaysInItsRange) {
-  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({0}), 0.02, 0), 5, 0.01);
-  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1}), 0.02, 0), 5, 0.01);
-  EXPECT_NEAR(fitted_threshold(inverse_scene(0), intervals_of({1000}), 0.02, 0), 0.01, 1e-4);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({0}), 0.02, 0, 2), 5, 0.01);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1}), 0.02, 0, 2), 5, 0.01);
+  EXPECT_NEAR(fitted_threshold(inverse_scene(0), intervals_of({1000}), 0.02, 0, 2), 0.01, 1e-4);
 }
 
 TEST(RealismSensor, IsWithoutNoise) {
