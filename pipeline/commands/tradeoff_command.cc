@@ -145,12 +145,12 @@ int run(TradeoffArguments& arguments) {
   const std::string json = to_json(report, arguments.demand);
   write_file_atomically(options.out / "tradeoff.json", json);
   write_file_atomically(options.out / "tradeoff.md", to_markdown(report, arguments.demand));
-  write_tradeoff_png(report, options.out / "tradeoff.png");
+  write_file_atomically(options.out / "tradeoff.svg", tradeoff_picture(report));
   if (arguments.progress == ProgressStyle::kJson) {
     std::cout << json << std::flush;
   } else {
     std::cout << to_text(report, arguments.demand) << "\nAll measurements: tradeoff.md, "
-              << "tradeoff.json and tradeoff.png in " << options.out.string() << std::endl;
+              << "tradeoff.json and tradeoff.svg in " << options.out.string() << std::endl;
   }
   return kComplete;
 }

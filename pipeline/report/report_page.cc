@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 #include <openssl/evp.h>
-#include <utf8.h>
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <string_view>
 #include <system_error>
@@ -15,42 +13,11 @@
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
 #include "pipeline/runtime/progress.h"
+#include "stages/base/charts/svg_chart.h"
 
 namespace eventgan {
 
 namespace fs = std::filesystem;
-
-std::string escaped(const std::string& text, std::size_t most) {
-  std::string sound;
-  utf8::replace_invalid(text.begin(), text.end(), std::back_inserter(sound));
-  std::string html;
-  for (std::size_t i = 0; i < sound.size(); ++i) {
-    const char c = sound[i];
-    const bool begins = (static_cast<unsigned char>(c) & 0xC0) != 0x80;
-    if (i >= most && begins) return html + "…";
-    switch (c) {
-      case '&':
-        html += "&amp;";
-        break;
-      case '<':
-        html += "&lt;";
-        break;
-      case '>':
-        html += "&gt;";
-        break;
-      case '"':
-        html += "&quot;";
-        break;
-      case '\'':
-        html += "&#39;";
-        break;
-      default:
-        html += static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t' ? "\uFFFD"
-                                                                               : std::string(1, c);
-    }
-  }
-  return html;
-}
 
 namespace {
 
@@ -107,113 +74,14 @@ std::string table(const std::vector<std::string>& columns, const std::vector<std
 
 // ---- Charts
 
-struct Series {
-  std::string name;
-  std::vector<double> values;
-};
-
-/// Bars in SVG: the values of one place beside each other, or `stacked`.
-struct BarChart {
-  std::string key;  ///< its data-key
-  std::string title, x_axis, y_axis;
-  /// Below the bars; or, one more than bars, below their edges.
-  std::vector<std::string> labels;
-  std::vector<Series> series;
-  bool stacked = false;
-};
-
-/// 1, 2 or 5 times a power of ten, so that `most` has at most five such steps.
-double tick_step(double most) {
-  const double rough = most / 5;
-  const double decade = std::pow(10.0, std::floor(std::log10(rough)));
-  for (const double digit : {1.0, 2.0, 5.0}) {
-    if (digit * decade >= rough * (1 - 1e-9)) return digit * decade;
-  }
-  return 10 * decade;
-}
-
-std::string draw(const BarChart& chart) {
-  // A tick label is a number of up to seven characters of 8: half of the last one is to the right
-  // of the bars, and the vertical axis has its title to the left of them.
-  constexpr double kWidth = 460, kHeight = 260, kLeft = 80, kRight = 28, kTop = 12, kBottom = 46;
-  constexpr std::size_t kMostLabel = 14;
-  constexpr double kPlotWidth = kWidth - kLeft - kRight, kPlotHeight = kHeight - kTop - kBottom;
-  const std::size_t bars = chart.series.empty() ? 0 : chart.series.front().values.size();
-  double most = 0;
-  for (std::size_t i = 0; i < bars; ++i) {
-    double sum = 0;
-    for (const Series& series : chart.series) {
-      sum = chart.stacked ? sum + series.values[i] : std::max(sum, series.values[i]);
-    }
-    most = std::max(most, sum);
-  }
-  std::string html = fmt::format("<figure data-key=\"{}\"><figcaption>{}</figcaption>",
-                                 escaped(chart.key), escaped(chart.title));
-  if (bars == 0 || !(most > 0)) return html + "<p class=note>nothing to show</p></figure>";
-
-  const double step = tick_step(most);
-  const double top = step * std::ceil(most / step - 1e-9);
-  const auto y_of = [&](double value) { return kTop + kPlotHeight * (1 - value / top); };
-  html += fmt::format("<svg viewBox=\"0 0 {} {}\" role=img aria-label=\"{}\">", kWidth, kHeight,
-                      escaped(chart.title));
-  for (double tick = 0; tick <= top * (1 + 1e-9); tick += step) {
-    html += fmt::format(
-        "<path class=grid d=\"M{:.1f} {:.1f}H{:.1f}\"/><text class=t x=\"{:.1f}\" y=\"{:.1f}\" "
-        "text-anchor=end>{:.4g}</text>",
-        kLeft, y_of(tick), kWidth - kRight, kLeft - 6, y_of(tick) + 4,
-        std::abs(tick) < step / 2 ? 0.0 : tick);
-  }
-  const double slot = kPlotWidth / static_cast<double>(bars);
-  const double bar_width =
-      chart.stacked ? slot * 0.84 : slot * 0.84 / static_cast<double>(chart.series.size());
-  for (std::size_t i = 0; i < bars; ++i) {
-    double below = 0;
-    for (std::size_t s = 0; s < chart.series.size(); ++s) {
-      const double value = chart.series[s].values[i];
-      if (!(value > 0)) continue;
-      const double left = kLeft + slot * (static_cast<double>(i) + 0.08) +
-                          (chart.stacked ? 0 : bar_width * static_cast<double>(s));
-      std::string where = chart.labels[i];
-      if (chart.labels.size() > bars) where += " – " + chart.labels[i + 1];
-      html += fmt::format(
-          "<rect class=s{} x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" "
-          "data-value=\"{:.6g}\"><title>{}{}{}: {:.4g}</title></rect>",
-          s % 6, left, y_of(below + value), bar_width, y_of(below) - y_of(below + value), value,
-          escaped(chart.series[s].name), chart.series[s].name.empty() ? "" : ", ", escaped(where),
-          value);
-      if (chart.stacked) below += value;
-    }
-  }
-  html += fmt::format("<path class=axis d=\"M{:.1f} {:.1f}H{:.1f}\"/>", kLeft, y_of(0),
-                      kWidth - kRight);
-  const bool at_edges = chart.labels.size() > bars;
-  std::size_t longest = 1;
-  for (const std::string& label : chart.labels) longest = std::max(longest, label.size());
-  const auto fitting =
-      static_cast<std::size_t>(kPlotWidth / (8.0 * std::min(longest, kMostLabel) + 8));
-  const std::size_t every = (chart.labels.size() + fitting - 1) / fitting;
-  for (std::size_t i = 0; i < chart.labels.size(); i += every) {
-    const double x = kLeft + slot * (static_cast<double>(i) + (at_edges ? 0 : 0.5));
-    html += fmt::format("<text class=t x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=middle>{}</text>", x,
-                        kTop + kPlotHeight + 16, escaped(chart.labels[i], kMostLabel));
-  }
-  html += fmt::format(
-      "<text class=a x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=middle>{}</text><text class=a "
-      "transform=\"translate(13 {:.1f}) rotate(-90)\" text-anchor=middle>{}</text></svg>",
-      kLeft + kPlotWidth / 2, kHeight - 8, escaped(chart.x_axis), kTop + kPlotHeight / 2,
-      escaped(chart.y_axis));
-  if (chart.series.size() > 1) {
-    html += "<p class=legend>";
-    for (std::size_t s = 0; s < chart.series.size(); ++s) {
-      html += fmt::format("<span><i class=s{}></i>{}</span>", s % 6, escaped(chart.series[s].name));
-    }
-    html += "</p>";
-  }
-  return html + "</figure>";
+std::string figure(const std::string& key, const Chart& chart) {
+  return fmt::format("<figure data-key=\"{}\"><figcaption>{}</figcaption>", key,
+                     escaped(chart.title)) +
+         chart_svg(chart) + "</figure>";
 }
 
 /// The bins that are occupied by any of the histograms, as labels of edges and series.
-void fill(BarChart& chart, const std::vector<std::pair<std::string, const LogHistogram*>>& of) {
+void fill(Chart& chart, const std::vector<std::pair<std::string, const LogHistogram*>>& of) {
   const int bins = static_cast<int>(std::size(LogHistogram().counts));
   int first = bins, last = -1;
   for (const auto& [name, histogram] : of) {
@@ -453,7 +321,8 @@ std::string histograms(const Survey& survey) {
                                       : "sum of a pixel's values, mean over the volume";
   std::string html = "<section><h2>Distributions</h2><div class=charts>";
 
-  BarChart density{"events_per_pixel", "Events per pixel", unit, "samples", {}, {}, true};
+  Chart density{"Events per pixel", unit, "samples"};
+  density.stacked = true;
   std::vector<std::pair<std::string, const LogHistogram*>> of;
   LogHistogram rest;
   std::int64_t zeros = 0;
@@ -472,37 +341,33 @@ std::string histograms(const Survey& survey) {
   fill(density, of);
   if (zeros > 0)
     density.title += fmt::format(" ({} volumes without events are left out)", grouped(zeros));
-  html += draw(density);
+  html += figure("events_per_pixel", density);
 
-  BarChart gaps{"gaps",    "Gaps", "frames from the pair's first frame to its second",
-                "samples", {},     {{"", {}}}};
+  Chart gaps{"Gaps", "frames from the pair's first frame to its second", "samples", {{"", {}}}};
   for (const auto& [number, gap] : survey.gaps) {
     gaps.labels.push_back(std::to_string(number));
-    gaps.series[0].values.push_back(static_cast<double>(gap.samples));
+    gaps.series[0].y.push_back(static_cast<double>(gap.samples));
   }
-  html += draw(gaps);
+  html += figure("gaps", gaps);
 
-  BarChart bins{"time_bins",
-                "Time bins by polarity, " + of_volumes(survey),
-                "time bin, first to last",
-                "mean pixel value",
-                {},
-                {}};
+  Chart bins{
+      "Time bins by polarity, " + of_volumes(survey),
+      "time bin, first to last",
+      "mean pixel value",
+      {{"brighter (positive)", survey.positive_bins}, {"darker (negative)", survey.negative_bins}}};
   for (std::size_t bin = 0; bin < survey.positive_bins.size(); ++bin) {
     bins.labels.push_back(std::to_string(bin + 1));
   }
-  bins.series = {{"brighter (positive)", survey.positive_bins},
-                 {"darker (negative)", survey.negative_bins}};
-  html += draw(bins);
+  html += figure("time_bins", bins);
 
   if (survey.counts.boxes > 0) {
-    BarChart sides{"box_sides", "Box sizes", "√(width × height) in volume pixels", "boxes", {}, {}};
+    Chart sides{"Box sizes", "√(width × height) in volume pixels", "boxes"};
     fill(sides, {{"", &survey.box_sides}});
     if (survey.box_sides.zeros > 0) {
       sides.title +=
           fmt::format(" ({} without area are left out)", grouped(survey.box_sides.zeros));
     }
-    html += draw(sides);
+    html += figure("box_sides", sides);
   }
   return html + "</div></section>";
 }
@@ -651,9 +516,9 @@ std::string shards(const Survey& survey, const PageContext& context) {
 
 constexpr char kStyle[] = R"css(
 :root{color-scheme:light dark;--paper:#fbfaf8;--card:#fff;--ink:#1d2327;--soft:#5c666d;--line:#dcdfe1;--bad:#b3261e;--bad-paper:#fdecea;
---link:#0b5fa5;--more:#0b5fa566;--s0:#2b6cb0;--s1:#d97706;--s2:#2f855a;--s3:#9f3a8b;--s4:#6b7280;--s5:#b7791f}
+--link:#0b5fa5;--more:#0b5fa566}
 @media (prefers-color-scheme:dark){:root{--paper:#14181b;--card:#1c2226;--ink:#e6e9eb;--soft:#9aa5ac;--line:#343c42;--bad:#ffb4ab;
---bad-paper:#4a1410;--link:#8cc4ff;--more:#8cc4ff66;--s0:#6aa9e9;--s1:#f0a04b;--s2:#68c48c;--s3:#d58ac6;--s4:#a0a8af;--s5:#e3c158}}
+--bad-paper:#4a1410;--link:#8cc4ff;--more:#8cc4ff66}}
 *{box-sizing:border-box}
 body{margin:0 auto;padding:1.5rem clamp(.75rem,3vw,2.5rem) 4rem;max-width:1240px;background:var(--paper);color:var(--ink);
 font:16px/1.5 system-ui,-apple-system,"Segoe UI",Roboto,"DejaVu Sans",sans-serif;overflow-wrap:anywhere}
@@ -686,11 +551,6 @@ figure{margin:0;background:var(--card);border:1px solid var(--line);border-radiu
 .charts figcaption{font-weight:600;font-size:.95rem;margin-bottom:.4rem}
 .pictures figure{padding:0;overflow:hidden}.pictures figcaption{padding:.5rem .75rem;font-size:.85rem;color:var(--soft)}
 .pictures figcaption b{color:var(--ink)}img{display:block;width:100%;height:auto}svg{display:block;width:100%;height:auto}
-svg text{fill:var(--soft);font-size:12px}svg .a{font-size:12.5px}.grid{stroke:var(--line)}.axis{stroke:var(--soft)}
-.s0{fill:var(--s0);background:var(--s0)}.s1{fill:var(--s1);background:var(--s1)}.s2{fill:var(--s2);background:var(--s2)}
-.s3{fill:var(--s3);background:var(--s3)}.s4{fill:var(--s4);background:var(--s4)}.s5{fill:var(--s5);background:var(--s5)}
-.legend{margin:.4rem 0 0;font-size:.85rem;color:var(--soft)}.legend span{margin-right:1rem;white-space:nowrap}
-.legend i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.4em}
 details{margin:.75rem 0}summary{cursor:pointer;color:var(--link)}details>.scroll,details>pre{margin-top:.5rem}
 )css";
 
@@ -704,7 +564,7 @@ std::string report_page(const Survey& survey, const PageContext& context) {
              "data:; "
              "style-src 'unsafe-inline'\"><title>{} – eventgan report</title><style>",
              escaped(survey.parts.frozen.plan.name)) +
-         kStyle + "</style></head><body>\n" + head(survey, context) + "\n" +
+         kStyle + chart_style() + "</style></head><body>\n" + head(survey, context) + "\n" +
          origin(survey, context) + "\n" + counts(survey) + "\n" + histograms(survey) + "\n" +
          labels_without_events(survey) + "\n" + pictures(survey, context) + "\n" +
          quarantine(survey, context) + "\n" + time(survey) + "\n" + shards(survey, context) +

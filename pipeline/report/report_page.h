@@ -27,8 +27,4 @@ struct PageContext {
 /// `data-value` without ornament. Text that comes from outside is escaped.
 std::string report_page(const Survey& survey, const PageContext& context);
 
-/// Text as HTML shows it: & < > " and ' as entities, bytes that are no UTF-8 and control characters
-/// as U+FFFD; beyond `most` bytes cut, with an ellipsis.
-std::string escaped(const std::string& text, std::size_t most = 300);
-
 }  // namespace eventgan

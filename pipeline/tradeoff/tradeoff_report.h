@@ -54,10 +54,9 @@ std::string to_markdown(const TradeoffReport& report, const TradeoffDemand& dema
 /// JSON, indented, with the spreads; null for what is no finite number.
 std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand);
 
-/// Draws speed (in the reference's) against error, both logarithmic, a point for each trial, the
-/// front as a line with numbers, and beside it their names. It says that the error is the distance
-/// to the reference, not to a camera. Writes a PNG. Throws std::runtime_error
-/// naming the path if it cannot be written.
-void write_tradeoff_png(const TradeoffReport& report, const std::filesystem::path& path);
+/// Speed (in the reference's) against error, both logarithmic, as an SVG file: a point for each
+/// trial, the front as a line with numbers, and below it their names. It says that the error is the
+/// distance to the reference, not to a camera.
+std::string tradeoff_picture(const TradeoffReport& report);
 
 }  // namespace eventgan

@@ -59,10 +59,10 @@ class LossLog {
 std::map<std::string, double> mean_losses(std::span<const LossRow> rows, TrainingPhase phase,
                                           std::size_t count);
 
-/// Draws the losses over the steps, a panel for each that has values, and writes a PNG: phases one
-/// after another on the horizontal axis, the raw values faint and their running mean (over a 50th
-/// of the values) in front. The vertical axis is logarithmic where all values are above 0 and span
-/// more than two decades. No rows give a blank picture. Throws std::runtime_error naming the file.
-void write_loss_curves(std::span<const LossRow> rows, const std::filesystem::path& file);
+/// The losses over the steps as an SVG file, a panel for each that has values: phases one after
+/// another on the horizontal axis, from its first value to its last, the raw values faint and their
+/// running mean (over a 50th of the values) in front. The vertical axis is logarithmic where all
+/// values are above 0 and span more than two decades.
+std::string loss_curves(std::span<const LossRow> rows);
 
 }  // namespace eventgan

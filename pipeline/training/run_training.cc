@@ -23,6 +23,7 @@
 #include "pipeline/training/sample_source.h"
 #include "pipeline/training/training_checkpoint.h"
 #include "pipeline/training/training_folder.h"
+#include "stages/base/files/atomic_file.h"
 #include "stages/base/processor/processor.h"
 #include "stages/training/trainer.h"
 
@@ -262,7 +263,7 @@ void TrainingRun::save() {
   losses_->flush();
   save_checkpoint(folder_.checkpoints(),
                   {position_, total_seconds(), settings_, environment_, trainer_.state()});
-  write_loss_curves(losses_->rows(), folder_.curves());
+  write_file_atomically(folder_.curves(), loss_curves(losses_->rows()));
   if (has_generator()) {
     generator_records_.save(trainer_.generator_state(), position_);
     use_training_threads(threads_);

@@ -82,7 +82,7 @@ struct TrainingReport {
 ///   the end of the run; what a later run goes on from;
 /// - weights-latest.safetensors: with each checkpoint of the generator phase;
 /// - weights.safetensors: at the end;
-/// - training.csv, curves.png: the losses;
+/// - training.csv, curves.svg: the losses;
 /// - validation.csv: realism of the validation pairs, with each checkpoint of the generator phase;
 /// - training.lock: see TrainingLock;
 /// - pictures/generator-STEP.png: every picture_minutes of the generator phase, and after its last

@@ -13,7 +13,7 @@ struct TrainingFolder {
 
   std::filesystem::path checkpoints() const { return root / "checkpoints"; }
   std::filesystem::path losses() const { return root / "training.csv"; }
-  std::filesystem::path curves() const { return root / "curves.png"; }
+  std::filesystem::path curves() const { return root / "curves.svg"; }
   std::filesystem::path validation() const { return root / "validation.csv"; }
   std::filesystem::path latest_weights() const { return root / "weights-latest.safetensors"; }
   std::filesystem::path weights() const { return root / "weights.safetensors"; }

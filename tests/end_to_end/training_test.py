@@ -10,6 +10,7 @@ import subprocess
 import tempfile
 import time
 import unittest
+from xml.etree import ElementTree
 
 import h5py
 import numpy as np
@@ -205,7 +206,7 @@ class Training(program.InFolder):
             else:
                 column = row["phase"]
             self.assertTrue(np.isfinite(float(row[column])), row)
-        self.assertEqual((work / "whole" / "curves.png").read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+        self.assertEqual(ElementTree.parse(work / "whole" / "curves.svg").getroot().tag, "{http://www.w3.org/2000/svg}svg")
 
     def test_weights_are_safetensors_and_tell_where_they_come_from(self):
         tensors, metadata = read_safetensors(work / "whole" / "weights.safetensors")

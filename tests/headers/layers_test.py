@@ -11,7 +11,7 @@ SOURCE = pathlib.Path(os.environ["EVENTGAN_SOURCE_DIR"])
 FLOORS = [
     ["manifests/values"],
     ["manifests/documents"],
-    ["stages/base/files", "stages/base/processor", "stages/base/processor_clones.h"],
+    ["stages/base/charts", "stages/base/files", "stages/base/processor", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/pictures"],
     ["stages/base/archives"],
     ["stages/recordings"],

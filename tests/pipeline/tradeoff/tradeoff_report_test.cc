@@ -175,15 +175,22 @@ TEST(TradeoffJson, HasNullForWhatIsNotKnown) {
   EXPECT_EQ(json["not_run"][0]["reason"], "no calibration");
 }
 
-TEST(TradeoffPicture, IsDrawnAlsoOfOneAndOfNothing) {
-  const testing::TemporaryFolder folder;
-  TradeoffReport report = small_report();
-  while (true) {
-    write_tradeoff_png(report, folder / "picture.png");
-    EXPECT_GT(std::filesystem::file_size(folder / "picture.png"), 1000u);
-    if (report.trials.empty()) break;
-    report.trials.resize(report.trials.size() > 1 ? 1 : 0);
+TEST(TradeoffPicture, NamesEachPointAndNumbersTheFront) {
+  const std::string svg = tradeoff_picture(small_report());
+  for (const char* name : {"a", "b", "c", "d"}) {
+    EXPECT_THAT(svg, HasSubstr(std::string("<title>") + name + " float32 x1 float16: "));
   }
+  EXPECT_THAT(svg, HasSubstr(">3. d float32 x1 float16: "));
+  EXPECT_THAT(svg, HasSubstr(">3</text>"));
+  EXPECT_THAT(svg, HasSubstr("not to a camera"));
+}
+
+TEST(TradeoffPicture, IsDrawnAlsoOfOneAndOfNothing) {
+  TradeoffReport report = small_report();
+  report.trials.resize(1);
+  EXPECT_THAT(tradeoff_picture(report), HasSubstr(" mark\""));
+  report.trials.clear();
+  EXPECT_THAT(tradeoff_picture(report), HasSubstr("nothing to show"));
 }
 
 TEST(KeptTrials, AreNotKeptThroughALink) {

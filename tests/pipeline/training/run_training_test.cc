@@ -199,7 +199,7 @@ TEST_F(SmallTraining, RunsAllPhasesAndLeavesWeightsThatRun) {
   EXPECT_EQ(weights.base_channels, 2);
   EXPECT_EQ(make_torch_generator(weights)->bins(), 3);
   EXPECT_THAT(weights.metadata.at("training_losses"), HasSubstr("generator.total\t"));
-  for (const char* made : {"curves.png", "validation.csv", "weights-latest.safetensors",
+  for (const char* made : {"curves.svg", "validation.csv", "weights-latest.safetensors",
                            "checkpoints/latest.safetensors", "checkpoints/previous.safetensors"}) {
     EXPECT_TRUE(fs::exists(folder_ / "out" / made)) << made;
   }
