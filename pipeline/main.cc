@@ -4,16 +4,16 @@
 #include <string_view>
 
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/commands/usage_internal.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 
 int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);
-  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails then, and is told as any other
+  std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails then, as any other may
   eventgan::keep_big_buffers();
   eventgan::silence_decoders();
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
     }
   } catch (const std::exception& error) {
     exit_code = eventgan::exit_code_of(error);
-    // One fault is told in one line, however many layers have something to say of it; a list of
+    // One fault is reported in one line, however many layers have something to say of it; a list of
     // faults in a line each.
     const bool is_list = std::string_view(error.what()).find('\n') != std::string_view::npos;
     eventgan::tell_error(is_list ? eventgan::error_text(error) : eventgan::error_line(error));

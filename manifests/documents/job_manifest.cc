@@ -9,9 +9,9 @@
 #include <ranges>
 #include <stdexcept>
 
-#include "manifests/documents/job_manifest_internal.h"
-#include "manifests/documents/manifest_file_internal.h"
-#include "manifests/documents/strict_json_internal.h"
+#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/manifest_file.h"
+#include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/job.h"
 #include "manifests/values/weights.h"
 #include "manifests/values/words.h"
@@ -146,7 +146,7 @@ SourceSpec read_source(const StrictValue& value) {
   SpecialKeys keys(object, dataset);
   spec.raw_root = keys.find_path("raw_root", {kKittiObject});
   spec.devkit = keys.find_path("devkit", {kKittiObject});
-  // Neither is of use without the other: the devkit's mapping says which raw frame a picture is.
+  // Neither is of use without the other: the devkit's mapping says which raw frame an image is.
   if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
   spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m, kRecording});
   if (dataset == kMpiiList && !spec.annotations)
@@ -184,7 +184,7 @@ SourceSpec read_source(const StrictValue& value) {
 
 namespace {
 
-// Below 16 pixels a side the network's four halvings leave less than one pixel of the picture at
+// Below 16 pixels a side the network's four halvings leave less than one pixel of the image at
 // its bottom; above 8192 no camera of these datasets goes, so that a larger number is a slip.
 constexpr int kSmallestSide = 16;
 constexpr int kLargestSide = 8192;
@@ -204,7 +204,7 @@ constexpr Preset kNoPreset{"", GreyOrder::kBeforeResize, 0};
 constexpr std::array kPresetWords{Word<Preset>{kKitti.name, kKitti},
                                   Word<Preset>{kMpii.name, kMpii}, Word<Preset>{kDemo.name, kDemo}};
 
-/// What the published scripts do to a dataset; to any other pictures, what their demo does.
+/// What the published scripts do to a dataset; to any other images, what their demo does.
 const Preset& preset_of(DatasetKind dataset) {
   switch (dataset) {
     case DatasetKind::kKittiObject:

@@ -1,3 +1,5 @@
+#include "manifests/documents/detail/json_text.h"
+
 #include <fmt/format.h>
 #include <utf8.h>
 
@@ -11,8 +13,6 @@
 #include <unordered_set>
 #include <utility>
 #include <vector>
-
-#include "manifests/documents/json_text_internal.h"
 
 namespace eventgan {
 

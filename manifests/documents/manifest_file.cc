@@ -1,3 +1,5 @@
+#include "manifests/documents/detail/manifest_file.h"
+
 #include <algorithm>
 #include <cerrno>
 #include <fstream>
@@ -5,7 +7,6 @@
 #include <sstream>
 #include <system_error>
 
-#include "manifests/documents/manifest_file_internal.h"
 #include "manifests/values/faults.h"
 
 namespace eventgan {

@@ -5,8 +5,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/plan_lines_internal.h"
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/detail/plan_lines.h"
 
 namespace eventgan {
 

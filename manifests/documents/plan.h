@@ -18,19 +18,19 @@ struct PlannedSample {
   std::string sequence;
   std::string label_key;
   FramePair pair;
-  /// Not empty if planning already found that the sample cannot be made (a hole in a sequence): it
-  /// keeps its slot and is quarantined with this reason.
+  /// Not empty if planning already found that the sample cannot be made (a missing frame in a
+  /// sequence): it keeps its slot and is quarantined with this reason.
   std::string fault;
 };
 
-/// One output file: samples of one source and one picture size, in slot order.
+/// One output file: samples of one source and one image size, in slot order.
 struct PlannedShard {
   std::string name;  ///< NAME-SPLIT-00012-of-01024.h5
   int source = 0;    ///< index into the manifest's sources
   ImageSize volume_size;
   std::vector<PlannedSample> samples;
-  /// No picture of its samples could be read when it was planned: volume_size is a guess. The shard
-  /// takes the size that the pictures have once they were mended (see complete_plan), and the file
+  /// No image of its samples could be read when it was planned: volume_size is a guess. The shard
+  /// takes the size that the images have once they were mended (see complete_plan), and the file
   /// itself says which.
   bool size_unknown = false;
 };
@@ -39,12 +39,13 @@ struct PlannedShard {
 struct SourceSummary {
   std::int64_t labelled_frames = 0;
   std::map<int, std::int64_t> pairs_by_gap;
-  /// Labelled frames (with choose = all: frame and gap) without a partner, because their sequence
-  /// does not reach that far, or not within pairs.max_gap_s: not an error, but never silent.
-  std::int64_t without_partner = 0;
-  std::vector<std::string> without_partner_ids;  ///< in the order of the source
-  std::int64_t faults = 0;                       ///< planned samples with a fault
-  std::vector<std::string> notes;  ///< Dataset::notes(), and what planning found out besides
+  /// Labelled frames (with choose = all: frame and gap) without a paired frame, because their
+  /// sequence does not reach that far, or not within pairs.max_gap_s: not an error, but never
+  /// silent.
+  std::int64_t unpaired = 0;
+  std::vector<std::string> unpaired_ids;  ///< in the order of the source
+  std::int64_t faults = 0;                ///< planned samples with a fault
+  std::vector<std::string> notes;         ///< Dataset::notes(), and what planning found out besides
 };
 
 /// The notes of all sources, in their order.
@@ -59,8 +60,7 @@ std::string notes_text(const std::vector<std::string>& notes);
 /// every machine with one kind of processor and one set of libraries.
 struct Plan {
   std::string name;
-  std::string
-      manifest_text;  ///< of the run that froze the plan, byte for byte; stands in every shard
+  std::string manifest_text;  ///< of the run that froze the plan, byte for byte; is in every shard
   std::map<std::string, std::string> fingerprint;  ///< field → value; compared field by field
   std::vector<SourceSummary> sources;
   std::vector<PlannedShard> shards;
@@ -75,7 +75,7 @@ struct Plan {
 void write_plan(const Plan& plan, const std::function<void(std::string_view)>& sink);
 std::string to_json(const Plan& plan);
 
-/// Reads what write_plan has written, line by line, so that no more than a line stands in memory
+/// Reads what write_plan has written, line by line, so that no more than a line is in memory
 /// beside the plan. Any other layout is damage, even of the same JSON. Throws std::runtime_error
 /// for the first line that is damaged, with all of its faults: "NAME:LINE: $.key: expected X, got
 /// Y".
@@ -112,7 +112,7 @@ ShardOutline outline_of(const PlannedShard& shard);
 std::vector<ShardOutline> outlines_of(const std::vector<const PlannedShard*>& shards);
 PlanOutline outline_of(const Plan& plan);
 
-/// Reads plan.json and skips its samples, which stand on lines of their own: a million pairs take
+/// Reads plan.json and skips its samples, which have lines of their own: a million pairs take
 /// about as long as reading the file. Throws std::runtime_error as parse_plan does; faults inside a
 /// sample's line are not seen.
 PlanOutline read_plan_outline(std::istream& stream, const std::string& name);

@@ -1,12 +1,13 @@
+#include "manifests/documents/detail/plan_lines.h"
+
 #include <algorithm>
 #include <cmath>
 #include <istream>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
-#include "manifests/documents/plan_lines_internal.h"
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
 
 namespace eventgan {
 namespace {
@@ -83,8 +84,8 @@ json to_json_value(const SourceSummary& source) {
     gaps.push_back({{"gap", gap}, {"pairs", pairs}});
   return {{"labelled_frames", source.labelled_frames},
           {"pairs_by_gap", gaps},
-          {"without_partner", source.without_partner},
-          {"without_partner_ids", source.without_partner_ids},
+          {"without_partner", source.unpaired},
+          {"without_partner_ids", source.unpaired_ids},
           {"faults", source.faults},
           {"notes", notes_as_json(source.notes)}};
 }
@@ -99,8 +100,8 @@ SourceSummary read_source_summary(const StrictValue& value) {
     source.pairs_by_gap[gap] = entry.at("pairs").integer<std::int64_t>(0, kMost);
     entry.finish();
   }
-  source.without_partner = object.at("without_partner").integer<std::int64_t>(0, kMost);
-  source.without_partner_ids = read_texts(object.at("without_partner_ids"));
+  source.unpaired = object.at("without_partner").integer<std::int64_t>(0, kMost);
+  source.unpaired_ids = read_texts(object.at("without_partner_ids"));
   source.faults = object.at("faults").integer<std::int64_t>(0, kMost);
   source.notes = read_texts(object.at("notes"));
   object.finish();
@@ -125,7 +126,7 @@ class Lines {
     if (!at_end_ && stream_.eof()) fail("a line feed at the end of the line");
   }
 
-  /// What stands between `begin` and `end` in this line; goes on to the next.
+  /// What is between `begin` and `end` in this line; goes on to the next.
   std::string take(std::string_view begin, std::string_view end) {
     const std::string_view text = line_;
     if (at_end_ || text.size() < begin.size() + end.size() || !text.starts_with(begin) ||
@@ -150,7 +151,7 @@ class Lines {
     return parse_of(number_ - 1, text, path, read);
   }
 
-  /// The same for what stands in this line.
+  /// The same for what is in this line.
   template <class Read>
   auto parse_here(std::string_view text, const std::string& path, Read&& read) const {
     return parse_of(number_, text, path, read);

@@ -2,8 +2,8 @@
 
 #include <set>
 
-#include "manifests/documents/job_manifest_internal.h"
-#include "manifests/documents/manifest_file_internal.h"
+#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/manifest_file.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
@@ -88,7 +88,7 @@ void check_names(const std::vector<StrictValue>& elements,
   }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const std::string& name = sources[i].name;
-    if (name.empty()) continue;  // faulty, as is told already
+    if (name.empty()) continue;  // faulty, as is reported already
     if (!names.insert(name).second) {
       elements[i].fault("a name that no other source has", "\"" + name + "\" again");
     } else if (!affine_names.contains(name) && affine_names.contains(possible_affine_name(name))) {

@@ -1,3 +1,5 @@
+#include "manifests/documents/detail/strict_json.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -8,8 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/strict_json_internal.h"
+#include "manifests/documents/detail/json_text.h"
 
 namespace eventgan {
 namespace {

@@ -1,7 +1,7 @@
 #include "manifests/documents/training_manifest.h"
 
-#include "manifests/documents/job_manifest_internal.h"
-#include "manifests/documents/manifest_file_internal.h"
+#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/manifest_file.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
@@ -10,10 +10,10 @@ namespace {
 constexpr std::string_view kTrainingFormat = "eventgan-training";
 constexpr int kTrainingVersion = 1;
 
-// As for conversion: below 16 pixels the generator's four halvings leave nothing of the picture.
+// As for conversion: below 16 pixels the generator's four halvings leave nothing of the image.
 constexpr int kSmallestCrop = 16;
 constexpr int kLargestCrop = 2048;
-// The discriminator halves a picture four times and then takes a pixel off twice.
+// The discriminator halves an image four times and then takes a pixel off twice.
 constexpr int kSmallestAdversarialCrop = 48;
 
 constexpr double kMostMinutes = 1e6;

@@ -9,7 +9,7 @@ namespace eventgan {
 
 /// Why one sample cannot be used: text of the form "expected X, got Y, in PATH (SAMPLE)".
 /// A fault is a value: it travels through the pipeline in the sample's place, keeps its slot in the
-/// shard and ends in the shard's marker. It never leaves a stage as an exception.
+/// shard and ends in the shard's commit record. It never leaves a stage as an exception.
 struct SampleFault {
   std::string reason;
   bool operator==(const SampleFault&) const = default;

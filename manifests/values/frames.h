@@ -8,7 +8,7 @@
 
 namespace eventgan {
 
-/// Size of a picture or a volume in pixels; always height first, as arrays are laid out.
+/// Size of an image or a volume in pixels; always height first, as arrays are laid out.
 struct ImageSize {
   int height = 0;
   int width = 0;
@@ -24,7 +24,7 @@ inline std::string to_string(ImageSize size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-/// A grey picture: [y, x] uint8, C order, 0..255.
+/// A grey image: [y, x] uint8, C order, 0..255.
 struct GreyImage {
   ImageSize size;
   std::vector<std::uint8_t> pixels;
@@ -39,7 +39,7 @@ struct FrameRef {
   std::string path;
   std::int64_t index = -1;  ///< the frame's own number in its sequence, as the dataset counts
   std::int64_t video_frame =
-      -1;  ///< position in the video or recording counted from 0; -1 if `path` is a picture
+      -1;  ///< position in the video or recording counted from 0; -1 if `path` is an image
   double time_s = std::numeric_limits<double>::quiet_NaN();  ///< NaN if unknown
 
   bool operator==(const FrameRef& other) const {

@@ -78,7 +78,7 @@ struct PairSpec {
   PairSide side = PairSide::kBefore;
   PairChoice choose = PairChoice::kOne;
   std::int64_t min_pairs = 1;  ///< fewer pairs than this from the source is an error
-  /// Frames farther apart in time than this are no partners; > 0. Where times are unknown, and
+  /// Frames farther apart in time than this are not paired; > 0. Where times are unknown, and
   /// without it, all are.
   std::optional<double> max_gap_s = std::nullopt;
 };
@@ -125,14 +125,14 @@ struct SourceSpec {
 
 enum class ImageFit { kStretch, kLetterbox, kCrop };
 
-/// Whether the picture is made grey before or after it is resized.
+/// Whether the image is made grey before or after it is resized.
 enum class GreyOrder { kBeforeResize, kAfterResize };
 
 /// How a frame becomes the network's input. Presets: kitti = grey before
 /// resizing and a 3x3 blur; mpii = grey before resizing, no blur; demo = grey after resizing, no
 /// blur. A manifest names one, gives both `grey` and `blur`, or takes that of its datasets.
 struct ImageSpec {
-  std::optional<ImageSize> size;  ///< sides 16..8192; none: every picture keeps its own size
+  std::optional<ImageSize> size;  ///< sides 16..8192; none: every image keeps its own size
   ImageFit fit = ImageFit::kStretch;
   std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
   GreyOrder grey = GreyOrder::kBeforeResize;

@@ -10,7 +10,7 @@
 namespace eventgan {
 
 /// A point in pixels, x to the right and y down. The centre of the top left pixel is (0, 0), so the
-/// picture covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
+/// image covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
 struct Point {
   double x = 0;
   double y = 0;
@@ -20,12 +20,12 @@ struct Point {
 /// What the datasets write where a point is not known; such a point is never moved by geometry.
 inline constexpr Point kMissingPoint{-1, -1};
 
-/// No label lies farther from the picture's corner, and no camera has a longer focal length: no
-/// picture has such pixels, so what is beyond is a slip.
+/// No label lies farther from the image's corner, and no camera has a longer focal length: no
+/// image has such pixels, so what is beyond is a slip.
 inline constexpr double kFarthest_px = 1e6;
 
 /// An upright rectangle given by its edges in pixels: an edge at x lies *between* the centres of
-/// the pixels x-1 and x, so a whole picture is {0, 0, width, height}.
+/// the pixels x-1 and x, so a whole image is {0, 0, width, height}.
 struct Rectangle {
   double left = 0;
   double top = 0;
@@ -34,12 +34,12 @@ struct Rectangle {
   bool operator==(const Rectangle&) const = default;
 };
 
-/// One object as annotated, in pixels of the source picture. Fields that a dataset does not have
+/// One object as annotated, in pixels of the source image. Fields that a dataset does not have
 /// hold KITTI's own values for "unknown".
 struct Box {
   int class_id = 0;  ///< index into LabelSchema::class_names
   Rectangle xyxy;
-  float truncation = -1;  ///< 0 whole .. 1 outside the picture; -1 unknown
+  float truncation = -1;  ///< 0 whole .. 1 outside the image; -1 unknown
   int occlusion = -1;     ///< 0 visible, 1 partly, 2 largely, 3 unknown; -1 not annotated
   float alpha = -10;      ///< observation angle, rad in [-pi, pi]; -10 unknown
   /// height, width, length (m), x, y, z (m, camera frame), rotation_y (rad).
@@ -51,7 +51,7 @@ struct Box {
   bool operator==(const Box&) const = default;
 };
 
-/// A joint as annotated, in pixels of the source picture; kMissingPoint if it was not annotated.
+/// A joint as annotated, in pixels of the source image; kMissingPoint if it was not annotated.
 struct Joint {
   Point at = kMissingPoint;
   int visible = -1;  ///< 1 visible; 0 hidden, or not annotated; -1 annotated, visibility unknown
@@ -70,7 +70,7 @@ struct Intrinsics {
 /// Lens distortion as Human3.6M models it, for a point (a, b) = (X/Z, Y/Z) with r2 = a^2 + b^2:
 ///   d = 1 + k1 r2 + k2 r2^2 + k3 r2^3 + p1 b + p2 a,   a' = a d + p2 r2,   b' = b d + p1 r2,
 /// and (a', b') goes through the pinhole camera in place of (a, b). It acts before pixels come in,
-/// so scaling or cutting a picture leaves it as it is. (OpenCV's model has twice this p1 b + p2 a.)
+/// so scaling or cutting an image leaves it as it is. (OpenCV's model has twice this p1 b + p2 a.)
 struct LensDistortion {
   double k1 = 0;
   double k2 = 0;
@@ -80,7 +80,7 @@ struct LensDistortion {
   bool operator==(const LensDistortion&) const = default;
 };
 
-/// One person as annotated, in pixels of the source picture, 0-based. Human3.6M has no centres,
+/// One person as annotated, in pixels of the source image, 0-based. Human3.6M has no centres,
 /// scales and boxes of its own: h36m-fetch's persons have those of their joints (derive_frame).
 struct Person {
   std::vector<Joint> joints;     ///< one for each of LabelSchema::joint_names, in that order
@@ -103,8 +103,8 @@ struct Annotation {
   std::string original;
   std::vector<Box> boxes;
   std::vector<Person> persons;
-  /// P, row-major [3][4], of the picture's camera (KITTI's P2): w [u, v, 1] = P [X, Y, Z, 1], in
-  /// pixels of the source picture and m in the rectified frame of camera 0.
+  /// P, row-major [3][4], of the image's camera (KITTI's P2): w [u, v, 1] = P [X, Y, Z, 1], in
+  /// pixels of the source image and m in the rectified frame of camera 0.
   std::optional<std::array<double, 12>> projection = {};
   bool operator==(const Annotation&) const = default;
 };

@@ -7,9 +7,9 @@
 
 namespace eventgan {
 
-/// Where a source picture comes to lie in the volume: scaled to `scaled`, then laid with its top
+/// Where a source image comes to lie in the volume: scaled to `scaled`, then laid with its top
 /// left corner at (`offset_y`, `offset_x`) of a volume of size `volume`. Offsets are positive with
-/// borders (letterbox) and negative where the picture is cut (crop).
+/// borders (letterbox) and negative where the image is cut (crop).
 ///
 /// Both axes scale by exact ratios, s = scaled / source, so that
 ///   a point (pixel centres are integers) maps as x' = (x + 0.5) s - 0.5 + offset,
@@ -36,7 +36,7 @@ struct Placement {
 ///   letterbox: the largest size of the same shape that fits, each side rounded to whole pixels (≥
 ///   1), in the middle; crop: the smallest size of the same shape that covers, each side rounded
 ///   (never below the volume), its middle.
-/// Offsets are floor((volume - scaled) / 2). Without `spec.size` the picture keeps its own size.
+/// Offsets are floor((volume - scaled) / 2). Without `spec.size` the image keeps its own size.
 /// Throws std::invalid_argument for an empty source.
 Placement place(ImageSize source, const ImageSpec& spec);
 

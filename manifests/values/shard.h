@@ -22,7 +22,7 @@ enum class VolumeUnit {
   kEvents    ///< a simulator's: a count of events, each spread over the two bins nearest in time
 };
 
-/// What is true of a whole shard; manifests/guides/shard_format.md says where each field stands.
+/// What is true of a whole shard; manifests/guides/shard_format.md says where each field is.
 struct ShardHeader {
   std::string name;  ///< file name: NAME-SPLIT-00012-of-01024.h5
   std::string dataset;
@@ -50,7 +50,7 @@ struct ShardHeader {
 /// One sample but for its volume: one row of everything else in a shard.
 struct ShardSample {
   bool valid = true;
-  std::string fault;  ///< why not, if not valid; kept in the marker, not in the shard
+  std::string fault;  ///< why not, if not valid; kept in the commit record, not in the shard
   std::string sample_id;
   std::string sequence;
   FrameOrigin origin;
@@ -82,7 +82,7 @@ struct QuarantinedSlot {
 };
 
 /// What a shard holds, quarantined samples included: with this a whole dataset can be laid out, and
-/// its offsets follow, from the markers alone.
+/// its offsets follow, from the commit records alone.
 struct ShardContents {
   std::vector<std::int32_t> boxes;              ///< rows of /labels/boxes by slot
   std::vector<std::int32_t> persons;            ///< rows of /labels/poses by slot
@@ -93,9 +93,9 @@ struct ShardContents {
 };
 
 /// The file SHARD.json beside a shard: written after the shard is whole and in place, so its
-/// existence is what says "done". A shard is done if its marker parses, names
-/// the plan, and the shard has the marker's size.
-struct ShardMarker {
+/// existence is what says "done". A shard is done if its commit record parses, names
+/// the plan, and the shard has the commit record's size.
+struct CommitRecord {
   std::string shard;      ///< the shard's file name
   std::string plan_hash;  ///< hex SHA-256
   std::string sha256;     ///< of the shard's bytes, hex
@@ -108,7 +108,7 @@ struct ShardMarker {
   double wall_seconds = 0;  ///< since the writer's previous commit, or the start of its run
   /// Most memory of the writer's process up to the commit; 0: not known.
   std::int64_t peak_bytes = 0;
-  bool operator==(const ShardMarker&) const = default;
+  bool operator==(const CommitRecord&) const = default;
 };
 
 }  // namespace eventgan

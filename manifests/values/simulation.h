@@ -12,25 +12,25 @@
 
 namespace eventgan {
 
-/// How the intensity between the given pictures comes about.
+/// How the intensity between the given images comes about.
 enum class SimulationMethod {
-  kAffine,     ///< ESIM as the EventGAN paper uses it: a random affine motion of each picture
+  kAffine,     ///< ESIM as the EventGAN paper uses it: a random affine motion of each image
   kClip,       ///< a real clip, frames between its frames by dense optical flow
   kDifference  ///< log intensity moves on a line from each frame to the next
 };
 
-/// A clip (a video, a folder of pictures) and how recordings are made of it.
+/// A clip (a video, a folder of images) and how recordings are made of it.
 struct SimulationSource {
   std::string path;  ///< as written in the manifest
   std::string name;  ///< the recording's file name without ".hdf5"; default: the path's stem
   SimulationMethod method = SimulationMethod::kClip;
-  std::optional<double> frames_per_second;  ///< default: the video's, 30 for pictures
+  std::optional<double> frames_per_second;  ///< default: the video's, 30 for images
   std::int64_t first_frame = 0;
-  std::int64_t frame_count = 0;  ///< 0: to the end. With kAffine the number of pictures used
+  std::int64_t frame_count = 0;  ///< 0: to the end. With kAffine the number of images used
   std::int64_t frame_step = 1;   ///< takes each n-th frame, 1..100
-  int frames_per_picture = 7;    ///< kAffine: frames of the motion of one picture, 2..100
-  /// kAffine: how far a picture moves from one of its frames to the next is drawn uniformly from 0
-  /// to this, for each picture; 0.1..100.
+  int frames_per_picture = 7;    ///< kAffine: frames of the motion of one image, 2..100
+  /// kAffine: how far an image moves from one of its frames to the next is drawn uniformly from 0
+  /// to this, for each image; 0.1..100.
   double max_displacement_px = 5;
 };
 

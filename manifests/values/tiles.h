@@ -8,13 +8,13 @@
 
 namespace eventgan {
 
-/// Which square tiles of a picture are wanted. Tile (r, c) holds rows r side - origin_y up to
-/// (r + 1) side - origin_y, as far as the picture goes, and columns likewise, so that the tiles of
-/// a picture within a larger one lie on the larger one's grid.
+/// Which square tiles of an image are wanted. Tile (r, c) holds rows r side - origin_y up to
+/// (r + 1) side - origin_y, as far as the image goes, and columns likewise, so that the tiles of
+/// an image within a larger one lie on the larger one's grid.
 struct TileMask {
-  ImageSize size;    ///< of the picture
+  ImageSize size;    ///< of the image
   int side = 16;     ///< of a tile, pixels
-  int origin_y = 0;  ///< rows of the first tile that lie before the picture, 0..side-1
+  int origin_y = 0;  ///< rows of the first tile that lie before the image, 0..side-1
   int origin_x = 0;
   std::vector<std::uint8_t> wanted;  ///< [row, column] 1 or 0
 
@@ -45,7 +45,7 @@ struct TileMask {
     }
   }
 
-  /// The same for the wanted tiles' parts in a rectangle of the picture, not empty.
+  /// The same for the wanted tiles' parts in a rectangle of the image, not empty.
   template <class Visit>
   void visit_within(const Pixels& part, Visit&& visit) const {
     for (int row = (part.top + origin_y) / side; row * side - origin_y < part.bottom; ++row) {

@@ -45,8 +45,8 @@ struct NetworkSpec {
   /// dead; but with a slope sums over time are none of what `convert` will write.
   double output_slope = 0;
   /// Above 0 the generator's first layer learns weights of (previous + next) / 2 and of this many
-  /// times next - previous, for those of previous and next. The networks that can be learnt are the
-  /// same, but small changes, which events come of, weigh as much as brightness. Weights are
+  /// times next - previous, for those of previous and next. The networks that can be learned are
+  /// the same, but small changes, which events come of, weigh as much as brightness. Weights are
   /// written for the frames.
   double difference_gain = 0;
 };

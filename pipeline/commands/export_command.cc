@@ -10,9 +10,9 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/commands/usage_internal.h"
 #include "pipeline/exports/export_job.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"

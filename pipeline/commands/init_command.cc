@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"

@@ -7,7 +7,7 @@
 #include "pipeline/commands/options.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
-#include "stages/scenes/demo_dataset.h"
+#include "stages/synthetic/demo_dataset.h"
 
 namespace eventgan {
 namespace {

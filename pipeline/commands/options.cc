@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
+#include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/commands/usage_internal.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace_watch.h"
 

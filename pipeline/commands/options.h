@@ -58,8 +58,8 @@ struct ProfiledCommand {
 
 /// Runs a command's work with a trace, or with none (null) if no file was given; its exit code. The
 /// trace is completed also when the work throws or was stopped; where it is, or why there is none,
-/// is told on the standard error stream. A trace that is lost while the work goes on costs nothing
-/// else: the exit code stays. Throws UsageError before the work if the file cannot be.
+/// is reported on the standard error stream. A trace that is lost while the work goes on costs
+/// nothing else: the exit code stays. Throws UsageError before the work if the file cannot be.
 int run_profiled(const ProfiledCommand& command, const std::function<int(TraceRecorder*)>& work);
 
 /// stopping_line of a run that makes shards, which get so many seconds after a request to stop.

@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/dataset/shown_samples.h"
@@ -22,15 +22,15 @@ struct PreviewArguments {
 
 int run(const PreviewArguments& arguments) {
   std::vector<std::string> warnings;
-  for (const auto& picture : preview(arguments.where, arguments.options, warnings)) {
-    std::cout << escape_controls(picture.string()) << "\n";
+  for (const auto& image : preview(arguments.where, arguments.options, warnings)) {
+    std::cout << escape_controls(image.string()) << "\n";
   }
   std::cout << std::flush;
   for (const std::string& warning : warnings) tell_warning(warning);
   return kComplete;
 }
 
-/// A single shard is compared with its marker; of many, parts are read.
+/// A single shard is compared with its commit record; of many, parts are read.
 int run_guarded(const PreviewArguments& arguments) {
   return (means_folder(arguments.where) ? read_apart : read_guarded)(
       arguments.where, [&] { return run(arguments); });

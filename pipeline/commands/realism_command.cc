@@ -12,9 +12,9 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
-#include "pipeline/commands/usage_internal.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/recordings/recording.h"
@@ -114,9 +114,9 @@ int run_realism(const RealismArguments& arguments) {
   for (const RecordingSpec& part : parts) {
     options.first_frame = part.first_frame;
     options.last_frame = part.last_frame;
-    options.pictures = arguments.out;
+    options.images = arguments.out;
     if (parts.size() > 1 && !arguments.out.empty()) {
-      options.pictures /= std::filesystem::path(part.path).stem();
+      options.images /= std::filesystem::path(part.path).stem();
     }
     const auto recording = open_recording(part.path, part.format, part.camera);
     if (parts.size() > 1 && is_too_short(part, *recording, options.gaps)) {

@@ -13,7 +13,7 @@
 #include "pipeline/report/report_page.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/base/files/atomic_file.h"
-#include "stages/events/pictures/picture_output.h"
+#include "stages/events/images/image_output.h"
 
 namespace eventgan {
 namespace {
@@ -27,7 +27,7 @@ struct ReportArguments {
 };
 
 int run(const ReportArguments& arguments) {
-  constexpr int kPictureWidth = 640;
+  constexpr int kImageWidth = 640;
   const fs::path& folder = arguments.folder;
   const Survey survey = survey_folder(folder);
   std::vector<std::string> warnings;
@@ -39,9 +39,9 @@ int run(const ReportArguments& arguments) {
   context.folder = folder;
   context.file = arguments.out.value_or(folder / kReportName);
   context.warning = weights_warning(survey.parts.manifest);
-  context.picture = [&](const PickedSample& sample) {
+  context.image = [&](const PickedSample& sample) {
     const PreviewContent content = reader.content(folder / sample.shard, sample.slot);
-    return jpeg_of(draw_tile(content, kPictureWidth), PageContext::kMostPictureBytes);
+    return jpeg_of(draw_tile(content, kImageWidth), PageContext::kMostImageBytes);
   };
   write_file_atomically(context.file, report_page(survey, context));
   std::cout << context.file.string() << std::endl;

@@ -12,7 +12,7 @@ namespace eventgan {
 /// 1. None is closed: else the next file that is opened, such as a shard, would take its place.
 /// 2. With `--progress json` every line on the standard error stream is a JSON object; what is not
 ///    written as one, by us or a library, becomes {"event": "error", "warning" or "note", "text":
-///    ...}. On a terminal a message stands in a row of its own, above the bar if there is one, and
+///    ...}. On a terminal a message is in a row of its own, above the bar if there is one, and
 ///    its first word is coloured if it is "error" or "warning", unless NO_COLOR is set.
 /// 3. What could not be written to the standard output is not passed over (finish()).
 /// 4. No control character of a name steers a terminal: in a line of the standard output, and in a
@@ -21,14 +21,15 @@ namespace eventgan {
 /// For one object in the program, made before there are other threads.
 class StandardStreams {
  public:
-  /// The command line is only searched for --progress json: it may be wrong, and that is told too.
+  /// The command line is only searched for --progress json: it may be wrong, and that is reported
+  /// too.
   StandardStreams(int argc, const char* const* argv);
   ~StandardStreams();
   StandardStreams(const StandardStreams&) = delete;
   StandardStreams& operator=(const StandardStreams&) = delete;
 
   /// The exit code of a program that would end with `exit_code`: the same, but kFailed instead of
-  /// kComplete, and an error is told, if the standard output did not take all that was written.
+  /// kComplete, and an error is reported, if the standard output did not take all that was written.
   int finish(int exit_code) const;
 
  private:
@@ -50,7 +51,7 @@ void tell(const std::string& text);
 /// what another Ctrl-C does.
 std::string stopping_line(const std::string& what);
 
-/// How wide the terminal on the standard error stream is, asked anew at each call; none where that
+/// How wide the terminal on the standard error stream is, asked again at each call; none where that
 /// stream is no terminal, or one that cannot redraw a line (TERM unset or "dumb").
 ProgressDisplay::Columns terminal_columns();
 

@@ -145,7 +145,7 @@ int run(TradeoffArguments& arguments) {
   const std::string json = to_json(report, arguments.demand);
   write_file_atomically(options.out / "tradeoff.json", json);
   write_file_atomically(options.out / "tradeoff.md", to_markdown(report, arguments.demand));
-  write_file_atomically(options.out / "tradeoff.svg", tradeoff_picture(report));
+  write_file_atomically(options.out / "tradeoff.svg", tradeoff_chart(report));
   if (arguments.progress == ProgressStyle::kJson) {
     std::cout << json << std::flush;
   } else {

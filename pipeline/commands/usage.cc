@@ -1,3 +1,5 @@
+#include "pipeline/commands/detail/usage.h"
+
 #include <algorithm>
 #include <iostream>
 #include <memory>
@@ -6,7 +8,6 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "pipeline/commands/usage_internal.h"
 #include "pipeline/runtime/errors.h"
 
 namespace eventgan {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/text.h"
 
 namespace eventgan {
@@ -38,13 +38,13 @@ std::string shards_text(const ConversionReport& report) {
 
 }  // namespace
 
-void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionReport& report) {
+void add_shard(const CommitRecord& record, std::int64_t volume_bytes, ConversionReport& report) {
   ++report.shards_done;
-  report.written += marker.valid;
-  report.stored_bytes += marker.size_bytes;
+  report.written += record.valid;
+  report.stored_bytes += record.size_bytes;
   report.volume_bytes += volume_bytes;
-  report.quarantined.insert(report.quarantined.end(), marker.quarantined.begin(),
-                            marker.quarantined.end());
+  report.quarantined.insert(report.quarantined.end(), record.quarantined.begin(),
+                            record.quarantined.end());
 }
 
 std::string to_text(const ConversionReport& report) {
@@ -57,12 +57,10 @@ std::string to_text(const ConversionReport& report) {
       text += fmt::format(" {} {:.1f}", stage, seconds);
     }
   }
-  if (report.without_partner > 0) {
-    text +=
-        fmt::format("\n{} labelled frames without a paired frame", report.frames_without_partner);
-    if (report.frames_without_partner != report.without_partner) {
-      text +=
-          fmt::format(" for at least one of their gaps, {} pairs in total", report.without_partner);
+  if (report.unpaired > 0) {
+    text += fmt::format("\n{} labelled frames without a paired frame", report.unpaired_frames);
+    if (report.unpaired_frames != report.unpaired) {
+      text += fmt::format(" for at least one of their gaps, {} pairs in total", report.unpaired);
     }
     text += " (listed in plan.json)";
   }
@@ -93,8 +91,8 @@ std::string to_json(const ConversionReport& report) {
                                {"planned", report.planned},
                                {"written", report.written},
                                {"quarantined", quarantined},
-                               {"without_partner", report.without_partner},
-                               {"frames_without_partner", report.frames_without_partner},
+                               {"without_partner", report.unpaired},
+                               {"frames_without_partner", report.unpaired_frames},
                                {"notes", report.notes},
                                {"shards_planned", report.shards_planned},
                                {"shards_done", report.shards_done},

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/documents/plan.h"
 
 namespace eventgan {
@@ -32,8 +32,8 @@ struct ConversionReport {
   std::int64_t plan_pairs = 0;  ///< of the whole plan
   int plan_shards = 0;
   /// Pairs that cannot be, since a sequence ends too early (SourceSummary), and their frames.
-  std::int64_t without_partner = 0;
-  std::int64_t frames_without_partner = 0;
+  std::int64_t unpaired = 0;
+  std::int64_t unpaired_frames = 0;
   std::vector<std::string> notes;          ///< on the inputs as they are, of the whole plan
   std::int64_t quarantined_elsewhere = 0;  ///< in other parts, when it started
   bool too_many_faults = false;  ///< the manifest's limits for quarantined samples are passed
@@ -47,7 +47,7 @@ struct ConversionReport {
 
 /// Counts a committed shard: its pairs, what is quarantined of them, its bytes. `volume_bytes` is
 /// the size of its volumes uncompressed.
-void add_shard(const ShardMarker& marker, std::int64_t volume_bytes, ConversionReport& report);
+void add_shard(const CommitRecord& record, std::int64_t volume_bytes, ConversionReport& report);
 
 /// A few lines for a person; quarantined samples are listed up to a number, then counted, and the
 /// last line says what to do about them.

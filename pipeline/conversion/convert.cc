@@ -77,8 +77,8 @@ ConversionReport empty_report(const fs::path& folder, const Plan& plan, const Pl
   report.shards_planned = static_cast<int>(own.size());
   for (const PlannedShard* shard : own) report.planned += std::ssize(shard->samples);
   for (const SourceSummary& source : plan.sources) {
-    report.without_partner += source.without_partner;
-    report.frames_without_partner += static_cast<std::int64_t>(source.without_partner_ids.size());
+    report.unpaired += source.unpaired;
+    report.unpaired_frames += static_cast<std::int64_t>(source.unpaired_ids.size());
   }
   return report;
 }
@@ -105,7 +105,7 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
   }
   report.damaged = earlier.faults;
   for (const CommittedShard& done : earlier.done) {
-    add_shard(done.marker, volume_bytes(job.manifest, *done.shard), report);
+    add_shard(done.record, volume_bytes(job.manifest, *done.shard), report);
   }
   report.shards_done_before = report.shards_done;
   // Where not even a plan of quarantined samples passes the limits, nobody needs to count.
@@ -118,8 +118,8 @@ EarlierShards look_back(const ConversionJob& job, const ConversionOptions& optio
 void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_this_run,
               const PlannedShards& by_others, ConversionReport& report) {
   for (const CommittedShard& made : by_this_run) {
-    add_shard(made.marker, volume_bytes(job.manifest, *made.shard), report);
-    for (const auto& [stage, seconds] : made.marker.stage_seconds) {
+    add_shard(made.record, volume_bytes(job.manifest, *made.shard), report);
+    for (const auto& [stage, seconds] : made.record.stage_seconds) {
       report.stage_seconds[stage] += seconds;
     }
   }
@@ -127,17 +127,17 @@ void add_made(const ConversionJob& job, const std::vector<CommittedShard>& by_th
     const ShardState state = shard_state(job.folder, outline_of(*shard), job.frozen.hash);
     if (!state.done()) continue;  // the last look tells of it
     ++report.shards_done_by_others;
-    add_shard(*state.marker, volume_bytes(job.manifest, *shard), report);
+    add_shard(*state.record, volume_bytes(job.manifest, *shard), report);
   }
 }
 
-/// A last look at the part, so that "complete" is what stands in the folder: beside this run
+/// A last look at the part, so that "complete" is what is in the folder: beside this run
 /// another may have overwritten, or a person deleted, what was committed.
 void look_again(const ConversionJob& job, const ConversionOptions& options,
                 const PlannedShards& own, ConversionReport& report) {
   const TraceSpan span(options.trace, "look again at all shards", "job");
   for (const ShardState& shard :
-       scan_shards(job.folder, outlines_of(own), job.frozen.hash, ScanDepth::kMarker,
+       scan_shards(job.folder, outlines_of(own), job.frozen.hash, ScanDepth::kRecord,
                    {.threads = thread_count(options.threads), .show_phase = options.show_phase})) {
     if (shard.done()) continue;
     report.lost.push_back((job.folder / shard.outline.name).string() +

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/text.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/runtime/progress.h"
@@ -116,14 +116,14 @@ std::string by_gap_text(const std::map<int, std::int64_t>& counts) {
   return counts.empty() ? "" : "  (" + counts_text(counts, "gap ") + ")";
 }
 
-std::string without_partner_text(const SourceSpec& spec, const SourceSummary& summary,
-                                 const std::map<int, std::int64_t>& by_gap) {
+std::string unpaired_text(const SourceSpec& spec, const SourceSummary& summary,
+                          const std::map<int, std::int64_t>& by_gap) {
   std::int64_t places = 0;
   for (const auto& [gap, count] : by_gap) places += count;
   const std::string text =
       fmt::format("  no paired frame  {} of {} labelled frames x gaps{}\n", places,
                   summary.labelled_frames * std::ssize(spec.pairs.gaps), by_gap_text(by_gap));
-  const std::vector<std::string>& ids = summary.without_partner_ids;
+  const std::vector<std::string>& ids = summary.unpaired_ids;
   if (ids.empty()) return text;
   const bool draws = spec.pairs.choose == PairChoice::kOne;
   return text + fmt::format("  {:<15}  {} of {} labelled frames  ({})\n",
@@ -132,7 +132,7 @@ std::string without_partner_text(const SourceSpec& spec, const SourceSummary& su
 }
 
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
-                        const std::map<int, std::int64_t>& without_partner, std::int64_t shards) {
+                        const std::map<int, std::int64_t>& unpaired, std::int64_t shards) {
   std::string text = fmt::format("{} {} ({})\n", to_string(spec.dataset),
                                  escape_controls(spec.root), escape_controls(spec.split));
   if (has_events(spec.dataset)) {
@@ -141,7 +141,7 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
     text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
     text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
                         by_gap_text(summary.pairs_by_gap));
-    text += without_partner_text(spec, summary, without_partner);
+    text += unpaired_text(spec, summary, unpaired);
   }
   if (summary.faults > 0) {
     text += fmt::format(
@@ -176,7 +176,7 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
   const Plan& plan = job.plan;
   std::string text;
   for (std::size_t i = 0; i < plan.sources.size(); ++i) {
-    text += source_text(manifest.sources[i], plan.sources[i], job.without_partner_by_gap[i],
+    text += source_text(manifest.sources[i], plan.sources[i], job.unpaired_by_gap[i],
                         shards_of(plan, static_cast<int>(i)));
   }
   return text +
@@ -196,10 +196,10 @@ std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job
                        {"labelled_frames", summary.labelled_frames},
                        {"pairs", pairs_of(summary)},
                        {"pairs_by_gap", by_gap_json(summary.pairs_by_gap)},
-                       {"without_partner", summary.without_partner},
-                       {"without_partner_by_gap", by_gap_json(job.without_partner_by_gap[i])},
-                       {"frames_without_partner", summary.without_partner_ids.size()},
-                       {"without_partner_ids", summary.without_partner_ids},
+                       {"without_partner", summary.unpaired},
+                       {"without_partner_by_gap", by_gap_json(job.unpaired_by_gap[i])},
+                       {"frames_without_partner", summary.unpaired_ids.size()},
+                       {"without_partner_ids", summary.unpaired_ids},
                        {"missing_frames", summary.faults},
                        {"notes", summary.notes},
                        {"shards", shards_of(plan, static_cast<int>(i))}});

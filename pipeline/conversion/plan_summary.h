@@ -9,7 +9,7 @@
 
 namespace eventgan {
 
-/// What a job will cost, measured on a few of its own pairs and scaled by picture size.
+/// What a job will cost, measured on a few of its own pairs and scaled by image size.
 struct TrialEstimate {
   int pairs_measured = 0;
   double seconds_per_pair = 0;  ///< on one thread, mean over the plan
@@ -19,7 +19,7 @@ struct TrialEstimate {
 
 /// Runs up to `most` pairs from the start of each source through reading, generating and encoding
 /// on the calling thread (after one more, which counts only where no other could be tried), and
-/// scales by source and picture size. Pairs that fail are left out.
+/// scales by source and image size. Pairs that fail are left out.
 TrialEstimate measure_trial(const JobManifest& manifest, const PlannedJob& job,
                             const Generator& generator, int threads, int most = 4);
 

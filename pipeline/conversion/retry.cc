@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
@@ -38,10 +38,10 @@ QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
     const ShardState& state = states[i];
     if (state.condition == ShardCondition::kMissing) ++found.shards_missing;
     found.damaged.insert(found.damaged.end(), state.faults.begin(), state.faults.end());
-    if (!state.done() || state.marker->quarantined.empty()) continue;
+    if (!state.done() || state.record->quarantined.empty()) continue;
     found.shards.push_back(i);
-    found.count += std::ssize(state.marker->quarantined);
-    for (const QuarantinedSample& sample : state.marker->quarantined) {
+    found.count += std::ssize(state.record->quarantined);
+    for (const QuarantinedSample& sample : state.record->quarantined) {
       found.ids.push_back(sample.sample_id);
     }
   }
@@ -54,7 +54,7 @@ std::vector<PlannedShard> plan_retry(const std::vector<CommittedShard>& shards) 
     const PlannedShard& whole = *committed.shard;
     PlannedShard& part = retried.emplace_back(
         PlannedShard{whole.name, whole.source, whole.volume_size, {}, whole.size_unknown});
-    for (const QuarantinedSample& quarantined : committed.marker.quarantined) {
+    for (const QuarantinedSample& quarantined : committed.record.quarantined) {
       part.samples.push_back(whole.samples.at(static_cast<std::size_t>(quarantined.slot)));
     }
   }
@@ -131,12 +131,12 @@ std::vector<CommittedShard> trusted_shards(const fs::path& folder, const FrozenP
   if (!options.stop_requested()) {
     report.quarantined = 0;  // what a damaged shard held does not count
     for (const CommittedShard& shard : earlier.done) {
-      report.quarantined += std::ssize(shard.marker.quarantined);
+      report.quarantined += std::ssize(shard.record.quarantined);
     }
   }
-  // What was made anew since the first look may have no quarantined sample any more.
+  // What was made again since the first look may have no quarantined sample any more.
   std::erase_if(earlier.done,
-                [](const CommittedShard& shard) { return shard.marker.quarantined.empty(); });
+                [](const CommittedShard& shard) { return shard.record.quarantined.empty(); });
   return std::move(earlier.done);
 }
 
@@ -151,25 +151,25 @@ class RetrySink final : public SampleSink {
 
   void open(const PlannedShard& shard) override {
     const auto committed = std::ranges::find_if(
-        shards_, [&](const CommittedShard& one) { return one.marker.shard == shard.name; });
-    marker_ = &committed->marker;
+        shards_, [&](const CommittedShard& one) { return one.record.shard == shard.name; });
+    record_ = &committed->record;
     rewrite_ = std::make_unique<ShardRewrite>(
-        folder_, *marker_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
+        folder_, *record_, shard.size_unknown ? std::optional(shard.volume_size) : std::nullopt);
   }
 
   void add(const SampleMessage& message) override {
-    const int slot = marker_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
+    const int slot = record_->quarantined.at(static_cast<std::size_t>(message.slot)).slot;
     rewrite_->redo(slot, message);
     if (!message.failed()) return;
-    failed_.push_back({marker_->shard, slot, message.sample.sample_id, message.sample.fault});
+    failed_.push_back({record_->shard, slot, message.sample.sample_id, message.sample.fault});
   }
 
   bool commit() override {
     TraceSpan span(trace_, "commit shard", "shard");
-    span.note("shard", marker_->shard);
+    span.note("shard", record_->shard);
     report_.shards_rewritten += rewrite_->commit();
     rewrite_.reset();
-    const std::int64_t tried = std::ssize(marker_->quarantined);
+    const std::int64_t tried = std::ssize(record_->quarantined);
     const std::int64_t mended = tried - std::ssize(failed_);
     report_.tried += tried;
     report_.mended += mended;
@@ -190,7 +190,7 @@ class RetrySink final : public SampleSink {
  private:
   const fs::path& folder_;
   const std::vector<CommittedShard>& shards_;
-  const ShardMarker* marker_ = nullptr;    // of the shard under way
+  const CommitRecord* record_ = nullptr;   // of the shard under way
   std::unique_ptr<ShardRewrite> rewrite_;  // of the shard under way
   std::vector<QuarantinedSlot> failed_;    // of the shard under way
   RetryReport& report_;
@@ -221,7 +221,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
                   const std::string& weights_hash, const RunOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   FrozenPlan frozen = read_frozen_plan(folder);
-  // Of two that write one shard anew, the one that is through last would put back what the other
+  // Of two that write one shard again, the one that is through last would put back what the other
   // has mended.
   const FileLock lock(folder / "plan.json", FileLock::IfTaken::kGiveUp);
   if (lock.is_taken()) {
@@ -246,7 +246,7 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
   for (std::size_t i = 0; i < shards.size(); ++i) {
     to_redo.push_back(&retried[i]);
     // A shard that has good samples already has the size of these.
-    if (!retried[i].size_unknown || shards[i].marker.valid == 0) continue;
+    if (!retried[i].size_unknown || shards[i].record.valid == 0) continue;
     retried[i].volume_size = ShardReader(folder / retried[i].name).header().volume.size;
   }
   const std::int64_t to_do = report.quarantined;

@@ -17,7 +17,7 @@
 
 namespace eventgan {
 
-/// Where an output folder has quarantined samples, by its markers alone.
+/// Where an output folder has quarantined samples, by its commit records alone.
 struct QuarantinedSamples {
   std::vector<std::size_t> shards;   ///< committed shards with any, by their place in the plan
   std::int64_t count = 0;            ///< in all of them
@@ -30,7 +30,7 @@ QuarantinedSamples find_quarantined(const std::filesystem::path& folder,
                                     const FrozenOutline& frozen);
 
 /// What to redo of each shard: the planned shard with its quarantined samples alone, in the order
-/// of its marker, which says the slot of each.
+/// of its commit record, which says the slot of each.
 std::vector<PlannedShard> plan_retry(const std::vector<CommittedShard>& shards);
 
 /// What a retry did.
@@ -72,7 +72,7 @@ std::optional<RetryReport> nothing_to_retry(const std::filesystem::path& folder,
 /// mended; every other byte of the shards stays, and plan.json does. A shard is written again only
 /// if a sample of it is mended now or fails for another reason. Shards that are damaged, or not
 /// made yet, are left to `convert`. A shard whose size was unknown at planning gets that of its
-/// mended pictures with its first good sample (see complete_plan).
+/// mended images with its first good sample (see complete_plan).
 ///
 /// The job must be the frozen one in all but its inputs: where the fingerprint differs in fields
 /// that may change, that is recorded first (amendments.json), so that later runs accept the folder.

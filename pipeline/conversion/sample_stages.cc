@@ -164,7 +164,7 @@ void SampleStages::read_labels(SampleMessage& message, const Dataset& dataset) c
     }
     message.fail(std::get<SampleFault>(labels).reason);
   }
-  // Without a usable picture or label there is no place in the volume; the original text is kept.
+  // Without a usable image or label there is no place in the volume; the original text is kept.
   message.sample.annotation.boxes.clear();
   message.sample.annotation.persons.clear();
 }

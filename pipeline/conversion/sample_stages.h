@@ -63,7 +63,7 @@ class SampleStages {
                const Generator& generator, int in_flight);
 
   /// Decodes and prepares the frames, or reads and places the events; reads the annotation, maps
-  /// its labels. Has the pictures of the shard's next `in_flight` samples loaded meanwhile.
+  /// its labels. Has the images of the shard's next `in_flight` samples loaded meanwhile.
   void read(SampleMessage& message) const;
 
   /// Runs the generator on the prepared frames; or makes the events' volume.

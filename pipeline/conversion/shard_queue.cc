@@ -9,7 +9,7 @@
 #include <system_error>
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/documents/plan.h"
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/atomic_file.h"
@@ -19,7 +19,7 @@
 namespace eventgan {
 namespace {
 
-/// A listing stands so many times as long as it took: folders of thousands of shards on network
+/// A listing is kept so many times as long as it took: folders of thousands of shards on network
 /// file systems are slow to list.
 constexpr int kListingStands = 20;
 
@@ -82,7 +82,7 @@ bool SharedFolder::is_done(const PlannedShard& shard) const {
     return shard_state(folder_, outline_of(shard), plan_hash_).done();
   }
   return shard_state(folder_, outline_of(shard), plan_hash_, ScanDepth::kBytes).done() &&
-         read_text_file(folder_ / marker_name(shard.name)) != distrusted->second;
+         read_text_file(folder_ / commit_record_name(shard.name)) != distrusted->second;
 }
 
 bool SharedFolder::is_busy(const PlannedShard& shard) {
@@ -95,7 +95,7 @@ bool SharedFolder::is_busy(const PlannedShard& shard) {
     const auto end = std::chrono::steady_clock::now();
     next_listing_ = end + kListingStands * (end - start);
   }
-  return busy_.contains(shard.name) || busy_.contains(marker_name(shard.name));
+  return busy_.contains(shard.name) || busy_.contains(commit_record_name(shard.name));
 }
 
 void SharedFolder::claim(const PlannedShard& shard) {

@@ -30,7 +30,7 @@ enum class ShardActivity {
 class SharedFolder {
  public:
   /// The shards named in `distrusted` (see EarlierShards) count as done only after their bytes were
-  /// hashed, and with another marker if it was that.
+  /// hashed, and with another commit record if it was that.
   SharedFolder(std::filesystem::path folder, std::string plan_hash,
                std::map<std::string, std::string> distrusted,
                std::chrono::steady_clock::duration tell_interval = std::chrono::seconds(2));
@@ -65,7 +65,7 @@ class SharedFolder {
 
   std::filesystem::path folder_;
   std::string plan_hash_;
-  std::map<std::string, std::string> distrusted_;  // with the text of a marker that is wrong
+  std::map<std::string, std::string> distrusted_;  // with the text of a commit record that is wrong
   std::mutex mutex_;
   std::map<std::string, Claim> claims_;  // by shard
   std::chrono::steady_clock::duration tell_interval_;

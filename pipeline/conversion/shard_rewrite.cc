@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
@@ -14,32 +14,32 @@ namespace eventgan {
 namespace {
 
 /// Why the sample in `slot` was quarantined; empty if it was not.
-std::string reason_of(const ShardMarker& marker, int slot) {
+std::string reason_of(const CommitRecord& record, int slot) {
   const auto found =
-      std::ranges::lower_bound(marker.quarantined, slot, {}, &QuarantinedSample::slot);
-  return found != marker.quarantined.end() && found->slot == slot ? found->reason : "";
+      std::ranges::lower_bound(record.quarantined, slot, {}, &QuarantinedSample::slot);
+  return found != record.quarantined.end() && found->slot == slot ? found->reason : "";
 }
 
 }  // namespace
 
-ShardRewrite::ShardRewrite(std::filesystem::path folder, ShardMarker marker,
+ShardRewrite::ShardRewrite(std::filesystem::path folder, CommitRecord record,
                            std::optional<ImageSize> volume_size)
     : folder_(std::move(folder)),
-      before_(std::move(marker)),
+      before_(std::move(record)),
       reader_(folder_ / before_.shard),
       header_(reader_.header()) {
   if (volume_size) header_.volume.size = *volume_size;
-  marker_.shard = before_.shard;
-  marker_.plan_hash = before_.plan_hash;
+  record_.shard = before_.shard;
+  record_.plan_hash = before_.plan_hash;
   // What the shard has cost so far; the work of a retry comes on top.
-  marker_.stage_seconds = before_.stage_seconds;
-  marker_.wall_seconds = before_.wall_seconds;
-  marker_.peak_bytes = before_.peak_bytes;
+  record_.stage_seconds = before_.stage_seconds;
+  record_.wall_seconds = before_.wall_seconds;
+  record_.peak_bytes = before_.peak_bytes;
 }
 
 void ShardRewrite::redo(int slot, const SampleMessage& message) {
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
-    marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
+    record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
   if (!is_news(slot, message.sample)) return;  // copied with the rest, if at all
   if (!writer_) writer_ = std::make_unique<ShardWriter>(folder_, header_);
@@ -53,42 +53,43 @@ bool ShardRewrite::is_news(int slot, const ShardSample& sample) const {
 }
 
 void ShardRewrite::copy_before(int slot) {
-  while (marker_.samples < slot) {
-    ShardSample sample = reader_.sample(marker_.samples);
-    sample.fault = reason_of(before_, marker_.samples);
-    append(sample, reader_.stored_chunk(marker_.samples));
+  while (record_.samples < slot) {
+    ShardSample sample = reader_.sample(record_.samples);
+    sample.fault = reason_of(before_, record_.samples);
+    append(sample, reader_.stored_chunk(record_.samples));
   }
 }
 
 void ShardRewrite::append(const ShardSample& sample, std::span<const std::byte> chunk) {
   writer_->append(sample, chunk);
   if (sample.valid) {
-    ++marker_.valid;
+    ++record_.valid;
   } else {
-    marker_.quarantined.push_back({marker_.samples, sample.sample_id, sample.fault});
+    record_.quarantined.push_back({record_.samples, sample.sample_id, sample.fault});
   }
-  ++marker_.samples;
+  ++record_.samples;
 }
 
 bool ShardRewrite::commit() {
   if (!writer_) return false;
   copy_before(reader_.header().sample_count);
-  const std::filesystem::path marker_file = folder_ / marker_name(marker_.shard);
-  if (parse_marker(read_text_file(marker_file), marker_file.string()).sha256 != before_.sha256) {
+  const std::filesystem::path commit_record_file = folder_ / commit_record_name(record_.shard);
+  if (parse_commit_record(read_text_file(commit_record_file), commit_record_file.string()).sha256 !=
+      before_.sha256) {
     throw std::runtime_error("expected the shard that the retry started with, got another, in " +
-                             (folder_ / marker_.shard).string() + ": run retry again");
+                             (folder_ / record_.shard).string() + ": run retry again");
   }
-  ShardBackup backup(folder_ / marker_.shard);
+  ShardBackup backup(folder_ / record_.shard);
   ShardReceipt receipt = writer_->commit();
-  marker_.sha256 = receipt.sha256;
-  marker_.size_bytes = receipt.size_bytes;
-  marker_.contents = std::move(receipt.contents);
-  const std::string text = to_json(marker_);
+  record_.sha256 = receipt.sha256;
+  record_.size_bytes = receipt.size_bytes;
+  record_.contents = std::move(receipt.contents);
+  const std::string text = to_json(record_);
   try {
-    write_file_atomically(marker_file, text);
+    write_file_atomically(commit_record_file, text);
   } catch (const std::runtime_error&) {
-    // The marker may be in place all the same: its name is, only not known to be on disk.
-    if (read_text_file(marker_file) == text) backup.release();
+    // The commit record may be in place all the same: its name is, only not known to be on disk.
+    if (read_text_file(commit_record_file) == text) backup.release();
     throw;
   }
   backup.release();

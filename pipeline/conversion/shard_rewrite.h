@@ -13,27 +13,28 @@
 
 namespace eventgan {
 
-/// Writes a committed shard anew with some of its quarantined samples redone. Everything else is
+/// Writes a committed shard again with some of its quarantined samples redone. Everything else is
 /// copied, rows as they are and volumes chunk by chunk, without being decoded. The file is begun
 /// only when a redone sample proves different: of a shard whose samples all fail as they did
 /// before, nothing is touched. One that is not committed leaves the shard as it was. Thread safety:
 /// one thread at a time.
 class ShardRewrite {
  public:
-  /// `marker` is that of the shard in `folder`, whose bytes are known to be the marker's.
+  /// `record` is that of the shard in `folder`, whose bytes are known to be the commit record's.
   /// `volume_size`: what its volumes get instead of their size; only of a shard without a good
   /// sample, and so without volumes. Throws as ShardReader does.
-  ShardRewrite(std::filesystem::path folder, ShardMarker marker,
+  ShardRewrite(std::filesystem::path folder, CommitRecord record,
                std::optional<ImageSize> volume_size = std::nullopt);
 
   /// A sample redone, good or failed again; slots ascend. Throws std::runtime_error if the disk
   /// fails.
   void redo(int slot, const SampleMessage& message);
 
-  /// Copies the rest, publishes the shard and then its marker; does nothing, and gives false, if
-  /// nothing differs. Throws std::runtime_error if another process has put another shard in its
-  /// place meanwhile, or the disk fails. Between the two names the folder holds a shard that is not
-  /// its marker's: an error just there puts the shard back, after a kill restore_shards does. Once.
+  /// Copies the rest, publishes the shard and then its commit record; does nothing, and gives
+  /// false, if nothing differs. Throws std::runtime_error if another process has put another shard
+  /// in its place meanwhile, or the disk fails. Between the two names the folder holds a shard that
+  /// is not its commit record's: an error just there puts the shard back, after a kill
+  /// restore_shards does. Once.
   bool commit();
 
  private:
@@ -42,11 +43,11 @@ class ShardRewrite {
   void append(const ShardSample& sample, std::span<const std::byte> chunk);
 
   std::filesystem::path folder_;
-  ShardMarker before_;
+  CommitRecord before_;
   ShardReader reader_;
   ShardHeader header_;                   // of what is written
   std::unique_ptr<ShardWriter> writer_;  // from the first difference on
-  ShardMarker marker_;                   // of what is written
+  CommitRecord record_;                  // of what is written
 };
 
 }  // namespace eventgan

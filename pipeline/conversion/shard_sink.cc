@@ -4,7 +4,7 @@
 #include <iterator>
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "pipeline/planning/fingerprint.h"
@@ -53,8 +53,8 @@ double seconds_since(std::chrono::steady_clock::time_point start) {
 }
 
 /// Counts the calling thread's work since `start_ns` (thread_processor_ns) as the stage "write".
-void add_write_seconds(std::int64_t start_ns, ShardMarker& marker) {
-  marker.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]] +=
+void add_write_seconds(std::int64_t start_ns, CommitRecord& record) {
+  record.stage_seconds[kStageNames[static_cast<std::size_t>(Stage::kWrite)]] +=
       1e-9 * static_cast<double>(thread_processor_ns() - start_ns);
 }
 
@@ -77,10 +77,10 @@ void ShardSink::open(const PlannedShard& shard) {
   const std::int64_t start_ns = thread_processor_ns();
   writer_ = std::make_unique<ShardWriter>(job_.folder, header_of(shard, job_));
   shard_ = &shard;
-  marker_ = {};
-  marker_.shard = shard.name;
-  marker_.plan_hash = job_.frozen.hash;
-  add_write_seconds(start_ns, marker_);
+  record_ = {};
+  record_.shard = shard.name;
+  record_.plan_hash = job_.frozen.hash;
+  add_write_seconds(start_ns, record_);
 }
 
 void ShardSink::add(const SampleMessage& message) {
@@ -89,23 +89,23 @@ void ShardSink::add(const SampleMessage& message) {
   }
   const std::int64_t start_ns = thread_processor_ns();
   writer_->append(message.sample, message.chunk);
-  ++marker_.samples;
+  ++record_.samples;
   if (message.failed()) {
-    marker_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
+    record_.quarantined.push_back({message.slot, message.sample.sample_id, message.sample.fault});
   } else {
-    ++marker_.valid;
+    ++record_.valid;
   }
   for (std::size_t stage = 0; stage < kStageCount; ++stage) {
-    marker_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
+    record_.stage_seconds[kStageNames[stage]] += message.seconds[stage];
   }
-  shared_.tell(*shard_, marker_.samples);
-  add_write_seconds(start_ns, marker_);
+  shared_.tell(*shard_, record_.samples);
+  add_write_seconds(start_ns, record_);
 }
 
 bool ShardSink::commit() {
   TraceSpan span(job_.options.trace, "commit shard", "shard");
   span.note("shard", shard_->name);
-  span.note("samples", marker_.samples);
+  span.note("samples", record_.samples);
   const std::int64_t start_ns = thread_processor_ns();
   ShardReceipt receipt;
   try {
@@ -117,21 +117,21 @@ bool ShardSink::commit() {
     return false;
   }
   writer_.reset();
-  marker_.sha256 = receipt.sha256;
-  marker_.size_bytes = receipt.size_bytes;
+  record_.sha256 = receipt.sha256;
+  record_.size_bytes = receipt.size_bytes;
   span.note("bytes", receipt.size_bytes);
-  marker_.contents = std::move(receipt.contents);
-  add_write_seconds(start_ns, marker_);
-  marker_.wall_seconds = seconds_since(committed_at_);
-  marker_.peak_bytes = static_cast<std::int64_t>(peak_memory_bytes());
+  record_.contents = std::move(receipt.contents);
+  add_write_seconds(start_ns, record_);
+  record_.wall_seconds = seconds_since(committed_at_);
+  record_.peak_bytes = static_cast<std::int64_t>(peak_memory_bytes());
   {
     const TraceSpan file(job_.options.trace, "write marker", "shard");
-    write_file_atomically(job_.folder / marker_name(shard_->name), to_json(marker_));
+    write_file_atomically(job_.folder / commit_record_name(shard_->name), to_json(record_));
   }
   shared_.release(*shard_);
   committed_at_ = std::chrono::steady_clock::now();
-  quarantined_ += std::ssize(marker_.quarantined);
-  committed_.push_back({shard_, std::move(marker_)});
+  quarantined_ += std::ssize(record_.quarantined);
+  committed_.push_back({shard_, std::move(record_)});
   return true;
 }
 

@@ -14,9 +14,9 @@
 
 namespace eventgan {
 
-/// Writes the shards of `convert` and commits each with its marker. Enforces the manifest's error
-/// policy: with "fail" the first fault throws TooManyFaults; with "quarantine" the shard in which
-/// the limits are passed is still committed, then the sink is closed.
+/// Writes the shards of `convert` and commits each with its commit record. Enforces the manifest's
+/// error policy: with "fail" the first fault throws TooManyFaults; with "quarantine" the shard in
+/// which the limits are passed is still committed, then the sink is closed.
 class ShardSink final : public SampleSink {
  public:
   /// Both must outlive the sink. `quarantined_before`: samples in all shards of the plan that are
@@ -25,8 +25,8 @@ class ShardSink final : public SampleSink {
 
   void open(const PlannedShard& shard) override;
   void add(const SampleMessage& message) override;
-  /// False if the file under way was lost, but another worker has committed the shard. The marker
-  /// is in place on return.
+  /// False if the file under way was lost, but another worker has committed the shard. The commit
+  /// record is in place on return.
   bool commit() override;
   void abandon() override;
   bool closed() const override;
@@ -41,7 +41,7 @@ class ShardSink final : public SampleSink {
   std::vector<CommittedShard> committed_;
   const PlannedShard* shard_ = nullptr;  // under way, or the last one
   std::unique_ptr<ShardWriter> writer_;  // of the shard under way
-  ShardMarker marker_;                   // of the shard under way
+  CommitRecord record_;                  // of the shard under way
 };
 
 }  // namespace eventgan

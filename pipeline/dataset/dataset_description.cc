@@ -12,8 +12,8 @@
 #include <string_view>
 #include <utility>
 
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "pipeline/folder/shard_guard.h"
@@ -39,7 +39,7 @@ JobManifest frozen_manifest(const fs::path& folder, const PlanOutline& plan) {
       file.string() + " (eventgan convert makes it again)");
 }
 
-/// The header of a shard whose bytes are its marker's.
+/// The header of a shard whose bytes are its commit record's.
 ShardHeader read_shard_header(const fs::path& folder, const ShardState& shard,
                               const std::string& plan_hash) {
   const fs::path file = folder / shard.outline.name;
@@ -130,7 +130,7 @@ std::vector<DatasetView> views_of(const DatasetParts& parts) {
       views.push_back({"", std::move(header), {}});
       shards.emplace_back();
     }
-    shards[number].push_back({parts.source_of(shard.outline).split, *shard.marker});
+    shards[number].push_back({parts.source_of(shard.outline).split, *shard.record});
   }
   for (std::size_t i = 0; i < views.size(); ++i) {
     views[i].layout = lay_out_view(std::move(shards[i]));
@@ -139,17 +139,17 @@ std::vector<DatasetView> views_of(const DatasetParts& parts) {
   return views;
 }
 
-void add(const ShardMarker& marker, DatasetCounts& counts) {
+void add(const CommitRecord& record, DatasetCounts& counts) {
   ++counts.shards;
-  counts.samples += marker.samples;
-  counts.valid += marker.valid;
+  counts.samples += record.samples;
+  counts.valid += record.valid;
   counts.boxes +=
-      std::accumulate(marker.contents.boxes.begin(), marker.contents.boxes.end(), std::int64_t{0});
-  counts.persons += std::accumulate(marker.contents.persons.begin(), marker.contents.persons.end(),
+      std::accumulate(record.contents.boxes.begin(), record.contents.boxes.end(), std::int64_t{0});
+  counts.persons += std::accumulate(record.contents.persons.begin(), record.contents.persons.end(),
                                     std::int64_t{0});
-  counts.size_bytes += marker.size_bytes;
-  for (const auto& [name, boxes] : marker.contents.classes) counts.classes[name] += boxes;
-  for (const auto& [gap, samples] : marker.contents.gaps) counts.gaps[gap] += samples;
+  counts.size_bytes += record.size_bytes;
+  for (const auto& [name, boxes] : record.contents.classes) counts.classes[name] += boxes;
+  for (const auto& [gap, samples] : record.contents.gaps) counts.gaps[gap] += samples;
 }
 
 namespace {
@@ -177,7 +177,7 @@ Json counts_json(const DatasetParts& parts) {
     const SourceSpec& source = parts.source_of(shard.outline);
     for (DatasetCounts* counts :
          {&total, &splits[source.split], &datasets[std::string(to_string(source.dataset))]}) {
-      add(*shard.marker, *counts);
+      add(*shard.record, *counts);
     }
   }
   Json by_split = Json::object();
@@ -190,7 +190,7 @@ Json counts_json(const DatasetParts& parts) {
 Json shard_entry(const DatasetParts& parts, const ShardState& shard) {
   const SourceSpec& source = parts.source_of(shard.outline);
   DatasetCounts counts;
-  add(*shard.marker, counts);
+  add(*shard.record, counts);
   return {{"name", shard.outline.name},
           {"split", source.split},
           {"dataset", to_string(source.dataset)},
@@ -199,7 +199,7 @@ Json shard_entry(const DatasetParts& parts, const ShardState& shard) {
           {"boxes", counts.boxes},
           {"persons", counts.persons},
           {"size_bytes", counts.size_bytes},
-          {"sha256", shard.marker->sha256}};
+          {"sha256", shard.record->sha256}};
 }
 
 Json source_entry(const DatasetParts& parts, std::size_t index) {
@@ -208,12 +208,12 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
   Json source = {{"dataset", to_string(spec.dataset)},
                  {"split", spec.split},
                  {"labelled_frames", summary.labelled_frames},
-                 {"without_partner", summary.without_partner},
-                 {"frames_without_partner", summary.without_partner_ids.size()},
+                 {"without_partner", summary.unpaired},
+                 {"frames_without_partner", summary.unpaired_ids.size()},
                  {"notes", summary.notes},
                  {"class_names", nullptr},
                  {"joint_names", nullptr}};
-  // Names stand in the shards; a source of which no shard is done yet keeps them to itself.
+  // Names are in the shards; a source of which no shard is done yet keeps them to itself.
   if (const auto header = parts.headers.find(static_cast<int>(index));
       header != parts.headers.end()) {
     source["class_names"] = header->second.label_schema.class_names;
@@ -225,7 +225,7 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
 Json quarantined_json(const DatasetParts& parts) {
   Json list = Json::array();
   for (const ShardState& shard : parts.done) {
-    for (const QuarantinedSample& sample : shard.marker->quarantined) {
+    for (const QuarantinedSample& sample : shard.record->quarantined) {
       list.push_back({{"sample_id", sample.sample_id},
                       {"shard", shard.outline.name},
                       {"slot", sample.slot},
@@ -251,7 +251,7 @@ Json view_entry(const DatasetView& view) {
 }
 
 /// What the settings do not say of what decided the bytes: inputs, versions, the processor. The
-/// manifest's own fields stand under "settings".
+/// manifest's own fields are under "settings".
 std::map<std::string, std::string> circumstances(const DatasetParts& parts) {
   auto fields = amended(parts.frozen.plan.fingerprint, parts.amendments);
   std::erase_if(fields, [](const auto& field) { return field.first.starts_with("manifest "); });
@@ -333,8 +333,8 @@ std::string dataset_text(const DatasetParts& parts) {
   std::map<int, DatasetCounts> sources;
   std::set<std::string> sizes;
   for (const ShardState& shard : parts.done) {
-    add(*shard.marker, total);
-    add(*shard.marker, sources[shard.outline.source]);
+    add(*shard.record, total);
+    add(*shard.record, sources[shard.outline.source]);
     sizes.insert(to_string(shard.outline.volume_size));
   }
   const ShardHeader& header = parts.headers.begin()->second;
@@ -364,9 +364,9 @@ std::string dataset_text(const DatasetParts& parts) {
        header.weights.empty() ? header.weights_hash : header.weights + ", " + header.weights_hash);
   line("plan", parts.frozen.hash);
   for (std::size_t i = 0; i < std::min(parts.done.size(), kListed); ++i) {
-    const ShardMarker& marker = *parts.done[i].marker;
-    line(i == 0 ? "done" : "", fmt::format("{}, samples {}, {} of them quarantined", marker.shard,
-                                           marker.samples, marker.samples - marker.valid));
+    const CommitRecord& record = *parts.done[i].record;
+    line(i == 0 ? "done" : "", fmt::format("{}, samples {}, {} of them quarantined", record.shard,
+                                           record.samples, record.samples - record.valid));
   }
   if (parts.done.size() > kListed) {
     line("", fmt::format("... and {} more (--json lists them)", parts.done.size() - kListed));

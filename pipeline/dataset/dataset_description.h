@@ -34,14 +34,14 @@ struct DatasetParts {
 
 /// Puts together what is known of an output folder whose plan is `frozen`. `shards`: each shard of
 /// the plan, from a scan that has read it. Of one shard of each source the header is read: of the
-/// first that is sound, so that its bytes are its marker's; and of each sound one whose size was
-/// unknown at planning: its outline then has the file's, that of one that is not sound {0, 0}.
+/// first that is sound, so that its bytes are its commit record's; and of each sound one whose size
+/// was unknown at planning: its outline then has the file's, that of one that is not sound {0, 0}.
 /// Throws std::runtime_error naming the file if the plan's manifest or such a shard is not as it
 /// should be.
 DatasetParts read_dataset_parts(const std::filesystem::path& folder, FrozenOutline frozen,
                                 std::vector<ShardState> shards);
 
-/// The same of what stands there, by the markers alone, for a look at it: no shard is hashed, so
+/// The same of what is there, by the commit records alone, for a look at it: no shard is hashed, so
 /// this must run where a damaged one may be opened (read_apart). Throws InputError too, if there is
 /// no plan or no shard that is done.
 DatasetParts read_dataset_parts(const std::filesystem::path& folder);
@@ -69,7 +69,7 @@ struct DatasetCounts {
 };
 
 /// Adds what a shard holds.
-void add(const ShardMarker& marker, DatasetCounts& counts);
+void add(const CommitRecord& record, DatasetCounts& counts);
 
 /// The text of dataset.json (manifests/guides/shard_format.md, "The whole dataset"): what the
 /// dataset is, without any time or place, so that the same shards give the same bytes. Canonical

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/job.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
@@ -27,7 +27,7 @@ FinalizationReport finalize(const std::filesystem::path& folder,
   report.shards_planned = static_cast<int>(parts.frozen.plan.shards.size());
   report.missing = parts.missing;
   report.notes = notes_of(parts.frozen.plan.sources);
-  for (const ShardState& shard : parts.done) add(*shard.marker, report.counts);
+  for (const ShardState& shard : parts.done) add(*shard.record, report.counts);
   report.too_many_faults =
       beyond_limits(options.errors.value_or(parts.manifest.errors), report.counts.quarantined(),
                     parts.frozen.plan.sample_count());
@@ -45,7 +45,7 @@ namespace {
 
 constexpr std::size_t kListedShards = 100;
 
-/// "missing", or what is wrong with what there is.
+/// "missing", or what is wrong with what is there.
 std::string why(const ShardState& shard) {
   return shard.faults.empty() ? to_string(shard.condition) : shard.faults.front();
 }

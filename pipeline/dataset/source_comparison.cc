@@ -29,7 +29,7 @@ namespace eventgan {
 namespace {
 
 // Another compiler's last bits: of a place in the volume, whose terms may cancel, and of what is
-// far away from the picture.
+// far away from the image.
 bool same(double a, double b) {
   return std::abs(a - b) <= 1e-9 + 1e-14 * std::abs(b) || (std::isnan(a) && std::isnan(b));
 }
@@ -129,7 +129,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   if (stored.sample_id != planned.sample_id) {
     return {"expected the planned sample " + planned.sample_id + ", got another"};
   }
-  // A hole that was filled since the plan was frozen: its frames were not known then.
+  // A missing frame that was added since the plan was frozen: its frames were not known then.
   const FramePair& pair = planned.fault.empty() ? planned.pair : stored.pair;
   if (stored.pair.previous != pair.previous || stored.pair.next != pair.next) {
     return {"expected the frames of the plan, " + pair.previous.path + " and " + pair.next.path +
@@ -143,7 +143,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
         std::get<Annotation>(read).original == stored.annotation.original) {
       return {};
     }
-    return {"expected the annotation as it stands in " + place + ", got other bytes"};
+    return {"expected the annotation as it is in " + place + ", got other bytes"};
   }
   if (is_fault(read)) {
     return {"expected the annotation that the shard holds, got none: " +
@@ -151,7 +151,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   const std::optional<ImageSize> size = has_events(kind)
                                             ? std::optional(dataset.sensor_size(planned.label_key))
-                                            : picture_size(stored.pair.next.path);
+                                            : image_size(stored.pair.next.path);
   if (size && *size != stored.source_size) {
     return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
             ", got " + to_string(stored.source_size)};
@@ -196,7 +196,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   return row_differences(header, reader.tables(), slot, expected, place);
 }
 
-std::optional<ImageSize> SourceComparison::picture_size(const std::string& path) {
+std::optional<ImageSize> SourceComparison::image_size(const std::string& path) {
   const auto [entry, is_new] = sizes_.try_emplace(path);
   if (is_new) {
     const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path));
@@ -210,7 +210,7 @@ std::vector<std::string> row_differences(const ShardHeader& header, const ShardT
                                          const std::string& place) {
   const auto row = static_cast<std::size_t>(slot);
   if (!std::ranges::equal(stored.original[row], expected.annotation.original)) {
-    return {"expected the annotation as it stands in " + place + ", got other bytes"};
+    return {"expected the annotation as it is in " + place + ", got other bytes"};
   }
   ShardTables wanted;
   append_row(header, expected, wanted);

@@ -31,8 +31,8 @@ class SourceComparison {
   const std::vector<std::string>& notes() const { return notes_; }
 
   /// Compares every valid sample: that it is the planned one, that its columns of `/pairs` and
-  /// `/labels` are those of the plan and of its annotation read anew and mapped by the placement of
-  /// its source size, that its picture, where it can be read, has that size, that classes and
+  /// `/labels` are those of the plan and of its annotation read again and mapped by the placement
+  /// of its source size, that its image, where it can be read, has that size, that classes and
   /// joints have the source's names. Of a quarantined sample the original annotation is compared,
   /// if the shard has one and it can be read. Texts "expected X, got Y (sample SLOT, ID)" without
   /// the file's name; none for a source that is not there.
@@ -44,7 +44,7 @@ class SourceComparison {
  private:
   std::vector<std::string> sample_faults(const PlannedShard& shard, int slot,
                                          const ShardSample& stored, const ShardReader& reader);
-  std::optional<ImageSize> picture_size(const std::string& path);
+  std::optional<ImageSize> image_size(const std::string& path);
 
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
@@ -53,7 +53,7 @@ class SourceComparison {
   long long compared_ = 0;
 };
 
-/// What slot `slot` of `stored` holds that `expected`, the sample made anew from its source (its
+/// What slot `slot` of `stored` holds that `expected`, the sample made again from its source (its
 /// `tiles` as stored), would not: every column of the format but those of `/events`, which the
 /// generator makes, is compared, so that a new one cannot be forgotten. Numbers of 64 bits may
 /// differ by 1e-9, since their last bits may depend on the compiler; all else is the same exactly.

@@ -14,9 +14,9 @@
 #include <string_view>
 #include <utility>
 
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
 #include "manifests/values/text.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/dataset/source_comparison.h"
@@ -51,7 +51,7 @@ std::vector<std::string> stray_files(const fs::path& folder, const PlanOutline& 
                                  "dataset.h5"};
   for (const ShardOutline& shard : plan.shards) {
     known.insert(shard.name);
-    known.insert(marker_name(shard.name));
+    known.insert(commit_record_name(shard.name));
   }
   std::vector<std::string> strays;
   for (const auto& entry : fs::directory_iterator(folder)) {
@@ -134,19 +134,19 @@ std::vector<std::string> dataset_faults(const fs::path& folder, FrozenOutline fr
 
 namespace {
 
-/// The plan that all readable markers of the plan's shards name, if there are two or more and it is
-/// not the frozen one: then the plan is what is wrong, and not each marker.
+/// The plan that all readable commit records of the plan's shards name, if there are two or more
+/// and it is not the frozen one: then the plan is what is wrong, and not each commit record.
 std::optional<std::string> other_plan(const std::vector<ShardState>& shards,
                                       const std::string& plan_hash) {
   std::string other;
-  int markers = 0;
+  int records = 0;
   for (const ShardState& shard : shards) {
     if (shard.named_plan.empty()) continue;  // reported with its shard
     if (shard.named_plan == plan_hash) return std::nullopt;
-    if (++markers == 1) other = shard.named_plan;
+    if (++records == 1) other = shard.named_plan;
     if (shard.named_plan != other) return std::nullopt;
   }
-  return markers > 1 ? std::optional(other) : std::nullopt;
+  return records > 1 ? std::optional(other) : std::nullopt;
 }
 
 /// One check of one folder.
@@ -223,15 +223,15 @@ class Verification {
         .name = shard.outline.name, .condition = shard.condition, .faults = shard.faults};
     if (shard.condition == ShardCondition::kMissing) {
       check.faults.push_back(
-          (folder_ / marker_name(check.name)).string() +
+          (folder_ / commit_record_name(check.name)).string() +
           ": expected the shard and its commit record, got neither (not made yet)");
     }
     if (!shard.done()) return check;
-    check.size_bytes = shard.marker->size_bytes;
-    check.samples = shard.marker->samples;
-    check.quarantined = shard.marker->samples - shard.marker->valid;
-    check_.samples += shard.marker->samples;
-    check_.valid += shard.marker->valid;
+    check.size_bytes = shard.record->size_bytes;
+    check.samples = shard.record->samples;
+    check.quarantined = shard.record->samples - shard.record->valid;
+    check_.samples += shard.record->samples;
+    check_.valid += shard.record->valid;
     if (!sources_ || !shard.sound()) return check;
     const long long compared_before = sources_->compared();
     const fs::path file = folder_ / check.name;

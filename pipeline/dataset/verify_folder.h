@@ -25,7 +25,7 @@ struct ShardCheck {
   std::string name;
   ShardCondition condition = ShardCondition::kMissing;
   std::int64_t size_bytes = 0;      ///< of a file that was hashed and read
-  int samples = 0;                  ///< by its marker
+  int samples = 0;                  ///< by its commit record
   int quarantined = 0;              ///< of these
   long long compared = 0;           ///< deep: valid samples compared with their source
   std::vector<std::string> faults;  ///< among those of the folder
@@ -51,12 +51,12 @@ std::string to_text(const FolderCheck& check, bool deep);
 /// The same as JSON; `folder` is the one that was checked.
 std::string to_json(const FolderCheck& check, const std::filesystem::path& folder);
 
-/// Checks a whole output folder: the plan, a marker for every shard of it, each shard's bytes,
-/// structure, counts, checksums and values, on all cores; that nothing else looks like a part of
-/// it; that dataset.json and dataset.h5, if there, are what the markers give. Temporaries of other
-/// processes are noted. With `deep`, labels are compared with the sources, where these are there
-/// (see SourceComparison). Changes nothing. Throws InputError if the folder has no plan,
-/// std::runtime_error if that is damaged.
+/// Checks a whole output folder: the plan, a commit record for every shard of it, each shard's
+/// bytes, structure, counts, checksums and values, on all cores; that nothing else looks like a
+/// part of it; that dataset.json and dataset.h5, if there, are what the commit records give.
+/// Temporaries of other processes are noted. With `deep`, labels are compared with the sources,
+/// where these are there (see SourceComparison). Changes nothing. Throws InputError if the folder
+/// has no plan, std::runtime_error if that is damaged.
 FolderCheck verify_folder(const std::filesystem::path& folder, const VerifyOptions& options = {});
 
 /// A line "PATH: expected X, got Y" for each .h5 or .json file of an output folder (not below it)
@@ -65,9 +65,9 @@ FolderCheck verify_folder(const std::filesystem::path& folder, const VerifyOptio
 std::vector<std::string> stray_files(const std::filesystem::path& folder, const PlanOutline& plan);
 
 /// What is wrong with dataset.json and dataset.h5 of an output folder: that they are not what
-/// `finalize` makes of the plan and the markers, or do not go together. Lines "PATH: expected X,
-/// got Y"; none if they are sound, or neither is there. `shards` as read_dataset_parts takes
-/// them: none is opened that was not found sound.
+/// `finalize` makes of the plan and the commit records, or do not go together. Lines "PATH:
+/// expected X, got Y"; none if they are sound, or neither is there. `shards` as read_dataset_parts
+/// takes them: none is opened that was not found sound.
 std::vector<std::string> dataset_faults(const std::filesystem::path& folder, FrozenOutline frozen,
                                         std::vector<ShardState> shards);
 

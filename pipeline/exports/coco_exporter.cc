@@ -6,11 +6,11 @@
 #include <optional>
 #include <utility>
 
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
-#include "stages/events/pictures/skeleton.h"
+#include "stages/events/images/skeleton.h"
 #include "stages/exports/detection_labels.h"
 #include "stages/exports/pose_list.h"
 #include "stages/labels/label_mapping.h"
@@ -183,7 +183,7 @@ class CocoExporter : public Exporter {
     if (step.is_done()) return;
     const Skeletons skeletons = persons ? skeletons_of(work.input) : Skeletons();
     CocoFile file(step.file(name));
-    // A picture's number is its place in the split, in both of the split's files.
+    // An image's number is its place in the split, in both of the split's files.
     std::int64_t image_id = 0;
     file.begin_list("images");
     work.walk(shards, [&](const OutgoingSample& sample) {

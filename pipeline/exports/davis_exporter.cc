@@ -7,7 +7,7 @@
 #include <span>
 
 #include "manifests/values/faults.h"
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/exports/array_files.h"
 #include "stages/exports/davis_file.h"

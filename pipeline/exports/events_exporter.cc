@@ -5,7 +5,7 @@
 #include <string>
 
 #include "manifests/values/counter_random.h"
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "stages/exports/sampled_events.h"
 #include "stages/recordings/mvsec_writer.h"
 
@@ -15,7 +15,7 @@ namespace {
 /// Of a pair whose frames' times are not known.
 constexpr double kUnknownGap_s = 1;
 
-/// A recording of two black frames, since shards have no pictures, and the events between them.
+/// A recording of two black frames, since shards have no images, and the events between them.
 void write_recording(const std::filesystem::path& path, ImageSize size, std::vector<Event> events,
                      double gap_s, const std::string& settings) {
   // MVSEC's readers take the events after a frame's time.

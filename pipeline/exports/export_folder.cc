@@ -10,7 +10,7 @@
 #include <system_error>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
@@ -46,7 +46,7 @@ bool is_export_name(std::string_view name) {
                              [&](std::string_view ending) { return name.ends_with(ending); });
 }
 
-/// `record`: the file that the name stands in, or the folder that it is for.
+/// `record`: the file that the name is in, or the folder that it is for.
 void require_export_name(const std::string& name, const fs::path& record) {
   if (is_export_name(name)) return;
   throw std::runtime_error("expected the name of a file that an export writes, got " +

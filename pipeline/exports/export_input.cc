@@ -10,8 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/output_folder.h"
@@ -49,11 +49,11 @@ ShardState require_shard(const fs::path& folder, const ShardOutline& outline,
                                                         (folder / outline.name).string())
                                           : state.faults.front());
   }
-  if (state.marker->sha256 != sha256) {
+  if (state.record->sha256 != sha256) {
     throw InputError(
         fmt::format("expected the shard that was finalized, SHA-256 {}, got {}, in {} (run "
                     "eventgan finalize again)",
-                    sha256, state.marker->sha256, (folder / outline.name).string()));
+                    sha256, state.record->sha256, (folder / outline.name).string()));
   }
   return state;
 }
@@ -130,9 +130,9 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
     if (source.any_shard.empty()) source.any_shard = outline.name;
     if (std::ranges::find(splits_, source.split) == splits_.end()) continue;
     ShardState state =
-        require_shard(folder_, outline, plan_hash_, hash->second, ScanDepth::kMarker);
+        require_shard(folder_, outline, plan_hash_, hash->second, ScanDepth::kRecord);
     shards_.push_back(
-        {outline, hash->second, state.marker->valid, std::move(state.marker->quarantined)});
+        {outline, hash->second, state.record->valid, std::move(state.record->quarantined)});
   }
 }
 

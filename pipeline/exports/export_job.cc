@@ -8,15 +8,15 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
-#include "stages/events/pictures/preview_picture.h"
+#include "stages/events/images/preview_image.h"
 #include "stages/exports/export_name.h"
 
 namespace eventgan {
@@ -63,8 +63,8 @@ std::vector<const ExportShard*> of_split(const ExportInput& input,
   return chosen;
 }
 
-void write_picture_pair(const OutgoingSample& sample, const std::string& folder, double full_scale,
-                        ExportFolder::Step& step) {
+void write_image_pair(const OutgoingSample& sample, const std::string& folder, double full_scale,
+                      ExportFolder::Step& step) {
   const VolumeShape& shape = sample.reader.header().volume;
   const std::vector<float> volume = sample.reader.volume(sample.slot);
   std::vector<std::uint8_t> codes(volume.size());
@@ -74,7 +74,7 @@ void write_picture_pair(const OutgoingSample& sample, const std::string& folder,
   const std::vector<std::size_t> sides{static_cast<std::size_t>(shape.size.height),
                                        static_cast<std::size_t>(shape.size.width),
                                        static_cast<std::size_t>(shape.channels())};
-  step.write(folder + "/" + sample.name + ".png", time_picture_png(volume, shape));
+  step.write(folder + "/" + sample.name + ".png", time_image_png(volume, shape));
   step.write(folder + "/" + sample.name + ".npy",
              npy_file("|u1", sides, channels_last(codes, sides[2])));
 }

@@ -1,6 +1,6 @@
 #include <fmt/core.h>
 
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "stages/exports/pose_list.h"
 
 namespace eventgan {
@@ -18,7 +18,7 @@ class MpiiExporter : public Exporter {
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
-      write_picture_pair(sample, "images/" + sample.source.split, full_scale_, step);
+      write_image_pair(sample, "images/" + sample.source.split, full_scale_, step);
     });
   }
 

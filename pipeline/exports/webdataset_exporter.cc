@@ -4,8 +4,8 @@
 #include <optional>
 #include <stdexcept>
 
-#include "manifests/documents/json_text_internal.h"
-#include "pipeline/exports/exporter_internal.h"
+#include "manifests/documents/detail/json_text.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/atomic_file.h"

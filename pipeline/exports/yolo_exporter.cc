@@ -1,7 +1,7 @@
 #include <fmt/core.h>
 
 #include "manifests/values/faults.h"
-#include "pipeline/exports/exporter_internal.h"
+#include "pipeline/exports/detail/exporter.h"
 #include "stages/exports/detection_labels.h"
 
 namespace eventgan {
@@ -41,7 +41,7 @@ class YoloExporter : public Exporter {
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
-      write_picture_pair(sample, "images/" + sample.source.split, full_scale_, step);
+      write_image_pair(sample, "images/" + sample.source.split, full_scale_, step);
       step.write("labels/" + sample.source.split + "/" + sample.name + ".txt", labels_of(sample));
     });
   }

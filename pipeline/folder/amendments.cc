@@ -4,8 +4,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/strict_json_internal.h"
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/detail/strict_json.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/file_lock.h"
 #include "stages/base/files/input_file.h"

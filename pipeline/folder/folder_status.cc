@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/plan.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
@@ -27,13 +27,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A commit is two renames, and a look between them finds a shard without its marker. Whoever is at
-/// it is soon through.
+/// A commit is two renames, and a look between them finds a shard without its commit record.
+/// Whoever is at it is soon through.
 constexpr int kLooksAgain = 10;
 constexpr std::chrono::milliseconds kBetweenLooks(100);
 
-/// A worker can have several temporaries for one shard: its claim, the shard, its marker. The one
-/// written last tells how it goes.
+/// A worker can have several temporaries for one shard: its claim, the shard, its commit record.
+/// The one written last tells how it goes.
 void add_running(std::vector<ShardAtWork>& running, ShardAtWork work) {
   for (ShardAtWork& known : running) {
     const bool same = known.shard == work.shard && known.file.name.host == work.file.name.host &&
@@ -62,7 +62,7 @@ class Observer {
  public:
   Observer(const fs::path& folder, const FrozenOutline& frozen) : folder_(folder), frozen_(frozen) {
     for (const ShardOutline& shard : frozen.plan.shards) {
-      shard_of_target_[shard.name] = shard_of_target_[marker_name(shard.name)] = shard.name;
+      shard_of_target_[shard.name] = shard_of_target_[commit_record_name(shard.name)] = shard.name;
     }
     look_at_temporaries();
     shards_ = scan_shards(folder_, frozen_.plan.shards, frozen_.hash);
@@ -81,7 +81,7 @@ class Observer {
     status.samples_planned = frozen_.plan.sample_count();
     status.notes = notes_of(frozen_.plan.sources);
     add_files(status);
-    std::vector<CommitRecord> commits;
+    std::vector<CommitTiming> commits;
     for (const ShardState& shard : shards_) {
       if (shard.done()) {
         add_done(shard, status, commits);
@@ -132,21 +132,21 @@ class Observer {
   }
 
   static void add_done(const ShardState& shard, FolderStatus& status,
-                       std::vector<CommitRecord>& commits) {
-    const ShardMarker& marker = *shard.marker;
+                       std::vector<CommitTiming>& commits) {
+    const CommitRecord& record = *shard.record;
     ++status.shards_done;
-    status.samples_written += marker.valid;
-    for (const QuarantinedSample& sample : marker.quarantined) {
-      status.quarantined.push_back({marker.shard, sample.slot, sample.sample_id, sample.reason});
+    status.samples_written += record.valid;
+    for (const QuarantinedSample& sample : record.quarantined) {
+      status.quarantined.push_back({record.shard, sample.slot, sample.sample_id, sample.reason});
     }
     const double committed_s =
         std::chrono::duration<double>(shard.committed.time_since_epoch()).count();
-    commits.push_back({committed_s, marker.samples, marker.wall_seconds});
+    commits.push_back({committed_s, record.samples, record.wall_seconds});
   }
 
   const fs::path& folder_;
   const FrozenOutline& frozen_;
-  std::map<std::string, std::string> shard_of_target_;  // by the names of shards and markers
+  std::map<std::string, std::string> shard_of_target_;  // by the names of shards and commit records
   std::vector<ShardState> shards_;
   std::vector<UnfinishedFile> files_;
   std::map<std::string, int> at_work_;  // shards, with their samples so far
@@ -173,20 +173,20 @@ FolderStatus folder_status(const fs::path& folder) {
   return Observer(folder, frozen).status();
 }
 
-std::optional<double> worker_rate(std::vector<CommitRecord> records, int writers) {
+std::optional<double> worker_rate(std::vector<CommitTiming> timings, int writers) {
   constexpr std::size_t kFewest = 8;
   constexpr std::size_t kOfEachWriter = 3;
-  std::erase_if(records, [](const CommitRecord& record) {
-    return record.samples <= 0 || !(record.wall_seconds > 0);
+  std::erase_if(timings, [](const CommitTiming& timing) {
+    return timing.samples <= 0 || !(timing.wall_seconds > 0);
   });
-  if (records.empty()) return std::nullopt;
+  if (timings.empty()) return std::nullopt;
   const auto wanted = std::max(kFewest, kOfEachWriter * static_cast<std::size_t>(writers));
-  const auto last = static_cast<std::ptrdiff_t>(std::min(records.size(), wanted));
-  std::partial_sort(records.begin(), records.begin() + last, records.end(),
+  const auto last = static_cast<std::ptrdiff_t>(std::min(timings.size(), wanted));
+  std::partial_sort(timings.begin(), timings.begin() + last, timings.end(),
                     [](const auto& one, const auto& other) { return one.time_s > other.time_s; });
   std::vector<double> rates;
-  for (auto record = records.begin(); record != records.begin() + last; ++record) {
-    rates.push_back(record->samples / record->wall_seconds);
+  for (auto timing = timings.begin(); timing != timings.begin() + last; ++timing) {
+    rates.push_back(timing->samples / timing->wall_seconds);
   }
   std::sort(rates.begin(), rates.end());
   const std::size_t middle = rates.size() / 2;

@@ -14,10 +14,10 @@ namespace eventgan {
 /// A shard under way.
 struct ShardAtWork {
   std::string shard;    ///< its file name
-  UnfinishedFile file;  ///< the shard's temporary, or its marker's
+  UnfinishedFile file;  ///< the shard's temporary, or its commit record's
 };
 
-/// What stands in an output folder.
+/// What is in an output folder.
 struct FolderStatus {
   std::filesystem::path folder;
   std::string plan_hash;
@@ -49,8 +49,8 @@ struct FolderStatus {
 /// shards are not read; see verify_folder for that. Throws InputError if there is no plan.
 FolderStatus folder_status(const std::filesystem::path& folder);
 
-/// What a marker tells about the speed of the worker that committed it.
-struct CommitRecord {
+/// What a commit record tells about the speed of the worker that committed it.
+struct CommitTiming {
   double time_s = 0;  ///< when, from any fixed point in time
   int samples = 0;
   double wall_seconds = 0;  ///< that the worker spent on the shard; 0 if unknown
@@ -58,8 +58,8 @@ struct CommitRecord {
 
 /// Samples a second of one worker, as of late: the median over the last commits, a few for each of
 /// `writers` workers, so that neither one that was paused for a night nor a slow beginning counts.
-/// None if no record knows its time.
-std::optional<double> worker_rate(std::vector<CommitRecord> records, int writers);
+/// None if no timing knows its time.
+std::optional<double> worker_rate(std::vector<CommitTiming> timings, int writers);
 
 /// What is wrong with a sample, without where: the reason's first line up to ", in PATH", by which
 /// the samples of a damaged disk or a wrong folder fall together.

@@ -17,10 +17,10 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/detail/plan_lines.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
-#include "manifests/documents/plan_lines_internal.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/amendments.h"
 #include "pipeline/planning/make_plan.h"
@@ -185,7 +185,7 @@ bool is_same_place(const fs::path& a, const fs::path& b) {
 
 /// A line for each field by which the job that has frozen its plan in FOLDER is another than that
 /// of `now`; none if it is the same, or the plan does not tell. `discards`: where places cannot be
-/// compared, what lies there must be the same.
+/// compared, what is there must be the same.
 std::vector<std::string> job_differences(const fs::path& folder, const Fingerprint& frozen,
                                          const Fingerprint& now, const fs::path& manifest_folder,
                                          bool discards) {
@@ -301,10 +301,10 @@ FrozenPlan freeze_plan(const fs::path& folder, Plan plan, const ShowPhase& show_
   FrozenOutline frozen = read_frozen_outline(folder);
   require_same_fingerprint(folder, amended(frozen.plan.fingerprint, amendments), plan.fingerprint,
                            manifest_folder);
-  // Inputs that were mended since then may give other samples now (a hole that was filled): those
-  // that were frozen stay.
+  // Inputs that were mended since then may give other samples now (a missing frame that was added):
+  // those that were frozen stay.
   if (!amendments.empty()) {
-    plan = {};  // a large plan need not stand in memory twice
+    plan = {};  // a large plan need not be in memory twice
     return read_frozen_plan(folder);
   }
   // The manifest may differ in what does not change bytes, and what was noteworthy beside the
@@ -326,13 +326,13 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
   try {
     shards = read_frozen_outline(folder).plan.shards;
   } catch (const std::runtime_error&) {
-    // A damaged plan names no shards; those that are left are made anew, or reported by `verify`.
+    // A damaged plan names no shards; those that are left are made again, or reported by `verify`.
   }
   // What says that something is whole goes before what it says it of; the plan last, so that after
   // an interruption the next run finds the rest.
   for (const char* name : {"dataset.json", "dataset.h5", "report.html"}) fs::remove(folder / name);
   for (const ShardOutline& shard : shards) {
-    fs::remove(folder / marker_name(shard.name));
+    fs::remove(folder / commit_record_name(shard.name));
     fs::remove(folder / shard.name);
   }
   fs::remove(folder / "amendments.json");

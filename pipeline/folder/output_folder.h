@@ -11,7 +11,7 @@
 
 namespace eventgan {
 
-/// A plan as it stands in an output folder.
+/// A plan as it is in an output folder.
 struct FrozenPlan {
   Plan plan;
   std::string hash;  ///< SHA-256 of plan.json, hex
@@ -24,12 +24,13 @@ struct FrozenOutline {
 };
 
 /// Freezes `plan` as FOLDER/plan.json, created whole and only if absent; written piece by piece, so
-/// that its text never stands in memory. If a plan is there already (from an earlier run, or a
-/// process that was faster) it is taken, provided its fingerprint, with the folder's amendments, is
-/// the same. Throws UsageError listing the fields that differ otherwise, or if the same fingerprint
-/// has another plan; std::runtime_error if the one that is there is damaged, or on an error of
-/// writing, after which there is no plan.json. Safe in several processes and threads at once.
-/// `manifest_folder` is where the plan's relative paths start: it decides nothing but the advice.
+/// that its text is never in memory as a whole. If a plan is there already (from an earlier run, or
+/// a process that was faster) it is taken, provided its fingerprint, with the folder's amendments,
+/// is the same. Throws UsageError listing the fields that differ otherwise, or if the same
+/// fingerprint has another plan; std::runtime_error if the one that is there is damaged, or on an
+/// error of writing, after which there is no plan.json. Safe in several processes and threads at
+/// once. `manifest_folder` is where the plan's relative paths start: it decides nothing but the
+/// advice.
 FrozenPlan freeze_plan(const std::filesystem::path& folder, Plan plan,
                        const ShowPhase& show_phase = {},
                        const std::filesystem::path& manifest_folder = {});
@@ -40,11 +41,12 @@ FrozenPlan read_frozen_plan(const std::filesystem::path& folder);
 FrozenOutline read_frozen_outline(const std::filesystem::path& folder);
 
 /// Makes room for the job that has this fingerprint, its relative paths starting at
-/// `manifest_folder`: deletes plan.json, every shard and marker it names, and what was made from
-/// these (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None without a
-/// plan. Throws UsageError, and deletes nothing, if the plan is of another job, whose shards this
-/// one would not make anew: of another name, or of other labelled frames (another source, folder,
-/// annotation, split or selection); or if it is of a whole job, and this one is a trial.
+/// `manifest_folder`: deletes plan.json, every shard and commit record it names, and what was made
+/// from these (dataset.json, dataset.h5, report.html, amendments.json); other files stay. None
+/// without a plan. Throws UsageError, and deletes nothing, if the plan is of another job, whose
+/// shards this one would not make again: of another name, or of other labelled frames (another
+/// source, folder, annotation, split or selection); or if it is of a whole job, and this one is a
+/// trial.
 void discard_output(const std::filesystem::path& folder,
                     const std::map<std::string, std::string>& fingerprint,
                     const std::filesystem::path& manifest_folder);

@@ -7,7 +7,7 @@
 #include <system_error>
 #include <vector>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
@@ -19,13 +19,15 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Whether the marker in place is of this plan, and of just these bytes.
-bool is_of_marker(const fs::path& file, const fs::path& marker_file, const std::string& plan_hash) {
+/// Whether the commit record in place is of this plan, and of just these bytes.
+bool is_of_commit_record(const fs::path& file, const fs::path& commit_record_file,
+                         const std::string& plan_hash) {
   try {
-    const ShardMarker marker = parse_marker(read_text_file(marker_file), marker_file.string());
-    return marker.plan_hash == plan_hash &&
-           static_cast<std::int64_t>(fs::file_size(file)) == marker.size_bytes &&
-           sha256_of_file(file) == marker.sha256;
+    const CommitRecord record =
+        parse_commit_record(read_text_file(commit_record_file), commit_record_file.string());
+    return record.plan_hash == plan_hash &&
+           static_cast<std::int64_t>(fs::file_size(file)) == record.size_bytes &&
+           sha256_of_file(file) == record.sha256;
   } catch (const std::runtime_error&) {
     return false;
   }
@@ -83,10 +85,10 @@ void restore_shards(const fs::path& folder, const FrozenOutline& frozen) {
   const std::set<std::string> at_work = targets_at_work(files);
   for (const UnfinishedFile& file : files) {
     const auto shard = shards.find(file.name.target);
-    // Whoever is at a shard may publish it at any moment; that counts, with its own marker.
+    // Whoever is at a shard may publish it at any moment; that counts, with its own commit record.
     if (shard == shards.end() || !is_stale(file) || at_work.contains(shard->first)) continue;
     // What most dead writers leave is not whole, which its size tells: nothing is hashed.
-    if (is_of_marker(file.path, folder / marker_name(shard->first), frozen.hash) &&
+    if (is_of_commit_record(file.path, folder / commit_record_name(shard->first), frozen.hash) &&
         !shard_state(folder, *shard->second, frozen.hash, ScanDepth::kBytes).done()) {
       put_back(file.path, folder / shard->first);
     }

@@ -6,10 +6,11 @@
 
 namespace eventgan {
 
-/// A committed shard as it is, kept while another is put in its place: shard and marker are two
-/// files, and cannot be replaced at once. It is a second name (a hard link, a temporary's) for the
-/// same file, so it costs nothing; where the file system has no such links nothing is kept, and
-/// what ends between the two leaves a shard that is not its marker's, for `convert` to make again.
+/// A committed shard as it is, kept while another is put in its place: shard and commit record are
+/// two files, and cannot be replaced at once. It is a second name (a hard link, a temporary's) for
+/// the same file, so it costs nothing; where the file system has no such links nothing is kept, and
+/// what ends between the two leaves a shard that is not its commit record's, for `convert` to make
+/// again.
 class ShardBackup {
  public:
   explicit ShardBackup(const std::filesystem::path& shard);
@@ -27,10 +28,10 @@ class ShardBackup {
   std::filesystem::path backup_;  // empty: none
 };
 
-/// Puts back the shards whose replacement was killed between shard and marker: those that are not
-/// their marker's while a dead writer (see is_stale) has left a file that is, and nobody alive is
-/// at them. Then deletes the leftover temporaries of dead writers. Safe in several processes at
-/// once. Throws std::runtime_error naming the path if the disk fails.
+/// Puts back the shards whose replacement was killed between shard and commit record: those that
+/// are not their commit record's while a dead writer (see is_stale) has left a file that is, and
+/// nobody alive is at them. Then deletes the leftover temporaries of dead writers. Safe in several
+/// processes at once. Throws std::runtime_error naming the path if the disk fails.
 void restore_shards(const std::filesystem::path& folder, const FrozenOutline& frozen);
 
 }  // namespace eventgan

@@ -19,8 +19,8 @@
 #include <stdexcept>
 #include <string>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
 #include "stages/base/files/input_file.h"
@@ -44,27 +44,27 @@ bool is_limited = false;  // this process is a child
                            shard.string());
 }
 
-/// The marker beside the shard; none if there is no such file, or it is not this shard's.
-std::optional<ShardMarker> marker_beside(const fs::path& shard) {
+/// The commit record beside the shard; none if there is no such file, or it is not this shard's.
+std::optional<CommitRecord> commit_record_beside(const fs::path& shard) {
   try {
     const std::string name = shard.filename().string();
-    const fs::path file = shard.parent_path() / marker_name(name);
-    ShardMarker marker = parse_marker(read_text_file(file), file.string());
-    if (marker.shard == name) return marker;
+    const fs::path file = shard.parent_path() / commit_record_name(name);
+    CommitRecord record = parse_commit_record(read_text_file(file), file.string());
+    if (record.shard == name) return record;
   } catch (const std::logic_error&) {  // not the name of a shard
   } catch (const std::runtime_error&) {
   }
   return std::nullopt;
 }
 
-void require_bytes_of(const ShardMarker& marker, const fs::path& shard) {
+void require_bytes_of(const CommitRecord& record, const fs::path& shard) {
   const auto size_bytes = static_cast<std::int64_t>(fs::file_size(shard));
-  if (size_bytes != marker.size_bytes) {
-    fail(shard, "size in bytes in its commit record " + std::to_string(marker.size_bytes) +
+  if (size_bytes != record.size_bytes) {
+    fail(shard, "size in bytes in its commit record " + std::to_string(record.size_bytes) +
                     ", of the file " + std::to_string(size_bytes));
   }
-  if (const std::string hash = sha256_of_file(shard); hash != marker.sha256) {
-    fail(shard, "SHA-256 in its commit record " + marker.sha256 + ", of the file " + hash);
+  if (const std::string hash = sha256_of_file(shard); hash != record.sha256) {
+    fail(shard, "SHA-256 in its commit record " + record.sha256 + ", of the file " + hash);
   }
 }
 
@@ -172,8 +172,8 @@ int read_guarded(const fs::path& shard, const std::function<int()>& read) {
   if (!fs::is_regular_file(status)) {
     throw std::runtime_error("expected a shard, got no regular file, in " + shard.string());
   }
-  if (const auto marker = marker_beside(shard)) {
-    require_bytes_of(*marker, shard);
+  if (const auto record = commit_record_beside(shard)) {
+    require_bytes_of(*record, shard);
     return read();
   }
   return in_child(shard, read);

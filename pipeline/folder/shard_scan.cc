@@ -6,7 +6,7 @@
 #include <system_error>
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/sha256.h"
@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A marker that does not parse may be wrong in many places; the first says enough.
+/// A commit record that does not parse may be wrong in many places; the first says enough.
 std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
 
 /// One look at one shard.
@@ -26,14 +26,14 @@ class Look {
   Look(const fs::path& folder, const ShardOutline& shard, const std::string& plan_hash)
       : plan_hash_(plan_hash),
         shard_file_(folder / shard.name),
-        marker_file_(folder / marker_name(shard.name)) {
+        commit_record_file_(folder / commit_record_name(shard.name)) {
     state_.outline = shard;
   }
 
   ShardState run(ScanDepth depth) && {
     look_at_names();
     if (depth == ScanDepth::kContents) {
-      if (state_.done()) state_.faults = check_shard(shard_file_, *state_.marker);
+      if (state_.done()) state_.faults = check_shard(shard_file_, *state_.record);
       return std::move(state_);
     }
     if (state_.done() && depth >= ScanDepth::kBytes) hash();
@@ -44,7 +44,7 @@ class Look {
  private:
   void fail(ShardCondition condition, std::string fault) {
     state_.condition = condition;
-    state_.marker.reset();
+    state_.record.reset();
     state_.faults = {std::move(fault)};
   }
 
@@ -54,50 +54,52 @@ class Look {
 
   void look_at_names() {
     std::error_code unreadable;
-    if (!fs::exists(marker_file_, unreadable) && !unreadable) {
+    if (!fs::exists(commit_record_file_, unreadable) && !unreadable) {
       if (!fs::exists(shard_file_, unreadable) && !unreadable) return;  // missing
       return fail(ShardCondition::kUncommitted, shard_file_,
-                  "expected its commit record " + marker_file_.filename().string() +
+                  "expected its commit record " + commit_record_file_.filename().string() +
                       " beside it, got no file (not committed)");
     }
-    read_marker();
+    read_commit_record();
     if (!state_.done()) return;
     if (!fs::is_regular_file(shard_file_, unreadable)) {
-      return fail(ShardCondition::kNoShard, shard_file_,
-                  "expected the shard of " + marker_file_.filename().string() + ", got no file");
+      return fail(
+          ShardCondition::kNoShard, shard_file_,
+          "expected the shard of " + commit_record_file_.filename().string() + ", got no file");
     }
     const auto size_bytes = static_cast<std::int64_t>(fs::file_size(shard_file_, unreadable));
-    if (unreadable || size_bytes != state_.marker->size_bytes) {
+    if (unreadable || size_bytes != state_.record->size_bytes) {
       fail(ShardCondition::kOtherSize, shard_file_,
-           "expected size in bytes " + std::to_string(state_.marker->size_bytes) + ", got " +
+           "expected size in bytes " + std::to_string(state_.record->size_bytes) + ", got " +
                (unreadable ? unreadable.message() : std::to_string(size_bytes)));
     }
   }
 
-  /// Done, if the marker says nothing against the plan.
-  void read_marker() {
+  /// Done, if the commit record says nothing against the plan.
+  void read_commit_record() {
     try {
-      state_.marker = parse_marker(read_text_file(marker_file_), marker_file_.string());
+      state_.record =
+          parse_commit_record(read_text_file(commit_record_file_), commit_record_file_.string());
     } catch (const std::runtime_error& error) {
-      return fail(ShardCondition::kTornMarker, first_line(error.what()));
+      return fail(ShardCondition::kTornRecord, first_line(error.what()));
     }
-    const ShardMarker& marker = *state_.marker;
+    const CommitRecord& record = *state_.record;
     const auto foreign = [&](const std::string& expected, const std::string& got) {
-      fail(ShardCondition::kForeignMarker, marker_file_,
+      fail(ShardCondition::kForeignRecord, commit_record_file_,
            "expected the commit record of " + expected + ", got one of " + got);
     };
-    state_.named_plan = marker.plan_hash;
-    if (marker.shard != state_.outline.name) return foreign(state_.outline.name, marker.shard);
-    if (marker.plan_hash != plan_hash_) {
-      return foreign("plan " + plan_hash_, "plan " + marker.plan_hash);
+    state_.named_plan = record.plan_hash;
+    if (record.shard != state_.outline.name) return foreign(state_.outline.name, record.shard);
+    if (record.plan_hash != plan_hash_) {
+      return foreign("plan " + plan_hash_, "plan " + record.plan_hash);
     }
-    if (marker.samples != state_.outline.samples) {
+    if (record.samples != state_.outline.samples) {
       return foreign(std::to_string(state_.outline.samples) + " samples",
-                     std::to_string(marker.samples) + " samples");
+                     std::to_string(record.samples) + " samples");
     }
     state_.condition = ShardCondition::kDone;
     std::error_code unknown;
-    const auto committed = fs::last_write_time(marker_file_, unknown);
+    const auto committed = fs::last_write_time(commit_record_file_, unknown);
     if (!unknown) state_.committed = committed;
   }
 
@@ -108,17 +110,17 @@ class Look {
     } catch (const std::runtime_error& error) {
       got = error.what();
     }
-    if (got == state_.marker->sha256) return;
+    if (got == state_.record->sha256) return;
     fail(ShardCondition::kOtherBytes, shard_file_,
-         "expected SHA-256 " + state_.marker->sha256 + ", got " + got);
+         "expected SHA-256 " + state_.record->sha256 + ", got " + got);
   }
 
   void compare_rows() {
     try {
-      const std::vector<std::string> faults = count_faults(shard_file_, *state_.marker);
-      if (!faults.empty()) fail(ShardCondition::kOtherCounts, marker_file_, faults.front());
+      const std::vector<std::string> faults = count_faults(shard_file_, *state_.record);
+      if (!faults.empty()) fail(ShardCondition::kOtherCounts, commit_record_file_, faults.front());
     } catch (const std::runtime_error& error) {  // not std::bad_alloc: that is not of the shard
-      fail(ShardCondition::kOtherCounts, marker_file_,
+      fail(ShardCondition::kOtherCounts, commit_record_file_,
            "expected the commit record of a readable shard, got one whose " +
                first_line(error.what()));
     }
@@ -126,13 +128,13 @@ class Look {
 
   const std::string& plan_hash_;
   fs::path shard_file_;
-  fs::path marker_file_;
+  fs::path commit_record_file_;
   ShardState state_;
 };
 
 ProgressUnit phase_of(ScanDepth depth) {
   switch (depth) {
-    case ScanDepth::kMarker:
+    case ScanDepth::kRecord:
       return {"shards", /*has_bytes=*/false, "checking"};
     case ScanDepth::kBytes:
     case ScanDepth::kRows:
@@ -148,7 +150,7 @@ template <class Which>
 void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth depth,
              const ScanOptions& options, std::vector<ShardState>& states, const Which& which) {
   constexpr int kLooksAtOnce = 16;
-  const bool is_read = depth != ScanDepth::kMarker;
+  const bool is_read = depth != ScanDepth::kRecord;
   const int threads =
       options.threads == 0 && !is_read ? kLooksAtOnce : thread_count(options.threads);
   Phase phase(options.show_phase, phase_of(depth), std::ranges::count_if(states, which));
@@ -157,11 +159,11 @@ void look_at(const fs::path& folder, const std::string& plan_hash, ScanDepth dep
     if (!which(state)) return;
     TraceSpan span(is_read ? options.trace : nullptr, "hash earlier shard", "shard");
     span.note("shard", state.outline.name);
-    if (state.marker) span.note("bytes", state.marker->size_bytes);
+    if (state.record) span.note("bytes", state.record->size_bytes);
     const ShardOutline outline = std::move(state.outline);
     state = options.stop && options.stop() ? ShardState{.outline = outline}
                                            : shard_state(folder, outline, plan_hash, depth);
-    phase.advance(state.marker ? state.marker->size_bytes : 0);
+    phase.advance(state.record ? state.record->size_bytes : 0);
   });
 }
 
@@ -177,9 +179,9 @@ const char* to_string(ShardCondition condition) {
       return "not committed";
     case ShardCondition::kNoShard:
       return "marker without shard";
-    case ShardCondition::kTornMarker:
+    case ShardCondition::kTornRecord:
       return "torn marker";
-    case ShardCondition::kForeignMarker:
+    case ShardCondition::kForeignRecord:
       return "foreign marker";
     case ShardCondition::kOtherSize:
       return "of another size";

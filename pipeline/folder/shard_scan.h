@@ -15,27 +15,27 @@ namespace eventgan {
 
 /// What an output folder holds of a planned shard.
 enum class ShardCondition {
-  kDone,           ///< the marker parses, is of this plan, and the shard has its size
-  kMissing,        ///< neither shard nor marker
-  kUncommitted,    ///< a shard without a marker: its writer ended between the two
-  kNoShard,        ///< a marker without a shard
-  kTornMarker,     ///< the marker does not parse
-  kForeignMarker,  ///< the marker is of another plan or another shard
-  kOtherSize,      ///< the shard has not the marker's size
-  kOtherBytes,     ///< the shard has not the marker's SHA-256
-  kOtherCounts     ///< the shard is the marker's, but not what the marker says of its rows
+  kDone,           ///< the commit record parses, is of this plan, and the shard has its size
+  kMissing,        ///< neither shard nor commit record
+  kUncommitted,    ///< a shard without a commit record: its writer ended between the two
+  kNoShard,        ///< a commit record without a shard
+  kTornRecord,     ///< the commit record does not parse
+  kForeignRecord,  ///< the commit record is of another plan or another shard
+  kOtherSize,      ///< the shard has not the commit record's size
+  kOtherBytes,     ///< the shard has not the commit record's SHA-256
+  kOtherCounts     ///< the rows are not what the commit record says
 };
 
 /// Short words for a person: "done", "missing", "not committed", ...
 const char* to_string(ShardCondition condition);
 
-/// A planned shard as it stands in an output folder.
+/// A planned shard as it is in an output folder.
 struct ShardState {
   ShardOutline outline;
   ShardCondition condition = ShardCondition::kMissing;
-  std::optional<ShardMarker> marker{};          ///< kDone: the shard's
-  std::filesystem::file_time_type committed{};  ///< kDone: when the marker was written, if known
-  std::string named_plan{};  ///< hash of the plan that the marker names; empty: no marker parses
+  std::optional<CommitRecord> record{};         ///< kDone: the shard's
+  std::filesystem::file_time_type committed{};  ///< kDone: of the commit record, if known
+  std::string named_plan{};  ///< hash of the plan that the commit record names; empty: none
   /// "PATH: expected X, got Y". None for kMissing; for kDone only after ScanDepth::kContents; else
   /// one.
   std::vector<std::string> faults{};
@@ -46,22 +46,23 @@ struct ShardState {
 };
 
 /// How far a look at a shard goes; each goes on where the one before has found the shard done.
-/// HDF5 opens a shard only if its bytes are the marker's: it does not promise to survive others.
+/// HDF5 opens a shard only if its bytes are the commit record's: it does not promise to survive
+/// others.
 enum class ScanDepth {
-  kMarker,   ///< names, sizes and the marker alone: what says "done"
+  kRecord,   ///< names, sizes and the commit record alone: what says "done"
   kBytes,    ///< and the shard is hashed: may find kOtherBytes
-  kRows,     ///< and what the marker says of the rows is compared: may find kOtherCounts
-  kContents  ///< as kMarker, and then all that check_shard finds: faults of a shard that is done
+  kRows,     ///< and what the commit record says of the rows is compared: may find kOtherCounts
+  kContents  ///< as kRecord, and then all that check_shard finds: faults of a shard that is done
 };
 
-/// Looks at one shard of the plan with hash `plan_hash`. Never throws for what stands in the
+/// Looks at one shard of the plan with hash `plan_hash`. Never throws for what is in the
 /// folder. Thread safe; with kRows and kContents nothing else may use HDF5 meanwhile but this and
 /// ShardReaders.
 ShardState shard_state(const std::filesystem::path& folder, const ShardOutline& shard,
-                       const std::string& plan_hash, ScanDepth depth = ScanDepth::kMarker);
+                       const std::string& plan_hash, ScanDepth depth = ScanDepth::kRecord);
 
 struct ScanOptions {
-  /// Shards to look at side by side. 0: all cores, or with kMarker, where on a network file system
+  /// Shards to look at side by side. 0: all cores, or with kRecord, where on a network file system
   /// each look is a few waits, as many as fit.
   int threads = 0;
   /// Asked before each shard, from several threads: true leaves it out, as if it were missing.
@@ -74,12 +75,12 @@ struct ScanOptions {
 std::vector<ShardState> scan_shards(const std::filesystem::path& folder,
                                     const std::vector<ShardOutline>& shards,
                                     const std::string& plan_hash,
-                                    ScanDepth depth = ScanDepth::kMarker,
+                                    ScanDepth depth = ScanDepth::kRecord,
                                     const ScanOptions& options = {});
 
 /// Looks again, at those of an earlier scan that are done, or at those that are not.
 void scan_again(const std::filesystem::path& folder, const std::string& plan_hash, bool done,
-                std::vector<ShardState>& states, ScanDepth depth = ScanDepth::kMarker,
+                std::vector<ShardState>& states, ScanDepth depth = ScanDepth::kRecord,
                 const ScanOptions& options = {});
 
 }  // namespace eventgan

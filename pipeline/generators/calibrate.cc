@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
@@ -145,7 +145,7 @@ void leave(const std::vector<PreparedPair>& pairs, const Watch& watch) {
   for (std::size_t i = 0; i < pairs.size(); ++i) watch.after_pair(/*skipped=*/false);
 }
 
-/// What stands between this program, on this processor, and int8; empty if nothing does.
+/// What is between this program, on this processor, and int8; empty if nothing does.
 std::string int8_lack() {
   const EngineSupport support = engine_support(Precision::kInt8);
   if (support.onednn_able) return "";

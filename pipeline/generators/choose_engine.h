@@ -40,7 +40,7 @@ struct EngineChoice {
 /// processor or the device lack, and what would work. Pure.
 EngineChoice choose_engine(const EngineRequest& request, const EngineSupport& support);
 
-/// What there is for a precision on the processor that runs this, as oneDNN sees it
+/// What runs a precision on the processor that runs this, as oneDNN sees it
 /// (ONEDNN_MAX_CPU_ISA minded), and, only for Device::kCuda, on the CUDA device (cuda_support).
 EngineSupport engine_support(Precision precision, Device device = Device::kCpu);
 

@@ -67,7 +67,7 @@ LoadedWeights load_weights(const JobManifest& manifest) {
 
 namespace {
 
-/// Stands where a camera's events make the volumes: says what they are, and generates none.
+/// Is there where a camera's events make the volumes: says what they are, and generates none.
 class CameraEvents final : public Generator {
  public:
   explicit CameraEvents(int bins) : bins_(bins) {}

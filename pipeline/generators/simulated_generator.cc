@@ -18,7 +18,7 @@
 namespace eventgan {
 namespace {
 
-/// A frame in [-1, 1] as a picture; what is not a number becomes black.
+/// A frame in [-1, 1] as an image; what is not a number becomes black.
 GreyImage grey_image(std::span<const float> frame, ImageSize size) {
   GreyImage image{size, std::vector<std::uint8_t>(frame.size())};
   std::ranges::transform(frame, image.pixels.begin(), [](float x) {
@@ -28,7 +28,7 @@ GreyImage grey_image(std::span<const float> frame, ImageSize size) {
   return image;
 }
 
-/// A key of the two frames' content. Both have one size, and with it the key tells apart pictures
+/// A key of the two frames' content. Both have one size, and with it the key tells apart images
 /// of the same bytes and another shape.
 std::string content_key(const GreyImage& previous, const GreyImage& next) {
   std::string content = std::to_string(previous.size.width) + '\n';

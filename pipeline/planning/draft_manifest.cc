@@ -15,8 +15,8 @@
 #include <string_view>
 #include <utility>
 
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/json_text_internal.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/text.h"
@@ -34,7 +34,7 @@ namespace fs = std::filesystem;
 struct Habits {
   std::string_view name;  ///< where the folder's own does not serve
   PairSide side;
-  std::vector<int> gaps;  ///< those of them that have partners
+  std::vector<int> gaps;  ///< those of them that have paired frames
   std::string_view size_comment;
   std::string_view size;
 };
@@ -113,7 +113,7 @@ struct Survey {
   std::size_t sequences = 0;
   std::size_t annotation_files = 0;
   std::map<int, std::int64_t> pairs_by_gap;  ///< every gap that `side` allows
-  std::int64_t holes = 0;                    ///< pairs at fault, as far as names tell
+  std::int64_t missing = 0;                  ///< pairs at fault, as far as names tell
 };
 
 Survey survey(const Dataset& dataset, SourceSpec spec) {
@@ -126,7 +126,7 @@ Survey survey(const Dataset& dataset, SourceSpec spec) {
   for (const LabelledFrame& frame : dataset.labelled_frames()) {
     if (!frame.sequence.empty()) sequences.insert(frame.sequence);
     for (const PlannedSample& sample : choose_pairs(dataset, frame, spec, 0).samples) {
-      ++(sample.fault.empty() ? counted.pairs_by_gap[sample.pair.gap_frames] : counted.holes);
+      ++(sample.fault.empty() ? counted.pairs_by_gap[sample.pair.gap_frames] : counted.missing);
     }
   }
   counted.labelled_frames = dataset.labelled_frames().size();
@@ -165,17 +165,17 @@ std::vector<std::string> findings_of(const FoundSource& found, const Survey& sur
   lines.back() += fmt::format(", {} annotation files", survey.annotation_files);
   lines.push_back(fmt::format("labelled frames with a pair of frames {}, by gap: {}",
                               where_text(side), counts_text(survey.pairs_by_gap, "gap ")));
-  if (survey.holes > 0) {
-    lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.holes));
+  if (survey.missing > 0) {
+    lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.missing));
   }
   lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
   return lines;
 }
 
-using Picture = cv::Mat_<float>;
+using Image = cv::Mat_<float>;
 
 /// Grey, small, without what varies slowly: light and darkness are alike in many scenes.
-Picture details_of(const ColourFrame& frame) {
+Image details_of(const ColourFrame& frame) {
   const cv::Mat colour(frame.size.height, frame.size.width, CV_8UC3,
                        const_cast<std::uint8_t*>(frame.bgr.data()));
   cv::Mat grey, blurred;
@@ -197,7 +197,7 @@ Picture details_of(const ColourFrame& frame) {
 std::optional<double> likeness(const ColourFrame& first, const ColourFrame& second) {
   constexpr int kTile = 24, kReach = 8;
   constexpr double kFlat = 2;  // standard deviation, grey levels
-  const Picture a = details_of(first), b = details_of(second);
+  const Image a = details_of(first), b = details_of(second);
   const cv::Rect all(0, 0, b.cols, b.rows);
   std::vector<double> best;
   for (int y = 0; y < a.rows; y += kTile) {
@@ -254,8 +254,8 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder,
   for (std::size_t turn = 0; turn < kPairs && pairs < kPairs; ++turn) {
     for (std::size_t i = turn; i < places.size() && pairs < kPairs; i += kPairs) {
       const FrameRef& frame = frames[places[i]].frame;
-      const Neighbour next = dataset.neighbour(frames[places[i]], 1);
-      if (next.state != Neighbour::State::kPresent) continue;
+      const PairedFrame next = dataset.paired_frame(frames[places[i]], 1);
+      if (next.state != PairedFrame::State::kPresent) continue;
       const auto a = decoder.decode(frame), b = decoder.decode(next.frame);
       if (is_fault(a) || is_fault(b)) continue;
       const auto alike = likeness(std::get<ColourFrame>(a), std::get<ColourFrame>(b));

@@ -14,14 +14,14 @@
 
 #include "manifests/documents/manifest_fields.h"
 #include "stages/base/files/sha256.h"
-#include "stages/base/hdf5/hdf5_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
 #include "stages/base/processor/processor.h"
 
 namespace eventgan {
 namespace {
 
 /// SHA-256 of a listing "PATH\tSTATE\n", sorted, each path once. A million pairs name two million
-/// frames: neither copies of their paths nor the listing stand in memory.
+/// frames: neither copies of their paths nor the listing are in memory.
 template <class State>
 std::string listing_hash(std::vector<std::string_view> paths,
                          const std::function<void()>& before_file, const State& state) {
@@ -73,8 +73,8 @@ std::string decisions_hash(const JobManifest& manifest, const Plan& plan) {
     }
   }
   for (const SourceSummary& source : plan.sources) {
-    line << source.labelled_frames << '\t' << source.without_partner;
-    for (const std::string& id : source.without_partner_ids) line << '\t' << id;
+    line << source.labelled_frames << '\t' << source.unpaired;
+    for (const std::string& id : source.unpaired_ids) line << '\t' << id;
     take_line();
   }
   return hash.hex();

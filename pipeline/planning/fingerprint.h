@@ -24,7 +24,7 @@ std::map<std::string, std::string> make_fingerprint(
     const std::string& weights_hash, const std::string& engine,
     const std::function<void()>& before_file = [] {});
 
-/// How frames are prepared, as compact JSON; stands in the fingerprint and in every shard.
+/// How frames are prepared, as compact JSON; is in the fingerprint and in every shard.
 std::string preprocessing_json(const ImageSpec& image);
 
 /// Name and version of this program: "eventgan 0.2.0".

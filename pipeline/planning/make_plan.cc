@@ -44,7 +44,7 @@ Window window(PairSide side, int gap) {
 }
 
 struct Candidate {
-  Neighbour::State state = Neighbour::State::kBeyond;
+  PairedFrame::State state = PairedFrame::State::kBeyond;
   PlannedSample sample;
 };
 
@@ -56,10 +56,10 @@ bool too_far_apart(const FramePair& pair, std::optional<double> max_gap_s) {
 
 Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const PairSpec& spec,
                     int gap) {
-  using State = Neighbour::State;
+  using State = PairedFrame::State;
   const Window place = window(spec.side, gap);
-  const Neighbour previous = dataset.neighbour(frame, place.first);
-  const Neighbour next = dataset.neighbour(frame, place.last);
+  const PairedFrame previous = dataset.paired_frame(frame, place.first);
+  const PairedFrame next = dataset.paired_frame(frame, place.last);
 
   Candidate result;
   result.sample = {frame.sample_id,
@@ -68,16 +68,16 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
                    {previous.frame, next.frame, gap, frame.frame.index, place.position},
                    ""};
   if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
-  for (const Neighbour* neighbour : {&previous, &next}) {
-    if (neighbour->state == State::kHole && result.sample.fault.empty()) {
-      result.sample.fault = "expected a frame, got no file, in " + neighbour->frame.path + " (" +
+  for (const PairedFrame* paired_frame : {&previous, &next}) {
+    if (paired_frame->state == State::kMissing && result.sample.fault.empty()) {
+      result.sample.fault = "expected a frame, got no file, in " + paired_frame->frame.path + " (" +
                             frame.sample_id + ")";
     }
   }
   if (!result.sample.fault.empty()) {
-    result.state = State::kHole;
+    result.state = State::kMissing;
   } else if (previous.state == State::kPresent && next.state == State::kPresent) {
-    result.state = frame.fault.empty() ? State::kPresent : State::kHole;
+    result.state = frame.fault.empty() ? State::kPresent : State::kMissing;
     result.sample.fault = frame.fault;
   }
   return result;
@@ -90,9 +90,9 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   std::vector<PlannedSample> damaged;
   for (const int gap : source.pairs.gaps) {
     Candidate found = candidate(dataset, frame, source.pairs, gap);
-    if (found.state == Neighbour::State::kPresent) present.push_back(std::move(found.sample));
-    if (found.state == Neighbour::State::kHole) damaged.push_back(std::move(found.sample));
-    if (found.state == Neighbour::State::kBeyond) result.without_partner.push_back(gap);
+    if (found.state == PairedFrame::State::kPresent) present.push_back(std::move(found.sample));
+    if (found.state == PairedFrame::State::kMissing) damaged.push_back(std::move(found.sample));
+    if (found.state == PairedFrame::State::kBeyond) result.unpaired.push_back(gap);
   }
   auto& choices = present.empty() ? damaged : present;
   if (choices.empty()) return result;
@@ -107,8 +107,8 @@ PairChoiceResult choose_all(const Dataset& dataset, const LabelledFrame& frame,
   PairChoiceResult result;
   for (const int gap : source.pairs.gaps) {
     Candidate found = candidate(dataset, frame, source.pairs, gap);
-    if (found.state == Neighbour::State::kBeyond) {
-      result.without_partner.push_back(gap);
+    if (found.state == PairedFrame::State::kBeyond) {
+      result.unpaired.push_back(gap);
       continue;
     }
     found.sample.sample_id += "@" + std::string(to_string(source.pairs.side)) + std::to_string(gap);
@@ -123,7 +123,7 @@ PlannedSample window_of(const Dataset& dataset, const LabelledFrame& frame,
   return {frame.sample_id,
           frame.sequence,
           frame.label_key,
-          {dataset.neighbour(frame, -1).frame, dataset.neighbour(frame, 1).frame, 0,
+          {dataset.paired_frame(frame, -1).frame, dataset.paired_frame(frame, 1).frame, 0,
            frame.frame.index, position},
           frame.fault};
 }
@@ -143,7 +143,7 @@ void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const Sour
                            ? Window{-1, 1}
                            : window(source.pairs.side, sample.pair.gap_frames);
   const auto renew = [&](FrameRef& planned, int steps) {
-    const FrameRef today = dataset.neighbour(frame, steps).frame;
+    const FrameRef today = dataset.paired_frame(frame, steps).frame;
     if (today == planned) planned.time_s = today.time_s;
   };
   renew(sample.pair.previous, place.first);
@@ -223,7 +223,7 @@ void ShardLayout::end_source() {
 
 namespace {
 
-/// Sizes of pictures, each file asked once (a video serves thousands of samples).
+/// Sizes of images, each file asked once (a video serves thousands of samples).
 class SizeProbe {
  public:
   explicit SizeProbe(const JobManifest& manifest) : manifest_(manifest) {}
@@ -254,7 +254,7 @@ class SizeProbe {
 struct PlannedSource {
   SourceSummary summary;
   std::int64_t pairs = 0;
-  std::map<int, std::int64_t> without_partner_by_gap;
+  std::map<int, std::int64_t> unpaired_by_gap;
 };
 
 /// Plans `most` pairs at most; then the source ends for it.
@@ -274,12 +274,12 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
     ++summary.labelled_frames;
     phase.advance();
     PairChoiceResult chosen = choose_pairs(dataset, frame, spec, manifest.seed);
-    for (const int gap : chosen.without_partner) ++planned.without_partner_by_gap[gap];
+    for (const int gap : chosen.unpaired) ++planned.unpaired_by_gap[gap];
     const std::int64_t lost = spec.pairs.choose == PairChoice::kOne
                                   ? std::int64_t{chosen.samples.empty()}
-                                  : std::ssize(chosen.without_partner);
-    summary.without_partner += lost;
-    if (lost > 0) summary.without_partner_ids.push_back(frame.sample_id);
+                                  : std::ssize(chosen.unpaired);
+    summary.unpaired += lost;
+    if (lost > 0) summary.unpaired_ids.push_back(frame.sample_id);
     for (PlannedSample& sample : chosen.samples) {
       if (planned.pairs == most) break;
       ++planned.pairs;
@@ -341,13 +341,13 @@ const LabelledFrame* frame_of(const Dataset& dataset, const SourceSpec& spec,
   return found != frames.end() && found->sample_id == id ? &*found : nullptr;
 }
 
-void fill_hole(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
-               PlannedSample& hole) {
-  const LabelledFrame* frame = frame_of(dataset, spec, hole);
+void fill_missing(const Dataset& dataset, const SourceSpec& spec, std::uint64_t seed,
+                  PlannedSample& missing) {
+  const LabelledFrame* frame = frame_of(dataset, spec, missing);
   if (frame == nullptr) return;
   for (PlannedSample& sample : choose_pairs(dataset, *frame, spec, seed).samples) {
-    if (sample.sample_id != hole.sample_id) continue;
-    hole = std::move(sample);
+    if (sample.sample_id != missing.sample_id) continue;
+    missing = std::move(sample);
     return;
   }
 }
@@ -409,7 +409,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
                                         layout, stop_if_asked, options.show_phase);
     left -= planned.pairs;
     job.plan.sources.push_back(std::move(planned.summary));
-    job.without_partner_by_gap.push_back(std::move(planned.without_partner_by_gap));
+    job.unpaired_by_gap.push_back(std::move(planned.unpaired_by_gap));
     std::ranges::move(dataset.warnings(), std::back_inserter(job.warnings));
     const auto files = dataset.annotation_files();
     annotation_files.insert(annotation_files.end(), files.begin(), files.end());
@@ -461,7 +461,7 @@ void complete_plan(const JobManifest& manifest,
     const auto source = static_cast<std::size_t>(shard.source);
     for (PlannedSample& sample : shard.samples) {
       if (sample.fault.empty()) continue;
-      fill_hole(*datasets[source], manifest.sources[source], manifest.seed, sample);
+      fill_missing(*datasets[source], manifest.sources[source], manifest.seed, sample);
     }
   }
   renew_samples(manifest, datasets, plan);

@@ -22,17 +22,18 @@ namespace eventgan {
 /// What becomes of one labelled frame.
 struct PairChoiceResult {
   std::vector<PlannedSample> samples;
-  /// Gaps whose partner lies beyond the sequence's ends or pairs.max_gap_s.
-  std::vector<int> without_partner;
+  /// Gaps whose paired frame lies beyond the sequence's ends or pairs.max_gap_s.
+  std::vector<int> unpaired;
 };
 
 /// Chooses the frame pairs of a labelled frame.
 ///
 /// choose = one: one of the gaps whose frames exist, drawn by (seed, dataset, sample id), so that
 /// no other source, sample or order of files changes the draw. choose = all: each gap; the gap and
-/// side are added to the sample id as "ID@before2". A gap that meets a hole in the sequence becomes
-/// a sample with a fault that names the missing file (choose = one: only if no gap can be had). All
-/// pairs of a frame that is itself at fault (LabelledFrame::fault) have that fault.
+/// side are added to the sample id as "ID@before2". A gap that meets a missing frame in the
+/// sequence becomes a sample with a fault that names the missing file (choose = one: only if no gap
+/// can be had). All pairs of a frame that is itself at fault (LabelledFrame::fault) have that
+/// fault.
 ///
 /// Of a dataset of events: its one window, of gap 0.
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
@@ -48,7 +49,7 @@ void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const Sour
 /// come in the order of their first sample. Shards are numbered within their split, over all
 /// sources.
 ///
-/// A sample of unknown size will be quarantined; once its picture is mended it may have any size,
+/// A sample of unknown size will be quarantined; once its image is mended it may have any size,
 /// and the number of shards cannot change then. So it gets a shard of its own, after the others of
 /// its source, marked size_unknown; only samples that follow each other in one file (a video) share
 /// one. Its size is a guess until then: the one that most samples of the source have (the first of
@@ -60,7 +61,7 @@ class ShardLayout {
   /// Samples are of this source until the next one begins.
   void begin_source(int source, const std::string& split);
 
-  /// `volume_size` is {0, 0} if the picture could not be read.
+  /// `volume_size` is {0, 0} if the image could not be read.
   void add(PlannedSample sample, ImageSize volume_size);
 
   /// The layout is empty afterwards.
@@ -94,8 +95,8 @@ class ShardLayout {
 /// A plan, and the opened datasets it was made from (their annotations are read while converting).
 struct PlannedJob {
   Plan plan;
-  /// Of each source, how many labelled frames have no partner at a gap.
-  std::vector<std::map<int, std::int64_t>> without_partner_by_gap;
+  /// Of each source, how many labelled frames have no paired frame at a gap.
+  std::vector<std::map<int, std::int64_t>> unpaired_by_gap;
   std::vector<std::unique_ptr<Dataset>> datasets;  ///< one for each source of the manifest
   std::vector<std::string> warnings;               ///< Dataset::warnings() of all sources
 };
@@ -123,16 +124,16 @@ std::optional<std::int64_t> limit_of(const std::map<std::string, std::string>& f
 /// Gives every sample of a frozen plan what its labelled frame says today (renew_sample): times and
 /// faults may have been mended, and the key of a label may be its row in an annotation file, where
 /// rows move. A sample whose frame is not labelled any more gets a fault, since another's label may
-/// stand in its row. `datasets`: one for each source, opened now; null where a source is not there,
+/// are in its row. `datasets`: one for each source, opened now; null where a source is not there,
 /// whose samples stay as they are.
 void renew_samples(const JobManifest& manifest,
                    const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan);
 
 /// Puts into a frozen plan what could not be known when it was frozen, as far as the inputs tell
-/// now: samples that were planned with a fault (a hole in their sequence) become what they would be
-/// planned as today, by source and id; all others are renewed (renew_samples); shards of unknown
-/// size get that of their first picture that can be read. What is unknown still stays as it is, and
-/// so do all slots. `datasets` as above, none null.
+/// now: samples that were planned with a fault (a missing frame in their sequence) become what they
+/// would be planned as today, by source and id; all others are renewed (renew_samples); shards of
+/// unknown size get that of their first image that can be read. What is unknown still stays as it
+/// is, and so do all slots. `datasets` as above, none null.
 void complete_plan(const JobManifest& manifest,
                    const std::vector<std::unique_ptr<Dataset>>& datasets, Plan& plan);
 

@@ -15,8 +15,8 @@
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/preview/preview_reader.h"
-#include "stages/events/pictures/picture_output.h"
-#include "stages/events/pictures/preview_picture.h"
+#include "stages/events/images/image_output.h"
+#include "stages/events/images/preview_image.h"
 
 namespace eventgan {
 namespace {
@@ -153,8 +153,8 @@ std::vector<ShownSample> choose(const ShownShards& shards, const PreviewOptions&
   }
   if (!options.samples.empty()) return find_samples(shards, options.samples);
   if (options.worst > 0) return worst_samples(shards, options);
-  constexpr int kPictures = 8, kTiles = 24;
-  const int count = options.count.value_or(options.sheet ? kTiles : kPictures);
+  constexpr int kImages = 8, kTiles = 24;
+  const int count = options.count.value_or(options.sheet ? kTiles : kImages);
   std::vector<ShownSample> all;
   if (!options.class_name.empty()) {
     visit_samples(shards, options, [&](ShownSample place, const auto&) { all.push_back(place); });
@@ -233,7 +233,7 @@ Sequence read_sequence(const ShownShards& shards, const PreviewOptions& options)
   return sequence;
 }
 
-std::string picture_name(const fs::path& shard, int slot) {
+std::string image_name(const fs::path& shard, int slot) {
   std::string number = std::to_string(slot);
   number.insert(0, 4 - std::min<std::size_t>(number.size(), 4), '0');
   return shard.stem().string() + "_" + number + ".png";
@@ -274,20 +274,20 @@ std::vector<fs::path> preview(const fs::path& where, const PreviewOptions& optio
     throw InputError("expected a valid sample, got none, in " + where.string());
   }
   fs::create_directories(options.out);
-  std::vector<fs::path> pictures;
+  std::vector<fs::path> images;
   if (options.sheet) {
     constexpr int kColumns = 3, kTileWidth = 400;
     std::vector<ColourFrame> tiles;
     for (const ShownSample& place : chosen) tiles.push_back(draw_tile(content(place), kTileWidth));
-    pictures.push_back(options.out / "sheet.png");
-    write_png(draw_sheet(tiles, kColumns), pictures.back());
-    return pictures;
+    images.push_back(options.out / "sheet.png");
+    write_png(draw_sheet(tiles, kColumns), images.back());
+    return images;
   }
   for (const ShownSample& place : chosen) {
-    pictures.push_back(options.out / picture_name(shards.files[place.shard], place.slot));
-    write_png(draw_preview(content(place)), pictures.back());
+    images.push_back(options.out / image_name(shards.files[place.shard], place.slot));
+    write_png(draw_preview(content(place)), images.back());
   }
-  return pictures;
+  return images;
 }
 
 }  // namespace eventgan

@@ -11,7 +11,7 @@
 namespace eventgan {
 
 struct PreviewOptions {
-  std::filesystem::path out;  ///< folder for the pictures, created if absent
+  std::filesystem::path out;  ///< folder for the images, created if absent
   /// Which samples, the first of these that is given: slots such as "0,3-5", of a single shard;
   /// those with some names, as find_samples has them; of those that are valid the `worst` emptiest,
   /// fullest and farthest beyond the gaps that the generator was trained on; `count` spread over
@@ -21,7 +21,7 @@ struct PreviewOptions {
   int worst = 0;
   std::optional<int> count;  ///< none: 8, of a sheet 24
   std::string class_name;    ///< only samples with a box of it; empty: any
-  /// One picture with all of them in small; or an MP4 of the sequence that the first of them is of
+  /// One image with all of them in small; or an MP4 of the sequence that the first of them is of
   /// (none chosen: of the longest), its labelled frames in order, of each the pair with the
   /// smallest gap.
   bool sheet = false;

@@ -41,9 +41,9 @@ Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* s
 }
 
 /// The colour frame laid into the volume; empty, with a warning, if it cannot be had.
-std::vector<std::uint8_t> frame_picture(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
-                                        const ShardSample& sample, const ImageSpec& image,
-                                        std::vector<std::string>& warnings) {
+std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
+                                      const ShardSample& sample, const ImageSpec& image,
+                                      std::vector<std::string>& warnings) {
   if (is_fault(decoded)) {
     warnings.push_back(std::get<SampleFault>(decoded).reason + " (" + sample.sample_id + ")");
     return {};
@@ -140,10 +140,10 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
     if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
       return std::vector<std::uint8_t>();
     }
-    return frame_picture(state_->has_events
-                             ? decode_recorded(state_->frames, state_->source, which)
-                             : state_->decoder.decode(which, sample.pair.video_stride()),
-                         which, sample, state_->manifest.image, state_->warnings);
+    return frame_image(state_->has_events
+                           ? decode_recorded(state_->frames, state_->source, which)
+                           : state_->decoder.decode(which, sample.pair.video_stride()),
+                       which, sample, state_->manifest.image, state_->warnings);
   };
   content.previous_bgr = frame(sample.pair.previous);
   content.next_bgr = frame(sample.pair.next);

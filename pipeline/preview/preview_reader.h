@@ -5,11 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "stages/events/pictures/preview_picture.h"
+#include "stages/events/images/preview_image.h"
 
 namespace eventgan {
 
-/// Reads samples as pictures show them.
+/// Reads samples as images show them.
 class PreviewReader {
  public:
   /// Relative frame paths start at `frames`. `warnings`, which outlives this, gets a line for each
@@ -18,7 +18,7 @@ class PreviewReader {
   ~PreviewReader();
   PreviewReader(PreviewReader&&) noexcept;
 
-  /// What a picture of the sample shows. The shard stays open until another one is asked for.
+  /// What an image of the sample shows. The shard stays open until another one is asked for.
   /// Throws as ShardReader does.
   PreviewContent content(const std::filesystem::path& shard, int slot);
 

@@ -11,7 +11,7 @@
 
 #include "pipeline/realism/real_interval.h"
 #include "pipeline/runtime/threads.h"
-#include "stages/events/pictures/comparison_picture.h"
+#include "stages/events/images/comparison_image.h"
 
 namespace eventgan {
 namespace {
@@ -19,8 +19,8 @@ namespace {
 /// Writes FIRST-LAST.png (six digits each) into `folder`, which must exist: the frames, the real
 /// volume and the methods', all as they are compared. Throws std::runtime_error if it cannot be
 /// written.
-void write_realism_picture(const RealInterval& real, std::vector<NamedVolume> volumes, int bins,
-                           const std::string& recording, const std::filesystem::path& folder) {
+void write_realism_image(const RealInterval& real, std::vector<NamedVolume> volumes, int bins,
+                         const std::string& recording, const std::filesystem::path& folder) {
   const FrameInterval interval = real.frames.interval;
   volumes.insert(volumes.begin(), {"real", real.volume});
   const ComparedPair pair{
@@ -89,14 +89,14 @@ IntervalResult compare_interval(const Recording& recording, const FrameInterval&
             std::to_string(interval.first) + " and " + std::to_string(interval.last) + " of " +
             recording.name()));
       }
-      if (draw == 0 && !run.pictures.empty()) {
+      if (draw == 0 && !run.images.empty()) {
         drawn.push_back({method->name(), std::move(volume)});
       }
     }
     result.methods.push_back(mean_of(draws));
   }
-  if (!run.pictures.empty()) {
-    write_realism_picture(real, std::move(drawn), run.bins, recording.name(), run.pictures);
+  if (!run.images.empty()) {
+    write_realism_image(real, std::move(drawn), run.bins, recording.name(), run.images);
   }
   return result;
 }

@@ -13,7 +13,7 @@ namespace eventgan {
 struct ComparisonRun {
   int bins = 9;
   int threads = 1;
-  std::filesystem::path pictures;     ///< folder that exists; empty: none
+  std::filesystem::path images;       ///< folder that exists; empty: none
   std::function<void()> on_interval;  ///< called after each interval, one call at a time
 };
 
@@ -22,7 +22,7 @@ struct ComparisonRun {
 /// (write_comparison_png): the real volume and each method's first draw, as they are compared.
 ///
 /// Throws InputError if the recording cannot be read, std::runtime_error if a method makes a volume
-/// that is not finite or a picture cannot be written. Fills `intervals`, `real` and `methods` of
+/// that is not finite or an image cannot be written. Fills `intervals`, `real` and `methods` of
 /// the report, and what it knows of the recording.
 RealismReport compare_volumes(const Recording& recording, std::span<const FrameInterval> intervals,
                               std::span<const std::unique_ptr<VolumeMethod>> methods,

@@ -31,7 +31,7 @@ float value_at(const std::vector<float>& values, ImageSize size, float x, float 
   for (const int dy : {0, 1}) {
     for (const int dx : {0, 1}) {
       const float weight = (dx == 0 ? 1 - along_x : along_x) * (dy == 0 ? 1 - along_y : along_y);
-      // NaN times zero is NaN; and a picture of one row or column has no neighbour there.
+      // NaN times zero is NaN; and an image of one row or column has no neighbour there.
       if (weight == 0) continue;
       sum +=
           weight * values[static_cast<std::size_t>(y0 + dy) * static_cast<std::size_t>(size.width) +

@@ -113,14 +113,14 @@ RealismReport measure_realism(
   const int threads = thread_count(options.threads);
   MethodMaker maker(recording, intervals, options, threads);
   const std::vector<std::unique_ptr<VolumeMethod>> methods = maker.make();
-  if (!options.pictures.empty()) std::filesystem::create_directories(options.pictures);
+  if (!options.images.empty()) std::filesystem::create_directories(options.images);
 
   const auto progress =
       make_progress ? make_progress(static_cast<std::int64_t>(intervals.size())) : nullptr;
   ComparisonRun run;
   run.bins = maker.bins();
   run.threads = threads;
-  run.pictures = options.pictures;
+  run.images = options.images;
   if (progress) run.on_interval = [&] { progress->advance(false, 0); };
   RealismReport report = compare_volumes(recording, intervals, methods, run);
   if (progress) progress->finish();

@@ -37,8 +37,8 @@ struct RealismOptions {
   double esim_displacement_px = 5;  ///< largest displacement a frame of the motions
 
   std::uint64_t seed = 0;
-  int threads = 0;                 ///< 0: all cores
-  std::filesystem::path pictures;  ///< folder for a picture of each pair; empty: none
+  int threads = 0;               ///< 0: all cores
+  std::filesystem::path images;  ///< folder for an image of each pair; empty: none
 };
 
 /// What `eventgan realism` does: chooses the pairs, opens the network, fits the models' thresholds

@@ -29,7 +29,7 @@ class VolumeMethod {
 };
 
 /// The generator as "network": the frames go in as they are, at their own size, in [-1, 1].
-/// `weights` is told in the report.
+/// `weights` is stated in the report.
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
                                                   const std::string& weights);
 
@@ -55,8 +55,8 @@ SimulatedScene esim_scene(double displacement_px, int draws);
 /// it, as in SensorSpec's defaults; no refractory time and no noise.
 SensorSpec realism_sensor(double threshold, double log_epsilon);
 
-/// A model with a sensor; `fitted` is told in the report. Volumes of `bins` bins; random numbers by
-/// seed, name, interval and draw.
+/// A model with a sensor; `fitted` is stated in the report. Volumes of `bins` bins; random numbers
+/// by seed, name, interval and draw.
 std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const SensorSpec& sensor,
                                                     bool fitted, int bins, std::uint64_t seed);
 

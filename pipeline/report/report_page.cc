@@ -260,7 +260,7 @@ std::string counts(const Survey& survey) {
     rows.push_back(
         text_cell(escaped(source_name(survey, i))) +
         cell(fmt::format("source.{}.labelled_frames", i), summary.labelled_frames) +
-        cell(fmt::format("source.{}.without_partner", i), summary.without_partner) +
+        cell(fmt::format("source.{}.without_partner", i), summary.unpaired) +
         cell(fmt::format("source.{}.empty", i), survey.sources[i].events_per_pixel.zeros) +
         counts_cells(fmt::format("source.{}", i), survey.sources[i].counts));
   }
@@ -402,7 +402,7 @@ std::string labels_without_events(const Survey& survey) {
       label_table("class", survey.classes), label_table("joint", survey.joints));
 }
 
-std::string pictures(const Survey& survey, const PageContext& context) {
+std::string images(const Survey& survey, const PageContext& context) {
   std::string html =
       "<section><h2>Samples</h2><p class=note>The labelled frame and the events between the pair's "
       "two frames: blue is early, red is late, bright is many. Random samples are drawn with the "
@@ -414,7 +414,7 @@ std::string pictures(const Survey& survey, const PageContext& context) {
       html += fmt::format(
           "<figure data-key=picture><img alt=\"{}\" src=\"data:image/jpeg;base64,{}\"><figcaption>"
           "<b>{}</b> {} · slot {} of {}</figcaption></figure>",
-          escaped(sample.sample_id), base64(context.picture(sample)), escaped(sample.why),
+          escaped(sample.sample_id), base64(context.image(sample)), escaped(sample.why),
           escaped(sample.sample_id), sample.slot, shard_link(context, sample.shard));
     }
     html += "</div>";
@@ -489,9 +489,9 @@ std::string shards(const Survey& survey, const PageContext& context) {
   for (const ShardState& shard : parts.done) {
     if (rows.size() > kMostRows) break;
     rows.push_back(text_cell(shard_link(context, shard.outline.name)) + text_cell("done") +
-                   right_cell(grouped(shard.marker->samples)) +
-                   right_cell(grouped(shard.marker->samples - shard.marker->valid)) +
-                   right_cell(bytes_text(shard.marker->size_bytes)));
+                   right_cell(grouped(shard.record->samples)) +
+                   right_cell(grouped(shard.record->samples - shard.record->valid)) +
+                   right_cell(bytes_text(shard.record->size_bytes)));
   }
   const auto all = std::ssize(parts.missing) + std::ssize(parts.done);
   const auto shown = std::min<std::ptrdiff_t>(std::ssize(rows), kMostRows);
@@ -566,7 +566,7 @@ std::string report_page(const Survey& survey, const PageContext& context) {
              escaped(survey.parts.frozen.plan.name)) +
          kStyle + chart_style() + "</style></head><body>\n" + head(survey, context) + "\n" +
          origin(survey, context) + "\n" + counts(survey) + "\n" + histograms(survey) + "\n" +
-         labels_without_events(survey) + "\n" + pictures(survey, context) + "\n" +
+         labels_without_events(survey) + "\n" + images(survey, context) + "\n" +
          quarantine(survey, context) + "\n" + time(survey) + "\n" + shards(survey, context) +
          "\n</body></html>\n";
 }

@@ -16,14 +16,14 @@ struct PageContext {
   std::filesystem::path folder;  ///< of the shards
   std::filesystem::path file;    ///< where the page will be: links to shards start there
   std::string warning;           ///< of the weights, shown in red; empty: there is none
-  /// The bytes of a JPEG that shows a sample; at most kMostPictureBytes.
-  std::function<std::string(const PickedSample&)> picture;
+  /// The bytes of a JPEG that shows a sample; at most kMostImageBytes.
+  std::function<std::string(const PickedSample&)> image;
 
-  static constexpr std::size_t kMostPictureBytes = 60'000;
+  static constexpr std::size_t kMostImageBytes = 60'000;
 };
 
 /// The survey as one HTML page that needs nothing else: no network, no script. Below 5 MB for any
-/// survey: lists and texts are cut, pictures are few. Numbers stand in elements with `data-key`, as
+/// survey: lists and texts are cut, images are few. Numbers are in elements with `data-key`, as
 /// `data-value` without ornament. Text that comes from outside is escaped.
 std::string report_page(const Survey& survey, const PageContext& context);
 

@@ -92,17 +92,16 @@ class Surveyor {
     survey_.header = survey_.parts.headers.begin()->second;
     std::set<int> with_shards;
     for (const ShardState& shard : survey_.parts.done) with_shards.insert(shard.outline.source);
-    const std::size_t pictured =
-        std::min<std::size_t>(with_shards.size(), Survey::kPicturedSources);
-    const std::size_t random = std::clamp<std::size_t>(12 / pictured, 2, 6);
+    const std::size_t shown = std::min<std::size_t>(with_shards.size(), Survey::kShownSources);
+    const std::size_t random = std::clamp<std::size_t>(12 / shown, 2, 6);
     for (const int source : with_shards) {
-      if (picks_.size() < pictured) picks_.emplace(source, Picks(random));
+      if (picks_.size() < shown) picks_.emplace(source, Picks(random));
     }
   }
 
   Survey run() {
     for (const ShardState& shard : survey_.parts.done) {
-      add_marker(shard);
+      add_commit_record(shard);
       renew_time_limit();
       add_overview(shard, read_overview(folder_ / shard.outline.name));
       lift_time_limit();
@@ -119,27 +118,27 @@ class Surveyor {
     return survey_.sources.at(static_cast<std::size_t>(shard.outline.source));
   }
 
-  void add_marker(const ShardState& shard) {
-    const ShardMarker& marker = *shard.marker;
+  void add_commit_record(const ShardState& shard) {
+    const CommitRecord& record = *shard.record;
     const SourceSpec& spec = survey_.parts.source_of(shard.outline);
     for (DatasetCounts* counts :
          {&survey_.counts, &source_of(shard).counts, &survey_.splits[spec.split],
           &survey_.datasets[std::string(to_string(spec.dataset))]}) {
-      add(marker, *counts);
+      add(record, *counts);
     }
-    for (const QuarantinedSample& sample : marker.quarantined) {
-      QuarantinedSlot slot{marker.shard, sample.slot, sample.sample_id, sample.reason};
+    for (const QuarantinedSample& sample : record.quarantined) {
+      QuarantinedSlot slot{record.shard, sample.slot, sample.sample_id, sample.reason};
       FaultSurvey& fault = survey_.faults[fault_kind(sample.reason)];
       if (fault.samples++ == 0) fault.first = slot;
       if (survey_.quarantined.size() < Survey::kMostQuarantined) {
         survey_.quarantined.push_back(std::move(slot));
       }
     }
-    for (const auto& [stage, seconds] : marker.stage_seconds) {
+    for (const auto& [stage, seconds] : record.stage_seconds) {
       survey_.stage_seconds[stage] += seconds;
     }
-    survey_.wall_seconds += marker.wall_seconds;
-    survey_.peak_bytes = std::max(survey_.peak_bytes, marker.peak_bytes);
+    survey_.wall_seconds += record.wall_seconds;
+    survey_.peak_bytes = std::max(survey_.peak_bytes, record.peak_bytes);
   }
 
   void add_overview(const ShardState& shard, const ShardOverview& overview) {

@@ -40,7 +40,7 @@ struct LabelSurvey {
   std::int64_t without_events = 0;
 };
 
-/// A sample that is worth a picture.
+/// A sample that is worth an image.
 struct PickedSample {
   std::string why;  ///< "random", "emptiest", "fullest", "farthest beyond the trained gaps", with
                     ///< commas between them
@@ -52,7 +52,7 @@ struct PickedSample {
 struct SourceSurvey {
   DatasetCounts counts;
   LogHistogram events_per_pixel;     ///< of valid samples: the volume's sum over its pixels' number
-  std::vector<PickedSample> picked;  ///< for the first kPicturedSources sources that have any
+  std::vector<PickedSample> picked;  ///< for the first kShownSources sources that have any
 };
 
 /// Samples in quarantine for one reason (fault_kind).
@@ -63,7 +63,7 @@ struct FaultSurvey {
 
 /// All numbers of a report.
 struct Survey {
-  static constexpr int kPicturedSources = 8;
+  static constexpr int kShownSources = 8;
   static constexpr int kMostVolumes = 256;
   /// A pixel has events if its values sum to this or more: drawn with a tenth of full brightness.
   static constexpr double kEventSum = 0.1;
@@ -93,9 +93,9 @@ struct Survey {
   std::map<std::string, LabelSurvey> classes, joints;
 };
 
-/// Reads a folder that convert has written: plan, markers, overviews of all shards that are done,
-/// and a bounded number of volumes. The same folder gives the same survey. Throws InputError if
-/// there is no plan or no shard is done, what ShardReader throws, and as read_dataset_parts.
+/// Reads a folder that convert has written: plan, commit records, overviews of all shards that are
+/// done, and a bounded number of volumes. The same folder gives the same survey. Throws InputError
+/// if there is no plan or no shard is done, what ShardReader throws, and as read_dataset_parts.
 Survey survey_folder(const std::filesystem::path& folder);
 
 }  // namespace eventgan

@@ -10,7 +10,7 @@ namespace eventgan {
 /// less. Thread safe.
 std::size_t memory_limit_bytes(const std::filesystem::path& root = "/");
 
-/// Gives freed memory back to the system and lets peak_memory_bytes begin anew. False where the
+/// Gives freed memory back to the system and lets peak_memory_bytes begin again. False where the
 /// kernel does not allow that: then the peak is that of the process's whole life. Thread safe.
 bool restart_peak_memory();
 

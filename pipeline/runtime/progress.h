@@ -41,14 +41,14 @@ struct ProgressText {
 /// or a JSON line a second.
 ///
 /// The bar keeps to one row of the terminal however that is resized: the cursor rests at the row's
-/// start, which is where a terminal that wraps the row anew leaves it, and everything from there on
-/// is wiped before the bar is drawn again. Thread safe.
+/// start, which is where a terminal that wraps the row again leaves it, and everything from there
+/// on is wiped before the bar is drawn again. Thread safe.
 class ProgressDisplay {
  public:
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
   /// Columns of the terminal, asked before each bar. None: no terminal that can redraw a line.
   using Columns = std::function<int()>;
-  /// What there is to show at a time; called by one thread at a time, also by that of keep_up().
+  /// What is to be shown at a time; called by one thread at a time, also by that of keep_up().
   using Describe = std::function<ProgressText(std::chrono::steady_clock::time_point now)>;
 
   /// kAuto is a bar if there are `columns`. `clock` is for tests. What `describe` refers to is
@@ -61,8 +61,8 @@ class ProgressDisplay {
   ProgressDisplay(const ProgressDisplay&) = delete;
   ProgressDisplay& operator=(const ProgressDisplay&) = delete;
 
-  /// From now on it shows by itself what there is, also while nothing changes for long, and draws
-  /// the bar anew when the terminal is resized.
+  /// From now on it shows the state by itself, also while nothing changes for long, and draws
+  /// the bar again when the terminal is resized.
   void keep_up();
 
   /// When this was made.
@@ -73,11 +73,11 @@ class ProgressDisplay {
   void update(const std::function<void(std::chrono::steady_clock::time_point now)>& change,
               bool at_once = false);
 
-  /// What keep_up() does ten times a second: shows what there is if it is time for that, or if the
+  /// What keep_up() does ten times a second: shows the state if it is time for that, or if the
   /// bar has not the terminal's width any more.
   void refresh();
 
-  /// Shows what there is at the end, and ends the bar's line. `passing`: only where something was
+  /// Shows the state at the end, and ends the bar's line. `passing`: only where something was
   /// shown before, and the bar goes.
   void finish(bool passing);
 
@@ -95,7 +95,7 @@ class ProgressDisplay {
   std::chrono::steady_clock::time_point start_;
   std::chrono::steady_clock::time_point shown_;
   bool anything_shown_ = false;
-  int bar_columns_ = 0;  // the terminal's when the bar was drawn that stands there; 0: none does
+  int bar_columns_ = 0;  // the terminal's when the bar was drawn that is there; 0: none does
   std::condition_variable_any wake_;
   std::jthread keeper_;
 };
@@ -116,7 +116,7 @@ struct ProgressUnit {
   std::string phase = {};
 };
 
-/// Where a run stands.
+/// How far a run is.
 struct ProgressState {
   std::int64_t done = 0;
   std::int64_t total = 0;

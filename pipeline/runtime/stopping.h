@@ -82,7 +82,7 @@ class StopMonitor {
   using Left = std::function<std::optional<WorkLeft>()>;        ///< ShardPace's, say
 
   /// Both functions are called from a thread of its own; they must be thread safe and not throw.
-  /// Without `since_request` the order is always kGoOn. The first order stands on return.
+  /// Without `since_request` the order is always kGoOn. The first order holds on return.
   StopMonitor(SinceRequest since_request, double grace_s, Left left);
 
   /// Thread safe, and cheap enough to ask for every sample.

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/runtime/trace_file.h"
 

@@ -57,7 +57,7 @@ class TraceRecorder {
   /// Adds work that the calling thread has done. Work of one thread must nest.
   void add(const TracedWork& work) noexcept;
 
-  /// Adds what a counter stands at now: `unit` names the number.
+  /// Adds what a counter is at now: `unit` names the number.
   void add_counter(const char* name, const char* unit, double value) noexcept;
 
   TraceGauges& gauges() { return gauges_; }

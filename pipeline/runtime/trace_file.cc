@@ -8,7 +8,7 @@
 #include <string>
 #include <system_error>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/unfinished_files.h"
 

@@ -21,7 +21,7 @@ std::string trace_microseconds(std::int64_t nanoseconds);
 /// How every trace of this program begins.
 inline constexpr std::string_view kTraceBegins = "{\"traceEvents\":[";
 
-/// A trace that grows under a temporary name beside `target`, so that it need not stand in memory,
+/// A trace that grows under a temporary name beside `target`, so that it need not be in memory,
 /// and is there whole or not at all. Thread safety: one thread at a time.
 class TraceFile {
  public:

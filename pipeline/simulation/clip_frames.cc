@@ -8,12 +8,12 @@
 #include "stages/base/files/sha256.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/picture_folder.h"
+#include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/sequences/video_clip.h"
 
 namespace eventgan {
 
-GreyImage sensor_picture(const ColourFrame& frame, std::optional<ImageSize> size) try {
+GreyImage sensor_image(const ColourFrame& frame, std::optional<ImageSize> size) try {
   ImageSpec spec;
   spec.size = size;
   spec.fit = ImageFit::kCrop;
@@ -30,10 +30,10 @@ GreyImage sensor_picture(const ColourFrame& frame, std::optional<ImageSize> size
   cv::resize(grey, scaled, cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
              shrinks ? cv::INTER_AREA : cv::INTER_LINEAR);
 
-  GreyImage picture{part.size, std::vector<std::uint8_t>(part.size.pixel_count())};
-  cv::Mat cut(part.size.height, part.size.width, CV_8UC1, picture.pixels.data());
+  GreyImage image{part.size, std::vector<std::uint8_t>(part.size.pixel_count())};
+  cv::Mat cut(part.size.height, part.size.width, CV_8UC1, image.pixels.data());
   scaled(cv::Rect(part.scaled_x, part.scaled_y, part.size.width, part.size.height)).copyTo(cut);
-  return picture;
+  return image;
 } catch (const cv::Exception&) {
   std::throw_with_nested(InputError("expected a frame that can be resized, got another"));
 }
@@ -68,8 +68,8 @@ ListedClip list_video(const fs::path& path, std::optional<double> rate_hz, std::
   return clip;
 }
 
-ListedClip list_pictures(const fs::path& path, std::optional<double> rate_hz) {
-  const PictureFolder folder = list_picture_folder(path);
+ListedClip list_images(const fs::path& path, std::optional<double> rate_hz) {
+  const ImageFolder folder = list_image_folder(path);
   const double rate = rate_hz.value_or(kUsualRate_hz);
   ListedClip clip{rate, {}, {}};
   for (const auto& [number, name] : folder.frames.frames()) {
@@ -85,7 +85,7 @@ ListedClip list_clip(const fs::path& path, std::optional<double> rate_hz, std::i
   if (!fs::exists(path)) {
     throw InputError("expected a video or a folder of images, got none, in " + path.string());
   }
-  return is_video_name(path) ? list_video(path, rate_hz, enough) : list_pictures(path, rate_hz);
+  return is_video_name(path) ? list_video(path, rate_hz, enough) : list_images(path, rate_hz);
 }
 
 /// Frames a clip must have for the source, counted from its own first.
@@ -131,7 +131,7 @@ GreyImage ClipFrames::frame(std::int64_t position) {
     throw InputError("expected a frame of " + to_string(*frame_size_) + " as the first one, got " +
                      to_string(frame.size) + ", in " + ref.path);
   }
-  return sensor_picture(frame, size_);
+  return sensor_image(frame, size_);
 }
 
 }  // namespace eventgan

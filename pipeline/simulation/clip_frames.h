@@ -8,7 +8,7 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/simulation.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {
@@ -17,10 +17,10 @@ namespace eventgan {
 /// sensor, averaging over areas when it shrinks and bilinear when it grows, cut around the centre.
 /// Without a size: grey alone. No blur, which would take away the contrast that makes events.
 /// Throws InputError if it cannot be resized. Thread safe.
-GreyImage sensor_picture(const ColourFrame& frame, std::optional<ImageSize> size);
+GreyImage sensor_image(const ColourFrame& frame, std::optional<ImageSize> size);
 
 /// The frames of a clip that a simulation uses: every `frame_step`-th from `first_frame` on of a
-/// video, or of a folder of pictures in the order of their numbers or names. Not thread safe.
+/// video, or of a folder of images in the order of their numbers or names. Not thread safe.
 class ClipFrames {
  public:
   /// Lists the folder, or decodes the video once to count its frames, no further than the source
@@ -34,7 +34,7 @@ class ClipFrames {
   /// some out, time leaves them out too.
   double time_s(std::int64_t position) const { return frames_[at(position)].time_s; }
 
-  /// A frame as the sensor sees it (sensor_picture). Videos are decoded in order: ask likewise.
+  /// A frame as the sensor sees it (sensor_image). Videos are decoded in order: ask likewise.
   /// Throws InputError if it cannot be decoded or is not as large as the first.
   GreyImage frame(std::int64_t position);
 

@@ -3,13 +3,13 @@
 #include <nlohmann/json.hpp>
 #include <opencv2/core/utility.hpp>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
 #include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/hdf5_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
 
 namespace eventgan {
 namespace {
@@ -35,7 +35,7 @@ nlohmann::json source_json(const SimulationSource& source) {
 
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
-                               std::optional<std::int64_t> picture) {
+                               std::optional<std::int64_t> image) {
   nlohmann::json json = {{"program", program_version()},
                          {"libraries", "OpenCV " + cv::getVersionString()},
                          {"seed", manifest.seed},
@@ -43,7 +43,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
                          {"source", source_json(source)},
                          {"files", files_hash},
                          {"sensor", nlohmann::json::parse(to_json(manifest.sensor))}};
-  if (picture) json["picture"] = *picture;
+  if (image) json["picture"] = *image;
   if (manifest.size) {
     json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
   }

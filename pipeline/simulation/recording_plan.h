@@ -12,14 +12,14 @@
 namespace eventgan {
 
 /// Everything that decides a recording's bytes, as JSON: program, seed, name, source, the clip's
-/// files, sensor. It stands in the recording as the attribute `simulation`, says where a recording
+/// files, sensor. It is in the recording as the attribute `simulation`, says where a recording
 /// came from, and tells whether an existing one is what a job would make. What the manifest says of
 /// other recordings is left out, so that they may change.
 ///
-/// `picture`: kAffine, the number of the picture within its clip; none for a whole clip.
+/// `image`: kAffine, the number of the image within its clip; none for a whole clip.
 std::string recording_settings(const SimulationManifest& manifest, const SimulationSource& source,
                                const std::string& recording, const std::string& files_hash,
-                               std::optional<std::int64_t> picture);
+                               std::optional<std::int64_t> image);
 
 /// The settings that a recording on disk was made with; none if there is no such file. Throws
 /// InputError if it is no recording of a simulation. Thread safe.
@@ -38,14 +38,13 @@ void check_same_settings(const std::filesystem::path& file, const std::string& f
 struct PlannedRecording {
   std::string name;  ///< and random key; the file is NAME.hdf5
   std::filesystem::path file;
-  std::string settings;  ///< recording_settings()
-  std::optional<std::int64_t>
-      picture;  ///< kAffine: position of its picture among the clip's frames
+  std::string settings;               ///< recording_settings()
+  std::optional<std::int64_t> image;  ///< kAffine: position of its image among the clip's frames
   std::int64_t frame_count = 0;
 };
 
-/// One for a clip, NAME; with kAffine one for each picture, NAME-000, NAME-001 and so on: nothing
-/// moves from one picture to another, so no pair of frames may reach across.
+/// One for a clip, NAME; with kAffine one for each image, NAME-000, NAME-001 and so on: nothing
+/// moves from one image to another, so no pair of frames may reach across.
 std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest,
                                               const SimulationSource& source,
                                               const ClipFrames& clip,

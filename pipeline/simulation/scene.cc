@@ -35,31 +35,31 @@ Matrix inverse(const Matrix& m) {
 /// The motion from `from` to `to`, both in [0, 1].
 class AffinePart final : public Interval {
  public:
-  AffinePart(const GreyImage& picture, const AffineMotion& motion, double from, double to)
-      : picture_(picture),
+  AffinePart(const GreyImage& image, const AffineMotion& motion, double from, double to)
+      : image_(image),
         motion_(motion),
         from_(from),
         to_(to),
         steps_(std::max(1, static_cast<int>(std::ceil(
-                               (to - from) * largest_displacement(motion, picture.size))))) {}
+                               (to - from) * largest_displacement(motion, image.size))))) {}
 
-  ImageSize size() const override { return picture_.size; }
+  ImageSize size() const override { return image_.size; }
   int steps() const override { return steps_; }
 
   std::vector<float> render(int step) const override {
     const double part = static_cast<double>(step) / steps_;
-    return render_affine(picture_, motion_, from_ + (to_ - from_) * part);
+    return render_affine(image_, motion_, from_ + (to_ - from_) * part);
   }
 
-  /// A point seen at y at the start is the picture's point x = A(from)⁻¹ y, seen at A(to) x later.
+  /// A point seen at y at the start is the image's point x = A(from)⁻¹ y, seen at A(to) x later.
   FlowDisplacement flow() const override {
     const Matrix back = inverse(motion_at(motion_, from_));
     const Matrix forth = motion_at(motion_, to_);
-    FlowDisplacement flow{picture_.size, {}, {}};
-    flow.x_px.reserve(picture_.size.pixel_count());
-    flow.y_px.reserve(picture_.size.pixel_count());
-    for (int y = 0; y < picture_.size.height; ++y) {
-      for (int x = 0; x < picture_.size.width; ++x) {
+    FlowDisplacement flow{image_.size, {}, {}};
+    flow.x_px.reserve(image_.size.pixel_count());
+    flow.y_px.reserve(image_.size.pixel_count());
+    for (int y = 0; y < image_.size.height; ++y) {
+      for (int x = 0; x < image_.size.width; ++x) {
         const auto source = moved(back, x, y);
         const auto target = moved(forth, source[0], source[1]);
         flow.x_px.push_back(static_cast<float>(target[0] - x));
@@ -70,7 +70,7 @@ class AffinePart final : public Interval {
   }
 
  private:
-  GreyImage picture_;
+  GreyImage image_;
   AffineMotion motion_;
   double from_;
   double to_;
@@ -87,27 +87,27 @@ GreyImage rounded(ImageSize size, const std::vector<float>& intensity) {
 
 }  // namespace
 
-AffineScene::AffineScene(GreyImage picture, const AffineMotion& motion, int frame_count,
+AffineScene::AffineScene(GreyImage image, const AffineMotion& motion, int frame_count,
                          double interval_s)
-    : picture_(std::move(picture)),
+    : image_(std::move(image)),
       motion_(motion),
       frame_count_(frame_count),
       interval_s_(interval_s),
-      frame_(rounded(picture_.size, render_affine(picture_, motion_, 1.0 / frame_count_))) {}
+      frame_(rounded(image_.size, render_affine(image_, motion_, 1.0 / frame_count_))) {}
 
 std::unique_ptr<Interval> AffineScene::advance() {
   if (position_ + 1 == frame_count_) return nullptr;
   const double from = static_cast<double>(position_ + 1) / frame_count_;
   const double to = static_cast<double>(position_ + 2) / frame_count_;
   ++position_;
-  frame_ = rounded(picture_.size, render_affine(picture_, motion_, to));
-  return std::make_unique<AffinePart>(picture_, motion_, from, to);
+  frame_ = rounded(image_.size, render_affine(image_, motion_, to));
+  return std::make_unique<AffinePart>(image_, motion_, from, to);
 }
 
 namespace {
 
-/// Two frames and no picture between them: the sensor itself takes the log intensity to move on a
-/// line from one picture to the next.
+/// Two frames and no image between them: the sensor itself takes the log intensity to move on a
+/// line from one image to the next.
 class FadeInterval final : public Interval {
  public:
   FadeInterval(GreyImage previous, GreyImage next)

@@ -16,7 +16,7 @@ class Scene {
  public:
   virtual ~Scene() = default;
 
-  /// The frame where the scene stands, and its time; it starts at its first frame, at 0 s.
+  /// The frame where the scene is, and its time; it starts at its first frame, at 0 s.
   virtual const GreyImage& frame() const = 0;
   virtual double time_s() const = 0;
 
@@ -27,22 +27,22 @@ class Scene {
   virtual bool has_flow() const = 0;
 };
 
-/// One picture under one steady affine motion, seen in n = frame_count frames: frame k is the
-/// picture at u = (k + 1)/n of the motion, rounded to 8 bits, so pairs any number of frames apart
-/// have a motion as far in proportion. The picture itself, u = 0, is no frame: it alone is not
+/// One image under one steady affine motion, seen in n = frame_count frames: frame k is the
+/// image at u = (k + 1)/n of the motion, rounded to 8 bits, so pairs any number of frames apart
+/// have a motion as far in proportion. The image itself, u = 0, is no frame: it alone is not
 /// smoothed by interpolation, and that would look like events. In each interval at most 1 px lies
-/// between two pictures of the sensor.
+/// between two images of the sensor.
 class AffineScene final : public Scene {
  public:
   /// frame_count ≥ 2; frames are `interval_s` apart.
-  AffineScene(GreyImage picture, const AffineMotion& motion, int frame_count, double interval_s);
+  AffineScene(GreyImage image, const AffineMotion& motion, int frame_count, double interval_s);
   const GreyImage& frame() const override { return frame_; }
   double time_s() const override { return position_ * interval_s_; }
   std::unique_ptr<Interval> advance() override;
   bool has_flow() const override { return true; }
 
  private:
-  GreyImage picture_;
+  GreyImage image_;
   AffineMotion motion_;
   int frame_count_;
   double interval_s_;

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/simulation/clip_frames.h"
@@ -122,12 +122,12 @@ std::unique_ptr<Scene> make_scene(const SimulationSource& source, ClipFrames& cl
     case SimulationMethod::kAffine:
       break;
   }
-  GreyImage picture = clip.frame(recording.picture.value());
+  GreyImage image = clip.frame(recording.image.value());
   const int frames = source.frames_per_picture;
   const double a_frame_px = source.max_displacement_px * random.keyed("displacement").uniform(0);
   const AffineMotion motion =
-      random_affine_motion(picture.size, a_frame_px * frames, random.keyed("motion"));
-  return std::make_unique<AffineScene>(std::move(picture), motion, frames, 1 / clip.rate_hz());
+      random_affine_motion(image.size, a_frame_px * frames, random.keyed("motion"));
+  return std::make_unique<AffineScene>(std::move(image), motion, frames, 1 / clip.rate_hz());
 }
 
 std::int64_t frame_total(const std::vector<SourceWork>& works) {

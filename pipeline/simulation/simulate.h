@@ -53,7 +53,7 @@ RecordingSummary record(Scene& scene, const SensorSpec& sensor, CounterRandom ra
 struct SimulationOptions {
   std::optional<std::filesystem::path> output;  ///< instead of the manifest's
   int threads = 0;                              ///< 0: all cores
-  bool overwrite = false;                       ///< make anew what is there
+  bool overwrite = false;                       ///< make what is there again
   /// Called with the number of frames to do; shows progress. None: silent.
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;
 };

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/realism/realism_report.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
@@ -83,7 +83,7 @@ RealismScores scores_of(const nlohmann::json& json) {
 }
 
 std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& key) {
-  constexpr std::size_t kDigits = 24;  // enough to tell files apart; the whole key stands in them
+  constexpr std::size_t kDigits = 24;  // enough to tell files apart; the whole key is in them
   return folder / (key.substr(0, kDigits) + ".json");
 }
 

@@ -18,7 +18,7 @@ namespace eventgan {
 /// its size, so the events per pixel of every part of the scene are kept, and with them the events
 /// times the area of a pixel; the plain sum grows with the number of pixels.
 ///
-/// `from` and `to` place the same source picture. values: [channels, y, x] float32 of size
+/// `from` and `to` place the same source image. values: [channels, y, x] float32 of size
 /// from.volume; the result is of size to.volume, `values` themselves if both placements are equal.
 /// Throws std::invalid_argument if the values are not as many, or the sources differ. Thread safe.
 std::vector<float> on_grid(std::vector<float> values, int channels, const Placement& from,

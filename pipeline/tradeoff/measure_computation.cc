@@ -131,7 +131,7 @@ std::vector<RoundCost> take_turn(ComparedPairs& pairs, const Computation& comput
     read.push_back(&pair);
     shards.push_back(pair.shard);
   }
-  // The first pair of each size of pictures waits for the engine's plan.
+  // The first pair of each size of images waits for the engine's plan.
   std::set<std::pair<int, int>> warm;
   for (const SampleMessage* pair : read) {
     const ImageSize content = pair->prepared.content;

@@ -10,7 +10,7 @@
 #include <numeric>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "pipeline/realism/realism_report.h"
 
 namespace eventgan {
@@ -232,7 +232,7 @@ std::vector<Answer> answers_of(const Digest& digest, const TradeoffDemand& deman
   return answers;
 }
 
-/// Answers with their lines for the manifest; `gap` stands between question and answer.
+/// Answers with their lines for the manifest; `gap` is between question and answer.
 std::string answers_text(const TradeoffReport& report, const Digest& digest,
                          const TradeoffDemand& demand, const char* gap) {
   const std::vector<Answer> answers = answers_of(digest, demand);

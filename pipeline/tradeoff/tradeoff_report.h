@@ -57,6 +57,6 @@ std::string to_json(const TradeoffReport& report, const TradeoffDemand& demand);
 /// Speed (in the reference's) against error, both logarithmic, as an SVG file: a point for each
 /// trial, the front as a line with numbers, and below it their names. It says that the error is the
 /// distance to the reference, not to a camera.
-std::string tradeoff_picture(const TradeoffReport& report);
+std::string tradeoff_chart(const TradeoffReport& report);
 
 }  // namespace eventgan

@@ -16,7 +16,7 @@ class CsvTable {
 
   /// Opens FILE, or begins it. Of the rows it has, those up to the first for which `keep` is false,
   /// or that is not whole (a run was killed while it wrote), stay; the rest is cut off. A file with
-  /// other columns is begun anew. Throws std::runtime_error naming the file.
+  /// other columns is begun again. Throws std::runtime_error naming the file.
   CsvTable(const std::filesystem::path& file, const Row& columns,
            const std::function<bool(const Row&)>& keep);
 

@@ -16,7 +16,7 @@
 #include "pipeline/training/csv_table.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
-#include "stages/events/pictures/comparison_picture.h"
+#include "stages/events/images/comparison_image.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/torch/torch_generator.h"
@@ -87,7 +87,7 @@ namespace {
 
 constexpr std::size_t kMostPairs = 16;
 
-/// A frame of a [frame, y, x] float picture in [-1, 1], as it was recorded.
+/// A frame of a [frame, y, x] float image in [-1, 1], as it was recorded.
 GreyImage grey_frame(const TrainingSample& sample, std::size_t frame) {
   const std::size_t plane = sample.shape.size.pixel_count();
   GreyImage image{sample.shape.size, {}};
@@ -181,8 +181,8 @@ constexpr std::size_t kMostRows = 4;
 
 /// Draws what the generator makes of four of the samples, evenly spread (of all, if there are
 /// fewer), beside the real volumes: see write_comparison_png, which says what is thrown.
-void write_generator_picture(const Generator& generator, std::span<const TrainingSample> samples,
-                             const std::filesystem::path& file) {
+void write_generator_image(const Generator& generator, std::span<const TrainingSample> samples,
+                           const std::filesystem::path& file) {
   std::vector<ComparedPair> pairs;
   for (const std::size_t place : spread(kMostRows, samples.size())) {
     const TrainingSample& sample = samples[place];
@@ -231,9 +231,9 @@ void GeneratorRecords::draw(const StateDict& generator_state, const TrainingPosi
                             std::span<const TrainingSample> batch) const {
   const Weights weights = trained_weights(generator_state, manifest_, position);
   in_another_thread([&] {
-    write_generator_picture(*make_torch_generator(weights),
-                            validation_pairs_ ? std::span(validation_pairs_->samples()) : batch,
-                            folder_.picture(position));
+    write_generator_image(*make_torch_generator(weights),
+                          validation_pairs_ ? std::span(validation_pairs_->samples()) : batch,
+                          folder_.image(position));
   });
 }
 

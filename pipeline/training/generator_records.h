@@ -40,11 +40,11 @@ struct ValidationScores {
 };
 
 /// Fixed pairs to judge a generator by in the course of a training: consecutive frames of the
-/// validation recordings, the middle of the picture, at most 16, evenly spread where there are
+/// validation recordings, the middle of the image, at most 16, evenly spread where there are
 /// more. Read once and kept.
 class ValidationPairs {
  public:
-  /// `crop`: the training's; recordings with smaller pictures are taken whole. Throws InputError if
+  /// `crop`: the training's; recordings with smaller images are taken whole. Throws InputError if
   /// a recording cannot be read.
   ValidationPairs(const CropReader& reader, ImageSize crop);
 
@@ -62,7 +62,7 @@ std::vector<float> generated_volume(const Generator& generator, const TrainingSa
 /// validation.csv: a row a checkpoint; columns step, volume_loss and realism's scores.
 class ValidationLog {
  public:
-  /// Goes on with FILE; rows of checkpoints after `step` are cut off.
+  /// Resumes FILE; rows of checkpoints after `step` are cut off.
   ValidationLog(const std::filesystem::path& file, std::int64_t step);
 
   void add(std::int64_t step, const ValidationScores& scores);
@@ -71,7 +71,7 @@ class ValidationLog {
   CsvTable table_;
 };
 
-/// What a training writes about its generator: weights, validation scores, pictures. Each takes
+/// What a training writes about its generator: weights, validation scores, images. Each takes
 /// Trainer::generator_state(). save() and draw() may leave LibTorch with another number of threads.
 /// Throw std::runtime_error naming the file. Not thread safe.
 class GeneratorRecords {
@@ -86,7 +86,7 @@ class GeneratorRecords {
   /// weights-latest.safetensors, and a row of validation.csv.
   void save(const StateDict& generator_state, const TrainingPosition& position);
 
-  /// The position's picture: of validation pairs, else of the batch.
+  /// The position's image: of validation pairs, else of the batch.
   void draw(const StateDict& generator_state, const TrainingPosition& position,
             std::span<const TrainingSample> batch) const;
 

@@ -40,7 +40,7 @@ struct LossRow {
 /// are also kept, for curves and means. Not thread safe.
 class LossLog {
  public:
-  /// Goes on with FILE after the rows before `next`, which it cuts off with all behind it.
+  /// Resumes FILE after the rows before `next`, which it cuts off with all behind it.
   LossLog(const std::filesystem::path& file, const TrainingPosition& next);
 
   /// Losses by name; names that have no column are left out.

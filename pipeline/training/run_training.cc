@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
@@ -86,7 +86,7 @@ class TrainingRun {
   TrainingPosition position_;
   Clock::time_point start_;
   Clock::time_point saved_;
-  Clock::time_point pictured_;
+  Clock::time_point shown_;
   TrainingLock lock_;
   double seconds_before_ = 0;
   std::int64_t steps_made_ = 0;
@@ -137,7 +137,7 @@ TrainingRun::TrainingRun(const TrainingManifest& manifest, const TrainingOptions
       environment_(training_environment(options.device)),
       start_(Clock::now()),
       saved_(start_),
-      pictured_(start_),
+      shown_(start_),
       lock_(folder_.root) {
   const std::string advice =
       precision_advice(manifest.precision, options.device, instruction_sets());
@@ -251,10 +251,10 @@ StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
 
 void TrainingRun::keep_records(const std::vector<TrainingSample>& batch) {
   const bool is_last = position_.step == steps_of(manifest_.steps, position_.phase);
-  if (has_generator() && (is_last || passed(pictured_, manifest_.picture_minutes))) {
+  if (has_generator() && (is_last || passed(shown_, manifest_.picture_minutes))) {
     generator_records_.draw(trainer_.generator_state(), position_, batch);
     use_training_threads(threads_);
-    pictured_ = Clock::now();
+    shown_ = Clock::now();
   }
   if (passed(saved_, manifest_.checkpoint_minutes)) save();
 }

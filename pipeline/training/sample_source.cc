@@ -68,13 +68,13 @@ namespace {
 constexpr std::size_t kFewestEvents = 100;
 constexpr int kMostAttempts = 10;
 
-/// Where a crop of `cut` pixels that was drawn to begin at `drawn`, uniformly over `picture`
+/// Where a crop of `cut` pixels that was drawn to begin at `drawn`, uniformly over `image`
 /// pixels, begins if it is to hold pixel `at`: uniformly over the places where it does.
-int holding(int drawn, int at, int cut, int picture) {
-  if (picture == cut) return drawn;
+int holding(int drawn, int at, int cut, int image) {
+  if (image == cut) return drawn;
   const int first = std::max(0, at - cut + 1);
-  const int last = std::min(at, picture - cut);
-  return first + static_cast<int>(std::int64_t{drawn} * (last - first + 1) / (picture - cut + 1));
+  const int last = std::min(at, image - cut);
+  return first + static_cast<int>(std::int64_t{drawn} * (last - first + 1) / (image - cut + 1));
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ TrainingSample SampleSource::sample(const SamplePlace& place) const {
   const TrainingSample cut = reader_.read(draw.recording, draw.first_frame, draw.last_frame, box);
   augmentation.top = augmentation.left = 0;  // it is cut already
   TrainingSample sample = augment(cut, augmentation);
-  sample.origin = cut.origin;  // augment has added where it cut: nothing of the picture
+  sample.origin = cut.origin;  // augment has added where it cut: nothing of the image
   return sample;
 }
 

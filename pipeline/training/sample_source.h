@@ -51,7 +51,7 @@ class SampleSource {
   SampleSource(const TrainingManifest& manifest, std::vector<TrainingRecording> recordings);
 
   /// The sample drawn by draw_sample. As in the published code a pair whose first interval has
-  /// fewer than 100 events in the whole picture is drawn again (at most 10 times, from the same
+  /// fewer than 100 events in the whole image is drawn again (at most 10 times, from the same
   /// recording): η98 would blow its noise up to full scale. Throws InputError naming the recording
   /// if it cannot be read.
   TrainingSample sample(const SamplePlace& place) const;

@@ -21,13 +21,13 @@ namespace fs = std::filesystem;
 namespace {
 
 void require_own_folders(const TrainingFolder& folder) {
-  for (const fs::path& below : {folder.checkpoints(), folder.pictures()}) {
+  for (const fs::path& below : {folder.checkpoints(), folder.images()}) {
     require_no_link(folder.root, below.filename());
   }
 }
 
-/// generator-12000.png, as TrainingFolder::picture names them.
-bool is_picture(std::string_view name) {
+/// generator-12000.png, as TrainingFolder::image names them.
+bool is_image(std::string_view name) {
   constexpr std::string_view kBegin = "generator-", kEnd = ".png";
   if (!name.starts_with(kBegin) || !name.ends_with(kEnd)) return false;
   name = name.substr(kBegin.size(), name.size() - kBegin.size() - kEnd.size());
@@ -38,7 +38,7 @@ bool is_picture(std::string_view name) {
 
 void TrainingFolder::prepare() const {
   require_own_folders(*this);
-  for (const fs::path& folder : {root, checkpoints(), pictures()}) {
+  for (const fs::path& folder : {root, checkpoints(), images()}) {
     fs::create_directories(folder);
     remove_stale_temporaries(folder);
   }
@@ -53,9 +53,9 @@ void TrainingFolder::discard() const {
         curves(), validation(), latest_weights(), weights()}) {
     fs::remove(file);
   }
-  if (!fs::is_directory(pictures())) return;
-  for (const auto& entry : fs::directory_iterator(pictures())) {
-    if (is_picture(entry.path().filename().string())) fs::remove(entry.path());
+  if (!fs::is_directory(images())) return;
+  for (const auto& entry : fs::directory_iterator(images())) {
+    if (is_image(entry.path().filename().string())) fs::remove(entry.path());
   }
 }
 

@@ -17,9 +17,9 @@ struct TrainingFolder {
   std::filesystem::path validation() const { return root / "validation.csv"; }
   std::filesystem::path latest_weights() const { return root / "weights-latest.safetensors"; }
   std::filesystem::path weights() const { return root / "weights.safetensors"; }
-  std::filesystem::path pictures() const { return root / "pictures"; }
-  std::filesystem::path picture(const TrainingPosition& position) const {
-    return pictures() /
+  std::filesystem::path images() const { return root / "pictures"; }
+  std::filesystem::path image(const TrainingPosition& position) const {
+    return images() /
            (std::string(to_string(position.phase)) + "-" + std::to_string(position.step) + ".png");
   }
 

@@ -85,9 +85,9 @@ void append_cut(const std::vector<Event>& events, const CropBox& box, std::vecto
 
 }  // namespace
 
-CropBox centre_crop(ImageSize picture, ImageSize size) {
-  const ImageSize cut{std::min(picture.height, size.height), std::min(picture.width, size.width)};
-  return {(picture.height - cut.height) / 2, (picture.width - cut.width) / 2, cut};
+CropBox centre_crop(ImageSize image, ImageSize size) {
+  const ImageSize cut{std::min(image.height, size.height), std::min(image.width, size.width)};
+  return {(image.height - cut.height) / 2, (image.width - cut.width) / 2, cut};
 }
 
 CropReader::CropReader(std::vector<TrainingRecording> recordings, int bins)

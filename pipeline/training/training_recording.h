@@ -97,15 +97,15 @@ class LruCache {
   std::map<Key, Entry> entries_;
 };
 
-/// A rectangle of a picture.
+/// A rectangle of an image.
 struct CropBox {
   int top = 0;
   int left = 0;
   ImageSize size;
 };
 
-/// The rectangle of this size in a picture's middle, cut down to the picture where it is larger.
-CropBox centre_crop(ImageSize picture, ImageSize size);
+/// The rectangle of this size in an image's middle, cut down to the image where it is larger.
+CropBox centre_crop(ImageSize image, ImageSize size);
 
 /// Reads frame pairs with the events between them, cut to a rectangle. What was read lately is
 /// kept, so that a few recordings are not read again and again. Thread safe.
@@ -116,14 +116,14 @@ class CropReader {
   const std::vector<TrainingRecording>& recordings() const { return recordings_; }
 
   /// As the published code does, events are cut first, and the volume is made and normalised by the
-  /// η98 of the events in the rectangle alone: its first and last event, not the picture's, span
+  /// η98 of the events in the rectangle alone: its first and last event, not the image's, span
   /// the time bins. Frames are x = (u/255 - 0.5)·2; network_frames are the same. first_frame ==
   /// last_frame gives one frame twice and an empty volume. Throws InputError naming the recording
   /// if it cannot be read.
   TrainingSample read(std::size_t recording, std::int64_t first_frame, std::int64_t last_frame,
                       const CropBox& box) const;
 
-  /// Events between a frame and the next one, in the whole picture.
+  /// Events between a frame and the next one, in the whole image.
   std::size_t event_count(std::size_t recording, std::int64_t frame) const;
 
   /// The event before which the share `place`, 0..1 without 1, of those between two frames lies;

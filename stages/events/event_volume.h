@@ -13,20 +13,20 @@ namespace eventgan {
 /// V(x,y,b) = Σ_i max(0, 1 - |b - t*_i|), t*_i = (B-1)(t_i - t_1)/(t_N - t_1), per polarity, as
 /// EventGAN has it; [2 bins, H, W] float32, C order; sums are formed in double. t_1 and t_N are
 /// `times_s`, or without them the times of the first and the last event. No events → zeros; t_N =
-/// t_1 → t* = 0. Throws std::invalid_argument for an event outside the picture or the times, a time
+/// t_1 → t* = 0. Throws std::invalid_argument for an event outside the image or the times, a time
 /// that is not finite, events that are not in time order, or times so far apart (1e307) that
 /// (B-1)(t_N - t_1) is not finite. Thread safe.
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
                                 std::optional<std::array<double, 2>> times_s = std::nullopt);
 
-/// Takes events of a picture into the volume that it is placed in: an event comes to the pixel that
+/// Takes events of an image into the volume that it is placed in: an event comes to the pixel that
 /// the centre of its own falls in, x' = floor((x + 0.5) s) + offset, whatever `s`; none is added or
 /// spread. Those that a crop cuts away are removed. Order and times stay. Thread safe.
 void place_events(const Placement& placement, std::vector<Event>& events);
 
-/// The average-timestamp picture of the paper, per polarity: at each pixel the mean of the bins'
+/// The average-timestamp image of the paper, per polarity: at each pixel the mean of the bins'
 /// times τ_b = 0.1 + 0.9 b/(B-1), weighted by the volume: T(x,y) = Σ_b τ_b V_b / (Σ_b V_b + 1e-5);
-/// 0 without events. The published picture is (positive + negative)/2.
+/// 0 without events. The published image is (positive + negative)/2.
 struct TimeImage {
   ImageSize size;
   std::vector<float> positive;  ///< [y, x] in [0, 1]

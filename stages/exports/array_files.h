@@ -18,7 +18,7 @@ std::string npz_file(const std::vector<std::pair<std::string, std::string>>& arr
 /// more.
 std::string tar_member(std::string_view name, std::string_view bytes);
 
-/// What stands at a tar file's end.
+/// What is at a tar file's end.
 std::string tar_end();
 
 }  // namespace eventgan

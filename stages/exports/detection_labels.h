@@ -43,7 +43,7 @@ struct ExportedJoint {
   int visible = -1;          ///< as Joint::visible
 };
 
-/// An entry for a person: COCO counts a picture from its left edge, so each joint is moved by half
+/// An entry for a person: COCO counts an image from its left edge, so each joint is moved by half
 /// a pixel; visibility 0 not annotated (then x = y = 0), 1 hidden, 2 visible or not known.
 std::string coco_person(const CocoPlace& place, const Rectangle& box,
                         const std::vector<ExportedJoint>& joints);

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/frames/events/dhp19_dataset.h"
 #include "stages/frames/events/recording_dataset.h"

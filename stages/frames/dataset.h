@@ -19,7 +19,7 @@ struct LabelledFrame {
   /// what a user of the dataset would call the frame ("001497", "S1/Directions-1/54138969/000006").
   std::string sample_id;
   std::string sequence;   ///< the sequence it belongs to; empty if none is known
-  FrameRef frame;         ///< the frame itself; its file may be absent (see Dataset::neighbour)
+  FrameRef frame;         ///< the frame itself; its file may be absent (see Dataset::paired_frame)
   std::string label_key;  ///< what Dataset::annotation takes; stands alone in a frozen plan
   /// Why no pair of it can be trusted, if opening the dataset told so already (damaged timestamps);
   /// empty otherwise.
@@ -27,10 +27,10 @@ struct LabelledFrame {
 };
 
 /// A frame some steps away from a labelled one.
-struct Neighbour {
+struct PairedFrame {
   enum class State {
     kPresent,  ///< `frame` exists
-    kHole,     ///< the sequence goes on beyond it, but its file is absent: damage; `frame` names it
+    kMissing,  ///< the sequence goes on beyond it, but its file is absent: damage; `frame` names it
     kBeyond    ///< the sequence does not reach that far (or there is none): nothing is wrong
   };
   State state = State::kBeyond;
@@ -39,7 +39,7 @@ struct Neighbour {
 
 /// The events that a sample of real events is made of.
 struct EventWindow {
-  ImageSize sensor;           ///< the source picture that coordinates and labels are in
+  ImageSize sensor;           ///< the source image that coordinates and labels are in
   std::vector<Event> events;  ///< in time order; none: nothing happened
 
   /// Gives a pair without times those of the first and the last event, if there are any: they alone
@@ -48,8 +48,8 @@ struct EventWindow {
 };
 
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
-/// their labels say. Opening one lists files and reads annotation files; it decodes no picture, but
-/// for KITTI object with its raw drives, a picture of each drive, and videos.
+/// their labels say. Opening one lists files and reads annotation files; it decodes no image, but
+/// for KITTI object with its raw drives, an image of each drive, and videos.
 ///
 /// Steps between frames are counted in *stored* frames: where a sequence stores every fifth frame
 /// of a video (or takes them, SourceSpec::every), one step is five frames of that video, and
@@ -67,13 +67,13 @@ class Dataset {
   virtual const std::vector<LabelledFrame>& labelled_frames() const = 0;
 
   /// The frame `steps` after the labelled one (before it, if negative; itself, if 0).
-  virtual Neighbour neighbour(const LabelledFrame& frame, int steps) const = 0;
+  virtual PairedFrame paired_frame(const LabelledFrame& frame, int steps) const = 0;
 
   /// Reads one annotation. A fault if it is malformed ("expected X, got Y, in PATH:LINE").
   virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
 
   /// Of a dataset of events (has_events), in which every "labelled frame" is a window: its
-  /// neighbours -1 and 1 are the window's begin and end, always present, and no other is. Their
+  /// paired frames -1 and 1 are the window's begin and end, always present, and no other is. Their
   /// times are NaN where the window is of so many events, which tell. `pairs` of these datasets is
   /// not looked at. Both throw std::logic_error for a dataset of frames.
   virtual ImageSize sensor_size(const std::string& label_key) const;

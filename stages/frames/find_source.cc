@@ -10,7 +10,7 @@
 #include "stages/frames/mpii/mpii_frames.h"
 #include "stages/frames/mpii/mpii_list_dataset.h"
 #include "stages/frames/sequences/frames_dataset.h"
-#include "stages/frames/sequences/picture_folder.h"
+#include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -89,12 +89,12 @@ bool is_human36m_official(const fs::path& root) {
 
 bool is_frames(const fs::path& root) {
   if (has_file(root)) return is_video_name(root);
-  if (has_folder(root / "image_2")) return false;  // KITTI's test pictures: no sequence at all
-  const PictureFolder top = has_folder(root) ? list_picture_folder(root) : PictureFolder();
+  if (has_folder(root / "image_2")) return false;  // KITTI's test images: no sequence at all
+  const ImageFolder top = has_folder(root) ? list_image_folder(root) : ImageFolder();
   return !top.frames.empty() || std::ranges::any_of(top.left_out, is_video_name) ||
          std::ranges::any_of(top.folders, [&](const std::string& name) {
            return !look_into(root / name).files.empty() &&
-                  !list_picture_folder(root / name).frames.empty();
+                  !list_image_folder(root / name).frames.empty();
          });
 }
 
@@ -167,7 +167,7 @@ void complete_mpii_list(FoundSource& found) {
 
 void complete_frames(FoundSource& found) {
   if (has_file(found.root)) return;
-  const PictureFolder top = list_picture_folder(found.root);
+  const ImageFolder top = list_image_folder(found.root);
   if (top.frames.empty() && std::ranges::any_of(top.left_out, is_video_name)) return;
   found.remarks.push_back("no times, since images have none (set \"frames_per_second\")");
 }

@@ -26,7 +26,7 @@ struct FoundSource {
 /// development kit in the two folders above the root and in their folders. Only names are looked
 /// at, and the beginnings of lists of people: opening the dataset tells whether it is sound.
 ///
-/// Any folder of pictures or videos is `frames`, so that this is asked last. Throws InputError if
+/// Any folder of images or videos is `frames`, so that this is asked last. Throws InputError if
 /// there is nothing at `path`, no such dataset, or more than one.
 FoundSource find_source(const std::filesystem::path& path,
                         std::optional<DatasetKind> dataset = std::nullopt);

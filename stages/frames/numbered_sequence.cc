@@ -115,19 +115,20 @@ bool NumberedSequence::contains(std::int64_t number) const {
 NumberedSequence::Place NumberedSequence::find(std::int64_t number) const {
   const auto frame = lower_bound(number);
   if (frame != frames_.end() && frame->first == number) {
-    return {Neighbour::State::kPresent, number, frame->second};
+    return {PairedFrame::State::kPresent, number, frame->second};
   }
   const bool goes_on = frame != frames_.begin() && frame != frames_.end();
-  return {goes_on ? Neighbour::State::kHole : Neighbour::State::kBeyond, number, name_for(number)};
+  return {goes_on ? PairedFrame::State::kMissing : PairedFrame::State::kBeyond, number,
+          name_for(number)};
 }
 
 NumberedSequence::Place NumberedSequence::at(std::int64_t number, int steps) const {
   Place place = find(number + steps * stride_);
-  if (place.state == Neighbour::State::kPresent) return place;
+  if (place.state == PairedFrame::State::kPresent) return place;
   const bool goes_on =
       steps == 0 || (!empty() && (steps > 0 ? frames_.back().first > place.number
                                             : frames_.front().first < place.number));
-  place.state = goes_on ? Neighbour::State::kHole : Neighbour::State::kBeyond;
+  place.state = goes_on ? PairedFrame::State::kMissing : PairedFrame::State::kBeyond;
   return place;
 }
 

@@ -14,10 +14,10 @@ namespace eventgan {
 /// One of 0 to 9, whatever the locale.
 inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-/// Pictures that a folder of frames may hold. Where a frame is there under two of them, the first
+/// Images that a folder of frames may hold. Where a frame is there under two of them, the first
 /// counts.
-inline const std::vector<std::string_view> kPictureExtensions = {".png", ".jpg",  ".jpeg", ".bmp",
-                                                                 ".tif", ".tiff", ".webp"};
+inline const std::vector<std::string_view> kImageExtensions = {".png", ".jpg",  ".jpeg", ".bmp",
+                                                               ".tif", ".tiff", ".webp"};
 
 /// A folder of frames whose names end in their number: "img_000006.jpg" is frame 6. Listed once;
 /// after that no question goes to the disk. A value; reading it from several threads is safe.
@@ -25,11 +25,11 @@ class NumberedSequence {
  public:
   using Frame = std::pair<std::int64_t, std::string>;  ///< number, file name
 
-  /// A frame some steps away: what Neighbour says, before the path is known.
+  /// A frame some steps away: what PairedFrame says, before the path is known.
   struct Place {
-    Neighbour::State state = Neighbour::State::kBeyond;
+    PairedFrame::State state = PairedFrame::State::kBeyond;
     std::int64_t number = -1;
-    /// Its file name; for a hole the name it would have. Empty in an empty sequence.
+    /// Its file name; for a missing frame the name it would have. Empty in an empty sequence.
     std::string name;
   };
 
@@ -50,7 +50,7 @@ class NumberedSequence {
   /// empty sequence. Throws InputError if the folder cannot be read or two files of one extension
   /// have the same number ("1.png", "01.png").
   static NumberedSequence list(const std::filesystem::path& folder, std::string_view prefix = "",
-                               const std::vector<std::string_view>& extensions = kPictureExtensions,
+                               const std::vector<std::string_view>& extensions = kImageExtensions,
                                Stride stride = Stride::kOne);
 
   bool empty() const { return frames_.empty(); }
@@ -67,11 +67,11 @@ class NumberedSequence {
 
   bool contains(std::int64_t number) const;
 
-  /// Frame `number`: present; a hole if there are frames on both sides of it; else beyond.
+  /// Frame `number`: present; a missing frame if there are frames on both sides of it; else beyond.
   Place find(std::int64_t number) const;
 
   /// The frame `steps` strides after `number` (before it, if negative). Frame `number` need not be
-  /// there; at 0 steps it is present or a hole, never beyond.
+  /// there; at 0 steps it is present or a missing frame, never beyond.
   Place at(std::int64_t number, int steps) const;
 
  private:

@@ -8,7 +8,7 @@ namespace eventgan {
 
 /// While it lives, the calling thread's float instructions take subnormal numbers (below 1.2e-38)
 /// for zero, as operands and as results. A processor computes them in microcode, up to a hundred
-/// times slower; what is that small vanishes in any sum with the activations of a picture. On
+/// times slower; what is that small vanishes in any sum with the activations of an image. On
 /// processors without SSE2 nothing changes.
 class FlushSubnormals {
  public:

@@ -20,7 +20,7 @@ struct GapRange {
 
 /// What an engine noticed while it made a volume.
 struct GenerationNotes {
-  /// Of the activations stored in 8 bits the share that stands at the end of the calibrated range,
+  /// Of the activations stored in 8 bits the share that is at the end of the calibrated range,
   /// where all beyond it is clipped; 0..1. 0 for engines that store none.
   double saturated_share = 0;
 };

@@ -42,7 +42,7 @@ struct QuantizableNetwork {
 ///    addition share their factors; Nagel et al., "Data-free quantization through weight
 ///    equalization and bias correction", 2019, but from activations' ranges);
 ///  - the negative part that storage loses is guessed from what is kept (TensorStatistics::mixing)
-///    and added by the uses' weights and biases. At the picture's edge the bias also adds the
+///    and added by the uses' weights and biases. At the image's edge the bias also adds the
 ///    offset of the zero padding, which has none; the residual additions do without the guess.
 /// Pure. Throws as check_weights and check_calibration do.
 QuantizableNetwork quantize_network(const Weights& weights, const Calibration& calibration);

@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "stages/base/files/input_file.h"
 
 namespace eventgan {
@@ -108,7 +108,7 @@ SafetensorsFile parse_safetensors(std::string_view bytes, const std::string& nam
 
   SafetensorsFile content;
   std::map<std::size_t, std::size_t>
-      extents;  // begin → end of every tensor, to find holes and overlaps
+      extents;  // begin → end of every tensor, to find gaps and overlaps
   for (const auto& [key, entry] : header.items()) {
     if (key == "__metadata__") {
       content.metadata = entry.get<std::map<std::string, std::string>>();

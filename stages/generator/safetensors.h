@@ -25,7 +25,7 @@ struct TensorView {
 };
 
 /// The file's bytes: 8-byte little-endian header length, header JSON padded with spaces to a
-/// multiple of 8, then the tensors in the order of their names without holes. The same content
+/// multiple of 8, then the tensors in the order of their names without gaps. The same content
 /// gives the same bytes.
 std::string serialize_safetensors(const SafetensorsFile& content);
 
@@ -34,7 +34,7 @@ std::string serialize_safetensors(const std::map<std::string, TensorView>& tenso
                                   const std::map<std::string, std::string>& metadata);
 
 /// Reads a file and checks all of it before use: a header of at most 1 MiB, lengths against the
-/// file's size, dtype F32, shapes against byte counts, no holes, no overlap. Takes at most twice
+/// file's size, dtype F32, shapes against byte counts, no gaps, no overlap. Takes at most twice
 /// the file's size and 64 MiB. Throws std::runtime_error "expected X, got Y, in PATH".
 SafetensorsFile read_safetensors(const std::filesystem::path& file);
 

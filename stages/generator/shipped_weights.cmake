@@ -1,5 +1,5 @@
 # Embeds the repository's weights, manifests/weights/eventgan-WIDTH.safetensors, in the program: writes the assembly
-# that shipped_weights.cc reads, widths ascending. None is well too. The files' paths stand in the assembly alone,
+# that shipped_weights.cc reads, widths ascending. None is well too. The files' paths are in the assembly alone,
 # not in the object, so the program's bytes depend on the files' content only.
 enable_language(ASM)
 

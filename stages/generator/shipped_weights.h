@@ -23,7 +23,7 @@ int default_shipped_width();
 /// "shipped" with its width, "shipped:8"; any other name as it is.
 std::string shipped_weights_name(const std::string& name);
 
-/// The file's bytes as they stand in the repository; they live as long as the program. Throws
+/// The file's bytes as they are in the repository; they live as long as the program. Throws
 /// InputError, listing the widths there are, if that width is not shipped.
 std::span<const std::byte> shipped_weights_bytes(int width);
 

@@ -8,7 +8,7 @@
 namespace eventgan {
 namespace {
 
-/// Marks the tiles that hold pixels top..bottom - 1, left..right - 1 of the picture.
+/// Marks the tiles that hold pixels top..bottom - 1, left..right - 1 of the image.
 void want(TileMask& mask, TileMask::Pixels part) {
   part = {std::max(part.top, 0), std::min(part.bottom, mask.size.height), std::max(part.left, 0),
           std::min(part.right, mask.size.width)};

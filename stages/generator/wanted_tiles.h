@@ -22,7 +22,7 @@ namespace eventgan {
 Rectangle pose_crop(const VolumePerson& person);
 
 /// Which tiles of a volume a scope wants, not kWhole. `frames` [2, y, x] in [-1, 1] are the
-/// `content` of a volume, whose first pixel stands at (content_y, content_x); the tiles lie on the
+/// `content` of a volume, whose first pixel is at (content_y, content_x); the tiles lie on the
 /// volume's grid, `labels` are in its pixels.
 ///
 /// Motion: pixels whose two values differ by more than `motion_threshold` grey levels (127.5 |x_1 -

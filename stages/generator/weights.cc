@@ -53,7 +53,7 @@ std::string describe_training_gaps(const std::optional<GapRange>& gaps) {
 
 std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes) {
   // What the encoders read and the decoders but the last write: levels of half the side and twice
-  // the channels, the topmost once, the others twice; and two tensors at the bottom.
+  // the channels, the topmost once, the others twice; and two tensors at the bottleneck.
   const std::size_t top = size.pixel_count() * base_channels * value_bytes;
   return top + 2 * (top / 2 + top / 4 + top / 8) + 2 * (top / 16) +
          2 * size.pixel_count() * sizeof(float);

@@ -19,7 +19,7 @@ inline constexpr int kNetworkLevels = 4;  ///< encoders, and as many decoders
 inline constexpr int kResidualBlocks = 2;
 inline constexpr float kLeakySlope = 0.01f;  ///< LeakyReLU turns x < 0 into this times x
 
-/// Size of what an encoder makes of a picture: both sides halved, rounded up.
+/// Size of what an encoder makes of an image: both sides halved, rounded up.
 constexpr ImageSize half_size(ImageSize size) {
   return {(size.height + 1) / 2, (size.width + 1) / 2};
 }
@@ -64,7 +64,7 @@ std::vector<Convolution> network_layout(int base_channels, int bins);
 /// "trained on gaps 1-5" or "training gaps unknown"; for people.
 std::string describe_training_gaps(const std::optional<GapRange>& gaps);
 
-/// Bytes of the activations between the network's layers for one picture, each held once, with
+/// Bytes of the activations between the network's layers for one image, each held once, with
 /// `value_bytes` a value, and of its input and output: what an engine that reuses nothing needs,
 /// but for what it works on at the moment.
 std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes);

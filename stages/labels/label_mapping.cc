@@ -111,13 +111,13 @@ bool is_finite(const LensDistortion& lens) {
   return all_finite(std::initializer_list<double>{lens.k1, lens.k2, lens.k3, lens.p1, lens.p2});
 }
 
-bool overlaps(const Rectangle& box, ImageSize picture) {
-  return box.left < picture.width && box.right > 0 && box.top < picture.height && box.bottom > 0;
+bool overlaps(const Rectangle& box, ImageSize image) {
+  return box.left < image.width && box.right > 0 && box.top < image.height && box.bottom > 0;
 }
 
-bool contains(ImageSize picture, Point point) {
-  return point.x >= -0.5 && point.x <= picture.width - 0.5 && point.y >= -0.5 &&
-         point.y <= picture.height - 0.5;
+bool contains(ImageSize image, Point point) {
+  return point.x >= -0.5 && point.x <= image.width - 0.5 && point.y >= -0.5 &&
+         point.y <= image.height - 0.5;
 }
 
 std::ostream& operator<<(std::ostream& out, const Rectangle& box) {
@@ -146,7 +146,7 @@ std::string text(const Parts&... parts) {
   return out.str();
 }
 
-Complaint check(const Box& box, ImageSize picture) {
+Complaint check(const Box& box, ImageSize image) {
   if (!is_near(box.xyxy)) return text("expected edges within 1e6 pixels, got ", box.xyxy);
   // A number beyond 3.4e38 is infinite in the 32 bits that these have.
   if (!std::isfinite(box.truncation))
@@ -158,31 +158,31 @@ Complaint check(const Box& box, ImageSize picture) {
   if (box.xyxy.right < box.xyxy.left || box.xyxy.bottom < box.xyxy.top) {
     return text("expected left <= right and top <= bottom, got ", box.xyxy);
   }
-  if (!box.ignore && !overlaps(box.xyxy, picture)) {
-    return text("expected an overlap with the image of ", to_string(picture), " pixels, got ",
+  if (!box.ignore && !overlaps(box.xyxy, image)) {
+    return text("expected an overlap with the image of ", to_string(image), " pixels, got ",
                 box.xyxy);
   }
   return std::nullopt;
 }
 
-Complaint check_joints(const std::vector<Joint>& joints, ImageSize picture) {
+Complaint check_joints(const std::vector<Joint>& joints, ImageSize image) {
   std::optional<Point> outside;
   bool any_inside = false;
   for (const Joint& joint : joints) {
     if (joint.at == kMissingPoint) continue;
     if (!is_near(joint.at)) return text("expected joints within 1e6 pixels, got ", joint.at);
-    if (contains(picture, joint.at)) {
+    if (contains(image, joint.at)) {
       any_inside = true;
     } else if (!outside) {
       outside = joint.at;
     }
   }
   if (any_inside || !outside) return std::nullopt;
-  return text("expected a joint inside the image of ", to_string(picture),
+  return text("expected a joint inside the image of ", to_string(image),
               " pixels, got all annotated ones outside it, the first at ", *outside);
 }
 
-Complaint check(const Person& person, ImageSize picture) {
+Complaint check(const Person& person, ImageSize image) {
   if (!is_near(person.center)) {
     return text("expected a centre within 1e6 pixels, got ", person.center);
   }
@@ -203,7 +203,7 @@ Complaint check(const Person& person, ImageSize picture) {
   if (person.distortion && !is_finite(*person.distortion)) {
     return text("expected a finite lens distortion, got ", *person.distortion);
   }
-  return check_joints(person.joints, picture);
+  return check_joints(person.joints, image);
 }
 
 VolumeBox map(const Box& box, const Placement& placement) {

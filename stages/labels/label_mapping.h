@@ -31,10 +31,10 @@ Rectangle clip(const Rectangle& box, ImageSize size);
 /// True if the rectangle has no area.
 bool is_empty(const Rectangle& box);
 
-/// Maps every label into the volume. A fault if a label cannot belong to the picture: a place, a
+/// Maps every label into the volume. A fault if a label cannot belong to the image: a place, a
 /// camera or a scale beyond 1e6 (px), another number that is not finite (a joint in 3-D may be
 /// unknown), a projection that is not in the volume, a box with right < left or bottom < top or
-/// without any overlap with the source picture (a box to ignore may lie anywhere within those 1e6
+/// without any overlap with the source image (a box to ignore may lie anywhere within those 1e6
 /// px), a person whose annotated joints all lie outside it. `where` names the annotation in the
 /// fault.
 Outcome<VolumeLabels> map_labels(const Annotation& annotation, const Placement& placement,

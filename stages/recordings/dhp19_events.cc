@@ -5,9 +5,9 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/base/hdf5/hdf5_internal.h"
-#include "stages/recordings/event_check_internal.h"
-#include "stages/recordings/hdf5_table_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/hdf5_table.h"
 
 namespace eventgan {
 namespace {

@@ -31,7 +31,7 @@ class Dhp19Events {
   double time_s(int camera, std::int64_t event) const;
 
   /// The events first .. first + count - 1 of a camera, which there must be. Throws InputError
-  /// where they are malformed: times that fall, pixels outside the picture, values that are not
+  /// where they are malformed: times that fall, pixels outside the image, values that are not
   /// finite.
   std::vector<Event> events(int camera, std::int64_t first, std::int64_t count) const;
 

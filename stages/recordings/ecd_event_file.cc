@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/ecd_event_file.h"
+
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -12,7 +14,6 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/ecd_event_file_internal.h"
 
 namespace eventgan {
 

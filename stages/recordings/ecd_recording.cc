@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/ecd_recording.h"
+
 #include <charconv>
 #include <sstream>
 #include <stdexcept>
@@ -8,9 +10,8 @@
 
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
-#include "stages/base/pictures/picture_file.h"
-#include "stages/recordings/ecd_recording_internal.h"
-#include "stages/recordings/frame_intervals_internal.h"
+#include "stages/base/images/image_file.h"
+#include "stages/recordings/detail/frame_intervals.h"
 
 namespace eventgan {
 namespace {
@@ -83,15 +84,15 @@ EcdImageList list_of_present_images(const std::filesystem::path& folder) {
   }
   EcdImageList images = read_ecd_image_list(folder / "images.txt");
   for (std::size_t i = 0; i < images.paths.size(); ++i) {
-    const std::filesystem::path picture = folder / images.paths[i];
-    if (std::filesystem::is_regular_file(picture, ignored)) continue;
-    throw InputError("expected an image, got none, in " + picture.string() + " (frame " +
+    const std::filesystem::path image = folder / images.paths[i];
+    if (std::filesystem::is_regular_file(image, ignored)) continue;
+    throw InputError("expected an image, got none, in " + image.string() + " (frame " +
                      std::to_string(i) + ")");
   }
   return images;
 }
 
-/// Decoding gives colour; of a grey picture all three channels are one, and stay what they are.
+/// Decoding gives colour; of a grey image all three channels are one, and stay what they are.
 GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
   GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
   for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
@@ -129,7 +130,7 @@ GreyImage EcdRecording::read_frame(std::size_t position) const {
   const std::filesystem::path file = folder_ / images_.paths[position];
   try {
     bool has_colour = false;
-    GreyImage image = grey_of(decode_picture_file(file), has_colour);
+    GreyImage image = grey_of(decode_image_file(file), has_colour);
     std::ptrdiff_t none_yet = -1;
     if (has_colour)
       colour_frame_.compare_exchange_strong(none_yet, static_cast<std::ptrdiff_t>(position));

@@ -1,9 +1,9 @@
+#include "stages/recordings/detail/event_check.h"
+
 #include <fmt/core.h>
 
 #include <cmath>
 #include <string>
-
-#include "stages/recordings/event_check_internal.h"
 
 namespace eventgan {
 namespace {

@@ -1,10 +1,11 @@
+#include "stages/recordings/detail/frame_intervals.h"
+
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/frame_intervals_internal.h"
 
 namespace eventgan {
 

@@ -1,7 +1,7 @@
+#include "stages/recordings/detail/growing_dataset.h"
+
 #include <algorithm>
 #include <cstdint>
-
-#include "stages/recordings/growing_dataset_internal.h"
 
 namespace eventgan {
 namespace {

@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/hdf5_recording.h"
+
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -6,9 +8,8 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/base/pictures/picture_file.h"
-#include "stages/recordings/frame_intervals_internal.h"
-#include "stages/recordings/hdf5_recording_internal.h"
+#include "stages/base/images/image_file.h"
+#include "stages/recordings/detail/frame_intervals.h"
 
 namespace eventgan {
 namespace {
@@ -49,8 +50,8 @@ Hdf5Table open_frames(hid_t file, const Hdf5Layout& layout, const std::string& n
   }
   const hsize_t height = frames.dims()[1];
   const hsize_t width = frames.dims()[2];
-  if (height == 0 || width == 0 || height > kMaxPicturePixels / width) {
-    frames.refuse("images of 1 to " + std::to_string(kMaxPicturePixels) + " pixels");
+  if (height == 0 || width == 0 || height > kMaxImagePixels / width) {
+    frames.refuse("images of 1 to " + std::to_string(kMaxImagePixels) + " pixels");
   }
   return frames;
 }

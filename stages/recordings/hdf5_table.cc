@@ -1,9 +1,10 @@
+#include "stages/recordings/detail/hdf5_table.h"
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/hdf5_table_internal.h"
 
 namespace eventgan {
 namespace {
@@ -31,7 +32,7 @@ std::size_t bytes_of_a_layer(hid_t dataset, const std::string& path) {
   return static_cast<std::size_t>(std::min(bytes, static_cast<double>(kLargestCacheBytes)));
 }
 
-/// A layer of events may be larger than HDF5's usual cache, and would be inflated anew for every
+/// A layer of events may be larger than HDF5's usual cache, and would be inflated again for every
 /// read. A larger cache for all would be filled, in each of a training's many recordings.
 Hdf5Handle open_dataset(hid_t file, const std::string& path) {
   Hdf5Handle dataset(H5Dopen2(file, path.c_str(), H5P_DEFAULT), H5Dclose, "open", path);

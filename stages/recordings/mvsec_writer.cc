@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stages/base/hdf5/hdf5_output_file_internal.h"
-#include "stages/recordings/event_check_internal.h"
-#include "stages/recordings/growing_dataset_internal.h"
-#include "stages/recordings/hdf5_recording_internal.h"
+#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/detail/growing_dataset.h"
+#include "stages/recordings/detail/hdf5_recording.h"
 
 namespace eventgan {
 namespace {
@@ -65,7 +65,7 @@ struct MvsecWriter::File {
   void append_flow(const FlowField& field);
   void close();
 
-  Dims picture() const {
+  Dims image() const {
     return {static_cast<hsize_t>(size.height), static_cast<hsize_t>(size.width)};
   }
   double last_frame_s() const { return times_s.empty() ? kBeforeAll : times_s.back(); }
@@ -89,13 +89,13 @@ void MvsecWriter::File::create_objects(const std::string& settings) {
   }
   const Hdf5Layout layout = mvsec_layout(kCamera);
   events.emplace(hdf5.id(), layout.events, Dims{4}, Dims{kEventsPerChunk, 1}, kEventsPerChunk);
-  const Dims sides = picture();
+  const Dims sides = image();
   frames.emplace(hdf5.id(), layout.frames, sides, Dims{1, sides[0], sides[1]}, 1);
 }
 
 void MvsecWriter::File::append_flow(const FlowField& field) {
   if (!flow) {
-    const Dims sides = picture();
+    const Dims sides = image();
     flow.emplace(hdf5.id(), mvsec_layout(kCamera).flow, Dims{2, sides[0], sides[1]},
                  Dims{1, 1, sides[0], sides[1]}, 1);
   }

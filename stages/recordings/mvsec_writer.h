@@ -30,7 +30,7 @@ class MvsecWriter {
   MvsecWriter(const std::filesystem::path& file, ImageSize size, const std::string& settings);
   ~MvsecWriter();
 
-  /// Events since the frame before: in time order, all later than that frame, inside the picture.
+  /// Events since the frame before: in time order, all later than that frame, inside the image.
   /// May be called several times between two frames, and before the first and after the last frame.
   /// Throws std::invalid_argument if these rules are broken; then nothing was added.
   void add_events(std::span<const Event> events);

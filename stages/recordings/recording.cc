@@ -3,9 +3,9 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "stages/base/hdf5/hdf5_internal.h"
-#include "stages/recordings/ecd_recording_internal.h"
-#include "stages/recordings/hdf5_recording_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/recordings/detail/ecd_recording.h"
+#include "stages/recordings/detail/hdf5_recording.h"
 
 namespace eventgan {
 

@@ -12,46 +12,46 @@
 #include <vector>
 
 #include "stages/base/files/sha256.h"
-#include "stages/base/hdf5/hdf5_internal.h"
-#include "stages/base/hdf5/hdf5_output_file_internal.h"
-#include "stages/shards/shard_objects_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 namespace {
 
 /// Adds the rows of a shard's samples behind those before, and gives their range.
-RowRange append_offsets(const ShardMarker& marker, const std::vector<std::int32_t>& rows,
+RowRange append_offsets(const CommitRecord& record, const std::vector<std::int32_t>& rows,
                         const char* what, std::vector<std::int64_t>& offsets) {
-  if (std::ssize(rows) != marker.samples) {
+  if (std::ssize(rows) != record.samples) {
     throw std::runtime_error("expected numbers of " + std::string(what) + " for " +
-                             std::to_string(marker.samples) + " samples, got " +
+                             std::to_string(record.samples) + " samples, got " +
                              std::to_string(rows.size()) + ", in the commit record of " +
-                             marker.shard);
+                             record.shard);
   }
   const std::int64_t first = offsets.back();
   for (const std::int32_t count : rows) {
     if (count < 0) {
       throw std::runtime_error("expected 0 or more " + std::string(what) + " of a sample, got " +
-                               std::to_string(count) + ", in the commit record of " + marker.shard);
+                               std::to_string(count) + ", in the commit record of " + record.shard);
     }
     offsets.push_back(offsets.back() + count);
   }
   return {first, offsets.back() - first};
 }
 
-RowRange append_valid(const ShardMarker& marker, std::vector<std::uint8_t>& valid) {
+RowRange append_valid(const CommitRecord& record, std::vector<std::uint8_t>& valid) {
   const std::size_t first = valid.size();
-  valid.resize(first + static_cast<std::size_t>(marker.samples), 1);
-  for (const QuarantinedSample& sample : marker.quarantined) {
-    if (sample.slot < 0 || sample.slot >= marker.samples) {
-      throw std::runtime_error("expected a slot below " + std::to_string(marker.samples) +
+  valid.resize(first + static_cast<std::size_t>(record.samples), 1);
+  for (const QuarantinedSample& sample : record.quarantined) {
+    if (sample.slot < 0 || sample.slot >= record.samples) {
+      throw std::runtime_error("expected a slot below " + std::to_string(record.samples) +
                                ", got " + std::to_string(sample.slot) +
-                               ", in the commit record of " + marker.shard);
+                               ", in the commit record of " + record.shard);
     }
     valid[first + static_cast<std::size_t>(sample.slot)] = 0;
   }
-  return {static_cast<std::int64_t>(first), marker.samples};
+  return {static_cast<std::int64_t>(first), record.samples};
 }
 
 }  // namespace
@@ -65,12 +65,12 @@ ViewLayout lay_out_view(std::vector<ViewShard> shards) {
 
   ViewLayout layout;
   for (ViewShard& shard : shards) {
-    const ShardMarker& marker = shard.marker;
-    const RowRange samples = append_valid(marker, layout.valid);
+    const CommitRecord& record = shard.record;
+    const RowRange samples = append_valid(record, layout.valid);
     const RowRange boxes =
-        append_offsets(marker, marker.contents.boxes, "boxes", layout.box_offsets);
+        append_offsets(record, record.contents.boxes, "boxes", layout.box_offsets);
     const RowRange persons =
-        append_offsets(marker, marker.contents.persons, "persons", layout.person_offsets);
+        append_offsets(record, record.contents.persons, "persons", layout.person_offsets);
     if (layout.splits.empty() || layout.splits.back().name != shard.split) {
       layout.splits.push_back({shard.split, {samples.first, 0}});
     }
@@ -143,8 +143,8 @@ const RowRange& rows_of(const PlacedShard& shard, Rows rows) {
   return shard.samples;
 }
 
-bool has_column(const ShardMarker& marker, const ColumnSpec& spec) {
-  return !spec.optional || std::ranges::count(marker.contents.optional_columns, spec.path) > 0;
+bool has_column(const CommitRecord& record, const ColumnSpec& spec) {
+  return !spec.optional || std::ranges::count(record.contents.optional_columns, spec.path) > 0;
 }
 
 /// The view's columns in its group.
@@ -154,7 +154,7 @@ class ViewColumns {
 
   void write() {
     write_volume();
-    // What stands in these tables is written; the columns that are empty in them are mapped.
+    // What is in these tables is written; the columns that are empty in them are mapped.
     ShardTables known;
     known.boxes.offsets = view_.layout.box_offsets;
     known.poses.offsets = view_.layout.person_offsets;
@@ -217,8 +217,8 @@ class ViewColumns {
     std::vector<MappedRows> rows;
     for (const PlacedShard& placed : view_.layout.shards) {
       const RowRange range = rows_of(placed, spec.rows);
-      if (range.count == 0 || !has_column(placed.shard.marker, spec)) continue;
-      rows.push_back({placed.shard.marker.shard, static_cast<hsize_t>(range.first),
+      if (range.count == 0 || !has_column(placed.shard.record, spec)) continue;
+      rows.push_back({placed.shard.record.shard, static_cast<hsize_t>(range.first),
                       static_cast<hsize_t>(range.count)});
     }
     return rows;
@@ -229,9 +229,9 @@ class ViewColumns {
 };
 
 /// Creates the volume and all columns of a shard (shard_tables.h) in the view's group, which has
-/// the groups they stand in. Every column goes one of two ways: what the layout knows from the
-/// markers is written, the rest is mapped; an optional one only if some shard has it. 4,000 shards
-/// take about 1 s and 15 MB. Throws Hdf5Error.
+/// the groups they are in. Every column goes one of two ways: what the layout knows from the
+/// commit records is written, the rest is mapped; an optional one only if some shard has it. 4,000
+/// shards take about 1 s and 15 MB. Throws Hdf5Error.
 void write_view_columns(hid_t group, const DatasetView& view) { ViewColumns(group, view).write(); }
 
 /// Groups `shards` and `splits`: which rows are whose.
@@ -261,7 +261,7 @@ void write_view(hid_t group, const DatasetView& view) {
       level);
   write_ranges(
       group, "shards", view.layout.shards,
-      [](const PlacedShard& placed) { return placed.shard.marker.shard; }, level);
+      [](const PlacedShard& placed) { return placed.shard.record.shard; }, level);
   create_groups(group);
   write_view_columns(group, view);
   describe_columns(group, view.header);

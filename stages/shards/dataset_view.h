@@ -9,10 +9,10 @@
 
 namespace eventgan {
 
-/// A shard that a view shows, as its marker tells.
+/// A shard that a view shows, as its commit record tells.
 struct ViewShard {
   std::string split;
-  ShardMarker marker;
+  CommitRecord record;
 };
 
 /// Rows first .. first + count - 1.
@@ -36,8 +36,8 @@ struct SplitRange {
   bool operator==(const SplitRange&) const = default;
 };
 
-/// Which row of a view each row of its shards becomes, and the columns that follow from the markers
-/// alone. N samples.
+/// Which row of a view each row of its shards becomes, and the columns that follow from the commit
+/// records alone. N samples.
 struct ViewLayout {
   std::vector<PlacedShard> shards;
   std::vector<SplitRange> splits;
@@ -50,7 +50,7 @@ struct ViewLayout {
 
 /// Puts shards one after the other: splits in the order of their first shard, so that each split is
 /// one range of rows; the shards of a split in the order given. Throws std::runtime_error naming
-/// the shard if its marker's numbers of rows do not go with its number of samples.
+/// the shard if its commit record's numbers of rows do not go with its number of samples.
 ViewLayout lay_out_view(std::vector<ViewShard> shards);
 
 inline constexpr char kViewFormat[] = "eventgan-view";
@@ -71,9 +71,9 @@ struct ViewReceipt {
 
 /// Writes `target`, an HDF5 file in which the shards beside it read as one dataset
 /// (manifests/guides/shard_format.md, "The whole dataset"): every column is a virtual dataset over
-/// the shards', but for the offsets and `valid`, which follow from the markers. No shard is opened.
-/// The same views give the same bytes; the file is published whole (atomic_file.h). `views`: at
-/// least one; more than one must all have groups, each its own.
+/// the shards', but for the offsets and `valid`, which follow from the commit records. No shard is
+/// opened. The same views give the same bytes; the file is published whole (atomic_file.h).
+/// `views`: at least one; more than one must all have groups, each its own.
 ///
 /// Throws std::runtime_error naming the path. Thread safe.
 ViewReceipt write_dataset_view(const std::filesystem::path& target,

@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kTolerance_px = 0.01;
 
-// Far away from the picture rounding alone is more than the tolerance.
+// Far away from the image rounding alone is more than the tolerance.
 bool near(double a, double b) {  // false for NaN
   return std::abs(a - b) <= kTolerance_px + 1e-12 * std::abs(b);
 }

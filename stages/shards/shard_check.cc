@@ -12,9 +12,9 @@
 
 #include "manifests/values/text.h"
 #include "stages/base/files/sha256.h"
+#include "stages/shards/detail/shard_reader.h"
 #include "stages/shards/sample_check.h"
 #include "stages/shards/shard_reader.h"
-#include "stages/shards/shard_reader_internal.h"
 
 namespace eventgan {
 namespace {
@@ -34,21 +34,21 @@ std::string text_of(const std::vector<std::string>& names) {
 class Comparison {
  public:
   template <class Value>
-  void expect(const std::string& what, const Value& marker, const Value& shard) {
-    if (marker == shard) return;
-    faults_.push_back("expected " + what + " " + text_of(marker) + ", got " + text_of(shard));
+  void expect(const std::string& what, const Value& record, const Value& shard) {
+    if (record == shard) return;
+    faults_.push_back("expected " + what + " " + text_of(record) + ", got " + text_of(shard));
   }
 
   /// Where many slots differ, the first tells enough.
-  void expect_rows(const std::string& what, const std::vector<std::int32_t>& marker,
+  void expect_rows(const std::string& what, const std::vector<std::int32_t>& record,
                    const std::vector<std::int32_t>& shard) {
-    if (marker.size() != shard.size()) {
-      return expect("number of slots with a count of " + what, std::ssize(marker),
+    if (record.size() != shard.size()) {
+      return expect("number of slots with a count of " + what, std::ssize(record),
                     std::ssize(shard));
     }
-    const auto [expected, got] = std::mismatch(marker.begin(), marker.end(), shard.begin());
-    if (expected == marker.end()) return;
-    expect("number of " + what + " in slot " + std::to_string(expected - marker.begin()) + ":",
+    const auto [expected, got] = std::mismatch(record.begin(), record.end(), shard.begin());
+    if (expected == record.end()) return;
+    expect("number of " + what + " in slot " + std::to_string(expected - record.begin()) + ":",
            std::int64_t{*expected}, std::int64_t{*got});
   }
 
@@ -60,29 +60,29 @@ class Comparison {
 
 }  // namespace
 
-std::vector<std::string> contents_faults(const ShardContents& marker, const ShardContents& shard) {
+std::vector<std::string> contents_faults(const ShardContents& record, const ShardContents& shard) {
   Comparison comparison;
-  comparison.expect_rows("boxes", marker.boxes, shard.boxes);
-  comparison.expect_rows("persons", marker.persons, shard.persons);
-  comparison.expect("boxes by class", marker.classes, shard.classes);
-  comparison.expect("samples by gap", marker.gaps, shard.gaps);
-  comparison.expect("optional columns", marker.optional_columns, shard.optional_columns);
+  comparison.expect_rows("boxes", record.boxes, shard.boxes);
+  comparison.expect_rows("persons", record.persons, shard.persons);
+  comparison.expect("boxes by class", record.classes, shard.classes);
+  comparison.expect("samples by gap", record.gaps, shard.gaps);
+  comparison.expect("optional columns", record.optional_columns, shard.optional_columns);
   return comparison.take();
 }
 
 namespace {
 
-/// Whether the marker lists just these samples, whose reasons only it has.
-bool are_quarantined(const ShardMarker& marker, const std::vector<QuarantinedSample>& invalid) {
-  std::vector<QuarantinedSample> recorded = marker.quarantined;
+/// Whether the commit record lists just these samples, whose reasons only it has.
+bool are_quarantined(const CommitRecord& record, const std::vector<QuarantinedSample>& invalid) {
+  std::vector<QuarantinedSample> recorded = record.quarantined;
   for (QuarantinedSample& sample : recorded) sample.reason.clear();
   return std::is_permutation(recorded.begin(), recorded.end(), invalid.begin(), invalid.end());
 }
 
 class Check {
  public:
-  Check(const std::filesystem::path& path, const ShardMarker& marker)
-      : path_(path), marker_(marker) {}
+  Check(const std::filesystem::path& path, const CommitRecord& record)
+      : path_(path), record_(record) {}
 
   std::vector<std::string> run() {
     // A file with other bytes is not looked into: HDF5 does not promise to survive that.
@@ -96,7 +96,7 @@ class Check {
       check_sample(reader, slot, sample);
     }
     check_quarantined(invalid);
-    for (const std::string& found : contents_faults(marker_.contents, reader.contents())) {
+    for (const std::string& found : contents_faults(record_.contents, reader.contents())) {
       fault(found);
     }
     return faults_;
@@ -129,23 +129,23 @@ class Check {
   }
 
   bool same_bytes() {
-    expect("file name", marker_.shard, path_.filename().string());
+    expect("file name", record_.shard, path_.filename().string());
     std::error_code error;
     const auto size = std::filesystem::file_size(path_, error);
     if (error) {
       fault("cannot read: " + error.message());
-    } else if (static_cast<std::int64_t>(size) != marker_.size_bytes) {
-      expect("size in bytes", marker_.size_bytes, static_cast<std::int64_t>(size));
+    } else if (static_cast<std::int64_t>(size) != record_.size_bytes) {
+      expect("size in bytes", record_.size_bytes, static_cast<std::int64_t>(size));
     } else {
-      expect("SHA-256", marker_.sha256, sha256_of_file(path_));
+      expect("SHA-256", record_.sha256, sha256_of_file(path_));
     }
     return faults_.empty();
   }
 
   void check_header(const ShardHeader& header) {
-    expect("name", marker_.shard, header.name);
-    expect("plan hash", marker_.plan_hash, header.plan_hash);
-    expect("number of samples", marker_.samples, header.sample_count);
+    expect("name", record_.shard, header.name);
+    expect("plan hash", record_.plan_hash, header.plan_hash);
+    expect("number of samples", record_.samples, header.sample_count);
   }
 
   void check_sample(const ShardReader& reader, int slot, const ShardSample& sample) {
@@ -166,9 +166,9 @@ class Check {
   }
 
   void check_quarantined(const std::vector<QuarantinedSample>& invalid) {
-    const int samples = marker_.samples;
-    expect("number of valid samples", marker_.valid, samples - static_cast<int>(invalid.size()));
-    if (!are_quarantined(marker_, invalid)) {
+    const int samples = record_.samples;
+    expect("number of valid samples", record_.valid, samples - static_cast<int>(invalid.size()));
+    if (!are_quarantined(record_, invalid)) {
       fault(
           "expected the samples with valid = 0 to be those that the commit record lists, got "
           "others");
@@ -176,15 +176,15 @@ class Check {
   }
 
   const std::filesystem::path& path_;
-  const ShardMarker& marker_;
+  const CommitRecord& record_;
   std::vector<std::string> faults_;
 };
 
 }  // namespace
 
 std::vector<std::string> check_shard(const std::filesystem::path& shard,
-                                     const ShardMarker& marker) {
-  Check check(shard, marker);
+                                     const CommitRecord& record) {
+  Check check(shard, record);
   try {
     return check.run();
   } catch (const std::exception& error) {
@@ -193,7 +193,7 @@ std::vector<std::string> check_shard(const std::filesystem::path& shard,
 }
 
 std::vector<std::string> count_faults(const std::filesystem::path& shard,
-                                      const ShardMarker& marker) {
+                                      const CommitRecord& record) {
   std::vector<std::string> faults;
   ShardTables tables;
   ShardHeader header;
@@ -209,11 +209,11 @@ std::vector<std::string> count_faults(const std::filesystem::path& shard,
     if (tables.valid[slot] != 0) continue;
     invalid.push_back({static_cast<int>(slot), tables.pairs.sample_id[slot], ""});
   }
-  if (!are_quarantined(marker, invalid)) {
+  if (!are_quarantined(record, invalid)) {
     faults.push_back("expected the " + std::to_string(invalid.size()) +
                      " samples with valid = 0 as quarantined, got others");
   }
-  for (std::string& fault : contents_faults(contents_of(tables, header), marker.contents)) {
+  for (std::string& fault : contents_faults(contents_of(tables, header), record.contents)) {
     faults.push_back(std::move(fault));
   }
   return faults;

@@ -1,10 +1,11 @@
+#include "stages/shards/detail/shard_objects.h"
+
 #include <cstdint>
 #include <limits>
 #include <stdexcept>
 #include <string>
 
 #include "stages/shards/codec/quantization.h"
-#include "stages/shards/shard_objects_internal.h"
 #include "stages/shards/shard_summary.h"
 
 namespace eventgan {

@@ -18,8 +18,8 @@
 #include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/codec/volume_codec.h"
-#include "stages/shards/shard_objects_internal.h"
-#include "stages/shards/shard_reader_internal.h"
+#include "stages/shards/detail/shard_objects.h"
+#include "stages/shards/detail/shard_reader.h"
 #include "stages/shards/shard_rows.h"
 #include "stages/shards/shard_tables.h"
 

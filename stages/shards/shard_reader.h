@@ -30,9 +30,9 @@ class ShardReader {
   /// The rows of the shard, counted.
   ShardContents contents() const;
 
-  /// Everything about slot `slot` but its volume. `fault` is empty, since it stands in the marker;
-  /// in a shard from before frame times were kept they are relative to the previous frame. Throws
-  /// std::out_of_range.
+  /// Everything about slot `slot` but its volume. `fault` is empty, since it is in the commit
+  /// record; in a shard from before frame times were kept they are relative to the previous frame.
+  /// Throws std::out_of_range.
   ShardSample sample(int slot) const;
 
   /// The volume of slot `slot`, decoded to float32 [2 bins, H, W], C order.

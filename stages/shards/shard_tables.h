@@ -86,7 +86,7 @@ double generated_fraction(const ShardSample& sample);
 /// What a column has one row for. kOffsets: one more row than samples.
 enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
 
-/// Where a column stands in a shard, and its shape [rows, inner...].
+/// Where a column is in a shard, and its shape [rows, inner...].
 struct ColumnSpec {
   const char* path;
   Rows rows;
@@ -96,7 +96,7 @@ struct ColumnSpec {
 
 /// Calls visit(ColumnSpec, column) for every column, offsets before the rows they lead to. Writer,
 /// reader and check all go through this list, so it is the one place where the layout of a shard
-/// stands in the code. Tables: ShardTables or const ShardTables.
+/// is in the code. Tables: ShardTables or const ShardTables.
 template <class Tables, class Visit>
 void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   const std::size_t joints = header.label_schema.joint_names.size();

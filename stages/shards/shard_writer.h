@@ -32,8 +32,8 @@ class UnfinishedShardLost : public std::runtime_error {
 /// everything else are kept in memory until `commit`. That closes every HDF5 object and then the
 /// file, checking each close, since HDF5 writes most of its own data only then; the close degree
 /// SEMI makes a forgotten object an error. Not everything that a write can meet surfaces in an HDF5
-/// call: see Hdf5OutputFile. The file is hashed as it is read back after its fsync. The marker is
-/// the caller's next step. A writer destroyed before `commit` deletes its temporary file.
+/// call: see Hdf5OutputFile. The file is hashed as it is read back after its fsync. The commit
+/// record is the caller's next step. A writer destroyed before `commit` deletes its temporary file.
 ///
 /// The same header and samples give the same bytes. Errors (disk full, no permission) are thrown as
 /// std::runtime_error that names the path. Thread safety: one writer is for one thread at a time.

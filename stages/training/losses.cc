@@ -159,24 +159,24 @@ std::array<double, kRadius + 1> window() {
   return weights;
 }
 
-at::Tensor blur_along(const at::Tensor& pictures, std::int64_t axis) {
+at::Tensor blur_along(const at::Tensor& images, std::int64_t axis) {
   const auto weights = window();
-  const std::int64_t length = pictures.size(axis);
-  at::Tensor result = pictures * weights[0];
+  const std::int64_t length = images.size(axis);
+  at::Tensor result = images * weights[0];
   for (std::int64_t distance = 1; distance <= std::min<std::int64_t>(kRadius, length - 1);
        ++distance) {
     const std::int64_t count = length - distance;
     const double weight = weights[distance];
-    result.narrow(axis, 0, count).add_(pictures.narrow(axis, distance, count), weight);
-    result.narrow(axis, distance, count).add_(pictures.narrow(axis, 0, count), weight);
+    result.narrow(axis, 0, count).add_(images.narrow(axis, distance, count), weight);
+    result.narrow(axis, distance, count).add_(images.narrow(axis, 0, count), weight);
   }
   return result;
 }
 
 class GaussianBlur : public torch::autograd::Function<GaussianBlur> {
  public:
-  static at::Tensor forward(torch::autograd::AutogradContext*, const at::Tensor& pictures) {
-    return blur_along(blur_along(pictures, 2), 3);
+  static at::Tensor forward(torch::autograd::AutogradContext*, const at::Tensor& images) {
+    return blur_along(blur_along(images, 2), 3);
   }
 
   static torch::autograd::tensor_list backward(torch::autograd::AutogradContext* context,
@@ -185,16 +185,16 @@ class GaussianBlur : public torch::autograd::Function<GaussianBlur> {
   }
 };
 
-/// Pictures [N, C, H, W], float32 or float64, blurred with the 11x11 Gaussian window of σ = 1.5
+/// Images [N, C, H, W], float32 or float64, blurred with the 11x11 Gaussian window of σ = 1.5
 /// whose weights sum to 1, zeros beyond the edge. Gradients flow through, once (no second
 /// derivatives).
-at::Tensor gaussian_blur(const at::Tensor& pictures) { return GaussianBlur::apply(pictures); }
+at::Tensor gaussian_blur(const at::Tensor& images) { return GaussianBlur::apply(images); }
 
 // With μ, σ² and σ₁₂ the Gaussian-weighted mean, variance and covariance around a pixel:
 //
 //   SSIM = (2 μ₁μ₂ + C₁)(2 σ₁₂ + C₂) / ((μ₁² + μ₂² + C₁)(σ₁² + σ₂² + C₂)),  C₁ = 0.01², C₂ = 0.03²
 //
-// Only the sum of the variances is needed, σ₁² + σ₂² = G * (a² + b²) - μ₁² - μ₂², so four pictures
+// Only the sum of the variances is needed, σ₁² + σ₂² = G * (a² + b²) - μ₁² - μ₂², so four images
 // are blurred, not five.
 
 constexpr double kC1 = 0.01 * 0.01;

@@ -28,13 +28,13 @@ struct FlowLoss {
 FlowLoss multi_scale_flow_loss(const at::Tensor& previous, const at::Tensor& next,
                                const std::vector<at::Tensor>& flows, const at::Tensor& mask);
 
-// How alike two pictures are, with the numbers of the published code. Pictures: [B, 1, H, W], both
+// How alike two images are, with the numbers of the published code. Images: [B, 1, H, W], both
 // of one type, float32 or float64, in [-1, 1], on one device and outside autocast (bfloat16 has too
 // few bits for a variance). Results: scalars [] that gradients flow through; a NaN passes through.
 // Throw std::invalid_argument if shapes differ. Thread safe.
 
 /// Structural similarity (Wang et al. 2004), mean over all pixels: 11x11 Gaussian window, σ = 1.5,
-/// zeros beyond the edge, constants for pictures in 0..1. At most 1, which equal pictures have.
+/// zeros beyond the edge, constants for images in 0..1. At most 1, which equal images have.
 at::Tensor ssim(const at::Tensor& first, const at::Tensor& second);
 
 /// mean|image - target| - SSIM(image, target); at least -1.

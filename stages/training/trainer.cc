@@ -14,12 +14,12 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/training.h"
-#include "stages/training/networks/network_state_internal.h"
-#include "stages/training/networks/patch_discriminator_internal.h"
+#include "stages/training/detail/training_batch.h"
+#include "stages/training/detail/training_networks.h"
+#include "stages/training/detail/update_loss.h"
+#include "stages/training/networks/detail/network_state.h"
+#include "stages/training/networks/detail/patch_discriminator.h"
 #include "stages/training/radam.h"
-#include "stages/training/training_batch_internal.h"
-#include "stages/training/training_networks_internal.h"
-#include "stages/training/update_loss_internal.h"
 
 namespace eventgan {
 namespace {
@@ -146,9 +146,10 @@ struct Trainer::Learners {
   Learner& turn(TrainingPhase phase, std::int64_t step) {
     if (phase == TrainingPhase::kFlow) return flow;
     if (phase == TrainingPhase::kReconstruction) return reconstruction;
-    const bool judge = manifest.losses.adversarial != 0 &&
-                       step % (manifest.discriminator_steps + 1) < manifest.discriminator_steps;
-    return judge ? discriminator : generator;
+    const bool discriminates =
+        manifest.losses.adversarial != 0 &&
+        step % (manifest.discriminator_steps + 1) < manifest.discriminator_steps;
+    return discriminates ? discriminator : generator;
   }
 
   UpdateLoss loss(const Learner& learner, const TrainingBatch& batch, std::int64_t step) {

@@ -1,9 +1,9 @@
+#include "stages/training/detail/training_batch.h"
+
 #include <ATen/Functions.h>
 
 #include <algorithm>
 #include <stdexcept>
-
-#include "stages/training/training_batch_internal.h"
 
 namespace eventgan {
 namespace {

@@ -1,11 +1,12 @@
+#include "stages/training/detail/training_networks.h"
+
 #include <ATen/autocast_mode.h>
 #include <c10/core/Device.h>
 #include <torch/cuda.h>
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
-#include "stages/training/networks/network_state_internal.h"
-#include "stages/training/training_networks_internal.h"
+#include "stages/training/networks/detail/network_state.h"
 
 namespace eventgan {
 
@@ -116,7 +117,7 @@ std::vector<at::Tensor> TrainingNetworks::run(UNet& network, const at::Tensor& i
   return outputs;
 }
 
-at::Tensor TrainingNetworks::judge(const at::Tensor& volume, const at::Tensor& images) {
+at::Tensor TrainingNetworks::discriminate(const at::Tensor& volume, const at::Tensor& images) {
   const AutocastScope lower(device, bfloat16);
   return discriminator->forward(volume, images).to(at::kFloat);
 }

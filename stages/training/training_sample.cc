@@ -18,13 +18,12 @@ void require(bool holds, const std::string& message) {
   if (!holds) throw std::invalid_argument(message);
 }
 
-void require_within(int top, int left, ImageSize crop, ImageSize picture,
-                    const std::string& origin) {
+void require_within(int top, int left, ImageSize crop, ImageSize image, const std::string& origin) {
   // Subtractions of values that are not negative cannot overflow, sums could.
   require(crop.height > 0 && crop.width > 0 && top >= 0 && left >= 0 &&
-              crop.height <= picture.height && crop.width <= picture.width &&
-              top <= picture.height - crop.height && left <= picture.width - crop.width,
-          "expected a crop within " + to_string(picture) + " pixels, got " + to_string(crop) +
+              crop.height <= image.height && crop.width <= image.width &&
+              top <= image.height - crop.height && left <= image.width - crop.width,
+          "expected a crop within " + to_string(image) + " pixels, got " + to_string(crop) +
               " at row " + std::to_string(top) + ", column " + std::to_string(left) +
               (origin.empty() ? "" : ", in " + origin) + " (augmentation)");
 }
@@ -34,7 +33,7 @@ float uniform(const std::array<double, 2>& range, const CounterRandom& random,
   return static_cast<float>(range[0] + (range[1] - range[0]) * random.uniform(draw));
 }
 
-/// Cuts and flips `planes` pictures of `from` pixels that lie one after the other.
+/// Cuts and flips `planes` images of `from` pixels that lie one after the other.
 std::vector<float> cut(const std::vector<float>& values, std::size_t planes, ImageSize from,
                        const Augmentation& augmentation) {
   const auto [height, width] = augmentation.crop;
@@ -58,7 +57,7 @@ std::vector<float> cut(const std::vector<float>& values, std::size_t planes, Ima
   return result;
 }
 
-/// Pictures of `pixels` pixels that lie one after the other: the last comes first.
+/// Images of `pixels` pixels that lie one after the other: the last comes first.
 void reverse_planes(std::vector<float>& values, std::size_t pixels) {
   auto low = values.begin();
   for (auto high = values.end(); high - low >= 2 * static_cast<std::ptrdiff_t>(pixels);) {
@@ -68,24 +67,24 @@ void reverse_planes(std::vector<float>& values, std::size_t pixels) {
 }
 
 /// Not std::min and std::max, which would take a NaN for the bound.
-float relight(float x, float gain, float gamma) {
+float with_gain_and_gamma(float x, float gain, float gamma) {
   const float u = (x + 1) / 2;
-  const float lit = gain * std::pow(u < 0 ? 0.0f : u, gamma);
-  return 2 * (lit > 1 ? 1.0f : lit) - 1;
+  const float changed = gain * std::pow(u < 0 ? 0.0f : u, gamma);
+  return 2 * (changed > 1 ? 1.0f : changed) - 1;
 }
 
 }  // namespace
 
-Augmentation draw_augmentation(ImageSize picture, ImageSize crop, const AugmentationSpec& spec,
+Augmentation draw_augmentation(ImageSize image, ImageSize crop, const AugmentationSpec& spec,
                                CounterRandom random) {
-  require_within(0, 0, crop, picture, "");
+  require_within(0, 0, crop, image, "");
   const auto place = [&](AugmentationDraw draw, int from, int cut) {
     return static_cast<int>(random.below(draw, static_cast<std::uint64_t>(from - cut) + 1));
   };
   Augmentation result;
   result.crop = crop;
-  result.top = place(kTop, picture.height, crop.height);
-  result.left = place(kLeft, picture.width, crop.width);
+  result.top = place(kTop, image.height, crop.height);
+  result.left = place(kLeft, image.width, crop.width);
   result.flip_x = spec.flip && random.below(kFlipX, 2) == 1;
   result.flip_y = spec.flip && random.below(kFlipY, 2) == 1;
   result.reverse = spec.reverse && random.below(kReverse, 2) == 1;
@@ -115,7 +114,8 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
   }
   result.network_frames = result.frames;
   if (augmentation.gain != 1 || augmentation.gamma != 1) {
-    for (float& x : result.network_frames) x = relight(x, augmentation.gain, augmentation.gamma);
+    for (float& x : result.network_frames)
+      x = with_gain_and_gamma(x, augmentation.gain, augmentation.gamma);
   }
   result.origin =
       sample.origin + ", crop " + to_string(augmentation.crop) + " at row " +

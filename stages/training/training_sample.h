@@ -36,9 +36,9 @@ struct Augmentation {
 };
 
 /// Draws crop, flips, gain and gamma, each uniformly over what is possible; a function of its
-/// arguments alone. Throws std::invalid_argument if the picture is smaller than the crop, or the
+/// arguments alone. Throws std::invalid_argument if the image is smaller than the crop, or the
 /// crop empty. Thread safe.
-Augmentation draw_augmentation(ImageSize picture, ImageSize crop, const AugmentationSpec& spec,
+Augmentation draw_augmentation(ImageSize image, ImageSize crop, const AugmentationSpec& spec,
                                CounterRandom random);
 
 /// Cuts, flips and reverses frames and volume. A flip moves pixels only: polarity, time and the

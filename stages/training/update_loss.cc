@@ -1,9 +1,10 @@
+#include "stages/training/detail/update_loss.h"
+
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
 
 #include "manifests/values/counter_random.h"
 #include "stages/training/losses.h"
-#include "stages/training/update_loss_internal.h"
 
 namespace eventgan {
 namespace {
@@ -65,7 +66,7 @@ UpdateLoss discriminator_update(TrainingNetworks& networks, const TrainingBatch&
                       0);
   }
   // One pass for both halves: the discriminator treats each sample on its own.
-  const at::Tensor logits = networks.judge(volumes, batch.frames);
+  const at::Tensor logits = networks.discriminate(volumes, batch.frames);
   const at::Tensor fake = logits.narrow(0, 0, half);
   const at::Tensor real = logits.narrow(0, half, half);
   const at::Tensor flipped = flipped_labels(real, manifest, step);
@@ -84,7 +85,7 @@ UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& bat
   UpdateLoss loss;
   loss.total = at::zeros({}, volume.options());
   if (weights.adversarial != 0) {
-    const at::Tensor logits = networks.judge(volume, batch.network_frames);
+    const at::Tensor logits = networks.discriminate(volume, batch.network_frames);
     loss.parts["generator"] = generator_hinge_loss(logits);
     loss.total = loss.total + weights.adversarial * loss.parts["generator"];
   }

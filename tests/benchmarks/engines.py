@@ -24,8 +24,8 @@ ENGINES = [("torch", "float32"), ("torch", "bfloat16"), ("onednn", "float32"), (
 @dataclasses.dataclass(frozen=True)
 class Settings:
     rounds: int
-    sizes: dict          # base width → picture sizes (height, width)
-    shipped_size: tuple  # picture size at which errors of trained weights are taken
+    sizes: dict          # base width → image sizes (height, width)
+    shipped_size: tuple  # image size at which errors of trained weights are taken
 
 
 SIZES = [(260, 861), (375, 1242), (256, 320), (128, 128)]
@@ -55,7 +55,7 @@ def start_contenders(bench, width, sizes, stack):
 
 
 def start_engine(bench, engine, precision, weights, size):
-    """int8 with weights calibrated on pictures of that size."""
+    """int8 with weights calibrated on images of that size."""
     if precision == "int8":
         weights = calibrated(bench, weights, size)
     return Contender(engine_command(bench, engine, precision, weights))

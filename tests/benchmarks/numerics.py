@@ -23,7 +23,7 @@ class Settings:
     weights: list
     size: tuple       # height, width
     tries: int        # changes of each kind
-    contrasts: list   # of the pictures that int8 is calibrated on
+    contrasts: list   # of the images that int8 is calibrated on
     shrinks: list     # powers of two
     rounds: int
 
@@ -52,8 +52,8 @@ def stability(bench, settings):
 
 
 def saturation(bench, settings):
-    table = Table(["weights, contrast of the calibration's pictures", "clipped activations", "error L2", "largest error"],
-                  caption="int8 on pictures of more contrast than it was calibrated for")
+    table = Table(["weights, contrast of the calibration's images", "clipped activations", "error L2", "largest error"],
+                  caption="int8 on images of more contrast than it was calibrated for")
     for weights in settings.weights:
         for contrast in settings.contrasts:
             with contextlib.suppress(ContenderFailed, NotCalibrated):

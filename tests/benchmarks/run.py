@@ -18,11 +18,11 @@ import tempfile
 import time
 
 import engines
+import image_sizes
 import intra_op
 import layers
 import numerics
 import pair_counts
-import picture_sizes
 import reading
 import scopes
 import slow_disk
@@ -33,10 +33,10 @@ import v2e
 import whole_conversion
 from measuring.bench import Bench, add_arguments, check_programs
 from measuring.machine import description, processor_name
-from measuring.picture import draw
+from measuring.curves import draw
 from measuring.report import markdown
 
-PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "picture_sizes": picture_sizes,
+PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "image_sizes": image_sizes,
          "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "slow_disk": slow_disk,
          "scopes": scopes, "v2e": v2e}
 

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What reading pictures ahead is worth: conversions from a disk on which every read waits, as on one behind a network.
+"""What reading images ahead is worth: conversions from a disk on which every read waits, as on one behind a network.
 
 The disk is a FUSE file system (python3-fusepy; /dev/fuse) that passes through to files in memory; its own work takes processor time, too.
 """
@@ -103,7 +103,7 @@ def measure(bench):
             with slow_disk(frames, mount, delay / 1000) as reads:
                 on_disk[delay].append(convert(bench.program, dataclasses.replace(job, frames=mount)))
                 reads_of[delay] = reads.value
-    table = Table(["pictures", "reads", "they wait, s in all", "conversion, s", "times that from memory"])
+    table = Table(["images", "reads", "they wait, s in all", "conversion, s", "times that from memory"])
     seconds = [run.wall_s for run in in_memory]
     table.add("in memory", "-", "-", spread(seconds).median_and_quartiles(), "1")
     for delay, runs in on_disk.items():
@@ -112,7 +112,7 @@ def measure(bench):
         table.add(f"each read waits {delay} ms", str(reads_of[delay]), number(delay / 1000 * reads_of[delay]), spread(times).median_and_quartiles(),
                   number(ratio))
     text = (f"{settings.frames} frames ({kind}), {settings.size[0]}x{settings.size[1]}, {settings.weights}, {settings.precision}, {THREADS} threads; "
-            f"{settings.rounds} rounds, each from a disk mounted anew. A read is at most 128 KiB.")
+            f"{settings.rounds} rounds, each from a disk mounted again. A read is at most 128 KiB.")
     return Section(title, text, [table])
 
 

@@ -119,7 +119,7 @@ def fitted(frames, times_s, wanted, video=False, steps=1):
     return middle
 
 
-def save_pictures(folder, frames):
+def save_images(folder, frames):
     """The files, in order."""
     files = [folder / f"{index:06d}.png" for index in range(len(frames))]
     for file, frame in zip(files, frames):
@@ -174,11 +174,11 @@ def cost_of_job(bench, folders, job):
     return Cost(pair_cost(few, many).stage_s["generate"], None, counted[-1] if job.generator else None)
 
 
-def time_table(bench, settings, what, pictures, refused):
+def time_table(bench, settings, what, images, refused):
     """`pictures`: files of one size, in order."""
-    size = PIL.Image.open(pictures[0]).size[::-1]
+    size = PIL.Image.open(images[0]).size[::-1]
     scratch = bench.folder(f"times-{size[0]}x{size[1]}")
-    folders = [link_frames(scratch / f"frames-{pairs}", pictures, pairs + 1) for pairs in (settings.few, settings.many)]
+    folders = [link_frames(scratch / f"frames-{pairs}", images, pairs + 1) for pairs in (settings.few, settings.many)]
     contenders = {f"{name}, threshold {threshold}": functools.partial(cost_of_v2e, settings, folders, threshold, mode)
                   for threshold in settings.thresholds for name, mode in V2E_MODES.items()}
     jobs = {f"{kind}, threshold {threshold}": simulated_job(folders[0], size, kind, threshold)
@@ -208,7 +208,7 @@ def time_tables(bench, settings, refused):
     slider = DATA / SLIDER["slider_depth"][0]
     if slider.exists():
         with h5py.File(slider) as file:
-            yield time_table(bench, settings, "slider_depth", save_pictures(bench.folder("slider"), file["davis/left/image_raw"]), refused)
+            yield time_table(bench, settings, "slider_depth", save_images(bench.folder("slider"), file["davis/left/image_raw"]), refused)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -255,7 +255,7 @@ def recording_scores(bench, settings, name, refused):
     path, part = settings.recordings[name]
     recorded = read_recording(DATA / path, part)
     folder = bench.folder(f"recording-{name}")
-    save_pictures(folder, recorded.frames)
+    save_images(folder, recorded.frames)
 
     models = realism(bench, DATA / path, part, "--with", "difference,esim")
     real = mean_scores(recorded.volumes, recorded)
@@ -324,7 +324,7 @@ the models do. numba does not matter: the emulator does not use it. SuperSloMo, 
 not run: its time would be added. Without such frames the events of a pair have only as many different times as the pixel with most events has events; blended ones mend that, as `difference` does, but nothing moves in them.
 
 Scores are those of manifests/guides/realism.md, means over the pairs, on parts of recordings that the shipped weights have not seen;
-from earlier parts of all but emlb_demo01 they were learnt. v2e's threshold is
+from earlier parts of all but emlb_demo01 they were learned. v2e's threshold is
 fitted as realism fits those of difference and esim: one for both polarities, by bisection, until all pairs together have the camera's number of events
 within {100 * FIT_TOLERANCE} %. The network is not told that number. difference and esim are scored by `eventgan realism`, the others by the same
 equations in NumPy, which agreed with it within {AGREEMENT:g} on the camera's volumes and the network's in float32. int8 was calibrated on the frames of the

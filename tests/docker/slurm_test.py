@@ -11,7 +11,7 @@ import unittest
 
 sys.path.append(str(pathlib.Path(__file__).parents[1] / "end_to_end"))
 import folders
-import moving_picture
+import moving_texture
 import program
 import small_job
 from slurm_cluster import Cluster, SLURM, command, field, print_logs, state, wait_until, why_not
@@ -24,7 +24,7 @@ HEIGHT, WIDTH = 320, 480
 def slow_job(folder):
     """A manifest of SHARDS shards, seconds of work each: little data, compressed as hard as can be."""
     frames = SHARDS * SAMPLES_PER_SHARD + 1
-    moving_picture.write_pictures(folder / "frames" / "scene", [4 * index for index in range(frames)], HEIGHT, WIDTH, seed=3)
+    moving_texture.write_images(folder / "frames" / "scene", [4 * index for index in range(frames)], HEIGHT, WIDTH, seed=3)
     manifest = program.manifest(
         [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
         image={"width": WIDTH, "height": HEIGHT, "preset": "mpii"}, generator={"kind": "difference"},
@@ -35,7 +35,7 @@ def slow_job(folder):
 
 
 def submit(*arguments):
-    """Sends a job through submit.sh; the ids of its arrays and of finalize. The line that it advises must run as it stands."""
+    """Sends a job through submit.sh; the ids of its arrays and of finalize. The line that it advises must run as it is."""
     out = command(SLURM / "submit.sh", *arguments, EVENTGAN=program.PROGRAM)
     advised = shlex.split(re.search(r"^look: (.+)$", out, re.MULTILINE)[1])
     assert advised[:2] == [program.PROGRAM, "status"] and len(advised) == 3, out

@@ -40,7 +40,7 @@ class Benchmarks(program.InFolder):
         page = self.run_all(environment=DATASET_FREE)
         sections = sections_of(page)
         self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
-                                          "The whole conversion", "Against the picture's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
+                                          "The whole conversion", "Against the image's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
                                           "Slow disk", "Scope", "Beside v2e"])
         self.assertEqual(sections.pop("Beside v2e"), [])
         if "python3-fusepy and /dev/fuse" in page:

@@ -99,12 +99,12 @@ class Recordings(program.InFolder):
         self.assertEqual((car["recall_easy"], car["recall_hard"], car["precision"]), (0.5, 0.5, 1.0))  # what is on "dont_care" counts nothing
 
     def greys_shown(self, *where):
-        """How many pixels of each picture that preview draws of `where` have the one grey of some recordings."""
-        pictures = self.folder / "pictures"
-        shutil.rmtree(pictures, ignore_errors=True)
-        told, warned = run("preview", *where, "--out", pictures, "--frames", self.folder)
+        """How many pixels of each image that preview draws of `where` have the one grey of some recordings."""
+        images = self.folder / "pictures"
+        shutil.rmtree(images, ignore_errors=True)
+        told, warned = run("preview", *where, "--out", images, "--frames", self.folder)
         drawn = [cv2.imread(line) for line in told.splitlines()]
-        return [[int((picture == grey).all(-1).sum()) for grey in (91, 155, 203)] for picture in drawn], warned
+        return [[int((image == grey).all(-1).sum()) for grey in (91, 155, 203)] for image in drawn], warned
 
     def test_a_sample_leads_to_the_frames_of_its_own_source(self):
         # Two cameras of one file; and a folder whose name begins as the file's, in which the time of each frame is another.

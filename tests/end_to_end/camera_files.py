@@ -55,7 +55,7 @@ def write_dhp19(root, recordings=("S1_1_1", "S13_2_3"), events=20000, seconds=1.
 
 
 def volume_of(events, bins=9, height=HEIGHT, width=WIDTH):
-    """[2 bins, height, width]: the volume of rows x, y, t, p as the published code has it, built here anew."""
+    """[2 bins, height, width]: the volume of rows x, y, t, p as the published code has it, built here again."""
     volume = np.zeros((2 * bins, height, width))
     if not len(events):
         return volume

@@ -82,7 +82,7 @@ class CommandLine(program.InFolder):
 
     def test_after_quarantine_the_last_line_says_what_to_run(self):
         path = small_job(self.folder / "small", errors=LENIENT)
-        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no image")
         out = run("convert", path)[0]
         last = out.splitlines()[-1]
         self.assertEqual(last, f"next, once the inputs are fixed:  eventgan retry {path.parent / 'out'}")
@@ -95,7 +95,7 @@ class CommandLine(program.InFolder):
         cars = folder / "cars"
         cars.rename(folder / "cars\x1b[31m")
         path.write_text(path.read_text().replace('"cars"', '"cars\\u001b[31m"'))
-        (folder / "cars\x1b[31m" / "image_2" / "000000.png").write_bytes(b"no picture")
+        (folder / "cars\x1b[31m" / "image_2" / "000000.png").write_bytes(b"no image")
         out = folder / "out"
         run("convert", path)
         shards = sorted(out.glob("*.h5"))
@@ -111,7 +111,7 @@ class CommandLine(program.InFolder):
 
     def test_verify_tells_of_each_shard(self):
         path = small_job(self.folder / "small", errors=LENIENT)
-        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no image")
         run("convert", path)
         folder = path.parent / "out"
         shards = sorted(folder.glob("*.h5"))
@@ -212,15 +212,15 @@ class CommandLine(program.InFolder):
         run("import-weights", old, self.folder / "w.pt", expect=64)
         self.assertFalse(weights.exists())
 
-    def write_damaged_pictures(self, folder):
-        """A good and a damaged picture of each format in turn, as frames 0, 1, ... of one folder."""
+    def write_damaged_images(self, folder):
+        """A good and a damaged image of each format in turn, as frames 0, 1, ... of one folder."""
         folder.mkdir()
-        picture = PIL.Image.fromarray(np.random.default_rng(3).integers(0, 256, (24, 32, 3), dtype=np.uint8))
+        image = PIL.Image.fromarray(np.random.default_rng(3).integers(0, 256, (24, 32, 3), dtype=np.uint8))
         formats = [("bmp", {}), ("jpg", {}), ("png", {}), ("tif", {}), ("tif", {"compression": "tiff_lzw"}),
                    ("tif", {"compression": "jpeg"})]
         for index, (extension, options) in enumerate(formats):
             good, bad = [folder / f"{2 * index + k:04d}.{extension}" for k in range(2)]
-            picture.save(good, **options)
+            image.save(good, **options)
             data = good.read_bytes()
             bad.write_bytes(data[:len(data) // 2])
         # A header that claims more pixels than there can be.
@@ -229,8 +229,8 @@ class CommandLine(program.InFolder):
         (folder / f"{2 * len(formats):04d}.bmp").write_bytes(large)
         return len(formats) + 1
 
-    def test_damaged_pictures_are_told_by_us_alone(self):
-        damaged = self.write_damaged_pictures(self.folder / "frames")
+    def test_damaged_images_are_told_by_us_alone(self):
+        damaged = self.write_damaged_images(self.folder / "frames")
         manifest = program.manifest(
             [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}], errors=LENIENT,
             generator={"kind": "difference"}, image={"width": 32, "height": 24, "preset": "mpii"})
@@ -269,7 +269,7 @@ class CommandLine(program.InFolder):
         self.assertIn("clip.mp4", events("convert", clip, "--progress", "json", expect=66)[-1]["text"])
 
         path = small_job(self.folder / "small", errors={"policy": "quarantine", "max_count": 0, "max_fraction": 0})
-        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no picture")
+        (self.folder / "small" / "cars" / "image_2" / "000000.png").write_bytes(b"no image")
         self.assertEqual(events("convert", path, "--progress", "json", expect=65)[-1]["event"], "error")
         self.assertEqual(events("retry", path.parent / "out", "--progress", "json", expect=65)[-1]["event"], "error")
 

@@ -1,11 +1,11 @@
-"""In which order a file is published: whole and fsynced under its temporary name, renamed, its folder fsynced, and a marker only
+"""In which order a file is published: whole and fsynced under its temporary name, renamed, its folder fsynced, and a commit record only
 after its shard. A kill shows nothing of this, since the system keeps what it was given; a power cut does."""
 
 import re
 
 import failing_files
 import program
-from folders import markers
+from folders import records
 from small_job import LENIENT, broken_cars, small_job
 
 TEMPORARY = re.compile(r"\.(?P<target>.+)\.[^.]+\.\d+\.\d+\.tmp")
@@ -47,7 +47,7 @@ class CommitOrder(program.InFolder):
 
     def test_convert(self):
         names = self.published(self.convert())
-        shards = sorted(markers(self.out))
+        shards = sorted(records(self.out))
         committed = [name for shard in shards for name in (shard, shard.replace(".h5", ".json"))]
         self.assertEqual(names, ["plan.json", "run.json", *committed])
 
@@ -58,7 +58,7 @@ class CommitOrder(program.InFolder):
     def test_retry(self):
         with broken_cars(self.folder / "job", [1]):
             self.convert()
-        spoiled, = (shard for shard, marker in markers(self.out).items() if marker["quarantined"])
+        spoiled, = (shard for shard, record in records(self.out).items() if record["quarantined"])
         names = self.published(self.calls("retry", self.out, "--threads", "1"))
         self.assertEqual(names, ["amendments.json", spoiled, spoiled.replace(".h5", ".json")])
 

@@ -1,4 +1,4 @@
-"""kill -9 at every step: whatever stands in the folder then, the next run ends with the bytes of an undisturbed one."""
+"""kill -9 at every step: whatever is in the folder then, the next run ends with the bytes of an undisturbed one."""
 
 import json
 import random
@@ -6,7 +6,7 @@ import shutil
 
 import failing_files
 import program
-from folders import content, markers, same_content, same_folder, temporaries
+from folders import content, records, same_content, same_folder, temporaries
 from program import run
 from small_job import LENIENT, broken_cars, small_job
 
@@ -35,7 +35,7 @@ class Crash(program.InFolder):
 
     def test_convert_killed_at_every_call(self):
         calls = self.undisturbed(cars=2, people=1)  # two shards
-        self.assertEqual(len(markers(self.expected)), 2)
+        self.assertEqual(len(records(self.expected)), 2)
         # Before a call the disk is as it was after the call before.
         numbers = failing_files.thinned(calls)
         failing_files.for_each(self.killed_then_resumed, [f"kill-before any {n}" for n in numbers])
@@ -44,9 +44,9 @@ class Crash(program.InFolder):
     def test_convert_killed_around_each_step_of_a_commit(self):
         calls = self.undisturbed(cars=2, people=1)
         shard = sorted(path.name for path in self.expected.glob("*.h5"))[0]
-        marker = shard.replace(".h5", ".json")
+        record = shard.replace(".h5", ".json")
         steps = [(call.kind, n) for n, call in enumerate(calls, 1)
-                 if marker in call.path.name or (shard in call.path.name and call.kind != "write")]
+                 if record in call.path.name or (shard in call.path.name and call.kind != "write")]
         self.assertLessEqual({"create", "write", "sync", "close", "rename"}, {kind for kind, _ in steps})
         rules = [f"kill-after any {n}" for _, n in steps]
         rules += [f"kill-within any {n}" for kind, n in steps if kind == "write"]
@@ -55,7 +55,7 @@ class Crash(program.InFolder):
 
     def test_convert_killed_fifty_times_at_random(self):
         calls = self.undisturbed(cars=60, people=40, samples_per_shard=1)
-        shards = len(markers(self.expected))
+        shards = len(records(self.expected))
         calls_per_shard = len(calls) // shards
         dice = random.Random(50)
         out = self.folder / "killed"
@@ -68,8 +68,8 @@ class Crash(program.InFolder):
                 break
             kills += 1
         self.assertEqual(kills, 50)
-        self.assertLess(len(markers(out)), shards, "done before the last kill")
-        self.assertGreater(len(markers(out)), 10, "hardly anything was done between the kills")
+        self.assertLess(len(records(out)), shards, "done before the last kill")
+        self.assertGreater(len(records(out)), 10, "hardly anything was done between the kills")
         self.convert(out)
         same_folder(out, self.expected)
         run("verify", out, "--deep")
@@ -123,13 +123,13 @@ class Crash(program.InFolder):
 
         failing_files.for_each(killed_then_again, failing_files.thinned(calls))
 
-    def test_finalize_after_a_retry_killed_between_shard_and_marker(self):
+    def test_finalize_after_a_retry_killed_between_shard_and_commit_record(self):
         self.undisturbed(cars=4, people=1, errors=LENIENT)
         broken = self.folder / "broken"
         with broken_cars(self.folder / "job", [1]):
             self.convert(broken)
         before = content(broken)
-        spoiled, = (shard for shard, marker in markers(broken).items() if marker["quarantined"])
+        spoiled, = (shard for shard, record in records(broken).items() if record["quarantined"])
         whole = self.folder / "whole"
         shutil.copytree(broken, whole)
         calls = failing_files.changes(failing_files.run(whole, "", "retry", whole, "--threads", "1").calls)
@@ -153,12 +153,12 @@ class Crash(program.InFolder):
         broken = self.folder / "broken"
         with broken_cars(self.folder / "job", [1]):
             self.convert(broken)
-        self.assertEqual(sum(len(marker["quarantined"]) for marker in markers(broken).values()), 1)
+        self.assertEqual(sum(len(record["quarantined"]) for record in records(broken).values()), 1)
 
         whole = self.folder / "whole"
         shutil.copytree(broken, whole)
         calls = failing_files.changes(failing_files.run(whole, "", "retry", whole, "--threads", "1").calls)
-        self.assertEqual(sum(len(marker["quarantined"]) for marker in markers(whole).values()), 0)
+        self.assertEqual(sum(len(record["quarantined"]) for record in records(whole).values()), 0)
         self.assertEqual(temporaries(whole), [])
         expected = content(whole)
 

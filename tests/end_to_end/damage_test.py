@@ -14,9 +14,9 @@ import numpy as np
 
 import failing_files
 import program
-from folders import content, markers, same_content, shards
+from folders import content, records, same_content, shards
 from program import run
-from small_job import save_picture, small_job, write_cars, write_people
+from small_job import save_image, small_job, write_cars, write_people
 
 
 def setUpModule():
@@ -38,7 +38,7 @@ class Damage(program.InFolder):
         shutil.copytree(whole, self.out)
         self.shards = shards(self.out)
         self.shard = self.out / self.shards[2]
-        self.marker = self.shard.with_suffix(".json")
+        self.record = self.shard.with_suffix(".json")
 
     def convert(self, expect=0, *more):
         return run("convert", job / "manifest.json", "--output", self.out, "--progress", "none", *more, expect=expect)
@@ -104,44 +104,44 @@ class Damage(program.InFolder):
         self.convert()
         self.same_as_whole()
 
-    def test_torn_marker(self):
+    def test_torn_commit_record(self):
         for kept in (1, 200, -2):
             with self.subTest(kept=kept):
-                self.marker.write_bytes(self.marker.read_bytes()[:kept])
-                self.found_and_mended(self.marker)
+                self.record.write_bytes(self.record.read_bytes()[:kept])
+                self.found_and_mended(self.record)
 
-    def test_emptied_marker(self):
-        self.marker.write_bytes(b"")
-        self.found_and_mended(self.marker)
+    def test_emptied_commit_record(self):
+        self.record.write_bytes(b"")
+        self.found_and_mended(self.record)
 
-    def test_marker_of_another_plan(self):
-        own = markers(self.out)[self.shard.name]["plan_hash"]
-        self.marker.write_text(self.marker.read_text().replace(own, own[::-1]))
-        self.found_and_mended(self.marker)
+    def test_commit_record_of_another_plan(self):
+        own = records(self.out)[self.shard.name]["plan_hash"]
+        self.record.write_text(self.record.read_text().replace(own, own[::-1]))
+        self.found_and_mended(self.record)
 
-    def test_marker_of_another_shard(self):
-        shutil.copy(self.marker.with_name(self.shards[1]).with_suffix(".json"), self.marker)
-        self.found_and_mended(self.marker)
+    def test_commit_record_of_another_shard(self):
+        shutil.copy(self.record.with_name(self.shards[1]).with_suffix(".json"), self.record)
+        self.found_and_mended(self.record)
 
-    def test_marker_with_plausible_counts_that_are_not_the_shards(self):
-        """Shard 2 holds one car; a marker with two would give the next sample's labels to this one in dataset.h5."""
-        marker = json.loads(self.marker.read_text())
-        self.assertEqual((marker["boxes"], marker["classes"]), ([1], {"Car": 1}))
-        self.marker.write_text(json.dumps({**marker, "boxes": [2], "classes": {"Car": 2}}))
+    def test_commit_record_with_plausible_counts_that_are_not_the_shards(self):
+        """Shard 2 holds one car; a commit record with two would give the next sample's labels to this one in dataset.h5."""
+        record = json.loads(self.record.read_text())
+        self.assertEqual((record["boxes"], record["classes"]), ([1], {"Car": 1}))
+        self.record.write_text(json.dumps({**record, "boxes": [2], "classes": {"Car": 2}}))
         told, _ = run("finalize", self.out, expect=1)
-        self.assertIn(f"{self.marker}: expected number of boxes in slot 0: 1, got 2", told)
+        self.assertIn(f"{self.record}: expected number of boxes in slot 0: 1, got 2", told)
         self.found_and_mended(self.shard.stem)
 
-    def test_marker_without_shard(self):
+    def test_commit_record_without_shard(self):
         self.shard.unlink()
         self.found_and_mended(self.shard)
 
-    def test_shard_without_marker(self):
-        self.marker.unlink()
-        self.found_and_mended(self.marker.name)
+    def test_shard_without_commit_record(self):
+        self.record.unlink()
+        self.found_and_mended(self.record.name)
 
-    def test_neither_shard_nor_marker(self):
-        self.marker.unlink()
+    def test_neither_shard_nor_commit_record(self):
+        self.record.unlink()
         self.shard.unlink()
         err = self.verify()
         self.assertIn(str(self.shard.with_suffix("")), err)
@@ -174,7 +174,7 @@ class Damage(program.InFolder):
         run("verify", self.out, "--deep")
 
     def test_shards_of_another_job_are_never_overwritten(self):
-        """Of other data under the same name: the second folder's labels would stand where the first one's shards were."""
+        """Of other data under the same name: the second folder's labels would be where the first one's shards were."""
         before = {path: stamp(path) for path in self.out.iterdir()}
         manifest = small_job(self.folder / "other", cars=6)
         for command in [["convert", manifest], ["convert", manifest, "--overwrite"], ["plan", "--freeze", manifest]]:
@@ -321,12 +321,12 @@ class Flips(program.InFolder):
         run("inspect", self.folder / "none.h5", expect=66)
         with open("/dev/full", "w", encoding="utf-8") as full:
             self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full, stderr=subprocess.PIPE).returncode, 1)
-        pictures, _ = run("preview", lone, "--out", self.folder / "pictures", "--frames", self.folder / "job", "--count", "2")
-        self.assertEqual([pathlib.Path(line).exists() for line in pictures.splitlines()], [True, True])
+        images, _ = run("preview", lone, "--out", self.folder / "pictures", "--frames", self.folder / "job", "--count", "2")
+        self.assertEqual([pathlib.Path(line).exists() for line in images.splitlines()], [True, True])
 
 
 class EveryColumn(program.InFolder):
-    """A value is changed, and the marker made to agree, as a faulty program or a careless hand would: the hash tells nothing then."""
+    """A value is changed, and the commit record made to agree, as a faulty program or a careless hand would: the hash tells nothing then."""
 
     def setUp(self):
         super().setUp()
@@ -357,7 +357,7 @@ class EveryColumn(program.InFolder):
         (root / "label_02").mkdir(parents=True)
         lines = []
         for frame in range(4):
-            save_picture(root / "image_02" / "0000" / f"{frame:06d}.png", random)
+            save_image(root / "image_02" / "0000" / f"{frame:06d}.png", random)
             lines.append(f"{frame} 3 Car 0 0 0.10 2.00 3.00 12.50 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n")
         (root / "label_02" / "0000.txt").write_text("".join(lines))
 
@@ -366,7 +366,7 @@ class EveryColumn(program.InFolder):
         """Human3.6M as pose trainers extract it: three frames of a person, and the camera with its lens."""
         names = [f"S1_Walking_1.54138969_{5 * k + 1:06d}.jpg" for k in range(3)]
         for name in names:
-            save_picture(root / "S1" / "S1_Walking_1.54138969" / name, random)
+            save_image(root / "S1" / "S1_Walking_1.54138969" / name, random)
         place = np.concatenate([random.uniform(-0.3, 0.3, (3, 17, 2)), np.full((3, 17, 1), 4.0), np.ones((3, 17, 1))], -1)
         part = np.concatenate([place[..., :2] / 4 * 100 + [16, 12], np.ones((3, 17, 1))], -1)
         np.savez(root / "a.npz", imgname=names, center=np.full((3, 2), [16.0, 12.0]), scale=np.full(3, 0.1), part=part, S=place)
@@ -409,10 +409,10 @@ class EveryColumn(program.InFolder):
         with h5py.File(path, "r+") as file:
             place = (1,) if column.endswith("/offsets") else (0,) * file[column].ndim
             file[column][place] = changed(file[column][place])
-        marker = path.with_suffix(".json")
-        said = json.loads(marker.read_text())
+        record = path.with_suffix(".json")
+        said = json.loads(record.read_text())
         said.update(size_bytes=path.stat().st_size, sha256=hashlib.sha256(path.read_bytes()).hexdigest())
-        marker.write_text(json.dumps(said))
+        record.write_text(json.dumps(said))
 
     def assert_named(self, column, faults):
         name = column.split("/")[-1]

@@ -1,4 +1,4 @@
-"""The demo dataset, from nothing to pictures; determinism; what damage to the inputs does."""
+"""The demo dataset, from nothing to images; determinism; what damage to the inputs does."""
 
 import json
 import pathlib
@@ -49,10 +49,10 @@ class Demo(program.InFolder):
         shards = sorted((self.folder / "out").glob("*.h5"))
         self.assertGreaterEqual(len(shards), 3)
         for shard in shards:
-            pictures, err = run("preview", shard, "--out", self.folder / "p", "--count", "2")
+            images, err = run("preview", shard, "--out", self.folder / "p", "--count", "2")
             self.assertEqual(err, "")
-            for picture in pictures.split():
-                self.assertEqual(pathlib.Path(picture).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+            for image in images.split():
+                self.assertEqual(pathlib.Path(image).read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
             self.assertIn("sample", run("inspect", shard)[0])
             json.loads(run("inspect", shard, "--json")[0])
             json.loads(run("inspect", shard, "--sample", "0", "--json")[0])
@@ -155,10 +155,10 @@ class Demo(program.InFolder):
         self.assertIn("sound", run("verify", self.folder / "whole")[0])
 
         quarantined = {}
-        for marker in (self.folder / "whole").glob("demo-*.json"):
-            for entry in json.loads(marker.read_text())["quarantined"]:
+        for record in (self.folder / "whole").glob("demo-*.json"):
+            for entry in json.loads(record.read_text())["quarantined"]:
                 quarantined[entry["sample_id"]] = entry["reason"]
-                with h5py.File(marker.with_suffix(".h5")) as shard:
+                with h5py.File(record.with_suffix(".h5")) as shard:
                     self.assertEqual(shard["valid"][entry["slot"]], 0)
                     self.assertEqual(text(shard["pairs/sample_id"][entry["slot"]]), entry["sample_id"])
                     self.assertFalse(shard["events/volume"][entry["slot"]].any())

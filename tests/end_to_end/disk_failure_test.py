@@ -33,7 +33,7 @@ class DiskFailure(program.InFolder):
         return failing_files.run(out, rule, *arguments) if rule is not None else run(*arguments)
 
     def told_and_clean(self, out, rule, outcome, expected):
-        """The failure is told with a path below `out` and its reason; what stands in the folder is whole."""
+        """The failure is reported with a path below `out` and its reason; what is in the folder is whole."""
         self.assertTrue(outcome.struck, rule)
         self.assertEqual(outcome.code, FAILED, f"{rule}\n{outcome.out}\n{outcome.err}")
         self.assertIn(str(out), outcome.err, rule)
@@ -42,7 +42,7 @@ class DiskFailure(program.InFolder):
         if not out.exists():
             return
         self.assertEqual(temporaries(out), [], rule)
-        there = content(out)  # parses every marker
+        there = content(out)  # parses every commit record
         same_content(there, {name: what for name, what in expected.items() if name in there}, f"{out} ({rule})")
 
     def fails_then_resumes(self, rule):
@@ -91,7 +91,7 @@ class DiskFailure(program.InFolder):
         same_folder(out, self.expected)
 
     def test_error_of_reading_is_never_taken_for_done(self):
-        """Listing, markers, shards, plan: either it is told, or the shard is made again."""
+        """Listing, commit records, shards, plan: either it is reported, or the shard is made again."""
         reads = [call for call in self.convert(self.expected, "").calls if call.kind == "open"]
         self.assertGreater(len(reads), 4)
 
@@ -145,7 +145,7 @@ class DiskFailure(program.InFolder):
         shutil.copytree(before, after)
         command = ("retry", "--threads", "1")
         calls = failing_files.changes(failing_files.run(after, "", "retry", after, "--threads", "1").calls)
-        # Between shard and marker the shard is not done: the next retry makes it again.
+        # Between shard and commit record the shard is not done: the next retry makes it again.
         failing_files.for_each(lambda rule: self.fails_then_again("retry", before, after, rule, *command), self.rules_for(calls))
 
     def test_really_small_disk(self):
@@ -187,8 +187,8 @@ class SizeLimit(program.InFolder):
         self.refused(2000, self.out, "finalize", self.out)
         self.refused(2000, self.out, "report", self.out)
         run("report", self.out)
-        pictures = self.folder / "pictures"
-        self.refused(500, pictures, "preview", self.out, "--out", pictures)
+        images = self.folder / "pictures"
+        self.refused(500, images, "preview", self.out, "--out", images)
         run("finalize", self.out)
         for to in ("yolo", "coco", "mpii", "davis", "webdataset", "events"):
             exported = self.folder / to

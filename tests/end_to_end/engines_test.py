@@ -43,7 +43,7 @@ def pytorch():
 
 
 def write_persons(root, count=12):
-    """Sources of persons at random places in pictures of 200 x 160, a person a picture: MPII's with centre and scale, with one of these or
+    """Sources of persons at random places in images of 200 x 160, a person an image: MPII's with centre and scale, with one of these or
     none, and Human3.6M's."""
     random = np.random.default_rng(7)
     (root / "images").mkdir(parents=True)

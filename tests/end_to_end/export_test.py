@@ -43,8 +43,8 @@ def setUpModule():
     folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-export-"))
     demo = folder / "demo"
     run("make-demo", demo)
-    picture = demo / "kitti" / "training" / "image_2" / f"{BROKEN}.png"
-    picture.write_bytes(picture.read_bytes()[:-50])
+    image = demo / "kitti" / "training" / "image_2" / f"{BROKEN}.png"
+    image.write_bytes(image.read_bytes()[:-50])
     kitti = {"dataset": "kitti_object", "root": "kitti/training", "pairs": program.pairs([1, 2, 3])}
     sources = [kitti, {**kitti, "split": "val"},
                {"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2, 4], side="around")},
@@ -169,8 +169,8 @@ class Formats(Export):
             self.assertEqual(codes.dtype, np.uint8)
             expected = np.round(np.minimum(sample["volume"].astype(float), 1) * 255)
             np.testing.assert_array_equal(codes, expected.transpose(1, 2, 0))
-            with PIL.Image.open(self.out / "images" / f"{stem}.png") as picture:
-                self.assertEqual((picture.height, picture.width), codes.shape[:2])
+            with PIL.Image.open(self.out / "images" / f"{stem}.png") as image:
+                self.assertEqual((image.height, image.width), codes.shape[:2])
             found = np.loadtxt(self.out / "labels" / f"{stem}.txt", ndmin=2).reshape(-1, 5)
             kept = np.flatnonzero(sample["boxes"]["ignore"] == 0)
             self.assertEqual([data["names"][int(row[0])] for row in found],
@@ -331,7 +331,7 @@ class Formats(Export):
             for row in range(len(events)):
                 expected = ids[row]["volume"].transpose(1, 2, 0) if row in ids else 0 * events[row]
                 np.testing.assert_array_equal(events[row], expected)
-            # The detector's list of ids: a line for each row that there is, and none for a hole.
+            # The detector's list of ids: a line for each row that there is, and none for a missing frame.
             lines = (self.out / "train-kitti_object.txt").read_text().splitlines()
             self.assertEqual([int(line) for line in lines], list(np.flatnonzero(valid)))
             self.assertLess(len(lines), len(valid))
@@ -365,8 +365,8 @@ class Formats(Export):
         cars = self.out.parent / "cars"
         small_job.write_cars(cars, 4, np.random.default_rng(7))
         for path in [cars / "image_2" / "000002.png", *(cars / "prev_2").glob("000002_*.png")]:
-            with PIL.Image.open(path) as picture:
-                picture.resize((40, 30)).save(path)
+            with PIL.Image.open(path) as image:
+                image.resize((40, 30)).save(path)
         sources = [{"dataset": "kitti_object", "root": str(cars), "pairs": program.pairs(gaps, choose=choose), "split": split}
                    for split, gaps, choose in (("one", [1, 2], "one"), ("all", [1, 2], "all"), ("two", [2], "all"))]
         manifest = self.out.parent / "manifest.json"
@@ -425,7 +425,7 @@ class Formats(Export):
         self.assertEqual(seen, len(samples))
 
     def check_columns(self, entry, columns, unknown):
-        """Each column of a shard's row stands in the JSON, in its shape, with null for what is unknown."""
+        """Each column of a shard's row is in the JSON, in its shape, with null for what is unknown."""
         for name, value in columns.items():
             if isinstance(value, (bytes, str)):
                 self.assertEqual(entry[name], text(value) or None, name)
@@ -490,7 +490,7 @@ class Trainers(Export):
         counted = self.python([TRAINERS / "yolov3", TRAINERS / "stubs"], """
             from utils.datasets import LoadImagesAndLabels
             data = LoadImagesAndLabels("train.txt", img_size=160, batch_size=2, augment=False)
-            picture, labels, path, _ = data[0]
+            image, labels, path, _ = data[0]
             print(len(data), sum(len(one) for one in data.labels), len(labels))
             """).split()[-3:]
         kitti = of("train", "kitti_object")
@@ -508,7 +508,7 @@ class Trainers(Export):
                            MODEL=dict(IMAGE_SIZE=np.array([256, 256]),
                                       EXTRA=dict(TARGET_TYPE="gaussian", HEATMAP_SIZE=np.array([64, 64]), SIGMA=2)))
             data = MPIIDataset(cfg, ".", "train-mpii", False)
-            picture, target, weight, meta = data[0]
+            image, target, weight, meta = data[0]
             assert target.shape == (16, 64, 64) and weight.sum() > 8, target.shape
             truth = np.array([entry["joints_3d"] for entry in data.db])
             _, mean = data.evaluate(cfg, truth, "")
@@ -680,7 +680,7 @@ class ForeignNames(Export):
         self.elsewhere.mkdir()
 
     def refused(self, *named, to="coco", arguments=()):
-        """The export must fail and change nothing; what stands in its message."""
+        """The export must fail and change nothing; what is in its message."""
         before, outside = content(self.out), content(self.elsewhere)
         done = subprocess.run([program.PROGRAM, "export", finalized, "--to", to, "--split", "val", "--out", self.out, "--progress", "none", *arguments],
                               capture_output=True, text=True, timeout=100)
@@ -778,22 +778,22 @@ class BadInput(Export):
         self.assertFalse(self.out.exists())
 
     def test_a_shard_that_is_missing_or_another_one(self):
-        for change in ("remove", "bytes", "marker", "plan"):
+        for change in ("remove", "bytes", "record", "plan"):
             with self.subTest(change=change):
                 source = self.out.parent / change
                 shutil.copytree(finalized, source)
                 shard = sorted(source.glob("*-val-*.h5"))[0]
-                marker = shard.with_suffix(".json")
+                record = shard.with_suffix(".json")
                 if change == "remove":
                     shard.unlink()
                 elif change == "bytes":
                     data = bytearray(shard.read_bytes())
                     data[len(data) // 2] ^= 1
                     shard.write_bytes(data)
-                elif change == "marker":
-                    edited = json.loads(marker.read_text())
+                elif change == "record":
+                    edited = json.loads(record.read_text())
                     edited["sha256"] = edited["sha256"][::-1]
-                    marker.write_text(json.dumps(edited))
+                    record.write_text(json.dumps(edited))
                 else:
                     description = json.loads((source / "dataset.json").read_text())
                     description["plan_hash"] = description["plan_hash"][::-1]

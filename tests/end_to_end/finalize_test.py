@@ -85,7 +85,7 @@ class Finalize(unittest.TestCase):
         self.assertEqual(description["plan_hash"], hashlib.sha256((done / "plan.json").read_bytes()).hexdigest())
         self.assertEqual(description["settings"], json.loads(manifest.read_text()))
         counts = description["counts"]
-        # Picture k has k % 3 cars: 0 + 1 + 2 + 0 + 1 of the five, in two splits.
+        # Image k has k % 3 cars: 0 + 1 + 2 + 0 + 1 of the five, in two splits.
         self.assertEqual(counts["total"]["boxes_by_class"], {"Car": 8})
         self.assertEqual(counts["by_split"]["val"]["samples"], 5)
         self.assertEqual(counts["by_dataset"]["mpii_list"]["persons"], 4)
@@ -160,7 +160,7 @@ class Finalize(unittest.TestCase):
         run("finalize", self.out)
         same_folder(self.out, done)
 
-    def test_a_damaged_marker_and_a_short_shard_are_missing(self):
+    def test_a_damaged_commit_record_and_a_short_shard_are_missing(self):
         out = self.copy()
         first, second = shards_in(out)[:2]
         (out / first).with_suffix(".json").write_text("{")
@@ -263,15 +263,15 @@ class Reading(unittest.TestCase):
 
     def test_the_reader_refuses_shards_that_were_not_described(self):
         name = shards_in(self.out)[0]
-        marker = (self.out / name).with_suffix(".json")
-        for change in (lambda: marker.write_text(marker.read_text().replace('"sha256": "', '"sha256": "0')),
+        record = (self.out / name).with_suffix(".json")
+        for change in (lambda: record.write_text(record.read_text().replace('"sha256": "', '"sha256": "0')),
                        lambda: (self.out / name).write_bytes(b"short"),
                        lambda: (self.out / name).unlink()):
             change()
             with self.assertRaisesRegex(ValueError, name):
                 eventgan_shards.Shards(self.out)
 
-    def test_the_reader_needs_no_markers_once_there_is_a_description(self):
+    def test_the_reader_needs_no_commit_records_once_there_is_a_description(self):
         for name in shards_in(self.out):
             (self.out / name).with_suffix(".json").unlink()
         self.assertEqual(len(eventgan_shards.Shards(self.out)), 14)

@@ -1,10 +1,10 @@
-"""Output folders: what stands in them, and whether two hold the same."""
+"""Output folders: what is in them, and whether two hold the same."""
 
 import hashlib
 import json
 import pathlib
 
-OF_ONE_RUN = ("stage_seconds", "wall_seconds", "peak_bytes")  # the only fields in which two runs' markers differ
+OF_ONE_RUN = ("stage_seconds", "wall_seconds", "peak_bytes")  # the only fields in which two runs' commit records differ
 
 
 def temporaries(folder):
@@ -17,22 +17,22 @@ def shards(folder):
     return sorted(path.name for path in pathlib.Path(folder).glob("*-of-*.h5"))
 
 
-def markers(folder):
-    """The markers by their shard's name."""
+def records(folder):
+    """The commit records by their shard's name."""
     found = pathlib.Path(folder).glob("*-of-*.json")
     return {path.with_suffix(".h5").name: json.loads(path.read_text()) for path in sorted(found)}
 
 
 def content(folder):
-    """Each file by name: a marker as JSON without what differs from run to run, any other as SHA-256 of its bytes."""
+    """Each file by name: a commit record as JSON without what differs from run to run, any other as SHA-256 of its bytes."""
     files = {}
     for path in sorted(pathlib.Path(folder).rglob("*")):
         if path.is_dir():
             continue
         name = str(path.relative_to(folder))
         if path.suffix == ".json" and "-of-" in path.name:
-            marker = json.loads(path.read_text())
-            files[name] = {key: value for key, value in marker.items() if key not in OF_ONE_RUN}
+            record = json.loads(path.read_text())
+            files[name] = {key: value for key, value in record.items() if key not in OF_ONE_RUN}
         else:
             files[name] = hashlib.sha256(path.read_bytes()).hexdigest()
     return files

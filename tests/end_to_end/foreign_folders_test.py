@@ -122,33 +122,33 @@ class ForeignFolders(program.InFolder):
                     self.assertEqual("--overwrite" in line, name != "newer")
             self.assertEqual(snapshot(self.out), before)
 
-    def test_a_marker_that_is_broken_or_newer(self):
-        marker = sorted(self.out.glob("*-of-*.json"))[0]
-        whole = marker.read_text()
+    def test_a_commit_record_that_is_broken_or_newer(self):
+        record = sorted(self.out.glob("*-of-*.json"))[0]
+        whole = record.read_text()
         for name, text in [("newer", None), ("torn", whole[:len(whole) // 2])]:
-            marker.write_text(whole if text is None else text)
+            record.write_text(whole if text is None else text)
             if text is None:
-                set_version(marker)
+                set_version(record)
             for command, code in [("status", 0), ("verify", 1), ("finalize", 1), ("retry", 1)]:
-                with self.subTest(marker=name, command=command):
-                    line = self.reports(marker, command, self.out, code=code)
+                with self.subTest(record=name, command=command):
+                    line = self.reports(record, command, self.out, code=code)
                     self.assertEqual("got 99" in line, name == "newer")
-            self.assertIn(str(marker), self.one_line("export", self.out, *ON_FOLDERS["export"]))
+            self.assertIn(str(record), self.one_line("export", self.out, *ON_FOLDERS["export"]))
 
     def test_a_shard_of_a_newer_format(self):
         shard = sorted(self.out.glob("*-of-*.h5"))[0]
         with h5py.File(shard, "r+") as file:
             file.attrs["format_version"] = file.attrs["format_version"].dtype.type(NEWER)
         data = shard.read_bytes()
-        marker = shard.with_suffix(".json")
-        said = json.loads(marker.read_text())
-        marker.write_text(json.dumps({**said, "size_bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}))
+        record = shard.with_suffix(".json")
+        said = json.loads(record.read_text())
+        record.write_text(json.dumps({**said, "size_bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}))
         for command, rest in ON_SHARDS.items():
             self.assertRegex(self.one_line(command, shard, *rest), r"expected format version 1, got 99")
         for command in ["verify", "finalize"]:
             self.assertIn("expected format version 1, got 99", self.reports(shard, command, self.out, code=1))
 
-    def test_a_shard_that_no_marker_vouches_for(self):
+    def test_a_shard_that_no_commit_record_vouches_for(self):
         shard = self.folder / "alone.h5"
         for name, data in {**DAMAGED, "half": sorted(self.out.glob("*-of-*.h5"))[0].read_bytes()[:3000]}.items():
             shard.write_bytes(data)

@@ -3,7 +3,7 @@
 import json
 
 import program
-from folders import markers
+from folders import records
 from program import run
 from small_job import small_job
 
@@ -26,9 +26,9 @@ class Freeze(program.InFolder):
         self.assertEqual({path: path.read_bytes() for path in files}, files)
         self.assertEqual(frozen["shards"], 5)
         self.assertEqual(len(list(self.out.glob("*.h5"))), 5)
-        committed = markers(self.out).values()
-        self.assertEqual({marker["plan_hash"] for marker in committed}, {frozen["plan_hash"]})
-        self.assertEqual(sum(marker["samples"] for marker in committed), frozen["samples"])
+        committed = records(self.out).values()
+        self.assertEqual({record["plan_hash"] for record in committed}, {frozen["plan_hash"]})
+        self.assertEqual(sum(record["samples"] for record in committed), frozen["samples"])
 
     def test_again_it_is_taken_as_it_is(self):
         first = self.freeze("--json")

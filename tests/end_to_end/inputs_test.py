@@ -13,7 +13,7 @@ import numpy as np
 import failing_files
 import program
 from program import run
-from small_job import LENIENT, save_picture, small_job
+from small_job import LENIENT, save_image, small_job
 
 NOBODY = 65534
 
@@ -52,8 +52,8 @@ def replace(path, how):
 
 class Labels(program.InFolder):
     def quarantined(self, out):
-        return {entry["sample_id"]: entry["reason"] for marker in pathlib.Path(out).glob("small-*.json")
-                for entry in json.loads(marker.read_text())["quarantined"]}
+        return {entry["sample_id"]: entry["reason"] for record in pathlib.Path(out).glob("small-*.json")
+                for entry in json.loads(record.read_text())["quarantined"]}
 
     def test_one_that_cannot_be_read_is_quarantined_and_mended_by_retry(self):
         for how, reason in {"loop": "Too many levels of symbolic links", "fifo": "Not a regular file",
@@ -95,7 +95,7 @@ class Labels(program.InFolder):
         folder = self.folder / "clip"
         shutil.rmtree(folder, ignore_errors=True)
         for k in range(3):
-            save_picture(folder / f"{k}.png", np.random.default_rng(k))
+            save_image(folder / f"{k}.png", np.random.default_rng(k))
         (folder / "1.json").write_text(label)
         source = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
         out = self.folder / "out"
@@ -123,7 +123,7 @@ class Labels(program.InFolder):
 
 
 class Files(program.InFolder):
-    """Those that the command line or the manifest name: a FIFO in their place is told, not waited for."""
+    """Those that the command line or the manifest name: a FIFO in their place is reported, not waited for."""
 
     def refused(self, path, *arguments):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -151,8 +151,8 @@ class Files(program.InFolder):
                      "plan", self.of_source(dataset="human36m", layout="official", root="o"))
         weights = self.write_manifest(program.manifest([{"dataset": "frames", "root": "m", "pairs": program.pairs([1])}],
                                                        generator={"weights": "w.safetensors"}))
-        save_picture(self.folder / "m" / "0.png", np.random.default_rng(0))
-        save_picture(self.folder / "m" / "1.png", np.random.default_rng(1))
+        save_image(self.folder / "m" / "0.png", np.random.default_rng(0))
+        save_image(self.folder / "m" / "1.png", np.random.default_rng(1))
         self.refused(self.folder / "w.safetensors", "plan", weights)
         self.refused(self.folder / "r.hdf5", "realism", self.folder / "r.hdf5", "--with", "difference")
 
@@ -180,7 +180,7 @@ class Names(program.InFolder):
         clip.mkdir(parents=True)
         random = np.random.default_rng(1)
         for number in range(4):
-            save_picture(clip / f"{number:06}.png", random)
+            save_image(clip / f"{number:06}.png", random)
         (clip / "000002.png").write_bytes(b"rubbish")
         (clip / "odd\x1b.txt").write_text("")
         source = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}

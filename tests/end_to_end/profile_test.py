@@ -8,7 +8,7 @@ import shutil
 
 import failing_files
 import program
-from folders import markers, same_folder, shards
+from folders import records, same_folder, shards
 from program import run
 from small_job import LENIENT, broken_cars, small_job
 
@@ -59,7 +59,7 @@ class Profile(program.InFolder):
 
     def test_every_sample_has_each_stage_once(self):
         self.convert(out=self.plain)
-        planned = sorted(marker["samples"] for marker in markers(self.plain).values())
+        planned = sorted(record["samples"] for record in records(self.plain).values())
         for threads in (1, 4):
             shutil.rmtree(self.out, ignore_errors=True)
             trace = self.profiled("--threads", threads)
@@ -121,7 +121,7 @@ class Profile(program.InFolder):
         for stage in STAGES:
             self.assertEqual(len(events(trace, "X", stage)), 1, stage)
         self.assertEqual(len(events(trace, "X", "commit shard")), 1)
-        self.assertFalse(any(marker["quarantined"] for marker in markers(self.out).values()))
+        self.assertFalse(any(record["quarantined"] for record in records(self.out).values()))
 
     def test_of_a_stopped_run_up_to_there(self):
         outcome = failing_files.run(self.out, "SIGTERM write 3", "convert", self.manifest, "--output", self.out, "--threads", "1",

@@ -15,7 +15,7 @@ import numpy as np
 import PIL.Image
 
 import program
-from folders import markers, shards
+from folders import records, shards
 from program import run, text
 from small_job import LENIENT, broken_cars, small_job
 
@@ -23,7 +23,7 @@ CHROMIUM = shutil.which("chromium")
 
 
 class Page(html.parser.HTMLParser):
-    """Numbers by data-key, texts by tag, links and pictures of a page."""
+    """Numbers by data-key, texts by tag, links and images of a page."""
 
     def __init__(self, source):
         super().__init__()
@@ -120,14 +120,14 @@ class Report(program.InFolder):
         for shard in shards(self.out):
             self.assertIn(shard, page.links)
 
-    def test_a_picture_of_it_in_the_browser_shows_light_dark_wide_and_narrow(self):
+    def test_an_image_of_it_in_the_browser_shows_light_dark_wide_and_narrow(self):
         run("report", self.out)
         paper = {}
         for name, options in {"light": [], "dark": ["--blink-settings=preferredColorScheme=0"]}.items():
             for width in (1280, 500):
-                picture = self.folder / f"{name}{width}.png"
-                self.browse(f"--screenshot={picture}", f"--window-size={width},2400", *options)
-                pixels = np.asarray(PIL.Image.open(picture).convert("RGB")).astype(int)
+                image = self.folder / f"{name}{width}.png"
+                self.browse(f"--screenshot={image}", f"--window-size={width},2400", *options)
+                pixels = np.asarray(PIL.Image.open(image).convert("RGB")).astype(int)
                 self.assertEqual(pixels.shape[1], width)
                 paper[name] = pixels[2, 2].mean()
                 self.assertGreater(pixels.std(), 10, "there is something on it")
@@ -142,9 +142,9 @@ class Report(program.InFolder):
             for width, hides in ((2000, True), (100, False)):
                 content = f'<div class=scroll><div style="width:{width}px;height:200px"></div></div>'
                 page.write_text(source[:source.index("<body>")] + "<body>" + content, encoding="utf-8")
-                picture = self.folder / "boxes.png"
-                self.browse(f"--screenshot={picture}", "--window-size=400,300", *options, page=page)
-                row = np.asarray(PIL.Image.open(picture).convert("RGB")).astype(int)[124]
+                image = self.folder / "boxes.png"
+                self.browse(f"--screenshot={image}", "--window-size=400,300", *options, page=page)
+                row = np.asarray(PIL.Image.open(image).convert("RGB")).astype(int)[124]
                 inside = row[15:min(width, 370) + 10]  # of the box, which has a margin of 12 and a border
                 glow = np.abs(inside - inside[0]).max(1) > 20
                 self.assertEqual(glow[-6:].all(), hides, f"{name}, {width} wide")
@@ -236,7 +236,7 @@ class Report(program.InFolder):
         shutil.copytree(self.out, torn)
         for shard in shards(torn):
             data = bytearray((torn / shard).read_bytes())
-            data[:] = bytes(len(data))  # of the marker's size
+            data[:] = bytes(len(data))  # of the commit record's size
             (torn / shard).write_bytes(data)
         planless = self.folder / "planless"
         shutil.copytree(self.out, planless)
@@ -259,7 +259,7 @@ class Report(program.InFolder):
         told, _ = run("preview", self.out, "--out", self.folder / "p", "--class", "Car")
         for line in told.splitlines():
             name, slot = re.fullmatch(r".*/(.*)_(\d{4})\.png", line).groups()
-            self.assertGreater(markers(self.out)[name + ".h5"]["boxes"][int(slot)], 0)
+            self.assertGreater(records(self.out)[name + ".h5"]["boxes"][int(slot)], 0)
         _, err = run("preview", self.out, "--out", self.folder / "p", "--class", "Unicorn", expect=64)
         self.assertIn("Car", err)
         _, err = run("preview", self.out, "--out", self.folder / "p", "--sample", "none", expect=64)

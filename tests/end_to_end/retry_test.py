@@ -9,11 +9,11 @@ import numpy as np
 import PIL.Image
 
 import program
-from folders import content, markers, same_content, temporaries
+from folders import content, records, same_content, temporaries
 from program import run
-from small_job import save_picture, small_job
+from small_job import save_image, small_job
 
-BROKEN_CAR, MALFORMED_CAR, HOLE = "000001", "000002", "000000002"
+BROKEN_CAR, MALFORMED_CAR, MISSING = "000001", "000002", "000000002"
 
 
 class Retry(program.InFolder):
@@ -21,15 +21,15 @@ class Retry(program.InFolder):
         super().setUp()
         self.manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})
         self.out = self.folder / "out"
-        self.picture = self.folder / "cars" / "image_2" / f"{BROKEN_CAR}.png"
+        self.image = self.folder / "cars" / "image_2" / f"{BROKEN_CAR}.png"
         self.label = self.folder / "cars" / "label_2" / f"{MALFORMED_CAR}.txt"
-        frames = self.folder / "people" / "sequences" / HOLE
+        frames = self.folder / "people" / "sequences" / MISSING
         # Pairs of gap 2 and 4 around frame 5 both lose one of their frames.
-        self.spoiled = {self.picture: self.picture.read_bytes(), self.label: self.label.read_bytes()}
+        self.spoiled = {self.image: self.image.read_bytes(), self.label: self.label.read_bytes()}
         for name in ("00000004.jpg", "00000003.jpg"):
             self.spoiled[frames / name] = (frames / name).read_bytes()
             (frames / name).unlink()
-        self.picture.write_bytes(self.picture.read_bytes()[:200])
+        self.image.write_bytes(self.image.read_bytes()[:200])
         self.label.write_bytes(self.label.read_bytes().replace(b"12.50", b"twelve", 1))
         self.convert()
 
@@ -46,16 +46,16 @@ class Retry(program.InFolder):
 
     def quarantined(self):
         """Sample ids by shard."""
-        return {shard: {sample["sample_id"] for sample in marker["quarantined"]}
-                for shard, marker in markers(self.out).items() if marker["quarantined"]}
+        return {shard: {sample["sample_id"] for sample in record["quarantined"]}
+                for shard, record in records(self.out).items() if record["quarantined"]}
 
     def test_mended_samples_are_those_of_a_fresh_conversion(self):
         ids = set().union(*self.quarantined().values())
         self.assertEqual(len(ids), 3)
         self.assertTrue({BROKEN_CAR, MALFORMED_CAR} < ids)
-        self.assertTrue(any(HOLE in sample for sample in ids))
+        self.assertTrue(any(MISSING in sample for sample in ids))
         touched = set(self.quarantined())
-        before = {name: shard(self.out / name) for name in markers(self.out)}
+        before = {name: shard(self.out / name) for name in records(self.out)}
         untouched = {name: (self.out / name).read_bytes() for name in before.keys() - touched}
         plan = (self.out / "plan.json").read_bytes()
         run("verify", self.out, "--deep")
@@ -168,29 +168,29 @@ class Retry(program.InFolder):
 
 
 class ChangedInputs(program.InFolder):
-    """A folder in which nothing is quarantined goes on with inputs that have changed, once `retry` has seen them."""
+    """A folder in which nothing is quarantined resumes with inputs that have changed, once `retry` has seen them."""
 
     def start(self, **settings):
         self.manifest = small_job(self.folder, **settings)
         self.out = self.folder / "out"
-        self.picture = self.folder / "cars" / "image_2" / "000001.png"
-        self.sound = self.picture.read_bytes()
+        self.image = self.folder / "cars" / "image_2" / "000001.png"
+        self.sound = self.image.read_bytes()
 
     def test_policy_fail(self):
         self.start(errors={"policy": "fail"})
-        self.picture.write_bytes(self.sound[:200])
+        self.image.write_bytes(self.sound[:200])
         run("convert", self.manifest, "--output", self.out, expect=65)
         self.goes_on_once_mended()
 
     def test_a_plan_that_was_only_frozen(self):
         self.start()
-        self.picture.write_bytes(self.sound[:200])
+        self.image.write_bytes(self.sound[:200])
         run("plan", self.manifest, "--freeze", "--output", self.out)
         self.goes_on_once_mended()
 
     def test_a_part_of_the_shards(self):
         self.start(errors={"policy": "fail"})
-        self.picture.write_bytes(self.sound[:200])
+        self.image.write_bytes(self.sound[:200])
         run("convert", self.manifest, "--output", self.out, "--shards", "4/5")
         self.goes_on_once_mended()
 
@@ -205,10 +205,10 @@ class ChangedInputs(program.InFolder):
         run("convert", self.manifest, "--output", self.out)
 
     def test_what_changes_the_plan_but_none_of_its_files(self):
-        """A second folder, whose only picture has no partner: counted, and in no pair. A file that is no UTF-8 is noted."""
+        """A second folder, whose only image has no paired frame: counted, and in no pair. A file that is no UTF-8 is noted."""
         random = np.random.default_rng(9)
         for k in range(4):
-            save_picture(self.folder / "clips" / "a" / f"{k:03d}.png", random)
+            save_image(self.folder / "clips" / "a" / f"{k:03d}.png", random)
         foreign = self.folder / "clips" / "a" / "caf\udce9.txt"
         foreign.write_bytes(b"")
         manifest = self.folder / "manifest.json"
@@ -217,7 +217,7 @@ class ChangedInputs(program.InFolder):
         subprocess.run([program.PROGRAM, "convert", manifest, "--output", out], check=True, capture_output=True)
         self.assertIn("1 files left out in clips/a: caf\ufffd.txt", run("status", out)[0])
         foreign.unlink()
-        save_picture(self.folder / "clips" / "b" / "000.png", random)
+        save_image(self.folder / "clips" / "b" / "000.png", random)
         _, err = run("convert", manifest, "--output", out, expect=64)
         self.assertIn("eventgan retry", err)
         self.assertIn("(frames): recorded", run("retry", out)[0])
@@ -226,7 +226,7 @@ class ChangedInputs(program.InFolder):
         run("verify", out, "--deep")
 
     def goes_on_once_mended(self):
-        self.picture.write_bytes(self.sound)
+        self.image.write_bytes(self.sound)
         _, err = run("convert", self.manifest, "--output", self.out, expect=64)
         self.assertIn("eventgan retry", err)
         out, _ = run("retry", self.out)
@@ -238,7 +238,7 @@ class ChangedInputs(program.InFolder):
 
 
 class UnknownSizes(program.InFolder):
-    """Pictures none of which could be read at planning; mended, they are of another size than the others."""
+    """Images none of which could be read at planning; mended, they are of another size than the others."""
 
     def test_they_are_converted_in_the_end(self):
         manifest = small_job(self.folder, errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1},
@@ -271,7 +271,7 @@ class UnknownSizes(program.InFolder):
         run("finalize", out)
         run("verify", out, "--deep")
         sizes = {}
-        for name in markers(out):
+        for name in records(out):
             with h5py.File(out / name) as file:
                 for sample, valid in zip(file["pairs/sample_id"].asstr()[:], file["valid"][:]):
                     self.assertTrue(valid, sample)

@@ -1,6 +1,6 @@
 """The bookkeeping of a million pairs in 4,000 shards: a plan is frozen within a minute and 1.5 GB, status and finalize take seconds.
 
-Only two shards are converted; the others are links to the first, with markers as convert would have written them."""
+Only two shards are converted; the others are links to the first, with commit records as convert would have written them."""
 
 import hashlib
 import json
@@ -27,7 +27,7 @@ GENERATOR = {"kind": "difference"}
 
 
 def grey_png(shade, side=16):
-    """A flat picture, made here so that nothing but Python's own library is needed."""
+    """A flat image, made here so that nothing but Python's own library is needed."""
     def chunk(kind, data):
         return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     rows = (b"\0" + bytes([shade]) * side) * side
@@ -73,7 +73,7 @@ class Scale(program.InFolder):
         self.assertEqual(os.stat(self.out / "plan.json").st_ino, bytes_before.st_ino)
 
         self.convert_first_and_last()
-        missing = self.make_markers()
+        missing = self.make_commit_records()
         self.check_incomplete(missing)
         for path, text in missing.items():
             path.write_text(text)
@@ -107,17 +107,17 @@ class Scale(program.InFolder):
             self.assertLess(done.peak_bytes, FREEZE_LIMIT_BYTES)
         self.assertEqual(len(list(self.out.glob("*.h5"))), 2)
 
-    def make_markers(self):
-        """Links and markers for the other shards; every hundredth has a quarantined sample. Three markers are given back
+    def make_commit_records(self):
+        """Links and commit records for the other shards; every hundredth has a quarantined sample. Three commit records are given back
         instead of written."""
-        marker = json.loads(self.name(0, "json").read_text())
-        self.assertEqual((marker["samples"], marker["valid"]), (SHARD, SHARD))
+        record = json.loads(self.name(0, "json").read_text())
+        self.assertEqual((record["samples"], record["valid"]), (SHARD, SHARD))
         self.quarantined = 0
         kept = {}
         spoiled, sha256 = self.shard_without_a_sample(7)
         for shard in range(1, SHARDS - 1):
             os.link(spoiled if shard % 100 == 0 else self.name(0, "h5"), self.name(shard, "h5"))
-            mine = dict(marker, shard=self.name(shard, "h5").name)
+            mine = dict(record, shard=self.name(shard, "h5").name)
             if shard % 100 == 0:
                 mine["valid"] -= 1
                 mine.update(sha256=sha256, size_bytes=spoiled.stat().st_size)

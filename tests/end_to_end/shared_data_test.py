@@ -105,7 +105,7 @@ class SharedData(program.InFolder):
         np.testing.assert_array_equal(shard["pairs/label_index"][:2], [7, 7])
         poses = shard["labels/poses"]
         self.assertEqual(poses["offsets"][1], 2)  # two people, one of them without joints
-        # Joint 0 stands at (711, 621) counted from 1.
+        # Joint 0 is at (711, 621) counted from 1.
         np.testing.assert_array_equal(poses["joints_source"][0, 0], [710, 620])
         np.testing.assert_array_equal(poses["visible"][0, :4], [1, 1, -1, 0])
         np.testing.assert_array_equal(poses["joints"][1], np.full((16, 2), -1.0))
@@ -169,7 +169,7 @@ class SharedData(program.InFolder):
         self.assertEqual([text(name) for name in poses.attrs["joint_names"]][13], "Neck")
         self.assertEqual(text(shard["pairs/action"][0]), "Directions 1")
 
-    def test_human36m_extracted_and_mpii_lists_have_no_partners(self):
+    def test_human36m_extracted_and_mpii_lists_have_no_paired_frames(self):
         sources = [{"dataset": "human36m", "root": str(SHARED / "human36m_lists"), "layout": "extracted",
                     "annotations": str(SHARED / "human36m_lists" / "test_h36m_body3d.npz"), "pairs": pairs([1])},
                    {"dataset": "mpii_list", "root": str(SHARED / "mpii_lists"),

@@ -1,4 +1,4 @@
-"""What the weights that come with the program promise, through the program: still pictures, real events, direction of motion.
+"""What the weights that come with the program promise, through the program: still images, real events, direction of motion.
 
 With EVENTGAN_CANDIDATE_WEIGHTS=FILE.safetensors these weights are judged in place of the shipped ones.
 """
@@ -12,14 +12,14 @@ import h5py
 import numpy as np
 
 import program
-from moving_picture import write_pictures
+from moving_texture import write_images
 from program import SHARED, SOURCE, pairs, run, text
 
 CANDIDATE = os.environ.get("EVENTGAN_CANDIDATE_WEIGHTS") and os.path.abspath(os.environ["EVENTGAN_CANDIDATE_WEIGHTS"])
 FOLDER = SOURCE / "manifests" / "weights"
 SHIPPED = sorted(FOLDER.glob("eventgan-*.safetensors"))
 
-# Pictures of a moving texture, and of one that rests.
+# Images of a moving texture, and of one that rests.
 HEIGHT, WIDTH = 96, 128
 FRAMES = 7
 SPEED_PX = 1  # a frame
@@ -72,8 +72,8 @@ class ShippedWeights(program.InFolder):
     def test_events_come_with_motion(self):
         steps = range(0, FRAMES * SPEED_PX, SPEED_PX)
         for seed in TEXTURES:
-            write_pictures(self.folder / "pictures" / f"moving_{seed}", steps, HEIGHT, WIDTH, seed)
-            write_pictures(self.folder / "pictures" / f"still_{seed}", [0] * FRAMES, HEIGHT, WIDTH, seed)
+            write_images(self.folder / "pictures" / f"moving_{seed}", steps, HEIGHT, WIDTH, seed)
+            write_images(self.folder / "pictures" / f"still_{seed}", [0] * FRAMES, HEIGHT, WIDTH, seed)
         shard = self.convert_by_default(self.folder / "pictures")
         events = shard["events/volume"][:].sum(axis=1).mean(axis=(1, 2))  # per pixel
         still = np.array(["still" in text(path) for path in shard["pairs/prev_path"]])
@@ -87,7 +87,7 @@ class ShippedWeights(program.InFolder):
 
     @unittest.skipIf(CANDIDATE, "other weights are judged")
     def test_the_plan_tells_which_weights(self):
-        write_pictures(self.folder / "pictures", range(FRAMES), HEIGHT, WIDTH, TEXTURES[0])
+        write_images(self.folder / "pictures", range(FRAMES), HEIGHT, WIDTH, TEXTURES[0])
         shard = self.convert_by_default(self.folder / "pictures")
         hashes = {hashlib.sha256(path.read_bytes()).hexdigest() for path in SHIPPED}
         used = json.loads((self.folder / "out" / "plan.json").read_text())["fingerprint"]["weights"]

@@ -1,4 +1,4 @@
-"""A job that takes a blink: a few tiny pictures with boxes and with persons, made into small shards without a network."""
+"""A job that takes a blink: a few tiny images with boxes and with persons, made into small shards without a network."""
 
 import contextlib
 import json
@@ -9,13 +9,13 @@ import PIL.Image
 
 import program
 
-HEIGHT, WIDTH = 24, 32  # of the pictures and of the volumes
+HEIGHT, WIDTH = 24, 32  # of the images and of the volumes
 JOINTS = 16
 LENIENT = {"policy": "quarantine", "max_count": 99, "max_fraction": 1}  # the manifest's `errors`: anything may be quarantined
 
 
 def small_job(folder, cars=5, people=4, samples_per_shard=2, **changes):
-    """Writes pictures and a manifest below `folder`; the manifest's path.
+    """Writes images and a manifest below `folder`; the manifest's path.
 
     The plan has ceil(cars / samples_per_shard) shards with boxes, then ceil(people / samples_per_shard) with persons:
     five with the values above. `changes` replace the manifest's keys; its output folder is FOLDER/out.
@@ -38,41 +38,41 @@ def small_job(folder, cars=5, people=4, samples_per_shard=2, **changes):
     return path
 
 
-def save_picture(path, random):
+def save_image(path, random):
     path.parent.mkdir(parents=True, exist_ok=True)
     PIL.Image.fromarray(random.integers(0, 256, (HEIGHT, WIDTH), dtype=np.uint8)).save(path)
 
 
 @contextlib.contextmanager
 def broken_cars(folder, numbers):
-    """Cuts the pictures of these cars short for a while."""
-    pictures = [folder / "cars" / "image_2" / f"{k:06d}.png" for k in numbers]
-    whole = [picture.read_bytes() for picture in pictures]
-    for picture, data in zip(pictures, whole):
-        picture.write_bytes(data[:-20])
+    """Cuts the images of these cars short for a while."""
+    images = [folder / "cars" / "image_2" / f"{k:06d}.png" for k in numbers]
+    whole = [image.read_bytes() for image in images]
+    for image, data in zip(images, whole):
+        image.write_bytes(data[:-20])
     yield
-    for picture, data in zip(pictures, whole):
-        picture.write_bytes(data)
+    for image, data in zip(images, whole):
+        image.write_bytes(data)
 
 
 def write_cars(root, count, random):
-    """KITTI's layout: picture k has k % 3 cars."""
+    """KITTI's layout: image k has k % 3 cars."""
     (root / "label_2").mkdir(parents=True)
     for k in range(count):
-        save_picture(root / "image_2" / f"{k:06d}.png", random)
+        save_image(root / "image_2" / f"{k:06d}.png", random)
         for step in (1, 2, 3):
-            save_picture(root / "prev_2" / f"{k:06d}_{step:02d}.png", random)
+            save_image(root / "prev_2" / f"{k:06d}_{step:02d}.png", random)
         cars = [f"Car 0.00 0 0.10 {2 + n}.00 3.00 {12 + n}.50 20.00 1.5 1.6 3.9 1.0 1.5 10.0 0.2\n" for n in range(k % 3)]
         (root / "label_2" / f"{k:06d}.txt").write_text("".join(cars))
 
 
 def write_people(root, count, random):
-    """The pose trainers' JSON list: one person a picture, which is frame 5 of a sequence of 9."""
+    """The pose trainers' JSON list: one person an image, which is frame 5 of a sequence of 9."""
     people = []
     for k in range(count):
         frames = root / "sequences" / f"{k:09d}"
         for frame in range(1, 10):
-            save_picture(frames / f"{frame:08d}.jpg", random)
+            save_image(frames / f"{frame:08d}.jpg", random)
         (root / "images").mkdir(exist_ok=True)
         shutil.copy(frames / "00000005.jpg", root / "images" / f"{k:09d}.jpg")
         people.append({"image": f"{k:09d}.jpg", "center": [16.0, 12.0], "scale": 0.1,

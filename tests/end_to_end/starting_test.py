@@ -15,9 +15,9 @@ import numpy as np
 
 import program
 from camera_files import random_events, write_dhp19, write_mvsec
-from moving_picture import texture
+from moving_texture import texture
 from program import SHARED, SOURCE, run, shard_bytes, text
-from small_job import save_picture, small_job, write_cars, write_people
+from small_job import save_image, small_job, write_cars, write_people
 
 sys.path.insert(0, str(SOURCE / "tests" / "fuzz"))
 from make_corpus import Cdf
@@ -28,14 +28,14 @@ EXAMPLES = SOURCE / "manifests" / "examples"
 def write_video(path, frames, height=48, width=64, frames_per_second=25):
     path.parent.mkdir(parents=True, exist_ok=True)
     video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), frames_per_second, (width, height))
-    picture = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
+    image = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
     for shift in range(frames):
-        video.write(picture[:, shift:shift + width])
+        video.write(image[:, shift:shift + width])
     video.release()
 
 
 def read_commented(path):
-    """A manifest, whose comments stand on lines of their own or after two spaces."""
+    """A manifest, whose comments have lines of their own or after two spaces."""
     return json.loads(re.sub(r"(?m)(^|  )\s*//.*$", "", path.read_text()))
 
 
@@ -88,19 +88,19 @@ class Init(program.InFolder):
         self.assertIn("no pairs can be made yet", told)
         self.assertIn("expected at least 1 pairs", run("plan", manifest, expect=66)[1])
 
-    def test_gaps_without_partner_are_left_out(self):
+    def test_gaps_without_paired_frames_are_left_out(self):
         write_cars(self.folder / "training", 2, np.random.default_rng(7))
-        for picture in (self.folder / "training" / "prev_2").glob("*_02.png"):
-            picture.unlink()
-        for picture in (self.folder / "training" / "prev_2").glob("*_03.png"):
-            picture.unlink()
+        for image in (self.folder / "training" / "prev_2").glob("*_02.png"):
+            image.unlink()
+        for image in (self.folder / "training" / "prev_2").glob("*_03.png"):
+            image.unlink()
         _, manifest = self.init(self.folder)
         self.assertEqual(read_commented(manifest)["sources"][0]["pairs"]["gaps"], [1])
 
     def test_kitti_tracking(self):
         random = np.random.default_rng(7)
         for k in range(4):
-            save_picture(self.folder / "t" / "image_02" / "0000" / f"{k:06d}.png", random)
+            save_image(self.folder / "t" / "image_02" / "0000" / f"{k:06d}.png", random)
         (self.folder / "t" / "label_02").mkdir()
         (self.folder / "t" / "label_02" / "0000.txt").write_text("")
         told, manifest = self.init("kitti_tracking", self.folder / "t")
@@ -126,11 +126,11 @@ class Init(program.InFolder):
         shutil.rmtree(root / "sequences")
         self.assertIn("no sequences", self.init(root)[0])
 
-    def test_pictures_and_videos(self):
+    def test_images_and_videos(self):
         random = np.random.default_rng(7)
         for clip in ["a", "b"]:
             for k in range(4):
-                save_picture(self.folder / "clips" / clip / f"f_{k}.png", random)
+                save_image(self.folder / "clips" / clip / f"f_{k}.png", random)
         write_video(self.folder / "videos" / "one.mp4", 5)
         write_video(self.folder / "videos" / "two.mp4", 4)
         for path, frames, gap_1 in [("clips/a", 4, 3), ("clips", 8, 6), ("videos", 9, 7), ("videos/one.mp4", 5, 4)]:
@@ -182,7 +182,7 @@ class Init(program.InFolder):
         write_cars(self.folder / "kitti" / "training", 2, random)
         for folder in ["walk in the park (2)", "drive/images", "\u0432\u0438\u0434\u0435\u043e"]:
             for k in range(2):
-                save_picture(self.folder / folder / f"{k}.png", random)
+                save_image(self.folder / folder / f"{k}.png", random)
         for path, name in [("a/one.mp4", "one"), ("a/two.mp4", "two"), ("a", "a"), ("kitti/training", "kitti"),
                            ("walk in the park (2)", "walk_in_the_park_2_"), ("drive/images", "drive"),
                            ("\u0432\u0438\u0434\u0435\u043e", "frames")]:
@@ -284,7 +284,7 @@ class Init(program.InFolder):
 
     @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
     def test_real_datasets(self):
-        # By folder: dataset, labelled frames, those with a partner at the first gap that its side has.
+        # By folder: dataset, labelled frames, those with a paired frame at the first gap that its side has.
         expected = {"kitti_object": ("kitti_object", 4, 1), "kitti_raw": ("kitti_raw", 21, 20), "mpii": ("mpii", 2, 1),
                     "human36m_fetch": ("human36m", 18, 16), "davis/slider_depth": ("frames", 3, 2),
                     "clips/01_dog.mp4": ("frames", 289, 288)}
@@ -341,11 +341,11 @@ class Trial(program.InFolder):
         manifest = json.loads(self.manifest.read_text())
         manifest["errors"] = {"max_count": 9, "max_fraction": 1}
         self.manifest.write_text(json.dumps(manifest))
-        picture = self.folder / "cars" / "image_2" / "000001.png"
-        whole = picture.read_bytes()
-        picture.write_bytes(whole[:-20])
+        image = self.folder / "cars" / "image_2" / "000001.png"
+        whole = image.read_bytes()
+        image.write_bytes(whole[:-20])
         self.assertIn("1 quarantined", self.convert("--limit", 4)[0])
-        picture.write_bytes(whole)
+        image.write_bytes(whole)
         out, _ = run("retry", self.folder / "out-trial-4")
         self.assertIn("1 of 1 quarantined sample fixed", out)
         self.assertIn("4 of 4 pairs written, 0 quarantined", self.convert("--limit", 4)[0])
@@ -374,7 +374,7 @@ class Examples(program.InFolder):
         write_video(cls.tree / "clip.mp4", 91)
         random = np.random.default_rng(7)
         for k in range(202):
-            save_picture(cls.tree / "drive" / "image_02" / "data" / f"{k:010d}.png", random)
+            save_image(cls.tree / "drive" / "image_02" / "data" / f"{k:010d}.png", random)
         cls.write_raw()
         write_mvsec(cls.tree / "drive.hdf5", random_events(2000, 0, 1, 7), [0, 0.25, 0.5, 0.75])
         (cls.tree / "drive.csv").write_text("time_s,left,top,right,bottom,class,category\n"
@@ -393,7 +393,7 @@ class Examples(program.InFolder):
 
     @classmethod
     def write_raw(cls):
-        """The demo's street as a drive of KITTI raw: picture n is its frame n + 3, as the pictures before it need."""
+        """The demo's street as a drive of KITTI raw: image n is its frame n + 3, as the images before it need."""
         training = cls.tree / "kitti" / "training"
         drive = cls.tree / "kitti" / "raw" / "2011_09_26" / "2011_09_26_drive_0001_sync" / "image_02" / "data"
         drive.mkdir(parents=True)

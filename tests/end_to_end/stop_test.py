@@ -14,7 +14,7 @@ import time
 
 import failing_files
 import program
-from folders import markers, same_folder, temporaries
+from folders import records, same_folder, temporaries
 from program import run
 from small_job import LENIENT, broken_cars, small_job
 
@@ -48,7 +48,7 @@ class Stop(program.InFolder):
         """Stopped, unless the signal came too late for the last shard; nothing half-done either way, and the next run completes
         the job. How many shards were done by then."""
         out, outcome = self.signalled(rule, *more)
-        done = len(markers(out)) if out.exists() else 0
+        done = len(records(out)) if out.exists() else 0
         self.assertEqual(outcome.code, STOPPED if done < 3 else 0, f"{rule}\n{outcome.err}")
         if out.exists():
             self.assertEqual(temporaries(out), [], rule)
@@ -75,9 +75,9 @@ class Stop(program.InFolder):
             "in a close": self.number_of("truncate", ".h5"),
             "before a shard's fsync": self.number_of("sync", ".h5"),
             "before a shard's rename": self.number_of("rename", ".h5"),
-            "before a marker": self.number_of("create", "-of-00003.json"),
-            "in a marker": self.number_of("write", "-of-00003.json"),
-            "before a marker's rename": self.number_of("rename", "-of-00003.json"),
+            "before a commit record": self.number_of("create", "-of-00003.json"),
+            "in a commit record": self.number_of("write", "-of-00003.json"),
+            "before a commit record's rename": self.number_of("rename", "-of-00003.json"),
             "in the second shard": self.number_of("write", "00001-of-00003.h5", 3),
             "at the very end": len(calls),
         }
@@ -90,12 +90,12 @@ class Stop(program.InFolder):
             with self.subTest(number=number):
                 out = self.folder / f"SIGTERM-open-{number}"
                 shutil.copytree(whole, out)
-                for marker in sorted(out.glob("*-of-*.json"))[2:]:
-                    marker.unlink()
+                for record in sorted(out.glob("*-of-*.json"))[2:]:
+                    record.unlink()
                 _, outcome = self.signalled(f"SIGTERM open {number}")
                 self.assertEqual(outcome.code, STOPPED, outcome.err)
                 self.assertEqual(temporaries(out), [])
-                self.assertEqual(len(markers(out)), 2)
+                self.assertEqual(len(records(out)), 2)
                 self.completes(out)
 
     def test_without_grace_the_open_shard_is_dropped(self):
@@ -113,7 +113,7 @@ class Stop(program.InFolder):
     def test_a_second_interrupt_ends_at_once_and_the_next_run_cleans_up(self):
         out, outcome = self.signalled(f"SIGINT any {self.number_of('write', '.h5', 3)}+", "--grace", "3600")
         self.assertEqual(outcome.code, -signal.SIGINT)
-        self.assertEqual(markers(out), {})
+        self.assertEqual(records(out), {})
         self.assertNotEqual(temporaries(out), [])
         self.completes(out)
 
@@ -125,13 +125,13 @@ class Stop(program.InFolder):
         mended = self.folder / "mended"
         shutil.copytree(broken, mended)
         made = failing_files.changes(failing_files.run(mended, "", "retry", mended, "--threads", "1").calls)
-        self.assertFalse(any(marker["quarantined"] for marker in markers(mended).values()))
+        self.assertFalse(any(record["quarantined"] for record in records(mended).values()))
 
         def stops_and_goes_on(number):
             out = self.folder / f"retry-{number}"
             shutil.copytree(broken, out)
             outcome = failing_files.run(out, f"SIGTERM any {number}", "retry", out, "--threads", "1")
-            left = any(marker["quarantined"] for marker in markers(out).values())
+            left = any(record["quarantined"] for record in records(out).values())
             self.assertEqual(outcome.code, STOPPED if left else 0, outcome.err)
             self.assertEqual(temporaries(out), [])
             run("retry", out)

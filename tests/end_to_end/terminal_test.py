@@ -13,7 +13,7 @@ import termios
 import time
 import unittest
 
-import moving_picture
+import moving_texture
 import program
 
 PAIRS = 24
@@ -29,7 +29,7 @@ def set_columns(terminal, columns):
 
 def on_terminal(*arguments, columns=80, resized=None, typed=(), expect=0, **environment):
     """Everything the program writes to a pseudo-terminal. `resized`: its columns from the first bar on. `typed`: pairs of what has
-    to stand there, as a regular expression, and of what a person types then."""
+    to be there, as a regular expression, and of what a person types then."""
     terminal, other_end = pty.openpty()
     set_columns(terminal, columns)
     process = subprocess.Popen([program.PROGRAM, *map(str, arguments)], stdin=other_end, stdout=other_end, stderr=other_end,
@@ -70,7 +70,7 @@ class Terminal(program.InFolder):
     def setUpClass(cls):
         cls.job = program.pathlib.Path(program.tempfile.mkdtemp(prefix="eventgan-"))
         cls.addClassCleanup(shutil.rmtree, cls.job)
-        moving_picture.write_pictures(cls.job / "frames" / "scene", [4 * index for index in range(PAIRS + 1)], HEIGHT, WIDTH, seed=3)
+        moving_texture.write_images(cls.job / "frames" / "scene", [4 * index for index in range(PAIRS + 1)], HEIGHT, WIDTH, seed=3)
         cls.manifest = cls.job / "manifest.json"
         cls.manifest.write_text(program.json.dumps(program.manifest(
             [{"dataset": "frames", "root": "frames", "pairs": program.pairs([1])}],
@@ -128,18 +128,18 @@ class Terminal(program.InFolder):
         self.assertTrue(err.startswith("error: "), err)
 
         self.convert()
-        marker = sorted((self.folder / "out").glob("*-of-*.json"))[0]
-        marker.write_text("torn")
+        record = sorted((self.folder / "out").glob("*-of-*.json"))[0]
+        record.write_text("torn")
         text = on_terminal("convert", self.manifest, "--output", self.folder / "out")
-        self.assertIn(f"{YELLOW}warning: {PLAIN}{marker}", text)
+        self.assertIn(f"{YELLOW}warning: {PLAIN}{record}", text)
         self.assertEqual(text.count("\x1b[1"), 1)
         for row in bars(text):
             self.assertNotIn("\x1b", row)
 
     def test_a_message_stands_above_the_bar(self):
         self.convert()
-        marker = sorted((self.folder / "out").glob("*-of-*.json"))[0]
-        marker.write_text("torn")
+        record = sorted((self.folder / "out").glob("*-of-*.json"))[0]
+        record.write_text("torn")
         text = on_terminal("convert", self.manifest, "--output", self.folder / "out", NO_COLOR="1")
         self.assertRegex(text, re.escape(WIPE) + r"warning: [^\r\n]*making it again\r\n")
 

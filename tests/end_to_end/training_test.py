@@ -1,4 +1,4 @@
-"""From pictures to simulated recordings, to a trained network, to shards and scores: nothing from outside is needed."""
+"""From images to simulated recordings, to a trained network, to shards and scores: nothing from outside is needed."""
 
 import csv
 import hashlib
@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 
 import program
-from moving_picture import write_pictures
+from moving_texture import write_images
 from program import PROGRAM, manifest, pairs, run
 from safetensors_rules import read_safetensors
 
@@ -66,9 +66,9 @@ def training():
 
 
 def setUpModule():
-    global work, pictures
+    global work, images
     work = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-training-"))
-    pictures = write_pictures(work / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), HEIGHT, WIDTH, seed=1)
+    images = write_images(work / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), HEIGHT, WIDTH, seed=1)
     for index in range(FRAMES):
         (work / "pictures" / f"frame_{index:02d}.json").write_text(json.dumps({"seen": index}))
     (work / "simulation.json").write_text(json.dumps(simulation()))
@@ -81,8 +81,8 @@ def tearDownModule():
     shutil.rmtree(work)
 
 
-def log_intensity(picture):
-    return np.log(picture / 255 + LOG_EPSILON)
+def log_intensity(image):
+    return np.log(image / 255 + LOG_EPSILON)
 
 
 def temporaries(folder):
@@ -90,7 +90,7 @@ def temporaries(folder):
 
 
 class Recordings(program.InFolder):
-    def test_there_is_one_for_each_clip_and_for_each_still_picture(self):
+    def test_there_is_one_for_each_clip_and_for_each_still_image(self):
         self.assertEqual(sorted(path.name for path in (work / "recordings").iterdir()), [f"{name}.hdf5" for name in RECORDINGS])
 
     def test_they_are_in_the_layout_of_mvsec(self):
@@ -112,14 +112,14 @@ class Recordings(program.InFolder):
                 np.testing.assert_array_equal(camera["image_raw_event_inds"][:], np.searchsorted(t, times, side="right") - 1)
                 self.assertEqual(json.loads(program.text(file.attrs["simulation"]))["seed"], 3)
 
-    def test_frames_of_a_clip_are_its_pictures(self):
+    def test_frames_of_a_clip_are_its_images(self):
         for name in ["clip", "difference"]:
             with h5py.File(work / "recordings" / f"{name}.hdf5") as file:
-                np.testing.assert_array_equal(file["davis/left/image_raw"][:], pictures)
+                np.testing.assert_array_equal(file["davis/left/image_raw"][:], images)
 
     def test_events_sum_to_the_change_of_log_intensity(self):
         # Each event moves a pixel's level by a threshold, and the level stays within one of the intensity.
-        change = log_intensity(pictures[-1]) - log_intensity(pictures[0])
+        change = log_intensity(images[-1]) - log_intensity(images[0])
         for name in ["clip", "difference"]:
             with self.subTest(name), h5py.File(work / "recordings" / f"{name}.hdf5") as file:
                 x, y, _, polarity = file["davis/left/events"][:].T
@@ -226,7 +226,7 @@ class Training(program.InFolder):
             self.assertEqual(listed[recording["path"]], hashlib.sha256(content).hexdigest())
 
     def test_the_shortest_example_runs_as_it_is_but_for_its_steps(self):
-        write_pictures(self.folder / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
+        write_images(self.folder / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
         (self.folder / "simulation.json").write_text(json.dumps({
             "format": "eventgan-simulation", "version": 1, "name": "one", "size": {"width": 144, "height": 128}, "output": {"directory": "."},
             "sources": [{"path": "pictures", "name": "recording", "method": "difference", "frames_per_second": FRAMES_PER_SECOND}]}))
@@ -293,7 +293,7 @@ class TrainedWeights(program.InFolder):
 
     def assert_counts_of_the_difference(self, shard, volumes):
         """Each volume's events, positive minus negative, make up the change of log intensity, but for less than one."""
-        logs = log_intensity(pictures)
+        logs = log_intensity(images)
         for volume, first, last in zip(volumes, shard["pairs/prev_index"][:], shard["pairs/next_index"][:]):
             signed = volume[:9].sum(axis=0) - volume[9:].sum(axis=0)
             self.assertLess(np.abs(signed - (logs[last] - logs[first]) / THRESHOLD).max(), 1 + 1e-3)

@@ -12,7 +12,7 @@ import time
 import unittest
 
 import program
-from folders import markers, same_folder, temporaries
+from folders import records, same_folder, temporaries
 from program import run
 from small_job import small_job
 
@@ -28,7 +28,7 @@ def setUpModule():
     alone = folder / "alone"
     finish(start(alone))
     run("verify", alone)
-    assert len(markers(alone)) == SHARDS
+    assert len(records(alone)) == SHARDS
 
 
 def tearDownModule():
@@ -60,7 +60,7 @@ def status(out):
 
 
 def shard_names():
-    return sorted(markers(alone))
+    return sorted(records(alone))
 
 
 class Workers(unittest.TestCase):
@@ -114,9 +114,9 @@ class Workers(unittest.TestCase):
     def test_a_part_beyond_the_plan_is_nothing_to_do(self):
         said, = finish(start(self.out, "--shards", f"{SHARDS}/{SHARDS + 1}"))
         self.assertIn(f"part {SHARDS} of {SHARDS + 1}", said)
-        self.assertEqual(markers(self.out), {})
+        self.assertEqual(records(self.out), {})
         finish(start(self.out, variables={"SLURM_ARRAY_TASK_ID": "4000"}))
-        self.assertEqual(markers(self.out), {})
+        self.assertEqual(records(self.out), {})
         finish(start(self.out, "--shards", "all"))
         self.assert_as_alone()
 
@@ -135,7 +135,7 @@ class Workers(unittest.TestCase):
             with self.subTest(variables):
                 finish(start(self.out, variables=variables))
                 done |= {names[shard] for shard in shards}
-                self.assertEqual(set(markers(self.out)), done)
+                self.assertEqual(set(records(self.out)), done)
         # A batch script is no task of a step, though Slurm gives it a SLURM_PROCID.
         finish(start(self.out, variables={"SLURM_PROCID": "0", "SLURM_NTASKS": "4"}))
         self.assert_as_alone()
@@ -150,7 +150,7 @@ class Workers(unittest.TestCase):
         self.assertFalse(self.out.exists())
 
     def test_a_race_to_freeze_the_plan_has_one_winner(self):
-        # The limits for errors change no shard's samples, but each manifest's text is another one, and stands in the
+        # The limits for errors change no shard's samples, but each manifest's text is another one, and is in the
         # plan.
         jobs = []
         for worker in range(6):
@@ -187,7 +187,7 @@ class Workers(unittest.TestCase):
         sleeper = self.asleep_at_a_shard()
         try:
             finish(start(self.out))
-            self.assertEqual(set(markers(self.out)), set(shard_names()))
+            self.assertEqual(set(records(self.out)), set(shard_names()))
         finally:
             sleeper.send_signal(signal.SIGCONT)
         finish(sleeper)

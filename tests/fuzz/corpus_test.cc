@@ -7,7 +7,7 @@
 #include <span>
 
 #include "stages/base/archives/cdf_matrix.h"
-#include "stages/frames/mpii/mat_json_internal.h"
+#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/safetensors.h"
 #include "tests/fuzz/readers.h"

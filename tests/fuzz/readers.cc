@@ -6,7 +6,7 @@
 
 #include "manifests/values/faults.h"
 #include "stages/base/archives/cdf_matrix.h"
-#include "stages/frames/mpii/mat_json_internal.h"
+#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/safetensors.h"

@@ -1,5 +1,5 @@
 """Which room may include which: every arrow points downward, and no stage knows another but for recordings, on which datasets of
-events stand."""
+events rest."""
 
 import os
 import pathlib
@@ -12,11 +12,11 @@ FLOORS = [
     ["manifests/values"],
     ["manifests/documents"],
     ["stages/base/charts", "stages/base/files", "stages/base/processor", "stages/base/processor_clones.h"],
-    ["stages/base/hdf5", "stages/base/pictures"],
+    ["stages/base/hdf5", "stages/base/images"],
     ["stages/base/archives"],
     ["stages/recordings"],
     ["stages/frames", "stages/labels", "stages/events", "stages/generator", "stages/training",
-     "stages/shards", "stages/scenes", "stages/exports"],
+     "stages/shards", "stages/synthetic", "stages/exports"],
     ["pipeline/runtime"],
     ["pipeline/planning"],
     ["pipeline/folder"],

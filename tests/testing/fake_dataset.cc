@@ -25,10 +25,10 @@ FrameRef FakeDataset::frame(int number) const {
   return {folder_ + name, number, -1, number * 0.1};
 }
 
-Neighbour FakeDataset::neighbour(const LabelledFrame& labelled, int steps) const {
+PairedFrame FakeDataset::paired_frame(const LabelledFrame& labelled, int steps) const {
   const int number = static_cast<int>(labelled.frame.index) + steps;
   if (number < 0 || number >= static_cast<int>(frames_.size())) return {};
-  return {holes_.count(number) ? Neighbour::State::kHole : Neighbour::State::kPresent,
+  return {missing_.count(number) ? PairedFrame::State::kMissing : PairedFrame::State::kPresent,
           frame(number)};
 }
 

@@ -15,7 +15,7 @@ class FakeDataset final : public Dataset {
  public:
   FakeDataset(const std::string& folder, int count);
 
-  void make_hole(int frame) { holes_.insert(frame); }
+  void make_missing(int frame) { missing_.insert(frame); }
   void break_annotation(int frame) { broken_.insert(frame); }
   void set_annotation(int frame, Annotation annotation) {
     annotations_[frame] = std::move(annotation);
@@ -23,7 +23,7 @@ class FakeDataset final : public Dataset {
 
   const LabelSchema& label_schema() const override { return schema_; }
   const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override;
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override;
   Outcome<Annotation> annotation(const std::string& label_key) const override;
   std::string label_place(const std::string& label_key) const override {
     return folder_ + "/" + label_key + ".txt";
@@ -36,7 +36,7 @@ class FakeDataset final : public Dataset {
   std::string folder_;
   LabelSchema schema_;
   std::vector<LabelledFrame> frames_;
-  std::set<int> holes_;
+  std::set<int> missing_;
   std::set<int> broken_;
   std::map<int, Annotation> annotations_;
 };

@@ -23,25 +23,25 @@ KITTI_LEVELS = {"easy": 40, "moderate": 25, "hard": 25}  # least height in sourc
 KITTI_POINTS = 41
 
 
-class Found(NamedTuple):
+class Detections(NamedTuple):
     """Boxes that were found: n rows, the highest score first, equal ones as they were given. Make it by `of`."""
 
-    image: np.ndarray  # int [n], which picture
+    image: np.ndarray  # int [n], which image
     label: np.ndarray  # int [n], which class
     xyxy: np.ndarray  # [n, 4] left, top, right, bottom
     score: np.ndarray  # [n]
 
     @staticmethod
-    def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]], score: Iterable[float]) -> Found:
+    def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]], score: Iterable[float]) -> Detections:
         score = np.asarray(score, float)
         order = np.argsort(-score, kind="stable")
-        return Found(np.asarray(image, int)[order], np.asarray(label, int)[order], np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
+        return Detections(np.asarray(image, int)[order], np.asarray(label, int)[order], np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
 
-    def rows(self, chosen: np.ndarray) -> Found:
-        return Found(*(column[chosen] for column in self))
+    def rows(self, chosen: np.ndarray) -> Detections:
+        return Detections(*(column[chosen] for column in self))
 
 
-class Truth(NamedTuple):
+class GroundTruth(NamedTuple):
     """Boxes that are there: m rows."""
 
     image: np.ndarray  # int [m]
@@ -52,7 +52,7 @@ class Truth(NamedTuple):
 
 
 class Overlaps(NamedTuple):
-    """Pairs of boxes of one picture that overlap."""
+    """Pairs of boxes of one image that overlap."""
 
     first: np.ndarray  # int [k], rows of the first list
     second: np.ndarray  # int [k], rows of the second
@@ -62,13 +62,13 @@ class Overlaps(NamedTuple):
 
 def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray, iou: float = 0.0) -> Overlaps:
     """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], whose IoU is at least `iou`, in order of the first
-    and then the second. Boxes are compared with those alone that lie beside them: of the same picture, their left edges near enough."""
+    and then the second. Boxes are compared with those alone that lie beside them: of the same image, their left edges near enough."""
     lefts, widths = np.sort(other_xyxy[:, 0]), xyxy[:, 2] - xyxy[:, 0]
     widest = (other_xyxy[:, 2] - other_xyxy[:, 0]).max(initial=0)
     reach = np.minimum(widths / iou, widest) if iou else widest  # none that is wider has that IoU
 
     def place(images: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """int: by picture, then by x: where it comes among the left edges."""
+        """int: by image, then by x: where it comes among the left edges."""
         return images * (len(lefts) + 1) + np.searchsorted(lefts, x)
 
     places = place(other_image, other_xyxy[:, 0])
@@ -105,7 +105,7 @@ def rounds(turn: np.ndarray) -> list[np.ndarray]:
     return np.split(order, np.flatnonzero(np.diff(turn[order])) + 1)
 
 
-def strongest(found: Found, iou: float) -> np.ndarray:
+def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
     """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU
     with it is above `iou`."""
     left = np.ones(len(found.score), bool)
@@ -127,9 +127,9 @@ def strongest(found: Found, iou: float) -> np.ndarray:
 
 
 def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: np.ndarray, others: int) -> np.ndarray:
-    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one picture
+    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one image
     one after the other; each takes, of the pairs (first, second) [k] in their order, the first that is `allowed` [k, T] and whose second is
-    still free. Pairs are never of two pictures."""
+    still free. Pairs are never of two images."""
     trials = allowed.shape[1]
     choice, free = np.full((len(turn), trials), -1), np.ones((others, trials), bool)
     order = np.argsort(first, kind="stable")
@@ -145,24 +145,24 @@ def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: n
     return choice
 
 
-def match_as_voc(found: Found, truth: Truth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """int [n], the row of the true box that each found one stands for, -1 for none; bool [n], whether it counts.
+def match_as_voc(found: Detections, truth: GroundTruth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
+    """int [n], the row of the true box that each detection matches, -1 for none; bool [n], whether it counts.
 
-    As PASCAL VOC's development kit: a found box stands for the true one of its class with which its IoU is greatest, if that is at least
-    `iou` and no box of a higher score has it; a second one on the same is wrong. What stands for none and lies with a share of at least
+    As PASCAL VOC's development kit: a detection matches the true box of its class with which its IoU is greatest, if that is at least
+    `iou` and no box of a higher score has it; a second one on the same is wrong. What matches none and lies with a share of at least
     `iou` of its area in a box to be ignored, of its class or of none, does not count.
     """
     pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy, iou)
     same = np.flatnonzero(_same_class(found, truth, pairs))
     same = same[np.lexsort((-pairs.iou[same], pairs.first[same]))]
     best = same[np.flatnonzero(np.diff(pairs.first[same], prepend=-1))]
-    stands_for = np.full(len(found.score), -1)
+    matched_truth = np.full(len(found.score), -1)
     rows, earliest = np.unique(pairs.second[best], return_index=True)
-    stands_for[pairs.first[best[earliest]]] = rows
-    return stands_for, (stands_for >= 0) | (_ignored_share(found, truth) < iou)
+    matched_truth[pairs.first[best[earliest]]] = rows
+    return matched_truth, (matched_truth >= 0) | (_ignored_share(found, truth) < iou)
 
 
-def match_as_coco(found: Found, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
+def match_as_coco(found: Detections, truth: GroundTruth) -> tuple[np.ndarray, np.ndarray]:
     """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the
     highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of
     their class, or of all if they are of none. Beyond the 100 best of a class and sample none counts."""
@@ -177,15 +177,15 @@ def match_as_coco(found: Found, truth: Truth) -> tuple[np.ndarray, np.ndarray]:
     return right, (right | (_ignored_share(found, truth)[:, None] < least)) & (turn < COCO_MOST)[:, None]
 
 
-def _group(found: Found) -> np.ndarray:
+def _group(found: Detections) -> np.ndarray:
     return found.image * (found.label.max(initial=0) + 1) + found.label
 
 
-def _same_class(found: Found, truth: Truth, pairs: Overlaps) -> np.ndarray:
+def _same_class(found: Detections, truth: GroundTruth, pairs: Overlaps) -> np.ndarray:
     return (found.label[pairs.first] == truth.label[pairs.second]) & ~truth.ignore[pairs.second]
 
 
-def _ignored_share(found: Found, truth: Truth) -> np.ndarray:
+def _ignored_share(found: Detections, truth: GroundTruth) -> np.ndarray:
     """[n]: the greatest share of each found box that lies in one box to be ignored, of its class or of none."""
     share = np.zeros(len(found.score))
     ignored = np.flatnonzero(truth.ignore)
@@ -221,7 +221,7 @@ def average_precisions(right: np.ndarray, truths: int) -> dict[str, float]:
             "ap_coco_101": at(np.linspace(0, 1, 101))}
 
 
-def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou: float = 0.5,
+def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str, int], iou: float = 0.5,
                      sure: np.ndarray | None = None) -> dict[str, dict[str, float]]:
     """By the name of each of `classes` (names with labels), and of "all":
 
@@ -262,7 +262,7 @@ def detection_scores(found: Found, truth: Truth, classes: Mapping[str, int], iou
     return {**scores, "all": {**sums(list(classes.values())), **means}}
 
 
-def kitti_average_precision(found: Found, truth: Truth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
+def kitti_average_precision(found: Detections, truth: GroundTruth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
     """KITTI's average precision, of 40 recalls, of class `name` at `level`, as its development kit (evaluate_object.cpp) counts it: IoU
     above 0.7 for cars and 0.5 for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found boxes
     lower than the level's least `height` [n], in source pixels, never count (of whatever class, they may take a true box); those that lie
@@ -313,7 +313,7 @@ def _kitti_thresholds(scores: np.ndarray, truths: int) -> np.ndarray:
     return np.array(thresholds[:KITTI_POINTS])
 
 
-def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> Truth:
+def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> GroundTruth:
     """The boxes of all samples; `image` is the sample's index, `label` the class's number."""
     numbers = {**numbers, DONT_CARE: -1}
     nothing = np.empty(0, int)
@@ -323,7 +323,7 @@ def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> Truth:
         labels = np.array([numbers[name] for name in shards.class_names(i)], int)[boxes["class_id"]]
         unknown = np.full(len(labels), -1)
         parts.append((np.full(len(labels), i), labels, boxes["xyxy"], boxes["ignore"] != 0, boxes.get("difficulty", unknown)))
-    return Truth(*map(np.concatenate, zip(*parts)))
+    return GroundTruth(*map(np.concatenate, zip(*parts)))
 
 
 def ratio(part: float, whole: float) -> float:

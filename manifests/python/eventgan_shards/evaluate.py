@@ -30,12 +30,12 @@ from typing import Any
 
 import numpy as np
 
-from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Found, Truth, curve, detection_scores, kitti_average_precision, match_as_voc,
-                               read_boxes, strongest)
+from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, curve, detection_scores, kitti_average_precision, match_as_voc,
+                               non_maximum_suppression, read_boxes)
 from .pose_scores import Persons, pose_scores, read_persons
 from .shards import PathLike, Shards, open_shard
 
-PICTURES = 12  # samples that are drawn
+IMAGES = 12  # samples that are drawn
 PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall", "recall": "combined recall", "ap_voc": "AP",
                  "f1": "F1"}  # of the EventGAN paper's Table 1
 
@@ -143,7 +143,7 @@ class Samples:
 
 
 def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
-                        iou: float = 0.5) -> tuple[dict[str, Any], Found, Truth]:
+                        iou: float = 0.5) -> tuple[dict[str, Any], Detections, GroundTruth]:
     """What `detections` prints, as a dictionary, with the boxes that it is of.
 
     classes: those to score (None: all that have a box to find or a prediction)
@@ -165,7 +165,7 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
         raise ValueError("expected samples of sources with boxes, got none")
     image = samples.of(entries, predictions)
     boxes[:, 2:] += boxes[:, :2]
-    found = Found.of(image, samples.labels(entries, predictions), boxes, scores)
+    found = Detections.of(image, samples.labels(entries, predictions), boxes, scores)
     found = found.rows((found.image >= 0) & np.append(labelled, False)[found.image])
     truth, sure = read_boxes(shards, numbers), _sure(found, confidence, nms)
     if classes is None:
@@ -180,17 +180,17 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     return ({**result, "kitti": kitti} if kitti else result), found, truth
 
 
-def _sure(found: Found, confidence: float, nms: float) -> np.ndarray:
+def _sure(found: Detections, confidence: float, nms: float) -> np.ndarray:
     """bool [n]: what is left by the confidence, and then by non-maximum suppression."""
     sure = found.score >= confidence
-    sure[sure] = strongest(found.rows(sure), nms)
+    sure[sure] = non_maximum_suppression(found.rows(sure), nms)
     return sure
 
 
-def _of_kitti(shards: Shards, found: Found, truth: Truth, numbers: Mapping[str, int], classes: Sequence[str]) -> dict[str, dict[str, float]]:
+def _of_kitti(shards: Shards, found: Detections, truth: GroundTruth, numbers: Mapping[str, int], classes: Sequence[str]) -> dict[str, dict[str, float]]:
     """KITTI's average precisions by class and level, of the samples of kitti_object."""
     ours = shards.column("dataset") == "kitti_object"
-    found, truth = found.rows(ours[found.image]), Truth(*(column[ours[truth.image]] for column in truth))
+    found, truth = found.rows(ours[found.image]), GroundTruth(*(column[ours[truth.image]] for column in truth))
     height = (found.xyxy[:, 3] - found.xyxy[:, 1]) / shards.column("source_to_volume")[found.image, 1, 1]
     return {name: {level: kitti_average_precision(found, truth, numbers, name, level, height) for level in KITTI_LEVELS}
             for name in classes if name in KITTI_CLASSES and (truth.difficulty[truth.label == numbers[name]] >= 0).any()}
@@ -262,45 +262,45 @@ def pose_tables(result: Mapping[str, Any]) -> str:
                                                           "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
 
 
-def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Found, truth: Truth) -> None:
+def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections, truth: GroundTruth) -> None:
     """Precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue, true green, to be
     ignored red."""
-    from . import pictures  # OpenCV, which nothing else here needs
+    from . import drawing  # OpenCV, which nothing else here needs
 
     names = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
     found = found.rows(np.isin(found.label, list(names)))
     settings = result["settings"]
-    stands_for, counts = match_as_voc(found, truth, settings["iou"])
-    curves = {name: curve(stands_for[counts & (found.label == label)] >= 0, result["classes"][name]["truths"]) for label, name in names.items()}
-    pictures.write(folder, "precision_recall", pictures.of_precision(curves))
+    matched_truth, counts = match_as_voc(found, truth, settings["iou"])
+    curves = {name: curve(matched_truth[counts & (found.label == label)] >= 0, result["classes"][name]["truths"]) for label, name in names.items()}
+    drawing.write(folder, "precision_recall", drawing.of_precision(curves))
     found = found.rows(_sure(found, settings["confidence"], settings["nms"]))
     true = ~truth.ignore & np.isin(truth.label, list(names))
     for i in _some(np.union1d(found.image, truth.image)):
         there, ours = truth.image == i, np.flatnonzero(found.image == i)
-        picture = pictures.of_events(samples.shards.sample(i, {"volume"})["volume"])
-        pictures.draw_boxes(picture, truth.xyxy[there & truth.ignore], pictures.IGNORED)
-        pictures.draw_boxes(picture, truth.xyxy[there & true], pictures.TRUE)
-        pictures.draw_boxes(picture, found.xyxy[ours], pictures.FOUND, [f"{names[found.label[n]]} {found.score[n]:.2f}" for n in ours])
-        pictures.write(folder, samples.shards.column("sample_id")[i], picture)
+        canvas = drawing.of_events(samples.shards.sample(i, {"volume"})["volume"])
+        drawing.draw_boxes(canvas, truth.xyxy[there & truth.ignore], drawing.IGNORED)
+        drawing.draw_boxes(canvas, truth.xyxy[there & true], drawing.TRUE)
+        drawing.draw_boxes(canvas, found.xyxy[ours], drawing.FOUND, [f"{names[found.label[n]]} {found.score[n]:.2f}" for n in ours])
+        drawing.write(folder, samples.shards.column("sample_id")[i], canvas)
 
 
 def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: np.ndarray, persons: Persons) -> None:
     """Some of the samples, evenly spread: joints found blue, true green, annotated and not scored red."""
-    from . import pictures
+    from . import drawing
 
     scored = persons.scored(result["settings"]["hidden"])
     for i in _some(np.unique(persons.place[:, 0])):
-        picture = pictures.of_events(samples.shards.sample(i, {"volume"})["volume"])
+        canvas = drawing.of_events(samples.shards.sample(i, {"volume"})["volume"])
         for row in np.flatnonzero(persons.place[:, 0] == i):
             true = persons.joints[row]
-            pictures.draw_joints(picture, true[persons.annotated[row] & ~scored[row]], pictures.IGNORED)
-            pictures.draw_joints(picture, true[scored[row]], pictures.TRUE)
-            pictures.draw_joints(picture, found[row][scored[row]], pictures.FOUND, true[scored[row]])
-        pictures.write(folder, samples.shards.column("sample_id")[i], picture)
+            drawing.draw_joints(canvas, true[persons.annotated[row] & ~scored[row]], drawing.IGNORED)
+            drawing.draw_joints(canvas, true[scored[row]], drawing.TRUE)
+            drawing.draw_joints(canvas, found[row][scored[row]], drawing.FOUND, true[scored[row]])
+        drawing.write(folder, samples.shards.column("sample_id")[i], canvas)
 
 
 def _some(values: np.ndarray) -> list[int]:
-    return values[np.unique(np.linspace(0, len(values) - 1, min(PICTURES, len(values))).round().astype(int))].tolist()
+    return values[np.unique(np.linspace(0, len(values) - 1, min(IMAGES, len(values))).round().astype(int))].tolist()
 
 
 def _without_nan(value: Any) -> Any:

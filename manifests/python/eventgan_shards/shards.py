@@ -37,9 +37,9 @@ class Shards(Sequence):
 
     paths: a folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
         shards that its dataset.json lists, in the order of the plan: a shard that is gone or another one by now is a
-        ValueError, and so is a name that is no shard's. Of any other folder all shards that are done, so those with a marker, by name. No shard at all is a ValueError.
+        ValueError, and so is a name that is no shard's. Of any other folder all shards that are done, so those with a commit record, by name. No shard at all is a ValueError.
     partial: True takes what is done of a folder that is not whole; without it a shard that dataset.json or plan.json misses,
-        one without marker, and a marker without its shard are a ValueError.
+        one without commit record, and a commit record without its shard are a ValueError.
     split: only the shards of this split ("train"...).
     ids: only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards. The id of
         a frame ("000001") stands for all its samples ("000001@before1"...).
@@ -56,7 +56,7 @@ class Shards(Sequence):
         decoded elsewhere: value = stored number x scale.
     open_files: how many shards stay open at a time (about half a megabyte each).
 
-    The labels of a shard are read once, when they are first needed, and kept. Files are opened anew in every process:
+    The labels of a shard are read once, when they are first needed, and kept. Files are opened again in every process:
     an object can go to workers that are forked or spawned. Slices share the files of what they were cut from: one thread at
     a time for all of them.
     """
@@ -208,8 +208,8 @@ class Shards(Sequence):
 
         return self._gathered(of_shard, self._shard[persons[:, 0]], rows)
 
-    def picture_area(self) -> np.ndarray:
-        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' pictures cover, all together.
+    def image_area(self) -> np.ndarray:
+        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' images cover, all together.
         What is outside is the border that a letterbox adds and never holds events."""
         maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
         if np.isnan(maps).all():
@@ -283,7 +283,7 @@ class Shards(Sequence):
         return self._files[self._place(index)[0]].names("labels/poses", "joint_names")
 
     def joint_places(self, index: int, names: Iterable[str]) -> list[int]:
-        """Where these joints stand among those of sample `index`, found by their names or by those of the 17 joints in common
+        """Where these joints are among those of sample `index`, found by their names or by those of the 17 joints in common
         use (`joint_aliases`); a name that is neither is a ValueError."""
         return self._files[self._place(index)[0]].joint_places(names)
 
@@ -501,14 +501,14 @@ def _first(texts: Iterable[str], most: int = 5) -> str:
     return ", ".join(texts[:most]) + (", ..." if texts[most:] else "")
 
 
-def _marker(path: PathLike) -> pathlib.Path:
+def _record(path: PathLike) -> pathlib.Path:
     return pathlib.Path(path).with_suffix(".json")
 
 
 def _reason(path: pathlib.Path, slot: int) -> str:
     reason = "quarantined"
-    if _marker(path).exists():
-        for sample in json.loads(_marker(path).read_text(encoding="utf-8"))["quarantined"]:
+    if _record(path).exists():
+        for sample in json.loads(_record(path).read_text(encoding="utf-8"))["quarantined"]:
             if sample["slot"] == slot:
                 reason = f"quarantined: {sample['reason']} ({sample['sample_id']})"
     return f"sample {slot} of {path} is {reason}"
@@ -546,15 +546,15 @@ def _listed_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Sha
 
 
 def _expected_shards(folder: pathlib.Path) -> set[str]:
-    """The names of shards that are there, or planned, or have a marker."""
+    """The names of shards that are there, or planned, or have a commit record."""
     names = {path.name for path in folder.glob("*.h5")} - {VIEW}
-    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json") if path.with_suffix(".h5").name not in names and _is_marker(path))
+    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json") if path.with_suffix(".h5").name not in names and _is_commit_record(path))
     if (folder / PLAN).exists():
         names.update(shard["name"] for shard in json.loads((folder / PLAN).read_text(encoding="utf-8"))["shards"])
     return names
 
 
-def _is_marker(path: pathlib.Path) -> bool:
+def _is_commit_record(path: pathlib.Path) -> bool:
     try:
         return path.name != PLAN and json.loads(path.read_text(encoding="utf-8")).get("shard") == path.with_suffix(".h5").name
     except (OSError, ValueError, AttributeError):
@@ -597,14 +597,14 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
 
 
 def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
-    """Whether the shard is the one that was described: by its size, and by its marker if that came along."""
+    """Whether the shard is the one that was described: by its size, and by its commit record if that came along."""
     try:
         if path.stat().st_size != entry["size_bytes"]:
             return False
     except OSError:
         return False
     try:
-        return json.loads(_marker(path).read_text(encoding="utf-8"))["sha256"] == entry["sha256"]
+        return json.loads(_record(path).read_text(encoding="utf-8"))["sha256"] == entry["sha256"]
     except FileNotFoundError:
         return True
     except (OSError, ValueError, KeyError):
@@ -612,9 +612,9 @@ def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
 
 
 def _is_done(path: pathlib.Path) -> bool:
-    """Whether the marker beside the file is a shard's and the file has its size: that is what done means."""
+    """Whether the commit record beside the file is a shard's and the file has its size: that is what done means."""
     try:
-        marker = json.loads(_marker(path).read_text(encoding="utf-8"))
+        record = json.loads(_record(path).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return False
-    return marker.get("shard") == path.name and marker.get("size_bytes") == path.stat().st_size
+    return record.get("shard") == path.name and record.get("size_bytes") == path.stat().st_size

@@ -9,7 +9,7 @@
         ...
 
 A volume is a tensor [2B, H, W], float32: channels 0..B-1 are the positive polarity in time order, B..2B-1 the negative. Points are
-x, y in pixels whose centres are whole numbers; boxes are left, top, right, bottom of edges between pixels, so that a whole picture is
+x, y in pixels whose centres are whole numbers; boxes are left, top, right, bottom of edges between pixels, so that a whole image is
 0, 0, W, H: the edge x is the left edge of pixel x, half a pixel left of its centre, the point x (shard_format.md, Geometry).
 """
 
@@ -43,9 +43,9 @@ class EventAugmentation:
         and so come to the other end of time: only samples whose labels lie half-way (`label_position` 0.5) are reversed.
     reverse_all: True reverses others, too.
     drop: probability of one polarity (either) being lost, as in a sensor with one threshold set high.
-    scale: factors between which the picture is enlarged, uniformly in its logarithm; what lies outside is cut, what is
+    scale: factors between which the image is enlarged, uniformly in its logarithm; what lies outside is cut, what is
         missing is filled with 0, no events.
-    shift: by at most this share of width and height the scaled picture is moved.
+    shift: by at most this share of width and height the scaled image is moved.
     There is no change of values: a volume has no brightness or hue.
     """
 
@@ -64,7 +64,7 @@ class EventAugmentation:
             raise ValueError(f"expected factors above 0, the smaller one first, and a shift of at least 0, got {self.scale}, {self.shift}")
 
     def affine(self, height: int, width: int) -> np.ndarray:
-        """[2, 3]: where a point of the volume goes, drawn anew."""
+        """[2, 3]: where a point of the volume goes, drawn again."""
         flip, size, dx, dy = (float(each) for each in torch.rand(4))
         s = math.exp(math.log(self.scale[0]) + size * math.log(self.scale[1] / self.scale[0]))
         middle = np.array([(width - 1) / 2, (height - 1) / 2])
@@ -128,7 +128,7 @@ def inverse(affine: np.ndarray) -> np.ndarray:
 
 def fitted(area: Sequence[float], size: tuple[int, int]) -> np.ndarray:
     """[2, 3]: the map of points that scales `area` (left, top, right, bottom in volume pixels, edges) to fit into (H, W) and lays it
-    into the middle, both sides by the same factor. Of Shards.picture_area(): what a letterbox has added is left out."""
+    into the middle, both sides by the same factor. Of Shards.image_area(): what a letterbox has added is left out."""
     left, top, right, bottom = area
     height, width = size
     s = min(width / (right - left), height / (bottom - top))
@@ -154,7 +154,7 @@ class DetectionDataset(Dataset):
     volume   [2B, H, W] float32
     boxes    [n, 4] float32, left, top, right, bottom in its pixels, cut to it
     labels   [n] int64, position in `classes`; -1 for DontCare, to be ignored whatever the class
-    ignore   [n] bool: neither to be learnt nor to be scored (annotated so, or less than `visible` of it is left)
+    ignore   [n] bool: neither for training nor for scoring (annotated so, or less than `visible` of it is left)
     id       str, sample_id
     index    int, of the sample in `shards`
 
@@ -212,7 +212,7 @@ def _areas(boxes: np.ndarray) -> np.ndarray:
 
 
 def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, list[str]]:
-    """imgs [N, 2B, H, W] float32; targets [n, 6] float32: number of the picture in the batch, class, and centre x, centre y,
+    """imgs [N, 2B, H, W] float32; targets [n, 6] float32: number of the image in the batch, class, and centre x, centre y,
     width, height as shares of W and H, 0..1; ids. Boxes to be ignored are left out. Volumes must be of one size
     (DetectionDataset's `size`)."""
     imgs = torch.stack([item["volume"] for item in items])
@@ -496,8 +496,8 @@ def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | 
 
 
 def exchange_first_convolution(model: nn.Module, channels: int) -> nn.Module:
-    """Gives the model's first Conv2d (in the order of modules()) `channels` inputs, in place: the layer is initialised anew,
-    all other weights stay, as the EventGAN paper does with networks pretrained on pictures. Returns the model (a model that is that
+    """Gives the model's first Conv2d (in the order of modules()) `channels` inputs, in place: the layer is initialised again,
+    all other weights stay, as the EventGAN paper does with networks pretrained on images. Returns the model (a model that is that
     layer alone: the new one)."""
     for name, layer in model.named_modules():
         if not isinstance(layer, nn.Conv2d):

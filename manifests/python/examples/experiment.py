@@ -5,14 +5,14 @@
     experiment.py pose --program build/release/eventgan --trainer ../shared/trainers/pose_resnet --out poses
     experiment.py trade --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
 
-detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny learns on each, and on the grey frames. The
-detectors of the three kinds of events are tested on the "camera's" events of other streets, as they are and made as bright as those that were learnt,
+detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny is trained on each, and on the grey frames. The
+detectors of the three kinds of events are tested on the "camera's" events of other streets, as they are and made as bright as the training volumes,
 that of the frames on their frames.
-pose: pose_resnet learns on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as they are, without
-those that stand alone, and after its last layer has learnt on the camera's for 1 and for 5 epochs; and one that has learnt on the camera's alone.
+pose: pose_resnet is trained on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as they are, without
+those that stand alone, and after its last layer was trained on the camera's for 1 and for 5 epochs; and one that was trained on the camera's alone.
 trade: as detection, of the network's volumes in several widths, precisions and scopes: what their errors mean to a detector.
 
-The "camera" is the sensor model with noise, before which the scenes move as they do: drawn at 160 pictures a second. The same line again goes on where
+The "camera" is the sensor model with noise, before which the scenes move as they do: drawn at 160 images a second. The same command resumes where
 it was.
 """
 
@@ -43,7 +43,7 @@ TRADE = {
 }
 CAMERA = {"kind": "events"}
 FRAMES_PER_SECOND = 10
-BETWEEN = 15  # moments between two frames that the "camera" sees
+BETWEEN = 15  # intermediate frames between two frames that the "camera" sees
 OTHERS = ("--seed", 1_000_000, "--between", BETWEEN)  # scenes for the "camera"
 SENSOR = {"threshold_spread": 0.03, "refractory_s": 0.0005, "leak_rate_hz": 0.1, "shot_noise_rate_hz": 0.2}  # of the "camera"
 CATEGORIES = {0: {"category": "easy"}, 1: {"category": "hard"}, 2: {"category": "hard"}, -1: {}}  # by difficulty
@@ -104,12 +104,12 @@ def make_scenes(args: argparse.Namespace, name: str, count: int, *more: Any) -> 
     return folder
 
 
-def camera_recordings(args: argparse.Namespace, scenes: pathlib.Path, moments: str, labelled: Shards) -> pathlib.Path:
-    """A recording of each scene by the "camera", which sees each of the pictures in the folder SCENES/MOMENTS/NAME: SCENES/recordings/NAME.hdf5. Its
+def camera_recordings(args: argparse.Namespace, scenes: pathlib.Path, intermediate: str, labelled: Shards) -> pathlib.Path:
+    """A recording of each scene by the "camera", which sees each of the images in the folder SCENES/INTERMEDIATE/NAME: SCENES/recordings/NAME.hdf5. Its
     pixels are those of the volumes of `labelled`."""
     folder = scenes / "recordings"
     sources = [{"path": str(path.relative_to(scenes)), "name": path.name, "method": "difference", "frames_per_second": (BETWEEN + 1) * FRAMES_PER_SECOND}
-               for path in sorted((scenes / moments).iterdir())]
+               for path in sorted((scenes / intermediate).iterdir())]
     path = scenes / "camera.json"
     size = dict(zip(("width", "height"), training.place_of(labelled.labels(0))[2:]))
     path.write_text(json.dumps({"format": "eventgan-simulation", "version": 1, "name": "camera", "seed": 1, "sources": sources, "size": size,
@@ -123,7 +123,7 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
     joint_names = samples.default_joints() if len(samples.persons) else []
     for i in range(len(samples)):
         sample = samples.labels(i)
-        corner = np.array(training.place_of(sample)[:2])  # of the picture in the volume
+        corner = np.array(training.place_of(sample)[:2])  # of the image in the volume
         columns, classes = sample["boxes"], samples.class_names(i)
         difficulty = columns.get("difficulty", np.full(len(columns["xyxy"]), -1))  # KITTI's labels have it
         boxes = [{**dict(zip(("left", "top", "right", "bottom"), box)), "class": classes[class_id],
@@ -143,13 +143,13 @@ def write_labels(samples: Shards, recordings: pathlib.Path) -> None:
 
 
 def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, test: pathlib.Path, seed: int, *options: Any,
-          learnt: pathlib.Path | None = None) -> pathlib.Path:
-    """The folder of a network that has learnt on `data`, for --steps unless `options` have its epochs, with what it finds in `test`; or of the network
-    of the folder `learnt`, which learns nothing more."""
+          trained: pathlib.Path | None = None) -> pathlib.Path:
+    """The folder of a network that was trained on `data`, for --steps unless `options` have its epochs, with what it finds in `test`; or of the network
+    of the folder `trained`, which is not trained further."""
     out = args.out / "runs" / f"{name}-{seed}".replace(",", "").replace(" ", "-")
     if not (out / "predictions.json").exists():
-        if learnt:
-            shutil.copytree(learnt, out, ignore=shutil.ignore_patterns("predictions.json"), dirs_exist_ok=True)
+        if trained:
+            shutil.copytree(trained, out, ignore=shutil.ignore_patterns("predictions.json"), dirs_exist_ok=True)
         limit = () if "--epochs" in options else ("--steps", args.steps)
         run(sys.executable, EXAMPLES / script, "--trainer", args.trainer, "--data", data, "--out", out, "--test", test, "--seed", seed, "--every", 1000,
             *limit, *options)
@@ -158,7 +158,7 @@ def train(args: argparse.Namespace, script: str, name: str, data: pathlib.Path, 
 
 def samples_of(folder: pathlib.Path) -> Samples:
     """Those that `train` tests on."""
-    return Samples(folder, training.checked_split(read_description(folder)), None, None)
+    return Samples(folder, training.validation_split(read_description(folder)), None, None)
 
 
 def pairs_of(dataset: str, splits: Mapping[str, list[int]]) -> list[dict[str, Any]]:
@@ -173,18 +173,18 @@ def parts(splits: list[str]) -> list[dict[str, Any]]:
     return [{"split": split, "fraction": fraction} for split, fraction in zip(splits, fractions)]
 
 
-def camera(args: argparse.Namespace, scenes: pathlib.Path, labelled: pathlib.Path, moments: str, window: Mapping[str, Any], splits: list[str]) -> pathlib.Path:
+def camera(args: argparse.Namespace, scenes: pathlib.Path, labelled: pathlib.Path, intermediate: str, window: Mapping[str, Any], splits: list[str]) -> pathlib.Path:
     """The folder of the "camera's" volumes of the scenes, with the labels of those of the folder `labelled`; or --truth."""
     if args.truth:
         return args.truth
     samples = Shards(labelled)
-    recordings = camera_recordings(args, scenes, moments, samples)
+    recordings = camera_recordings(args, scenes, intermediate, samples)
     write_labels(samples, recordings)
     return convert(args, scenes, "events", [{"dataset": "recording", "root": recordings.name, **window, **part} for part in parts(splits)], CAMERA)
 
 
 def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
-    """The scores of each seed, by what the detectors have learnt on; with `trade` the error of that, too."""
+    """The scores of each seed, by what the detectors were trained on; with `trade` the error of that, too."""
     generators = TRADE if args.what == "trade" else GENERATORS
     scenes, seen = make_scenes(args, "scenes", args.scenes), make_scenes(args, "camera", max(args.scenes // 4, 8), *OTHERS)
     sources = pairs_of("kitti_object", {"train": [1, 2, 3], "val": [1]})
@@ -197,9 +197,9 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
         scale = "--scale", 1.5  # cheaper than its default by half
         tests = {}
         for name, folder in data.items():
-            learnt, row = train(args, "train_yolov3.py", name, folder, real, seed, *scale), f"{name}, as bright"
-            tests[name] = learnt, real
-            tests[row] = train(args, "train_yolov3.py", row, folder, real, seed, *scale, "--as-bright", learnt=learnt), real
+            trained, row = train(args, "train_yolov3.py", name, folder, real, seed, *scale), f"{name}, as bright"
+            tests[name] = trained, real
+            tests[row] = train(args, "train_yolov3.py", row, folder, real, seed, *scale, "--as-bright", trained=trained), real
         if args.what == "detection":
             frames = data["log difference"]  # or any other of the same pairs: --frames leaves the events
             tests["Frame"] = train(args, "train_yolov3.py", "Frame", frames, labelled, seed, *scale, "--frames"), labelled
@@ -210,14 +210,14 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
 
 
 def error_of(folder: pathlib.Path, reference: pathlib.Path) -> float:
-    """Mean of |v - r| / |r| over the volumes to learn, both divided by their 98th percentiles."""
+    """Mean of |v - r| / |r| over the training volumes, both divided by their 98th percentiles."""
     volumes, references = (Shards(each, split="train", fields=["volume"]) for each in (folder, reference))
     pairs = ((volumes[i]["volume"], references[i]["volume"]) for i in range(len(references)))
     return float(np.mean([np.linalg.norm(v - r) / np.linalg.norm(r) for v, r in pairs if r.any()]))
 
 
 def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
-    """The scores of each seed, by what the networks have learnt on."""
+    """The scores of each seed, by what the networks were trained on."""
     scenes, seen = make_scenes(args, "scenes", args.scenes), make_scenes(args, "camera", max(args.scenes // 4, 8), *OTHERS)
     made = convert(args, scenes, "EventGAN", pairs_of("mpii", {"train": [2, 4], "val": [2]}), GENERATORS["EventGAN"])
     labelled = convert(args, seen, "labelled", pairs_of("mpii", {"train": [2]}), {"kind": "difference"})
@@ -225,10 +225,10 @@ def pose(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     of_camera = ("--dataset", next(iter(read_description(real)["counts"]["by_dataset"])))
     scores: dict[str, list[dict[str, float]]] = {}
     for seed in range(args.seeds):
-        learnt, row = train(args, "train_pose.py", "EventGAN", made, real, seed), "EventGAN, without noise"
-        tests = {"EventGAN": (learnt, real), row: (train(args, "train_pose.py", row, made, real, seed, "--without-noise", learnt=learnt), real)}
+        trained, row = train(args, "train_pose.py", "EventGAN", made, real, seed), "EventGAN, without noise"
+        tests = {"EventGAN": (trained, real), row: (train(args, "train_pose.py", row, made, real, seed, "--without-noise", trained=trained), real)}
         for epochs, name in ((1, "1 epoch"), (5, "5 epochs")):
-            tuned = "--pretrained", learnt / "weights.pt", "--last-layer", "--epochs", epochs
+            tuned = "--pretrained", trained / "weights.pt", "--last-layer", "--epochs", epochs
             tests[f"EventGAN, last layer {name}"] = train(args, "train_pose.py", f"tuned-{epochs}", real, real, seed, *tuned, *of_camera), real
         tests["camera"] = train(args, "train_pose.py", "camera", real, real, seed, *of_camera), real
         for name, (out, test) in tests.items():

@@ -12,7 +12,7 @@ import functools
 import numpy as np
 import torch
 import training
-from eventgan_shards import Shards, pictures
+from eventgan_shards import Shards, drawing
 from eventgan_shards.pose_scores import pose_scores, read_persons
 from eventgan_shards.torch import PoseAugmentation, PoseDataset, exchange_first_convolution
 
@@ -50,24 +50,24 @@ def main() -> None:
     from core.loss import JointsMSELoss
     from models.pose_resnet import get_pose_net
 
-    learnt, checked = training.divided(args, with_persons)
+    train_shards, validation_shards = training.divided(args, with_persons)
     size = (args.size, args.size)
-    searched = training.tested(args, learnt, checked, with_persons)
+    searched = training.tested(args, train_shards, validation_shards, with_persons)
     try:
-        learn = PoseDataset(learnt, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
-        check = PoseDataset(checked, size, learn.joint_names, sigma=args.sigma)
-        test = PoseDataset(searched, size, learn.joint_names, sigma=args.sigma)
-        persons = read_persons(checked)
+        train_set = PoseDataset(train_shards, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
+        validation_set = PoseDataset(validation_shards, size, train_set.joint_names, sigma=args.sigma)
+        test = PoseDataset(searched, size, train_set.joint_names, sigma=args.sigma)
+        persons = read_persons(validation_shards)
     except ValueError as error:
         raise SystemExit(str(error))
-    persons = persons.rows(checked.annotated(learn.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
-    check.persons = persons.place
-    if not len(check) or persons.names != learn.joint_names:
-        raise SystemExit(f"expected validation persons with head boxes and the trained joints, got {len(check)} with {len(persons.names)} joints, in "
+    persons = persons.rows(validation_shards.annotated(train_set.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
+    validation_set.persons = persons.place
+    if not len(validation_set) or persons.names != train_set.joint_names:
+        raise SystemExit(f"expected validation persons with head boxes and the trained joints, got {len(validation_set)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")
-    print(f"{len(learn)} persons for training, {len(check)} for validation")
+    print(f"{len(train_set)} persons for training, {len(validation_set)} for validation")
 
-    config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = len(learn.joint_names), list(size), args.layers
+    config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = len(train_set.joint_names), list(size), args.layers
     config.MODEL.EXTRA.NUM_DECONV_FILTERS = [args.filters] * 3
     model = get_pose_net(config, is_train=False)
     model = exchange_first_convolution(model, 18)
@@ -94,28 +94,28 @@ def main() -> None:
         return np.concatenate([find(events, meta) for events, _, _, meta in training.batches(args, dataset)])
 
     def measure() -> dict[str, float]:
-        scores = pose_scores(search(check), persons, hidden=True)["all"]
+        scores = pose_scores(search(validation_set), persons, hidden=True)["all"]
         return {"PCKh@0.5": scores["pckh_mpii"], "MPJPE": scores["mpjpe_source"]}
 
     if args.last_layer:
         model.requires_grad_(False).final_layer.requires_grad_(True)
     optimizer = torch.optim.Adam([weight for weight in model.parameters() if weight.requires_grad], lr=args.lr)
-    training.fit(args, model, optimizer, training.batches(args, learn, learn=True), loss_of, measure, "PCKh@0.5")
+    training.fit(args, model, optimizer, training.batches(args, train_set, shuffle=True), loss_of, measure, "PCKh@0.5")
 
-    def picture_of(i: int) -> tuple[str, np.ndarray]:
-        events, _, _, meta = check[i]
-        picture = pictures.of_events(checked[int(meta["index"])]["volume"])
+    def image_of(i: int) -> tuple[str, np.ndarray]:
+        events, _, _, meta = validation_set[i]
+        canvas = drawing.of_events(validation_shards[int(meta["index"])]["volume"])
         found = find(events[None], {name: meta[name][None] for name in ("center", "scale")})[0]
-        pictures.draw_joints(picture, persons.joints[i][persons.annotated[i]], pictures.TRUE)
-        pictures.draw_joints(picture, found, pictures.FOUND, np.where(persons.annotated[i][:, None], persons.joints[i], np.nan))
-        return f"{meta['image']}_{meta['person']}", picture
+        drawing.draw_joints(canvas, persons.joints[i][persons.annotated[i]], drawing.TRUE)
+        drawing.draw_joints(canvas, found, drawing.FOUND, np.where(persons.annotated[i][:, None], persons.joints[i], np.nan))
+        return f"{meta['image']}_{meta['person']}", canvas
 
     names = searched.column("sample_id")[test.persons[:, 0]]
     with torch.no_grad():
         found = search(test).tolist()
     training.write_predictions(args, ({"image_id": name, "person": person, "joints": joints}
                                       for name, person, joints in zip(names, test.persons[:, 1].tolist(), found)))
-    training.write_pictures(args, len(check), picture_of)
+    training.write_images(args, len(validation_set), image_of)
 
 
 if __name__ == "__main__":

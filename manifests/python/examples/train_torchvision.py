@@ -14,7 +14,7 @@ import numpy as np
 import torch
 import torchvision
 import training
-from eventgan_shards import pictures
+from eventgan_shards import drawing
 from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
 from torch.utils.data import Dataset
 
@@ -51,7 +51,7 @@ def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
 
 def network(task: str, classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
     """The detector for inputs of 18 channels that are of this size already and are not normalised. A volume holds tens of objects, not hundreds
-    as a picture of COCO: fewer regions are looked at."""
+    as an image of COCO: fewer regions are looked at."""
     settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size), "image_mean": [0.0] * 18,
                 "image_std": [1.0] * 18, "box_batch_size_per_image": regions, "rpn_post_nms_top_n_train": 4 * regions,
                 "rpn_post_nms_top_n_test": 2 * regions, "box_detections_per_img": regions // 2}
@@ -62,24 +62,24 @@ def network(task: str, classes: int, joints: int, size: tuple[int, int], regions
 
 def main() -> None:
     args = read_args()
-    learnt, checked = training.divided(args, usable(args.task))
-    area = learnt.picture_area()
+    train_shards, validation_shards = training.divided(args, usable(args.task))
+    area = train_shards.image_area()
     width, height = (32 * int(np.ceil(side * args.scale / 32)) for side in (area[2:] - area[:2]))
     place = {"size": (height, width), "view": fitted(area, (height, width))}
     augmentation = EventAugmentation(scale=(0.8, 1.25), shift=0.1)
     try:
         if args.task == "keypoints":
-            learn = KeypointDataset(learnt, augmentation=augmentation, **place)
-            check = KeypointDataset(checked, learn.joint_names, **place)
+            train_set = KeypointDataset(train_shards, augmentation=augmentation, **place)
+            validation_set = KeypointDataset(validation_shards, train_set.joint_names, **place)
         else:
-            learn = DetectionDataset(learnt, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
-            check = DetectionDataset(checked, learn.classes, **place)
-            test = DetectionDataset(training.tested(args, learnt, checked, usable(args.task)), learn.classes, **place)
+            train_set = DetectionDataset(train_shards, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
+            validation_set = DetectionDataset(validation_shards, train_set.classes, **place)
+            test = DetectionDataset(training.tested(args, train_shards, validation_shards, usable(args.task)), train_set.classes, **place)
     except ValueError as error:
         raise SystemExit(str(error))
-    classes = list(learn.classes)
+    classes = list(train_set.classes)
     print(f"input {width}x{height}, classes " + ", ".join(classes))
-    model = network(args.task, len(classes), len(getattr(learn, "joint_names", ())), (height, width), args.regions)
+    model = network(args.task, len(classes), len(getattr(train_set, "joint_names", ())), (height, width), args.regions)
     model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device)
@@ -101,7 +101,7 @@ def main() -> None:
         return found["boxes"], found["labels"] - 1, found["scores"]
 
     def measure() -> dict[str, float]:
-        pairs = list(search(check))
+        pairs = list(search(validation_set))
         values = training.average_precisions(((item, boxes(found)) for item, found in pairs), classes)
         if args.task == "detection":
             return values
@@ -109,24 +109,24 @@ def main() -> None:
         return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))}
 
     optimizer = torch.optim.AdamW(model.parameters(), lr=args.lr, weight_decay=1e-4)
-    loader = training.batches(args, learn, collate_torchvision, learn=True)
+    loader = training.batches(args, train_set, collate_torchvision, shuffle=True)
     training.fit(args, model, optimizer, loader, loss_of, measure, f"AP50 {classes[0]}")
 
-    def picture_of(i: int) -> tuple[str, np.ndarray]:
-        item = check[i]
+    def image_of(i: int) -> tuple[str, np.ndarray]:
+        item = validation_set[i]
         found = detect([item["volume"]])[0]
         sure = found["scores"] > 0.5
         texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
-        picture = training.draw_item(item, found["boxes"][sure], texts)
-        for source, kept, colour in ((item, ~item["ignore"], pictures.TRUE), (found, sure, pictures.FOUND)):
+        canvas = training.draw_item(item, found["boxes"][sure], texts)
+        for source, kept, colour in ((item, ~item["ignore"], drawing.TRUE), (found, sure, drawing.FOUND)):
             for joints in source["keypoints"][kept].numpy() if "keypoints" in source else ():
-                pictures.draw_joints(picture, joints[joints[:, 2] > 0, :2], colour)
-        return item["id"], picture
+                drawing.draw_joints(canvas, joints[joints[:, 2] > 0, :2], colour)
+        return item["id"], canvas
 
     if args.task == "detection":
         training.write_predictions(args, (entry for item, found in search(test)
                                           for entry in training.box_predictions(item, boxes(found), classes, place["view"])))
-    training.write_pictures(args, len(check), picture_of)
+    training.write_images(args, len(validation_set), image_of)
 
 
 if __name__ == "__main__":

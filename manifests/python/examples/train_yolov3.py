@@ -37,7 +37,7 @@ def collate(items: list) -> tuple:
 
 
 def anchors_of(shards: Shards, classes: list[str], view: np.ndarray, count: int) -> np.ndarray:
-    """[count, 2] widths and heights in input pixels: means of the boxes to learn, by k-means of their logarithms, smallest first."""
+    """[count, 2] widths and heights in input pixels: means of the training boxes, by k-means of their logarithms, smallest first."""
     boxes = [np.empty((0, 4))]
     for i in range(len(shards)):
         rows, names = shards.labels(i)["boxes"], np.array(shards.class_names(i))
@@ -68,16 +68,16 @@ def main() -> None:
     from train import hyp
     from utils.utils import clip_coords, compute_loss, non_max_suppression
 
-    learnt, checked = training.divided(args, with_boxes)
+    train_shards, validation_shards = training.divided(args, with_boxes)
     classes = args.classes.split(",")
-    area = learnt.picture_area()  # what a letterbox has added costs time and shows nothing
+    area = train_shards.image_area()  # what a letterbox has added costs time and shows nothing
     width, height = (32 * int(np.ceil(side * args.scale / 32)) for side in (area[2:] - area[:2]))
     view = fitted(area, (height, width))
     augmentation = EventAugmentation(scale=(0.8, 1.25), shift=0.1)
     try:
-        learn = DetectionDataset(learnt, classes, (height, width), augmentation, view=view)
-        check = DetectionDataset(checked, classes, (height, width), view=view)
-        test = DetectionDataset(training.tested(args, learnt, checked, with_boxes), classes, (height, width), view=view)
+        train_set = DetectionDataset(train_shards, classes, (height, width), augmentation, view=view)
+        validation_set = DetectionDataset(validation_shards, classes, (height, width), view=view)
+        test = DetectionDataset(training.tested(args, train_shards, validation_shards, with_boxes), classes, (height, width), view=view)
     except ValueError as error:
         raise SystemExit(str(error))
 
@@ -85,7 +85,7 @@ def main() -> None:
     if not path.exists():
         raise SystemExit(f"expected a cfg, got none, in {path}")
     cfg = path.read_text()
-    anchors = anchors_of(learnt, classes, view, int(re.search(r"(?m)^num *= *(\d+)", cfg)[1]))
+    anchors = anchors_of(train_shards, classes, view, int(re.search(r"(?m)^num *= *(\d+)", cfg)[1]))
     own = pathlib.Path(args.out, "model.cfg")
     own.write_text(adapted(cfg, len(classes), anchors))
     with torch.no_grad():  # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
@@ -115,22 +115,22 @@ def main() -> None:
             yield from ((item, (each[:, :4], each[:, 5], each[:, 4])) for item, each in zip(items, detect(imgs, 0.001)))
 
     def measure() -> dict[str, float]:
-        return training.average_precisions(search(check), classes)
+        return training.average_precisions(search(validation_set), classes)
 
     groups = {True: [], False: []}
     for name, weight in model.named_parameters():
         groups["Conv2d.weight" in name].append(weight)
     optimizer = torch.optim.AdamW([{"params": groups[True], "weight_decay": 0.01}, {"params": groups[False], "weight_decay": 0}], lr=args.lr)
     print(f"input {width}x{height}, anchors " + ", ".join(f"{w:.0f}x{h:.0f}" for w, h in anchors))
-    training.fit(args, model, optimizer, training.batches(args, learn, collate, learn=True), loss_of, measure, f"AP50 {classes[0]}")
+    training.fit(args, model, optimizer, training.batches(args, train_set, collate, shuffle=True), loss_of, measure, f"AP50 {classes[0]}")
 
-    def picture_of(i: int) -> tuple[str, np.ndarray]:
-        item = check[i]
+    def image_of(i: int) -> tuple[str, np.ndarray]:
+        item = validation_set[i]
         found = detect(item["volume"][None], 0.3)[0]
         return item["id"], training.draw_item(item, found[:, :4], [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
 
     training.write_predictions(args, (entry for item, found in search(test) for entry in training.box_predictions(item, found, classes, view)))
-    training.write_pictures(args, len(check), picture_of)
+    training.write_images(args, len(validation_set), image_of)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""What the examples share: options, which samples are learnt and which are checked, the loop with its checkpoint, pictures."""
+"""What the examples share: options, which samples are for training and which for validation, the loop with its checkpoint, images."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan_shards import Sample, Shards, pictures, read_description  # noqa: E402
-from eventgan_shards.detection_scores import Found, Truth, detection_scores  # noqa: E402
+from eventgan_shards import Sample, Shards, drawing, read_description  # noqa: E402
+from eventgan_shards.detection_scores import Detections, GroundTruth, detection_scores  # noqa: E402
 from eventgan_shards.torch import inverse, move_boxes  # noqa: E402
 
-CHECKED_SPLITS = ("validation", "valid", "val", "test")
+VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
 MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every", "test", "as_bright",
               "without_noise"}  # when a run goes on
@@ -110,20 +110,20 @@ class _NoWriter:
         return lambda *_, **__: None
 
 
-def checked_split(description: dict[str, Any]) -> str | None:
-    """The folder's split for checking, of its dataset.json; None if it has none."""
-    return next((name for name in CHECKED_SPLITS if name in description["counts"]["by_split"]), None)
+def validation_split(description: dict[str, Any]) -> str | None:
+    """The folder's validation split, of its dataset.json; None if it has none."""
+    return next((name for name in VALIDATION_SPLITS if name in description["counts"]["by_split"]), None)
 
 
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
-    """The samples to learn and those to check, of which `usable` gives the positions of those with labels: by the folder's
+    """The training samples and the validation samples, of which `usable` gives the positions of those with labels: by the folder's
     splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no labelled frame."""
     where = {"dataset": args.dataset} if args.dataset else None
     try:
         description = read_description(args.data)
-        checked = checked_split(description)
-        if checked and "train" in description["counts"]["by_split"] and not args.overfit:
-            parts, how = [Shards(args.data, split=split, where=where, partial=True) for split in ("train", checked)], f"of split {checked}"
+        validation = validation_split(description)
+        if validation and "train" in description["counts"]["by_split"] and not args.overfit:
+            parts, how = [Shards(args.data, split=split, where=where, partial=True) for split in ("train", validation)], f"of split {validation}"
             parts = [part[list(usable(part))] for part in parts]
         else:
             shards = Shards(args.data, where=where, partial=True)
@@ -142,29 +142,29 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     if description["quarantined"]:
         print(f"{len(description['quarantined'])} quarantined samples are left out")
     print(f"{len(parts[0])} samples for training, {len(parts[1])} for validation, {how}")
-    learnt, checked = (part.changed(labelled_frame) if args.frames else part for part in parts)
-    return learnt, checked
+    train_shards, validation_shards = (part.changed(labelled_frame) if args.frames else part for part in parts)
+    return train_shards, validation_shards
 
 
-def tested(args: argparse.Namespace, learnt: Shards, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
+def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
     """The samples that predictions.json is of, changed as the options say."""
-    shards = _to_test(args, checked, usable)
+    shards = _to_test(args, validation_shards, usable)
     if args.without_noise:
         shards = shards.changed(without_noise)
     if args.as_bright:
-        factor = _mean(learnt) / _mean(shards)
+        factor = _mean(train_shards) / _mean(shards)
         print(f"the volumes of {args.test or args.data} are scaled by {factor:.2f}, to the brightness of those of {args.data}")
         shards = shards.changed(functools.partial(_brighter, factor=factor))
     return shards
 
 
-def _to_test(args: argparse.Namespace, checked: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
+def _to_test(args: argparse.Namespace, validation_shards: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
     if not args.test:
-        return checked
+        return validation_shards
     try:
         description = read_description(args.test)
         where = {"dataset": args.dataset} if args.dataset in description["counts"]["by_dataset"] else None
-        shards = Shards(args.test, split=checked_split(description), where=where, partial=True)
+        shards = Shards(args.test, split=validation_split(description), where=where, partial=True)
         shards = shards[list(usable(shards))]
     except (OSError, ValueError) as error:
         sys.exit(str(error))
@@ -187,20 +187,20 @@ def without_noise(sample: Sample) -> np.ndarray:
 
 
 def place_of(sample: Sample) -> tuple[int, int, int, int]:
-    """Where the picture lies in the volume, in whole pixels: left, top, width, height."""
+    """Where the image lies in the volume, in whole pixels: left, top, width, height."""
     (scale_x, _, x), (_, scale_y, y) = sample["pair"]["source_to_volume"]
     height, width = sample["pair"]["source_size"]
     return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
 
 
 def labelled_frame(sample: Sample) -> np.ndarray:
-    """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel. It must be a picture at the pair's end."""
+    """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel. It must be an image at the pair's end."""
     pair, volume = sample["pair"], np.zeros_like(sample["volume"])
-    picture = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
-    if picture is None:
-        raise ValueError(f"expected a picture, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
+    image = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
+    if canvas is None:
+        raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
     left, top, width, height = place_of(sample)
-    volume[0, top:top + height, left:left + width] = cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA) / 255
+    volume[0, top:top + height, left:left + width] = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA) / 255
     return volume
 
 
@@ -211,8 +211,8 @@ def _divides(shards: Shards, by: str) -> bool:
         return False
 
 
-def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None, learn: bool = False) -> DataLoader:
-    return DataLoader(dataset, args.batch, shuffle=learn, num_workers=args.workers, collate_fn=collate, persistent_workers=args.workers > 0)
+def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None, shuffle: bool = False) -> DataLoader:
+    return DataLoader(dataset, args.batch, shuffle=shuffle, num_workers=args.workers, collate_fn=collate, persistent_workers=args.workers > 0)
 
 
 def load_fitting(model: nn.Module, path: str | None) -> None:
@@ -320,7 +320,7 @@ def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Ten
         found.append((np.full(len(boxes), image), labels, boxes, scores))
         there, labels, ignore = (item[name].numpy() for name in ("boxes", "labels", "ignore"))
         truth.append((np.full(len(there), image), labels, there, ignore, np.full(len(there), -1)))
-    found, truth = Found.of(*map(np.concatenate, zip(*found))), Truth(*map(np.concatenate, zip(*truth)))
+    found, truth = Detections.of(*map(np.concatenate, zip(*found))), GroundTruth(*map(np.concatenate, zip(*truth)))
     scores = detection_scores(found, truth, {name: i for i, name in enumerate(classes)})
     return {f"AP50 {name}": scores[name]["ap_voc"] for name in classes}
 
@@ -343,15 +343,15 @@ def write_predictions(args: argparse.Namespace, entries: Iterable[dict]) -> None
 
 def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarray:
     """The item's volume with its boxes, and those that were found [n, 4] with their texts."""
-    picture = pictures.of_events(item["volume"].numpy())
-    pictures.draw_boxes(picture, item["boxes"][item["ignore"]], pictures.IGNORED)
-    pictures.draw_boxes(picture, item["boxes"][~item["ignore"]], pictures.TRUE)
-    pictures.draw_boxes(picture, found, pictures.FOUND, texts)
-    return picture
+    canvas = drawing.of_events(item["volume"].numpy())
+    drawing.draw_boxes(canvas, item["boxes"][item["ignore"]], drawing.IGNORED)
+    drawing.draw_boxes(canvas, item["boxes"][~item["ignore"]], drawing.TRUE)
+    drawing.draw_boxes(canvas, found, drawing.FOUND, texts)
+    return canvas
 
 
-def write_pictures(args: argparse.Namespace, count: int, picture_of: Callable[[int], tuple[str, np.ndarray]]) -> None:
-    """picture_of(i) for some of `count` items, evenly spread: a name, and what to write under it."""
+def write_images(args: argparse.Namespace, count: int, image_of: Callable[[int], tuple[str, np.ndarray]]) -> None:
+    """image_of(i) for some of `count` items, evenly spread: a name, and what to write under it."""
     with torch.no_grad():
         for i in np.unique(np.linspace(0, count - 1, args.pictures).round().astype(int)).tolist() if args.pictures else ():
-            pictures.write(pathlib.Path(args.out, "pictures"), *picture_of(i))
+            drawing.write(pathlib.Path(args.out, "pictures"), *image_of(i))

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "stages/base/files/input_file.h"
-#include "stages/base/hdf5/hdf5_internal.h"
+#include "stages/base/hdf5/detail/hdf5.h"
 
 namespace eventgan {
 namespace {

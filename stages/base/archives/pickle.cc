@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "stages/base/archives/pickle_machine_internal.h"
+#include "stages/base/archives/detail/pickle_machine.h"
 
 namespace eventgan {
 

@@ -13,7 +13,7 @@
 namespace eventgan {
 
 /// One value of a pickle, as data. Nothing is imported, called or executed: what the pickle wants
-/// called stands here as a kCall for the reader to interpret.
+/// called is here as a kCall for the reader to interpret.
 struct PickleNode {
   enum class Kind {
     kNone,
@@ -36,7 +36,7 @@ struct PickleNode {
   std::string text;          ///< kString (UTF-8), kBytes, kLong, kGlobal
   /// List, tuple; dictionary as key, value, key, value, ...; call, persistent id as above. A kCall
   /// that builds a container (OrderedDict) gets the items set on it afterwards in `assigned`, as
-  /// key, value, ... A key may stand there twice; the last one counts.
+  /// key, value, ... A key may be there twice; the last one counts.
   std::vector<const PickleNode*> items;
   std::vector<const PickleNode*> assigned;
   const PickleNode* state = nullptr;  ///< what the BUILD opcode gave the object, if anything

@@ -1,3 +1,5 @@
+#include "stages/base/archives/detail/pickle_cursor.h"
+
 #include <utf8.h>
 
 #include <bit>
@@ -5,8 +7,6 @@
 #include <stdexcept>
 #include <system_error>
 #include <utility>
-
-#include "stages/base/archives/pickle_cursor_internal.h"
 
 namespace eventgan {
 

@@ -1,11 +1,12 @@
+#include "stages/base/archives/detail/pickle_machine.h"
+
 #include <fmt/format.h>
 #include <utf8.h>
 
 #include <algorithm>
 #include <utility>
 
-#include "stages/base/archives/pickle_cursor_internal.h"
-#include "stages/base/archives/pickle_machine_internal.h"
+#include "stages/base/archives/detail/pickle_cursor.h"
 
 // What each opcode does, in groups; a group says false to an opcode that is not its own.
 

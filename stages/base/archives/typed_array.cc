@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "stages/base/archives/typed_array_internal.h"
+#include "stages/base/archives/detail/typed_array.h"
 
 namespace eventgan {
 

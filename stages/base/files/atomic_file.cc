@@ -70,7 +70,7 @@ std::string unsaid_reason(const fs::path& file) {
 fs::path temporary_beside(const fs::path& target) {
   static std::atomic<unsigned> next_attempt{0};
   fs::path temporary;
-  do {  // a dead process with this one's pid, in a container that was started anew, can have left
+  do {  // a dead process with this one's pid, in a container that was started again, can have left
         // its file
     temporary = folder_of(target) / to_string(TemporaryName{target.filename().string(), host_name(),
                                                             ::getpid(), next_attempt++});

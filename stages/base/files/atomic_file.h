@@ -78,7 +78,7 @@ void write_file_atomically(const std::filesystem::path& target, std::string_view
 /// Takes a file's text piece by piece; pieces should be large.
 using TextSink = std::function<void(std::string_view)>;
 
-/// Writes a text that need not stand in memory, but only if `target` does not exist; false (and
+/// Writes a text that need not be in memory, but only if `target` does not exist; false (and
 /// nothing changed) if it does. Of two processes that race, one wins. `write` is called with the
 /// sink to give the text to, unless `target` exists already. What it throws is passed on, and
 /// nothing has changed.

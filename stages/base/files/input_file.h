@@ -33,7 +33,7 @@ void require_regular_file(const std::filesystem::path& file);
 /// file cannot be opened: who reads it will say why. Thread safe.
 void load_ahead(const std::filesystem::path& file);
 
-/// The whole file as it stands; none if it cannot be read, and then `reason` says why. Thread safe.
+/// The whole file as it is; none if it cannot be read, and then `reason` says why. Thread safe.
 std::optional<std::string> try_read_file(const std::filesystem::path& file, std::string& reason);
 
 /// The same. Throws std::runtime_error naming the path if there is none, it is no

@@ -61,7 +61,7 @@ inline constexpr double kSilenceOfTheDead_s = 3600;
 
 /// The temporaries in `folder` (not below it), sorted by path. One with this process's own number
 /// that was last written before this process began is another's, dead: the first process of a
-/// container that is started anew has the same number each time. Throws std::runtime_error naming
+/// container that is started again has the same number each time. Throws std::runtime_error naming
 /// the folder if it cannot be listed. Thread safe.
 std::vector<UnfinishedFile> unfinished_files(const std::filesystem::path& folder);
 

@@ -1,3 +1,5 @@
+#include "stages/base/hdf5/detail/hdf5.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -5,8 +7,6 @@
 #include <functional>
 #include <mutex>
 #include <numeric>
-
-#include "stages/base/hdf5/hdf5_internal.h"
 
 namespace eventgan {
 namespace {

@@ -1,3 +1,5 @@
+#include "stages/base/hdf5/detail/hdf5_output_file.h"
+
 #include <fcntl.h>
 #include <unistd.h>
 
@@ -6,8 +8,6 @@
 #include <cstring>
 #include <limits>
 #include <string>
-
-#include "stages/base/hdf5/hdf5_output_file_internal.h"
 
 namespace eventgan {
 namespace {

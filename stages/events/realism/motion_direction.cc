@@ -8,13 +8,13 @@
 #include <string>
 #include <vector>
 
-#include "stages/events/realism/motion_direction_internal.h"
+#include "stages/events/realism/detail/motion_direction.h"
 #include "stages/events/volume_statistics.h"
 
 namespace eventgan {
 namespace {
 
-/// A picture's value beside (x, y), if there is a pixel with events.
+/// An image's value beside (x, y), if there is a pixel with events.
 std::optional<double> event_time(const cv::Mat1d& time, const cv::Mat1b& event, int y, int x) {
   if (y < 0 || x < 0 || y >= event.rows || x >= event.cols || event(y, x) == 0) return {};
   return time(y, x);
@@ -87,7 +87,7 @@ void check_arguments(std::span<const float> volume, const VolumeShape& shape,
   }
 }
 
-/// Sums over the window around each pixel, as far as it lies in the picture.
+/// Sums over the window around each pixel, as far as it lies in the image.
 cv::Mat1d window_sums(const cv::Mat& values, int window) {
   cv::Mat1d sums;
   cv::boxFilter(values, sums, CV_64F, {window, window}, {-1, -1}, /*normalize=*/false,

@@ -7,12 +7,12 @@
 
 namespace eventgan {
 
-/// Whether a volume shows the true direction of motion. The average-timestamp picture T (both
+/// Whether a volume shows the true direction of motion. The average-timestamp image T (both
 /// polarities together) rises in the direction of motion; the flow v with ∇T · v = 1 fitted by
 /// least squares over a window around the pixel, where events lie, is compared with the true flow.
 ///
 /// Each slope has the weight 1/|∇T|: steep ones are mostly steps from the time of one contour to
-/// that of another, flat ones mostly noise, and this stands between the fit in time (weight 1) and
+/// that of another, flat ones mostly noise, and this is between the fit in time (weight 1) and
 /// that in distance (1/|∇T|²).
 struct DirectionScore {
   std::int64_t pixels = 0;  ///< event pixels whose true flow is ≥ min_flow_px and whose window

@@ -148,7 +148,7 @@ std::vector<float> without_polarity(const std::vector<float>& sums) {
   return both;
 }
 
-/// The average-timestamp pictures side by side, [polarity, y, x]; 0 where there is no event. T does
+/// The average-timestamp images side by side, [polarity, y, x]; 0 where there is no event. T does
 /// not fade with the volume: without the threshold, traces far below an event would count as fully
 /// as events do.
 std::vector<double> event_times(const SummedVolume& volume, const VolumeShape& shape) {

@@ -23,7 +23,7 @@ struct RealismScores {
   double f1_time_polarity = 0;  ///< summed over time and polarity
   double pool_mse_2 = 0;        ///< mean squared difference after 2x2 mean pooling in y and x
   double pool_mse_4 = 0;  ///< after 4x4; an incomplete border block is the mean of what it has
-  double time_correlation = 0;  ///< Pearson, of the average-timestamp pictures (both polarities
+  double time_correlation = 0;  ///< Pearson, of the average-timestamp images (both polarities
                                 ///< side by side) over all pixels; T is 0 where there is no event,
                                 ///< a sum over time of at most 0.01. (Over the pixels with events
                                 ///< alone an empty or a random volume would do better than one that
@@ -65,9 +65,9 @@ struct Bounds {
 };
 
 /// How sure `statistic` of `pairs` pairs is: the percentile bootstrap (Efron 1979). The pairs are
-/// drawn anew a thousand times, as many as there are, with repetition; `statistic` gets the indices
-/// of a draw; the bounds are the middle 95 % of what it gives, NaN left out. Not told for fewer
-/// than three pairs. Always the same draws, so that methods are compared on the same ones.
+/// drawn again a thousand times, as many as there are, with repetition; `statistic` gets the
+/// indices of a draw; the bounds are the middle 95 % of what it gives, NaN left out. Not told for
+/// fewer than three pairs. Always the same draws, so that methods are compared on the same ones.
 /// Neighbouring pairs of a recording are alike, so the truth is less sure than this.
 Bounds bootstrap_bounds(std::size_t pairs,
                         const std::function<double(std::span<const std::size_t>)>& statistic);

@@ -18,7 +18,7 @@ namespace {
 
 using Corners = std::array<cv::Vec2d, 4>;
 
-/// The corner pixels' centres as seen from the picture's centre.
+/// The corner pixels' centres as seen from the image's centre.
 Corners corners_about_centre(ImageSize size) {
   const double x = 0.5 * (size.width - 1);
   const double y = 0.5 * (size.height - 1);
@@ -72,7 +72,7 @@ AffineMotion random_affine_motion(ImageSize size, double displacement_px, Counte
     linear = linear * (displacement_px * random.uniform(0) / largest);
     linear = linear * (0.5 / std::max(0.5, cv::norm(linear)));
   } else {
-    linear = cv::Matx22d::zeros();  // a picture of one pixel has no linear motion
+    linear = cv::Matx22d::zeros();  // an image of one pixel has no linear motion
   }
   const double angle = 2 * std::numbers::pi * random.uniform(1);
   const cv::Vec2d direction(std::cos(angle), std::sin(angle));
@@ -93,9 +93,9 @@ double largest_displacement(const AffineMotion& motion, ImageSize size) {
                    cv::norm(displacement_at(motion, right, bottom))});
 }
 
-std::vector<float> render_affine(const GreyImage& picture, const AffineMotion& motion, double u) {
-  std::vector<float> still = linear_intensity(picture);
-  const cv::Mat source(picture.size.height, picture.size.width, CV_32FC1, still.data());
+std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u) {
+  std::vector<float> still = linear_intensity(image);
+  const cv::Mat source(image.size.height, image.size.width, CV_32FC1, still.data());
   std::vector<float> intensity(still.size());
   cv::Mat target(source.size(), source.type(), intensity.data());
   const auto& m = motion.matrix;
@@ -110,26 +110,26 @@ std::vector<float> render_affine(const GreyImage& picture, const AffineMotion& m
   return intensity;
 }
 
-AffineInterval::AffineInterval(GreyImage picture, const AffineMotion& motion)
-    : picture_(std::move(picture)), motion_(motion) {}
+AffineInterval::AffineInterval(GreyImage image, const AffineMotion& motion)
+    : image_(std::move(image)), motion_(motion) {}
 
 int AffineInterval::steps() const {
   // A drawn displacement of 6 px that rounds to just above 6 is 6 steps, not 7.
   constexpr double kRoundingPx = 1e-9;
   return std::max(
-      1, static_cast<int>(std::ceil(largest_displacement(motion_, picture_.size) - kRoundingPx)));
+      1, static_cast<int>(std::ceil(largest_displacement(motion_, image_.size) - kRoundingPx)));
 }
 
 std::vector<float> AffineInterval::render(int step) const {
-  return render_affine(picture_, motion_, static_cast<double>(step) / steps());
+  return render_affine(image_, motion_, static_cast<double>(step) / steps());
 }
 
 FlowDisplacement AffineInterval::flow() const {
-  FlowDisplacement flow{.size = picture_.size, .x_px = {}, .y_px = {}};
-  flow.x_px.reserve(picture_.size.pixel_count());
-  flow.y_px.reserve(picture_.size.pixel_count());
-  for (int y = 0; y < picture_.size.height; ++y) {
-    for (int x = 0; x < picture_.size.width; ++x) {
+  FlowDisplacement flow{.size = image_.size, .x_px = {}, .y_px = {}};
+  flow.x_px.reserve(image_.size.pixel_count());
+  flow.y_px.reserve(image_.size.pixel_count());
+  for (int y = 0; y < image_.size.height; ++y) {
+    for (int x = 0; x < image_.size.width; ++x) {
       const cv::Vec2d displacement = displacement_at(motion_, x, y);
       flow.x_px.push_back(static_cast<float>(displacement[0]));
       flow.y_px.push_back(static_cast<float>(displacement[1]));

@@ -9,44 +9,44 @@
 
 namespace eventgan {
 
-/// A random affine motion of a flat picture, as the EventGAN paper uses ESIM: every point moves
+/// A random affine motion of a flat image, as the EventGAN paper uses ESIM: every point moves
 /// steadily on a straight line from its place at u = 0 to where the matrix takes it at u = 1:
-///   x(u) = A(u) x,  A(u) = I + u (A₁ - I);  points outside the picture are mirrored (reflect-101).
+///   x(u) = A(u) x,  A(u) = I + u (A₁ - I);  points outside the image are mirrored (reflect-101).
 struct AffineMotion {
   /// A₁, row-major 2x3, previous → next, pixel centres integers:
   /// x' = m0 x + m1 y + m2, y' = m3 x + m4 y + m5.
   std::array<double, 6> matrix = {1, 0, 0, 0, 1, 0};
 };
 
-/// Draws a motion whose largest displacement over the picture is `displacement_px`: rotation, zoom,
-/// stretch and shear about the picture's centre, which take a uniformly drawn share of it, and a
+/// Draws a motion whose largest displacement over the image is `displacement_px`: rotation, zoom,
+/// stretch and shear about the image's centre, which take a uniformly drawn share of it, and a
 /// translation in a uniformly drawn direction, which takes the rest. The linear part is held to
-/// ‖A₁ - I‖ ≤ 1/2, so that A(u) is invertible on the smallest picture too. Throws
+/// ‖A₁ - I‖ ≤ 1/2, so that A(u) is invertible on the smallest image too. Throws
 /// std::invalid_argument if the displacement is not finite or below 0. Thread safe.
 AffineMotion random_affine_motion(ImageSize size, double displacement_px, CounterRandom random);
 
-/// Largest displacement |A₁ x - x| in pixels over the picture, which an affine motion has at one of
+/// Largest displacement |A₁ x - x| in pixels over the image, which an affine motion has at one of
 /// the corner pixels' centres.
 double largest_displacement(const AffineMotion& motion, ImageSize size);
 
-/// The picture at u in [0, 1], bilinear with places rounded to 1/32 px (cv::warpAffine). Intensity:
-/// [y, x] float32 in [0, 1], C order. Throws std::invalid_argument if the picture is empty,
+/// The image at u in [0, 1], bilinear with places rounded to 1/32 px (cv::warpAffine). Intensity:
+/// [y, x] float32 in [0, 1], C order. Throws std::invalid_argument if the image is empty,
 /// std::runtime_error if OpenCV fails. Thread safe.
-std::vector<float> render_affine(const GreyImage& picture, const AffineMotion& motion, double u);
+std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u);
 
-/// Motion of one picture as an interval of pictures in which no point moves more than 1 px from one
+/// Motion of one image as an interval of images in which no point moves more than 1 px from one
 /// to the next: steps = max(1, ceil(largest displacement)).
 class AffineInterval : public Interval {
  public:
-  /// The picture must not be empty: rendering throws std::invalid_argument otherwise.
-  AffineInterval(GreyImage picture, const AffineMotion& motion);
-  ImageSize size() const override { return picture_.size; }
+  /// The image must not be empty: rendering throws std::invalid_argument otherwise.
+  AffineInterval(GreyImage image, const AffineMotion& motion);
+  ImageSize size() const override { return image_.size; }
   int steps() const override;
   std::vector<float> render(int step) const override;
   FlowDisplacement flow() const override;  ///< exactly A₁ x - x, rounded to float
 
  private:
-  GreyImage picture_;
+  GreyImage image_;
   AffineMotion motion_;
 };
 

@@ -25,16 +25,16 @@ namespace {
 /// DIS needs some patches of 8 px at its coarsest scale.
 constexpr int kSmallestSide = 32;
 
-cv::Mat continued(const cv::Mat& picture) {
+cv::Mat continued(const cv::Mat& image) {
   cv::Mat result;
-  cv::copyMakeBorder(picture, result, 0, std::max(kSmallestSide - picture.rows, 0), 0,
-                     std::max(kSmallestSide - picture.cols, 0), cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(image, result, 0, std::max(kSmallestSide - image.rows, 0), 0,
+                     std::max(kSmallestSide - image.cols, 0), cv::BORDER_REPLICATE);
   return result;
 }
 
-/// Dense optical flow between two pictures [y, x] CV_8UC1 of one size: CV_32FC2, displacement (x,
+/// Dense optical flow between two images [y, x] CV_8UC1 of one size: CV_32FC2, displacement (x,
 /// y) in pixels of each pixel of `from` to its place in `to`, finite. OpenCV's DIS (Kroeger et al.
-/// 2016), medium preset; pictures below 32 px a side are continued by their border. The result does
+/// 2016), medium preset; images below 32 px a side are continued by their border. The result does
 /// not depend on the number of threads (DIS searches in a fixed number of stripes). Thread safe.
 cv::Mat dense_flow(const cv::Mat& from, const cv::Mat& to) {
   cv::Mat flow;
@@ -45,7 +45,7 @@ cv::Mat dense_flow(const cv::Mat& from, const cv::Mat& to) {
   return result;
 }
 
-/// Whether the place lies on the picture: within half a pixel of a pixel's centre.
+/// Whether the place lies on the image: within half a pixel of a pixel's centre.
 inline bool lies_inside(const cv::Point2f& place, const cv::Size& size) {
   return place.x >= -0.5f && place.y >= -0.5f && place.x < static_cast<float>(size.width) - 0.5f &&
          place.y < static_cast<float>(size.height) - 0.5f;
@@ -58,7 +58,7 @@ inline float trust(float squared_error, float scale) {
 }
 
 /// W(x) = source(x + part · flow(x)), bilinear with places rounded to 1/32 px (cv::remap), mirrored
-/// outside the picture (reflect-101). source: CV_32F, any channels; flow: CV_32FC2 of the same
+/// outside the image (reflect-101). source: CV_32F, any channels; flow: CV_32FC2 of the same
 /// size, displacement (x, y) in pixels. Thread safe.
 cv::Mat look_along(const cv::Mat& source, const cv::Mat& flow, float part) {
   cv::Mat places(flow.size(), CV_32FC2);
@@ -81,7 +81,7 @@ constexpr float kLeastAgreement =
 
 /// How far the other frame confirms each pixel's flow, in (0, 1], [y, x] CV_32FC1: near 1 where the
 /// flow leads to the same intensity and the flow there leads back; small where the point is covered
-/// in the other frame or leaves the picture. Thread safe.
+/// in the other frame or leaves the image. Thread safe.
 cv::Mat flow_agreement(const FlowFrame& frame, const FlowFrame& other) {
   const cv::Mat intensity_there = look_along(other.intensity, frame.flow, 1);
   const cv::Mat flow_back = look_along(other.flow, frame.flow, 1);
@@ -132,7 +132,7 @@ void carry(Landed& landed, const FlowFrame& frame, float part, float sign, float
   }
 }
 
-/// Flow previous → next of what stands at each pixel at the time u in (0, 1): CV_32FC2, pixels.
+/// Flow previous → next of what is at each pixel at the time u in (0, 1): CV_32FC2, pixels.
 /// Both frames' flows are carried along themselves to the time u and averaged where they land, by
 /// distance (bilinear), agreement and nearness in time (forward splatting: Baker et al. 2011,
 /// section 3.3.2; weights as in softmax splatting, Niklaus and Liu 2020). Where nothing lands, the
@@ -158,13 +158,13 @@ cv::Mat project_flow(const FlowFrame& previous, const FlowFrame& next, float u) 
 
 constexpr int kMostSteps = 64;
 
-cv::Mat intensity_of(const GreyImage& picture) {
-  const std::vector<float> intensity = linear_intensity(picture);
-  return cv::Mat(intensity, true).reshape(1, picture.size.height);
+cv::Mat intensity_of(const GreyImage& image) {
+  const std::vector<float> intensity = linear_intensity(image);
+  return cv::Mat(intensity, true).reshape(1, image.size.height);
 }
 
-cv::Mat grey_of(const GreyImage& picture) {
-  return cv::Mat(picture.pixels, true).reshape(1, picture.size.height);
+cv::Mat grey_of(const GreyImage& image) {
+  return cv::Mat(image.pixels, true).reshape(1, image.size.height);
 }
 
 int steps_for(const cv::Mat& forward, const cv::Mat& backward) {

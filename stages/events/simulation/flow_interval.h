@@ -9,7 +9,7 @@
 namespace eventgan {
 
 /// Frames between two real ones by dense optical flow (OpenCV's DIS, medium preset, forward and
-/// backward; Kroeger et al. 2016). At the time u the flow f of what stands at a pixel x is
+/// backward; Kroeger et al. 2016). At the time u the flow f of what is at a pixel x is
 /// projected from both frames (project_flow), and
 ///   I(u, x) = (w₀ I₀(x - u f) + w₁ I₁(x + (1-u) f)) / (w₀ + w₁),
 /// w₀ = (1-u) v₀, w₁ = u v₁, where vᵢ falls to near 0 if frame i has another flow there (the point

@@ -13,7 +13,7 @@ struct FlowDisplacement {
   std::vector<float> y_px;
 };
 
-/// What a sensor sees between two frames: pictures close enough to each other that no point moves
+/// What a sensor sees between two frames: images close enough to each other that no point moves
 /// more than a pixel from one to the next. Thread safe.
 class Interval {
  public:
@@ -21,7 +21,7 @@ class Interval {
 
   virtual ImageSize size() const = 0;
 
-  /// Pictures after the first: at least 1.
+  /// Images after the first: at least 1.
   virtual int steps() const = 0;
 
   /// Intensity at step / steps() of the interval, 0 ≤ step ≤ steps(): [y, x] float32 in [0, 1].

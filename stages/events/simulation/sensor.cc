@@ -13,14 +13,14 @@
 
 namespace eventgan {
 
-std::vector<float> linear_intensity(const GreyImage& picture) {
-  const ImageSize& size = picture.size;
-  if (size.height < 1 || size.width < 1 || picture.pixels.size() != size.pixel_count()) {
+std::vector<float> linear_intensity(const GreyImage& image) {
+  const ImageSize& size = image.size;
+  if (size.height < 1 || size.width < 1 || image.pixels.size() != size.pixel_count()) {
     throw std::invalid_argument("expected an image, got " + to_string(size) + " with " +
-                                std::to_string(picture.pixels.size()) + " pixels");
+                                std::to_string(image.pixels.size()) + " pixels");
   }
-  std::vector<float> intensity(picture.pixels.size());
-  std::ranges::transform(picture.pixels, intensity.begin(),
+  std::vector<float> intensity(image.pixels.size());
+  std::ranges::transform(image.pixels, intensity.begin(),
                          [](std::uint8_t value) { return static_cast<float>(value) / 255.0f; });
   return intensity;
 }
@@ -78,7 +78,7 @@ void PixelNoise::draw_wait(std::size_t pixel) {
 
 namespace {
 
-/// Part of a step until a line that stands at `difference` and moves by `change` over a whole step
+/// Part of a step until a line that is at `difference` and moves by `change` over a whole step
 /// reaches a threshold.
 double until_crossing(double difference, double change, double positive_threshold,
                       double negative_threshold) {
@@ -126,7 +126,7 @@ void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
       spec.leak_rate_hz, spec.refractory_s));
 }
 
-/// The time from one picture to the next. Times within are parts of it, 0..1, so that neither a
+/// The time from one image to the next. Times within are parts of it, 0..1, so that neither a
 /// recording's absolute time nor a tiny step costs precision.
 struct Sensor::Step {
   double start_s;

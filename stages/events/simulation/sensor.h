@@ -12,11 +12,11 @@
 
 namespace eventgan {
 
-/// The intensity a simulated sensor sees for a picture: u/255, [y, x] float32 in [0, 1], C order.
+/// The intensity a simulated sensor sees for an image: u/255, [y, x] float32 in [0, 1], C order.
 /// Grey values are taken for linear intensity, as ESIM and v2e take them: a camera's gamma is not
-/// undone, so contrasts are those of the picture as it is stored. Throws std::invalid_argument if
-/// the picture is empty or its size and pixels disagree. Thread safe.
-std::vector<float> linear_intensity(const GreyImage& picture);
+/// undone, so contrasts are those of the image as it is stored. Throws std::invalid_argument if
+/// the image is empty or its size and pixels disagree. Thread safe.
+std::vector<float> linear_intensity(const GreyImage& image);
 
 /// No pixel's contrast threshold is below this, however wide the spread.
 inline constexpr float kSmallestThreshold = 0.01f;
@@ -65,9 +65,9 @@ double idle_event_bytes(const SensorSpec& spec, std::size_t pixel_count, double 
 void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
                       std::size_t memory_bytes);
 
-/// The pixels of a simulated event camera, fed with intensity pictures at rising times. A pixel
+/// The pixels of a simulated event camera, fed with intensity images at rising times. A pixel
 /// remembers a level ℓ and compares with it the log intensity L = ln(I + ε), which moves on a
-/// straight line from one picture to the next (ESIM, Rebecq et al. 2018, eq. 2):
+/// straight line from one image to the next (ESIM, Rebecq et al. 2018, eq. 2):
 ///
 ///   d(t) = L(t) - ℓ(t);   positive event where d rises to C₊, negative one where it falls to -C₋.
 ///
@@ -80,7 +80,7 @@ void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
 /// - Shot noise and hot pixels: see PixelNoise.
 /// - Thresholds: see draw_thresholds, one draw a pixel and polarity.
 ///
-/// All randomness is a function of `random` and of the pixel: the same pictures give the same
+/// All randomness is a function of `random` and of the pixel: the same images give the same
 /// events. Not thread safe; one object a recording.
 class Sensor {
  public:
@@ -106,7 +106,7 @@ class Sensor {
   std::vector<float> positive_threshold_;
   std::vector<float> negative_threshold_;
 
-  // State at time_s_; noise_ is set by the first picture.
+  // State at time_s_; noise_ is set by the first image.
   double time_s_ = 0;
   std::optional<PixelNoise> noise_;
   std::vector<float> log_intensity_;

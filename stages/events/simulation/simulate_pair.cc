@@ -27,13 +27,13 @@ std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec&
   return events;
 }
 
-std::vector<Event> simulate_affine(const GreyImage& picture, double max_displacement_px,
+std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,
                                    const SensorSpec& sensor, double duration_s,
                                    CounterRandom random) {
   const double displacement_px = max_displacement_px * random.keyed("displacement").uniform(0);
   const AffineMotion motion =
-      random_affine_motion(picture.size, displacement_px, random.keyed("motion"));
-  return simulate_interval(AffineInterval(picture, motion), sensor, duration_s,
+      random_affine_motion(image.size, displacement_px, random.keyed("motion"));
+  return simulate_interval(AffineInterval(image, motion), sensor, duration_s,
                            random.keyed("sensor"));
 }
 

@@ -10,8 +10,8 @@
 
 namespace eventgan {
 
-/// Shows the sensor pictures 1..steps() of the interval, evenly spaced in (from_s, to_s], and
-/// appends what it sees to `events`, in order of time. The sensor must have seen picture 0 (or the
+/// Shows the sensor images 1..steps() of the interval, evenly spaced in (from_s, to_s], and
+/// appends what it sees to `events`, in order of time. The sensor must have seen image 0 (or the
 /// last of the interval before) at from_s. Throws as Sensor::step.
 void feed_interval(Sensor& sensor, const Interval& interval, double from_s, double to_s,
                    std::vector<Event>& events);
@@ -22,10 +22,10 @@ void feed_interval(Sensor& sensor, const Interval& interval, double from_s, doub
 std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec& sensor,
                                      double duration_s, CounterRandom random);
 
-/// ESIM as the EventGAN paper compares with: one picture (the previous frame) under a random affine
+/// ESIM as the EventGAN paper compares with: one image (the previous frame) under a random affine
 /// motion whose largest displacement is drawn uniformly from [0, max_displacement_px); the next
 /// frame is not looked at. Throws std::invalid_argument if max_displacement_px is below 0.
-std::vector<Event> simulate_affine(const GreyImage& picture, double max_displacement_px,
+std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,
                                    const SensorSpec& sensor, double duration_s,
                                    CounterRandom random);
 

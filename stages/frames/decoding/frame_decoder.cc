@@ -4,14 +4,14 @@
 #include <string>
 #include <utility>
 
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
 
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file) {
   try {
-    if (is_picture_file(file)) return picture_file_size(file);
+    if (is_image_file(file)) return image_file_size(file);
     const auto size_of = [](const ColourView& frame) { return frame.size; };
     return VideoWindow<ImageSize>(file, 1, size_of).frame(0);
   } catch (const std::runtime_error& error) {
@@ -34,7 +34,7 @@ FrameDecoder::FrameDecoder(std::filesystem::path base, int kept_frames)
 Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame, std::int64_t video_stride) const {
   const std::filesystem::path path = base_ / frame.path;
   try {
-    return frame.video_frame < 0 ? decode_picture_file(path)
+    return frame.video_frame < 0 ? decode_image_file(path)
                                  : videos_->frames<1>(path, {frame.video_frame}, video_stride)[0];
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + frame.path};

@@ -6,23 +6,23 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
 
-/// The size of a picture as stored, read from its header alone (PNG, JPEG); other formats are
+/// The size of an image as stored, read from its header alone (PNG, JPEG); other formats are
 /// decoded. For a video, the size of its first frame. A fault names the file. Thread safe.
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file);
 
-/// Decodes single frames of pictures and videos. A picture that decodes only in part (a truncated
-/// JPEG, a PNG with a bad checksum) is a fault, never a picture with a grey rest. Pictures are
+/// Decodes single frames of images and videos. An image that decodes only in part (a truncated
+/// JPEG, a PNG with a bad checksum) is a fault, never an image with a grey rest. Images are
 /// taken as stored: an orientation tag (EXIF) is not applied, since labels are given in stored
 /// pixels.
 ///
 /// Thread safety: `decode` may be called from several threads. Frames of videos are decoded one
 /// after another under a lock, from the video's start (seeking is not exact), and the latest ones
-/// are kept; ask for them roughly in order, since going back further starts anew.
+/// are kept; ask for them roughly in order, since going back further starts again.
 class FrameDecoder {
  public:
   static constexpr int kDefaultKeptFrames = 24;
@@ -31,8 +31,8 @@ class FrameDecoder {
   /// `kept_frames` are kept, whatever their size.
   explicit FrameDecoder(std::filesystem::path base, int kept_frames = kDefaultKeptFrames);
 
-  /// A fault if the file is missing, empty, truncated, not a picture, or larger than
-  /// kMaxPicturePixels, or if a video ends before the frame; it names the frame's path. Of a video
+  /// A fault if the file is missing, empty, truncated, not an image, or larger than
+  /// kMaxImagePixels, or if a video ends before the frame; it names the frame's path. Of a video
   /// whose frames are asked for at multiples of `video_stride`, only these are kept.
   Outcome<ColourFrame> decode(const FrameRef& frame, std::int64_t video_stride = 1) const;
 

@@ -8,19 +8,19 @@
 #include <utility>
 
 #include "stages/base/files/input_file.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/prepared_frame.h"
 
 namespace eventgan {
 
-SharedPictures::SharedPictures(std::size_t most) : most_(std::max<std::size_t>(most, 1)) {}
+SharedImages::SharedImages(std::size_t most) : most_(std::max<std::size_t>(most, 1)) {}
 
-SharedFrame SharedPictures::get(const std::string& name, const std::function<SharedFrame()>& make) {
+SharedFrame SharedImages::get(const std::string& name, const std::function<SharedFrame()>& make) {
   std::promise<SharedFrame> promise;
   {
     std::unique_lock lock(mutex_);
     if (const auto found = by_name_.find(name); found != by_name_.end()) {
-      pictures_.splice(pictures_.begin(), pictures_, found->second);
+      images_.splice(images_.begin(), images_, found->second);
       const std::shared_future<SharedFrame> frame = found->second->frame;
       lock.unlock();
       return frame.get();
@@ -37,12 +37,12 @@ SharedFrame SharedPictures::get(const std::string& name, const std::function<Sha
   }
 }
 
-void SharedPictures::add(const std::string& name, std::shared_future<SharedFrame> frame) {
-  pictures_.push_front({name, std::move(frame)});
-  by_name_[pictures_.front().name] = pictures_.begin();
-  if (pictures_.size() <= most_) return;
-  by_name_.erase(pictures_.back().name);
-  pictures_.pop_back();
+void SharedImages::add(const std::string& name, std::shared_future<SharedFrame> frame) {
+  images_.push_front({name, std::move(frame)});
+  by_name_[images_.front().name] = images_.begin();
+  if (images_.size() <= most_) return;
+  by_name_.erase(images_.back().name);
+  images_.pop_back();
 }
 
 namespace {
@@ -70,7 +70,7 @@ SampleFault fault_in(const FrameRef& frame, const std::string& reason) {
 PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way)
     : base_(std::move(base)),
       spec_(std::move(spec)),
-      pictures_(std::make_unique<SharedPictures>(2 * pairs_under_way + kLongestGap + kMargin)),
+      images_(std::make_unique<SharedImages>(2 * pairs_under_way + kLongestGap + kMargin)),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
           pairs_under_way + kLongestGap + kMargin, [spec = spec_](const ColourView& view) {
             return frame_or_fault([&] { return prepare_frame(view, spec); });
@@ -78,10 +78,10 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
 
 SharedFrame PairReader::frame(const FrameRef& ref) const {
   if (ref.video_frame >= 0) return videos_->frames<1>(base_ / ref.path, {ref.video_frame})[0];
-  return pictures_->get(ref.path, [&] {
+  return images_->get(ref.path, [&] {
     return frame_or_fault([&] {
-      const ColourFrame picture = decode_picture_file(base_ / ref.path);
-      return prepare_frame({picture.size, picture.bgr.data()}, spec_);
+      const ColourFrame image = decode_image_file(base_ / ref.path);
+      return prepare_frame({image.size, image.bgr.data()}, spec_);
     });
   });
 }

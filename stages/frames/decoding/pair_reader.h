@@ -22,41 +22,41 @@
 
 namespace eventgan {
 
-/// The pictures used last, so that pairs that share a frame decode it once.
+/// The images used last, so that pairs that share a frame decode it once.
 ///
-/// Thread safe. Of several threads that want one picture at the same time the first makes it and
-/// the others wait for it; no lock is held meanwhile, so pictures are made in parallel. A thread
-/// waits only for one that is making a picture and itself waits for none: no deadlock.
-class SharedPictures {
+/// Thread safe. Of several threads that want one image at the same time the first makes it and
+/// the others wait for it; no lock is held meanwhile, so images are made in parallel. A thread
+/// waits only for one that is making an image and itself waits for none: no deadlock.
+class SharedImages {
  public:
-  /// Keeps `most` pictures (at least one), whatever their size.
-  explicit SharedPictures(std::size_t most);
+  /// Keeps `most` images (at least one), whatever their size.
+  explicit SharedImages(std::size_t most);
 
-  /// The picture of that name: kept, or under way in another thread, or else what `make` returns
-  /// (never null). A fault is kept like a picture, and so is what `make` throws: every `get` that
+  /// The image of that name: kept, or under way in another thread, or else what `make` returns
+  /// (never null). A fault is kept like an image, and so is what `make` throws: every `get` that
   /// finds it throws the same. `make` must not call `get`, nor lend its thread to tasks that may
   /// (as an algorithm that runs in parallel in the same thread pool does).
   SharedFrame get(const std::string& name, const std::function<SharedFrame()>& make);
 
  private:
-  struct Picture {
+  struct Image {
     std::string name;
     std::shared_future<SharedFrame> frame;
   };
 
-  /// Puts a promised picture in front, and the one unused for longest out.
+  /// Puts a promised image in front, and the one unused for longest out.
   void add(const std::string& name, std::shared_future<SharedFrame> frame);
 
   std::size_t most_;
   std::mutex mutex_;
-  std::list<Picture> pictures_;  ///< most recently used first
-  std::unordered_map<std::string_view, std::list<Picture>::iterator> by_name_;
+  std::list<Image> images_;  ///< most recently used first
+  std::unordered_map<std::string_view, std::list<Image>::iterator> by_name_;
 };
 
 /// Two frames, ready for the generator.
 struct PreparedPair {
   /// [frame, y, x] float32, C order; frame 0 = previous, 1 = next; x = (u/255 - 0.5) * 2 in [-1,
-  /// 1]. Only the visible part of the picture: with letterbox the borders are left out (no scene
+  /// 1]. Only the visible part of the image: with letterbox the borders are left out (no scene
   /// there, no work, no events), with crop what is cut away.
   std::vector<float> input;
   ImageSize content;  ///< size of each frame in `input`
@@ -65,26 +65,26 @@ struct PreparedPair {
   Placement placement;
 };
 
-/// Decodes frame pairs from pictures and videos, as FrameDecoder does, and prepares them as `spec`
+/// Decodes frame pairs from images and videos, as FrameDecoder does, and prepares them as `spec`
 /// says (prepare_frame). Pairs near each other in the plan share frames: the prepared frames used
 /// last are kept, so that each is decoded once. A file that changes meanwhile may be seen as it
 /// was.
 ///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
-/// pictures are decoded in parallel, videos one frame after another under a lock.
+/// images are decoded in parallel, videos one frame after another under a lock.
 class PairReader {
  public:
   /// Relative frame paths start at `base`. `pairs_under_way`: how many pairs, of those in the
   /// plan's order, may be read out of order at once. A pair reaches 6 frames back, so
   /// pairs_under_way + 6 prepared frames and a margin are kept of each video (of two videos at
-  /// most): with that no video is decoded twice. Of pictures, whose pairs may skip frames, two for
+  /// most): with that no video is decoded twice. Of images, whose pairs may skip frames, two for
   /// each pair under way are kept, besides those 6 and the margin.
   PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way = 16);
 
-  /// A fault if a file is missing, empty, truncated, not a picture, or the sizes differ.
+  /// A fault if a file is missing, empty, truncated, not an image, or the sizes differ.
   Outcome<PreparedPair> read(const FramePair& pair) const;
 
-  /// Has the system load the pictures of a pair that will be read soon, so that reading it does not
+  /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
   void expect(const FramePair& pair) const;
 
@@ -94,7 +94,7 @@ class PairReader {
 
   std::filesystem::path base_;
   ImageSpec spec_;
-  std::unique_ptr<SharedPictures> pictures_;
+  std::unique_ptr<SharedImages> images_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;
 };
 

@@ -32,11 +32,10 @@ cv::Mat as_grey(const cv::Mat& colour) {
 
 /// Grey, resized and blurred, uncut.
 cv::Mat scaled_grey(const ColourView& frame, ImageSize scaled, const ImageSpec& spec) {
-  cv::Mat picture(frame.size.height, frame.size.width, CV_8UC3,
-                  const_cast<std::uint8_t*>(frame.bgr));
-  if (spec.grey == GreyOrder::kBeforeResize) picture = as_grey(picture);
+  cv::Mat image(frame.size.height, frame.size.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr));
+  if (spec.grey == GreyOrder::kBeforeResize) image = as_grey(image);
   cv::Mat resized;
-  cv::resize(picture, resized, cv::Size(scaled.width, scaled.height), 0, 0, cv::INTER_LINEAR);
+  cv::resize(image, resized, cv::Size(scaled.width, scaled.height), 0, 0, cv::INTER_LINEAR);
   if (spec.grey == GreyOrder::kAfterResize) resized = as_grey(resized);
   if (spec.blur == 0) return resized;
   cv::Mat blurred;

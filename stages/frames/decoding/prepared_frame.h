@@ -8,11 +8,11 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
 #include "manifests/values/placement.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 
 namespace eventgan {
 
-/// The part of the scaled picture that lies in the volume: its size, and its top left pixel's place
+/// The part of the scaled image that lies in the volume: its size, and its top left pixel's place
 /// in either.
 struct VisiblePart {
   ImageSize size;
@@ -25,9 +25,9 @@ struct VisiblePart {
 VisiblePart visible_part(const Placement& placement);
 
 /// One frame as the generator sees it, in 8 bits: what is kept while other pairs may want it, since
-/// it takes a fraction of the colour picture's memory.
+/// it takes a fraction of the colour image's memory.
 struct PreparedFrame {
-  /// [y, x] uint8, C order, 0..255: the VisiblePart of the placed picture.
+  /// [y, x] uint8, C order, 0..255: the VisiblePart of the placed image.
   std::vector<std::uint8_t> grey;
   Placement placement;  ///< placement.source is the frame's own size
 };
@@ -44,7 +44,7 @@ PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec);
 /// `input` must have the size of `grey`. Thread safe.
 void to_input(std::span<const std::uint8_t> grey, std::span<float> input);
 
-/// A colour picture laid into the volume's frame as the generator's input was (same resizing, same
+/// A colour image laid into the volume's frame as the generator's input was (same resizing, same
 /// cut, borders black): [y, x, channel] uint8 of size placement.volume, channels blue, green, red.
 /// For looking at, not for the network. Throws std::invalid_argument if the frame's size is not the
 /// placement's source. Thread safe.

@@ -8,7 +8,7 @@
 #include <system_error>
 
 #include "stages/base/files/input_file.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 
 namespace eventgan {
 namespace {
@@ -24,7 +24,7 @@ bool is_text(std::FILE* file) {
 
 struct VideoFile::Capture {
   cv::VideoCapture video;
-  cv::Mat picture;  ///< the latest frame
+  cv::Mat image;  ///< the latest frame
 };
 
 VideoFile::VideoFile(const std::filesystem::path& path) : capture_(std::make_unique<Capture>()) {
@@ -59,21 +59,21 @@ bool VideoFile::skip() {
 
 std::optional<ColourView> VideoFile::next() {
   if (!skip()) return std::nullopt;
-  cv::Mat& picture = capture_->picture;
+  cv::Mat& image = capture_->image;
   try {
-    if (!capture_->video.retrieve(picture)) {
+    if (!capture_->video.retrieve(image)) {
       throw std::runtime_error("expected a whole video, got one whose frame " +
                                std::to_string(position_ - 1) + " cannot be read");
     }
   } catch (const cv::Exception& exception) {
     throw std::runtime_error("expected a whole video, got " + exception.err);
   }
-  if (picture.type() != CV_8UC3 || !picture.isContinuous()) {
+  if (image.type() != CV_8UC3 || !image.isContinuous()) {
     throw std::runtime_error("expected 8-bit colour frames, got others");
   }
-  const ImageSize size{picture.rows, picture.cols};
-  check_picture_size(size);
-  return ColourView{size, picture.data};
+  const ImageSize size{image.rows, image.cols};
+  check_image_size(size);
+  return ColourView{size, image.data};
 }
 
 }  // namespace eventgan

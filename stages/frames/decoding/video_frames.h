@@ -15,7 +15,7 @@
 #include <string>
 #include <utility>
 
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 
 namespace eventgan {
 
@@ -45,9 +45,9 @@ class VideoFile {
 };
 
 /// A window on one video: its latest frames, since pairs of close frames are asked for by turns.
-/// Asking for an earlier one opens the video anew, which costs all the frames before it. Of a video
-/// that is thinned those at multiples of `stride` count alone: others are passed over. What is kept
-/// of a frame (its pixels, or less) is up to `keep`. Not thread safe.
+/// Asking for an earlier one opens the video again, which costs all the frames before it. Of a
+/// video that is thinned those at multiples of `stride` count alone: others are passed over. What
+/// is kept of a frame (its pixels, or less) is up to `keep`. Not thread safe.
 template <class Kept>
 class VideoWindow {
  public:

@@ -18,13 +18,13 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
-#include "stages/frames/human36m/pose_table_internal.h"
-#include "stages/frames/kitti/calibration_file_internal.h"
-#include "stages/frames/mpii/mat_file_internal.h"
-#include "stages/frames/mpii/mat_json_internal.h"
+#include "stages/frames/human36m/detail/pose_table.h"
+#include "stages/frames/kitti/detail/calibration_file.h"
+#include "stages/frames/mpii/detail/mat_file.h"
+#include "stages/frames/mpii/detail/mat_json.h"
 #include "stages/frames/source_folders.h"
 #include "stages/recordings/dhp19_events.h"
 
@@ -182,13 +182,13 @@ class Dhp19Dataset final : public Dataset {
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
   std::vector<std::string> notes() const override { return notes_; }
 
-  Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
-    if (steps == 0) return {Neighbour::State::kPresent, labelled.frame};
+  PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
+    if (steps == 0) return {PairedFrame::State::kPresent, labelled.frame};
     if (steps != 1 && steps != -1) return {};
     FrameRef edge = labelled.frame;
     edge.index *= events_per_window_;
     if (steps > 0) edge.index += events_per_window_ - 1;
-    return {Neighbour::State::kPresent, std::move(edge)};
+    return {PairedFrame::State::kPresent, std::move(edge)};
   }
 
   ImageSize sensor_size(const std::string&) const override { return kDhp19Size; }

@@ -20,11 +20,11 @@ namespace eventgan {
 /// is the mean, without NaN, of the poses from that of its first to that of its last event, row
 /// floor(t / 10 ms), projected by the camera's matrix (cam0..cam3 have P4, P1, P3, P2): w [u, v, 1]
 /// = P [X, Y, Z, 1], x = u, y = 260 - v, since v counts from the bottom. A joint outside the
-/// picture is not visible; of the others it is not known. Centre, scale and box as derive_frame
+/// image is not visible; of the others it is not known. Centre, scale and box as derive_frame
 /// gives them. Annotation::original is the mean pose in mm and its rows.
 ///
 /// Names: subject S1, action SESSION_MOVEMENT, camera 0..3; sequence S1/1_1/2, sample_id
-/// S1/1_1/2/000012. FrameRef::index is a window's number, of the neighbours -1 and 1 that of its
+/// S1/1_1/2/000012. FrameRef::index is a window's number, of the paired frames -1 and 1 that of its
 /// first and last event. The manifest's `subjects` default to S1-S12 for split train, S13-S17 for
 /// test; its `cameras` to 2 and 3.
 ///

@@ -17,7 +17,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
 #include "stages/frames/events/recording_labels.h"
@@ -112,8 +112,8 @@ class RecordingDataset final : public Dataset {
 
   std::vector<std::string> warnings() const override { return warnings_; }
 
-  Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
-    if (steps == 0) return {Neighbour::State::kPresent, labelled.frame};
+  PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
+    if (steps == 0) return {PairedFrame::State::kPresent, labelled.frame};
     if (steps != 1 && steps != -1) return {};
     const Recorded& recorded = recordings_.at(labelled.sequence);
     FrameRef edge = labelled.frame;
@@ -122,7 +122,7 @@ class RecordingDataset final : public Dataset {
     } else {
       edge.time_s = kNan;
     }
-    return {Neighbour::State::kPresent, std::move(edge)};
+    return {PairedFrame::State::kPresent, std::move(edge)};
   }
 
   ImageSize sensor_size(const std::string& label_key) const override {

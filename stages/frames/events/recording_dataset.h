@@ -26,7 +26,7 @@ namespace eventgan {
 /// frames and events is at fault. Windows before or after all events are noted, and warned of where
 /// all of a recording's are.
 ///
-/// sample_id is NAME/SECONDS with six decimals, and the same two stand in label_key. FrameRef::path
+/// sample_id is NAME/SECONDS with six decimals, and the same two are in label_key. FrameRef::path
 /// is the HDF5 file or the folder's events.txt, and FrameRef::video_frame the last frame at or
 /// before the time, -1 if there is none.
 ///

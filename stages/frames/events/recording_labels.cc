@@ -15,8 +15,8 @@
 #include <unordered_set>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
-#include "manifests/documents/strict_json_internal.h"
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
 

@@ -11,7 +11,7 @@ namespace eventgan {
 
 /// Labels of a recording of events, by their times in seconds on its clock.
 struct RecordingLabels {
-  /// What stands at one time. Its boxes' class_id is an index into `class_names` here.
+  /// What is at one time. Its boxes' class_id is an index into `class_names` here.
   std::map<double, Annotation> annotations;
   std::vector<std::string> class_names;  ///< as they first occur
   std::vector<std::string> joint_names;
@@ -26,8 +26,8 @@ struct RecordingLabels {
 /// Category: easy is difficulty 0; hard is 2, which the scores count as hard, as 1 would be;
 /// dont_care is to be ignored; none is difficulty -1, not known.
 ///
-/// Names of classes and joints have no control characters, a joint's stands once; places lie within
-/// 1e6 px, as everywhere (map_labels).
+/// Names of classes and joints have no control characters, a joint's is there once; places lie
+/// within 1e6 px, as everywhere (map_labels).
 ///
 /// Throws InputError, with every fault of the file: "expected X, got Y, in FILE (line 3)".
 RecordingLabels read_recording_labels(const std::filesystem::path& file);

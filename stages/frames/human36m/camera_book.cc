@@ -1,3 +1,5 @@
+#include "stages/frames/human36m/detail/camera_book.h"
+
 #include <fmt/core.h>
 
 #include <algorithm>
@@ -8,12 +10,11 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/pickle.h"
-#include "stages/base/archives/typed_array_internal.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/human36m/camera_book_internal.h"
-#include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/frames/human36m/detail/pose_table.h"
 
 namespace eventgan {
 namespace {

@@ -1,3 +1,5 @@
+#include "stages/frames/human36m/detail/extracted_layout.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,12 +13,11 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
-#include "stages/frames/human36m/extracted_layout_internal.h"
-#include "stages/frames/human36m/human36m_dataset_internal.h"
+#include "stages/frames/human36m/detail/human36m_dataset.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -218,7 +219,7 @@ Annotations choose_annotations(const SourceSpec& spec, const std::filesystem::pa
   throw UsageError(message);
 }
 
-/// A video by the names of its labelled pictures.
+/// A video by the names of its labelled images.
 struct Video {
   std::string folder;
   std::vector<std::int64_t> labelled;
@@ -238,8 +239,8 @@ std::map<std::string, Video> videos_of(const NpzTable& table, const std::string&
   return videos;
 }
 
-/// Stored frames by sequence, from one listing of a folder, which may hold several sequences. A
-/// picture that is no frame, and the lesser of two of one frame, is noted.
+/// Stored frames by sequence, from one listing of a folder, which may hold several sequences. An
+/// image that is no frame, and the lesser of two of one frame, is noted.
 std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const std::string& folder,
                                                   IndexedDataset& dataset) {
   std::map<std::string, std::map<std::int64_t, std::string>> names;
@@ -248,13 +249,13 @@ std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const 
     std::string lower = file;
     std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
     const auto ends_file = [&](std::string_view extension) { return lower.ends_with(extension); };
-    if (std::ranges::none_of(kPictureExtensions, ends_file)) continue;
+    if (std::ranges::none_of(kImageExtensions, ends_file)) continue;
     const bool may_be_frame = file.ends_with(".jpg") || file.ends_with(".png");
     try {
       const ExtractedName name = parse_extracted_name(file);
       // Files come sorted, so a frame that is there as .jpg and .png counts once, as .jpg.
       if (may_be_frame && names[name.sequence].try_emplace(name.number, file).second) continue;
-    } catch (const std::invalid_argument&) {  // another picture, a segmentation perhaps
+    } catch (const std::invalid_argument&) {  // another image, a segmentation perhaps
     }
     left_out.push_back(file);
   }

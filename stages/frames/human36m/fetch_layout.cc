@@ -10,13 +10,13 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/hdf5_arrays.h"
-#include "stages/base/archives/typed_array_internal.h"
-#include "stages/frames/human36m/camera_book_internal.h"
-#include "stages/frames/human36m/human36m_dataset_internal.h"
-#include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/frames/human36m/detail/camera_book.h"
+#include "stages/frames/human36m/detail/human36m_dataset.h"
+#include "stages/frames/human36m/detail/pose_table.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -152,11 +152,11 @@ namespace {
 
 constexpr char kPrefix[] = "img_";
 
-/// One ACTION-N folder, `action` below the root. Gives the folders of pictures that have no label.
+/// One ACTION-N folder, `action` below the root. Gives the folders of images that have no label.
 std::vector<std::string> add_action(const SourceRoot& root, const std::string& action,
                                     IndexedDataset& dataset) {
-  const std::string pictures = action + "/imageSequence";
-  std::vector<std::string> cameras = root.folders_in(pictures);
+  const std::string images = action + "/imageSequence";
+  std::vector<std::string> cameras = root.folders_in(images);
   const auto files = root.files_in(action);
   const bool labelled = std::ranges::binary_search(files, "annot.h5");
 
@@ -170,7 +170,7 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
     }
   }
   for (const auto& [camera, labelled_numbers] : numbers) {
-    const std::string folder = pictures + "/" + camera;
+    const std::string folder = images + "/" + camera;
     auto stored = NumberedSequence::list(root.on_disk(folder), kPrefix);
     if (const auto& others = stored.left_out(); !others.empty()) {
       dataset.add_note(counted(others, "files left out in " + root.written(folder)));
@@ -187,7 +187,7 @@ std::vector<std::string> add_action(const SourceRoot& root, const std::string& a
   if (labelled) dataset.add_table(key, root.written(key), std::move(table));
 
   std::erase_if(cameras, [&](const std::string& camera) { return numbers.contains(camera); });
-  for (std::string& camera : cameras) camera = root.written(pictures + "/" + camera);
+  for (std::string& camera : cameras) camera = root.written(images + "/" + camera);
   return cameras;
 }
 

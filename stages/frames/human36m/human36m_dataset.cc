@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/human36m/human36m_dataset_internal.h"
+#include "stages/frames/human36m/detail/human36m_dataset.h"
 
 namespace eventgan {
 
@@ -93,15 +93,15 @@ FrameRef FrameFolder::frame(std::int64_t number) const {
           .time_s = human36m_time_s(number)};
 }
 
-Neighbour FrameFolder::neighbour(std::int64_t number, int steps) const {
+PairedFrame FrameFolder::paired_frame(std::int64_t number, int steps) const {
   const auto here = std::ranges::lower_bound(numbers_, number);
   const bool is_known = here != numbers_.end() && *here == number;
-  if (steps == 0 && !is_known) return {Neighbour::State::kHole, frame(number)};
+  if (steps == 0 && !is_known) return {PairedFrame::State::kMissing, frame(number)};
   const std::ptrdiff_t place =
       here - numbers_.begin() + (steps > 0 && !is_known ? steps - 1 : steps);
   if (place < 0 || place >= std::ssize(numbers_)) return {};
   const std::int64_t target = numbers_[static_cast<std::size_t>(place)];
-  return {stored_.contains(target) ? Neighbour::State::kPresent : Neighbour::State::kHole,
+  return {stored_.contains(target) ? PairedFrame::State::kPresent : PairedFrame::State::kMissing,
           frame(target)};
 }
 
@@ -158,10 +158,10 @@ void IndexedDataset::finish(const std::string& root) {
   root_ = root;
 }
 
-Neighbour IndexedDataset::neighbour(const LabelledFrame& frame, int steps) const {
+PairedFrame IndexedDataset::paired_frame(const LabelledFrame& frame, int steps) const {
   const auto take = takes_.find(frame.sequence);
   if (take == takes_.end()) return {};
-  return take->second->neighbour(frame.frame.index, steps);
+  return take->second->paired_frame(frame.frame.index, steps);
 }
 
 const IndexedDataset::Table* IndexedDataset::table_of(const std::string& label_key) const {

@@ -34,16 +34,16 @@ namespace eventgan {
 ///
 /// Every row is a sample of one person. Frame numbers are the official ones, from 1 at 50 frames a
 /// second, so time_s = (number - 1) / 50; one step is one frame of those stored or labelled, or
-/// taken of a video. A row whose picture is absent stays a labelled frame, a hole. A video tells
-/// how many frames it has; rows beyond that are no labelled frames, and notes() count them, as they
-/// do videos and files of poses without the other. A video that cannot be read, or is not one of 50
-/// frames a second, is a fault of its frames. Visibility is not annotated:
-/// Joint::visible is -1. In an .npz a joint at (0, 0) without confidence is one without annotation,
-/// kMissingPoint; elsewhere it stays, with visible 0; a joint in 3-D without confidence is unknown.
-/// A person whose camera does not project the joints in 3-D onto those in the picture
-/// (kProjectionTolerance_px) has no camera; notes() tell how many. Values that are not finite are a
-/// fault of their row; in fields that this program does not use, JSON makes them null.
-/// Annotation::original is an object with every field of the row, and the camera's.
+/// taken of a video. A row whose image is absent stays a labelled frame, a missing one. A video
+/// tells how many frames it has; rows beyond that are no labelled frames, and notes() count them,
+/// as they do videos and files of poses without the other. A video that cannot be read, or is not
+/// one of 50 frames a second, is a fault of its frames. Visibility is not annotated: Joint::visible
+/// is -1. In an .npz a joint at (0, 0) without confidence is one without annotation, kMissingPoint;
+/// elsewhere it stays, with visible 0; a joint in 3-D without confidence is unknown. A person whose
+/// camera does not project the joints in 3-D onto those in the image (kProjectionTolerance_px) has
+/// no camera; notes() tell how many. Values that are not finite are a fault of their row; in fields
+/// that this program does not use, JSON makes them null. Annotation::original is an object with
+/// every field of the row, and the camera's.
 ///
 /// The annotations of all frames taken are read into memory here (about 1-2 kB each), so that
 /// nothing uses HDF5 later: it is not thread safe, and open_human36m_dataset must not run while

@@ -13,13 +13,13 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/archives/cdf_matrix.h"
-#include "stages/base/archives/typed_array_internal.h"
-#include "stages/frames/human36m/camera_book_internal.h"
-#include "stages/frames/human36m/human36m_dataset_internal.h"
-#include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/base/archives/detail/typed_array.h"
+#include "stages/frames/human36m/detail/camera_book.h"
+#include "stages/frames/human36m/detail/human36m_dataset.h"
+#include "stages/frames/human36m/detail/pose_table.h"
 #include "stages/frames/sequences/video_clip.h"
 #include "stages/frames/source_folders.h"
 
@@ -136,10 +136,10 @@ class VideoFrames final : public TakenFrames {
             .time_s = human36m_time_s(number)};
   }
 
-  Neighbour neighbour(std::int64_t number, int steps) const override {
+  PairedFrame paired_frame(std::int64_t number, int steps) const override {
     const std::int64_t target = number + steps * every_;
     if (target < 1 || target > frame_count_) return {};
-    return {Neighbour::State::kPresent, frame(target)};
+    return {PairedFrame::State::kPresent, frame(target)};
   }
 
  private:

@@ -1,3 +1,5 @@
+#include "stages/frames/human36m/detail/pose_table.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,8 +8,7 @@
 #include <ranges>
 #include <utility>
 
-#include "stages/base/archives/typed_array_internal.h"
-#include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/base/archives/detail/typed_array.h"
 
 namespace eventgan {
 namespace {

@@ -1,8 +1,9 @@
+#include "stages/frames/kitti/detail/calibration_file.h"
+
 #include <array>
 #include <cmath>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/kitti/calibration_file_internal.h"
 #include "stages/frames/kitti/kitti_label.h"
 
 namespace eventgan {

@@ -72,7 +72,7 @@ int kitti_class_id(std::string_view name);
 /// Which benchmark's columns a label file has.
 enum class KittiColumns {
   kObject,   ///< truncated is a fraction 0..1
-  kTracking  ///< frame and track id stand in front; truncated is a level 0, 1 or 2
+  kTracking  ///< frame and track id come first; truncated is a level 0, 1 or 2
 };
 
 /// One object of a label file: type, truncated, occluded (0..3), alpha, left, top, right, bottom,

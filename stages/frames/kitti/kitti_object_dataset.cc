@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stages/base/pictures/picture_file.h"
-#include "stages/frames/kitti/calibration_file_internal.h"
+#include "stages/base/images/image_file.h"
+#include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/source_folders.h"
@@ -16,21 +16,21 @@
 namespace eventgan {
 namespace {
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 /// "_01" for the frame one before.
 std::string previous_mark(int steps_back) { return "_0" + std::to_string(steps_back); }
 
 }  // namespace
 
-ObjectPictures::ObjectPictures(const SourceRoot& root) {
+ObjectImages::ObjectImages(const SourceRoot& root) {
   root.require_folder("image_2");
   labelled_ = NumberedSequence::list(root.on_disk("image_2"));
   for (int k = 1; k <= kPrevious; ++k) {
-    // A frame's number in prev_2 is the labelled picture's; the mark counts as part of the
+    // A frame's number in prev_2 is the labelled image's; the mark counts as part of the
     // extension.
     std::vector<std::string> marked;
-    for (const std::string_view extension : kPictureExtensions) {
+    for (const std::string_view extension : kImageExtensions) {
       marked.push_back(previous_mark(k).append(extension));
     }
     const NumberedSequence& listed = previous_[static_cast<std::size_t>(k - 1)] =
@@ -43,19 +43,19 @@ ObjectPictures::ObjectPictures(const SourceRoot& root) {
   }
 }
 
-ObjectPictures::Place ObjectPictures::at(std::int64_t number, const std::string& stem,
-                                         int steps) const {
+ObjectImages::Place ObjectImages::at(std::int64_t number, const std::string& stem,
+                                     int steps) const {
   if (steps == 0) {
     const auto place = labelled_.find(number);
     if (place.state == State::kPresent) return {State::kPresent, "image_2/" + place.name};
-    return {State::kHole, "image_2/" + stem + ".png"};
+    return {State::kMissing, "image_2/" + stem + ".png"};
   }
   const auto back = static_cast<std::size_t>(-steps);
   const auto place = previous_[back - 1].find(number);
   if (place.state == State::kPresent) return {State::kPresent, "prev_2/" + place.name};
   State state = State::kBeyond;
   for (std::size_t further = back; further < previous_.size(); ++further) {
-    if (previous_[further].contains(number)) state = State::kHole;
+    if (previous_[further].contains(number)) state = State::kMissing;
   }
   return {state, "prev_2/" + stem + previous_mark(-steps) + ".png"};
 }
@@ -70,18 +70,17 @@ RawMapping read_mapping(const SourceRoot& devkit) {
           devkit.read_or_throw(kMappingFile), devkit.written(kMappingFile)};
 }
 
-/// Whether two picture files show the same; nothing if one of them cannot be read. Raw frames and
-/// object pictures are the same files as KITTI gives them out: pixels are compared only where
-/// somebody has written one of them anew.
-std::optional<bool> same_picture(const SourceRoot& base, const std::string& a,
-                                 const std::string& b) {
+/// Whether two image files show the same; nothing if one of them cannot be read. Raw frames and
+/// object images are the same files as KITTI gives them out: pixels are compared only where
+/// somebody has written one of them again.
+std::optional<bool> same_image(const SourceRoot& base, const std::string& a, const std::string& b) {
   const auto bytes_a = base.read(a);
   const auto bytes_b = base.read(b);
   if (is_fault(bytes_a) || is_fault(bytes_b)) return std::nullopt;
   if (bytes_a == bytes_b) return true;
   try {
-    const ColourFrame frame_a = decode_picture_file(base.on_disk(a));
-    const ColourFrame frame_b = decode_picture_file(base.on_disk(b));
+    const ColourFrame frame_a = decode_image_file(base.on_disk(a));
+    const ColourFrame frame_b = decode_image_file(base.on_disk(b));
     return frame_a.size == frame_b.size && frame_a.bgr == frame_b.bgr;
   } catch (const std::runtime_error&) {
     return std::nullopt;
@@ -91,14 +90,14 @@ std::optional<bool> same_picture(const SourceRoot& base, const std::string& a,
 class KittiObjectDataset : public Dataset {
  public:
   KittiObjectDataset(const SourceSpec& spec, const std::filesystem::path& base)
-      : root_(spec.root, base), pictures_(root_) {
+      : root_(spec.root, base), images_(root_) {
     root_.require_folder("label_2");
     const auto labels = NumberedSequence::list(root_.on_disk("label_2"), "", {".txt"});
     frames_.reserve(labels.frames().size());
     for (const auto& [number, name] : labels.frames()) add_frame(number, name);
     note_left_out(labels.left_out(), "label_2");
-    note_left_out(pictures_.labelled().left_out(), "image_2");
-    note_left_out(pictures_.previous_left_out(), "prev_2");
+    note_left_out(images_.labelled().left_out(), "image_2");
+    note_left_out(images_.previous_left_out(), "prev_2");
     if (spec.devkit) {
       const SourceRoot devkit(*spec.devkit, base);
       std::optional<SourceRoot> raw;
@@ -108,7 +107,7 @@ class KittiObjectDataset : public Dataset {
     }
     std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
-    note(std::ranges::count_if(pictures_.labelled().frames(),
+    note(std::ranges::count_if(images_.labelled().frames(),
                                [&](const auto& frame) { return !labels.contains(frame.first); }),
          "pictures without labels in " + root_.written("image_2"));
   }
@@ -118,23 +117,24 @@ class KittiObjectDataset : public Dataset {
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
   std::vector<std::string> notes() const override { return notes_; }
 
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
     const std::int64_t index = frame.frame.index + steps;
     const RawDrive* drive = drive_of(frame);
-    Neighbour here;
+    PairedFrame here;
     here.frame.index = index;
     here.frame.time_s =
         drive ? drive->time_s(index) : static_cast<double>(index) * kKittiFrameSeconds;
-    if (steps <= 0 && steps >= -ObjectPictures::kPrevious) {
-      const auto place = pictures_.at(number_of(frame), frame.sample_id, steps);
+    if (steps <= 0 && steps >= -ObjectImages::kPrevious) {
+      const auto place = images_.at(number_of(frame), frame.sample_id, steps);
       here.state = place.state;
       here.frame.path = root_.written(place.path);
     }
     if (here.state == State::kPresent || steps == 0 || drive == nullptr) return here;
 
-    // prev_2 may know of a frame still further back where the drive does not: a hole all the same.
-    Neighbour raw = drive->frame(index);
-    if (raw.state == State::kBeyond && here.state == State::kHole) return here;
+    // prev_2 may know of a frame still further back where the drive does not: a missing frame all
+    // the same.
+    PairedFrame raw = drive->frame(index);
+    if (raw.state == State::kBeyond && here.state == State::kMissing) return here;
     return raw;
   }
 
@@ -168,7 +168,7 @@ class KittiObjectDataset : public Dataset {
         root_.has_file(calibration)) {
       annotation_files_.push_back(root_.written(calibration));
     }
-    const auto place = pictures_.at(number, frame.sample_id, 0);
+    const auto place = images_.at(number, frame.sample_id, 0);
     frame.frame = {root_.written(place.path), 0, -1, 0};
     frames_.push_back(std::move(frame));
   }
@@ -210,7 +210,7 @@ class KittiObjectDataset : public Dataset {
   }
 
   /// Tells the frames of drives that are at fault so. Another list than the devkit's leads
-  /// every picture elsewhere, so that one of a drive shows it; a list wrong in single places does
+  /// every image elsewhere, so that one of a drive shows it; a list wrong in single places does
   /// not show unless the first of a drive is among them.
   void check_mapping(const SourceRoot& base, const std::string& mapping_path) {
     std::map<std::string, std::optional<std::string>> faults;  // by drive; empty: compared, equal
@@ -235,30 +235,30 @@ class KittiObjectDataset : public Dataset {
     }
   }
 
-  /// Compares the frame's picture or one before it with the drive's: what is wrong, "" if they are
+  /// Compares the frame's image or one before it with the drive's: what is wrong, "" if they are
   /// equal, nothing if there are no two to compare.
   std::optional<std::string> contradiction(const LabelledFrame& frame, const RawDrive& drive,
                                            const SourceRoot& base,
                                            const std::string& mapping_path) const {
-    for (int steps = 0; steps >= -ObjectPictures::kPrevious; --steps) {
-      const auto place = pictures_.at(number_of(frame), frame.sample_id, steps);
-      const Neighbour raw = drive.frame(frame.frame.index + steps);
+    for (int steps = 0; steps >= -ObjectImages::kPrevious; --steps) {
+      const auto place = images_.at(number_of(frame), frame.sample_id, steps);
+      const PairedFrame raw = drive.frame(frame.frame.index + steps);
       if (place.state != State::kPresent || raw.state != State::kPresent) continue;
-      const std::string picture = root_.written(place.path);
-      const auto same = same_picture(base, picture, raw.frame.path);
+      const std::string image = root_.written(place.path);
+      const auto same = same_image(base, image, raw.frame.path);
       if (!same) continue;
       if (*same) return "";
       return "expected the picture " + raw.frame.path + ", to which " + mapping_path +
-             " leads, got another, in " + picture;
+             " leads, got another, in " + image;
     }
     return std::nullopt;
   }
 
-  /// What is wrong if there is a picture before the drive's frame 0; "" if there is none.
+  /// What is wrong if there is an image before the drive's frame 0; "" if there is none.
   std::string before_the_first(const LabelledFrame& frame, const std::string& mapping_path) const {
     if (frame.sequence.empty()) return "";  // not in the mapping: previous frames are -1, -2, -3
-    for (int back = 1; back <= ObjectPictures::kPrevious; ++back) {
-      const auto place = pictures_.at(number_of(frame), frame.sample_id, -back);
+    for (int back = 1; back <= ObjectImages::kPrevious; ++back) {
+      const auto place = images_.at(number_of(frame), frame.sample_id, -back);
       if (frame.frame.index >= back || place.state != State::kPresent) continue;
       return "expected no frame before number 0 of " + frame.sequence + ", got one " +
              std::to_string(back) + " before number " + std::to_string(frame.frame.index) +
@@ -270,7 +270,7 @@ class KittiObjectDataset : public Dataset {
   void open_drive(const SourceRoot& raw, const std::string& folder,
                   std::optional<RawDrive>& drive) {
     RawDrive opened(raw, folder);
-    if (opened.pictures().empty()) return;
+    if (opened.images().empty()) return;
     if (!opened.timestamps_path().empty()) annotation_files_.push_back(opened.timestamps_path());
     drive = std::move(opened);
   }
@@ -296,7 +296,7 @@ class KittiObjectDataset : public Dataset {
   }
 
   SourceRoot root_;
-  ObjectPictures pictures_;
+  ObjectImages images_;
   std::vector<LabelledFrame> frames_;
   std::map<std::string, std::optional<RawDrive>> drives_;
   std::vector<std::string> annotation_files_;

@@ -14,25 +14,25 @@
 
 namespace eventgan {
 
-/// The pictures of KITTI object itself: image_2 and the three frames before each in prev_2. Listed
+/// The images of KITTI object itself: image_2 and the three frames before each in prev_2. Listed
 /// once; thread-safe.
-class ObjectPictures {
+class ObjectImages {
  public:
   static constexpr int kPrevious = 3;  ///< prev_2 reaches as far back as this
 
   /// Throws InputError if there is no image_2; prev_2 may be absent.
-  explicit ObjectPictures(const SourceRoot& root);
+  explicit ObjectImages(const SourceRoot& root);
 
   const NumberedSequence& labelled() const { return labelled_; }
 
   /// Files of prev_2 whose names are none of a previous frame, sorted.
   const std::vector<std::string>& previous_left_out() const { return previous_left_out_; }
 
-  /// The picture `steps` (-3..0) after picture `number`, below the root; where it is absent, the
-  /// path it would have, given that the picture's name is `stem`. A hole if an earlier frame is
-  /// there.
+  /// The image `steps` (-3..0) after image `number`, below the root; where it is absent, the
+  /// path it would have, given that the image's name is `stem`. A missing frame if an earlier frame
+  /// is there.
   struct Place {
-    Neighbour::State state;
+    PairedFrame::State state;
     std::string path;
   };
   Place at(std::int64_t number, const std::string& stem, int steps) const;
@@ -48,16 +48,16 @@ class ObjectPictures {
 /// without ".txt".
 ///
 /// With `raw_root` and `devkit`, devkit/mapping leads to the raw drive: FrameRef::index is then the
-/// raw frame's number and `sequence` the drive, and neighbours come from prev_2 where it has them
-/// (its pictures are those of the raw drive, pixel for pixel), else from the drive. Without, index
-/// is 0 for the labelled frame and -K for the frame K before. With `devkit` alone drive and number
-/// are known, no frames beyond prev_2. Times are the drive's timestamps, or 0.1 s a frame.
+/// raw frame's number and `sequence` the drive, and paired frames come from prev_2 where it has
+/// them (its images are those of the raw drive, pixel for pixel), else from the drive. Without,
+/// index is 0 for the labelled frame and -K for the frame K before. With `devkit` alone drive and
+/// number are known, no frames beyond prev_2. Times are the drive's timestamps, or 0.1 s a frame.
 ///
 /// calib/NNNNNN.txt, where it is there, gives Annotation::projection (P2).
 ///
-/// What the mapping says is compared with what is stored: of each drive one picture, labelled or
+/// What the mapping says is compared with what is stored: of each drive one image, labelled or
 /// previous, with the raw frame it should be, and the pixels must be equal. Where they are not,
-/// where a previous picture would come before the drive's first frame, and where the drive's
+/// where a previous image would come before the drive's first frame, and where the drive's
 /// timestamps are damaged, the frames are at fault (LabelledFrame::fault).
 ///
 /// Throws UsageError if `raw_root` is given without `devkit`.

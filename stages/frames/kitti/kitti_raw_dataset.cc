@@ -54,8 +54,8 @@ class KittiRawDataset : public Dataset {
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
   std::vector<std::string> notes() const override { return notes_; }
 
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
-    return drives_.at(frame.sequence).frames.neighbour(frame.frame.index, steps);
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
+    return drives_.at(frame.sequence).frames.paired_frame(frame.frame.index, steps);
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
@@ -135,7 +135,7 @@ class KittiRawDataset : public Dataset {
         drive.unreadable = std::move(*fault);
       } else {
         drive.tracklets.emplace(std::get<std::string>(xml), root_.written(labels));
-        note_labels_beyond_pictures(drive, root_.written(labels));
+        note_labels_beyond_images(drive, root_.written(labels));
       }
     }
     for (const std::int64_t number : labelled_numbers(drive)) {
@@ -150,27 +150,27 @@ class KittiRawDataset : public Dataset {
     if (!drive.frames.fault().empty()) {
       notes_.push_back("no frame of " + name + " can be used: " + drive.frames.fault());
     }
-    note(drive.frames.pictures().left_out(), "files left out in", folder + "/image_02/data");
+    note(drive.frames.images().left_out(), "files left out in", folder + "/image_02/data");
     const bool has_tracklets = drive.tracklets.has_value();
     drives_.emplace(name, std::move(drive));
     return has_tracklets;
   }
 
-  /// The frames with a picture, and those with tracklets that lost theirs.
+  /// The frames with an image, and those with tracklets that lost theirs.
   static std::set<std::int64_t> labelled_numbers(const Drive& drive) {
     std::set<std::int64_t> numbers;
-    for (const auto& [number, file] : drive.frames.pictures().frames()) numbers.insert(number);
+    for (const auto& [number, file] : drive.frames.images().frames()) numbers.insert(number);
     if (!drive.tracklets) return numbers;
     for (const std::int64_t number : drive.tracklets->frames()) {
-      if (drive.frames.frame(number).state == Neighbour::State::kHole) numbers.insert(number);
+      if (drive.frames.frame(number).state == PairedFrame::State::kMissing) numbers.insert(number);
     }
     return numbers;
   }
 
-  void note_labels_beyond_pictures(const Drive& drive, const std::string& path) {
+  void note_labels_beyond_images(const Drive& drive, const std::string& path) {
     const auto frames = drive.tracklets->frames();
     const auto beyond = std::ranges::count_if(frames, [&](std::int64_t frame) {
-      return drive.frames.frame(frame).state == Neighbour::State::kBeyond;
+      return drive.frames.frame(frame).state == PairedFrame::State::kBeyond;
     });
     if (beyond == 0) return;
     notes_.push_back(std::to_string(beyond) + " frames beyond the drive's pictures left out in " +

@@ -10,9 +10,9 @@ namespace eventgan {
 
 /// KITTI raw, synchronised and rectified: DATE/DATE_drive_NNNN_sync below the root, each with
 /// image_02/data and perhaps image_02/timestamps.txt and tracklet_labels.xml; DATE/calib_*.txt
-/// beside them. Every picture is a labelled frame: without tracklets its annotation is empty, with
+/// beside them. Every image is a labelled frame: without tracklets its annotation is empty, with
 /// them `original` is TrackletFrame::json, and there are boxes if the date's calibration is there.
-/// So is a frame inside a drive that has tracklets and no picture. All frames of a drive whose
+/// So is a frame inside a drive that has tracklets and no image. All frames of a drive whose
 /// timestamps are damaged are at fault.
 /// sample_id "2011_09_26_drive_0052_sync/0000000007".
 std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,

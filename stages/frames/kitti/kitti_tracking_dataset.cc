@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "stages/frames/kitti/calibration_file_internal.h"
+#include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/numbered_sequence.h"
@@ -67,7 +67,7 @@ Outcome<Annotation> TrackingLabels::annotation(std::int64_t frame) const {
 namespace {
 
 struct Sequence {
-  NumberedSequence pictures;
+  NumberedSequence images;
   TrackingLabels labels;
   std::optional<std::array<double, 12>> projection;  ///< P2 of calib/SEQ.txt, if it is there
 };
@@ -91,9 +91,9 @@ class KittiTrackingDataset : public Dataset {
     }
     note_left_out(left_out, "label_02");
     std::ranges::sort(frames_, {}, &LabelledFrame::sample_id);
-    const auto pictures = root_.folders_in("image_02");
+    const auto images = root_.folders_in("image_02");
     const auto unlabelled = std::ranges::count_if(
-        pictures, [&](const std::string& name) { return !sequences_.contains(name); });
+        images, [&](const std::string& name) { return !sequences_.contains(name); });
     if (unlabelled > 0) {
       notes_.push_back(std::to_string(unlabelled) + " sequences without labels in " +
                        root_.written("image_02"));
@@ -105,8 +105,8 @@ class KittiTrackingDataset : public Dataset {
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
   std::vector<std::string> notes() const override { return notes_; }
 
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
-    const auto place = sequences_.at(frame.sequence).pictures.at(frame.frame.index, steps);
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
+    const auto place = sequences_.at(frame.sequence).images.at(frame.frame.index, steps);
     if (place.number < 0) return {};
     return {place.state, frame_ref(frame.sequence, place)};
   }
@@ -153,16 +153,16 @@ class KittiTrackingDataset : public Dataset {
         name, Sequence{NumberedSequence::list(root_.on_disk("image_02/" + name)),
                        read_labels(label), read_projection("calib/" + name + ".txt")});
     const Sequence& sequence = place->second;
-    note_left_out(sequence.pictures.left_out(), "image_02/" + name);
+    note_left_out(sequence.images.left_out(), "image_02/" + name);
 
     std::set<std::int64_t> numbers;
     for (const std::int64_t number : sequence.labels.frames()) numbers.insert(number);
-    for (const auto& [number, file] : sequence.pictures.frames()) numbers.insert(number);
+    for (const auto& [number, file] : sequence.images.frames()) numbers.insert(number);
     for (const std::int64_t number : numbers) {
       LabelledFrame frame;
       frame.sample_id = fmt::format("{}/{:06}", name, number);
       frame.sequence = name;
-      frame.frame = frame_ref(name, sequence.pictures.at(number, 0));
+      frame.frame = frame_ref(name, sequence.images.at(number, 0));
       frame.label_key = label + "#" + std::to_string(number);
       frames_.push_back(std::move(frame));
     }

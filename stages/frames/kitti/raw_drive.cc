@@ -100,10 +100,10 @@ Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::
 }
 
 RawDrive::RawDrive(const SourceRoot& root, const std::string& folder)
-    : pictures_path_(root.written(folder + "/image_02/data")),
-      pictures_(NumberedSequence::list(root.on_disk(folder + "/image_02/data"))) {
+    : images_path_(root.written(folder + "/image_02/data")),
+      images_(NumberedSequence::list(root.on_disk(folder + "/image_02/data"))) {
   const std::string timestamps = folder + "/image_02/timestamps.txt";
-  if (pictures_.empty() || !root.has_file(timestamps)) return;
+  if (images_.empty() || !root.has_file(timestamps)) return;
   timestamps_path_ = root.written(timestamps);
   const auto text = root.read(timestamps);
   Outcome<std::vector<double>> times =
@@ -114,22 +114,22 @@ RawDrive::RawDrive(const SourceRoot& root, const std::string& folder)
     return;
   }
   times_s_ = std::get<std::vector<double>>(std::move(times));
-  const std::int64_t last = pictures_.frames().back().first;
+  const std::int64_t last = images_.frames().back().first;
   if (last < std::ssize(times_s_)) return;
   fault_ = "expected a line for each frame up to " + std::to_string(last) + ", got " +
            std::to_string(times_s_.size()) + " lines, in " + timestamps_path_;
   times_s_.clear();
 }
 
-Neighbour RawDrive::frame(std::int64_t number) const { return at(pictures_.find(number)); }
+PairedFrame RawDrive::frame(std::int64_t number) const { return at(images_.find(number)); }
 
-Neighbour RawDrive::neighbour(std::int64_t number, int steps) const {
-  return at(pictures_.at(number, steps));
+PairedFrame RawDrive::paired_frame(std::int64_t number, int steps) const {
+  return at(images_.at(number, steps));
 }
 
-Neighbour RawDrive::at(const NumberedSequence::Place& place) const {
+PairedFrame RawDrive::at(const NumberedSequence::Place& place) const {
   if (place.number < 0) return {};
-  return {place.state, {pictures_path_ + "/" + place.name, place.number, -1, time_s(place.number)}};
+  return {place.state, {images_path_ + "/" + place.name, place.number, -1, time_s(place.number)}};
 }
 
 double RawDrive::time_s(std::int64_t number) const {

@@ -34,16 +34,16 @@ class RawDrive {
   /// InputError for a folder that cannot be read.
   RawDrive(const SourceRoot& root, const std::string& folder);
 
-  const NumberedSequence& pictures() const { return pictures_; }
+  const NumberedSequence& images() const { return images_; }
 
   /// Frame `number`.
-  Neighbour frame(std::int64_t number) const;
+  PairedFrame frame(std::int64_t number) const;
 
   /// The frame `steps` after frame `number`, which is there: the drive stores every frame.
-  Neighbour neighbour(std::int64_t number, int steps) const;
+  PairedFrame paired_frame(std::int64_t number, int steps) const;
 
   /// Why none of its frames can be timed: its timestamps.txt cannot be read, is not as
-  /// parse_timestamps asks, or ends before the last picture. Empty if nothing is wrong.
+  /// parse_timestamps asks, or ends before the last image. Empty if nothing is wrong.
   const std::string& fault() const { return fault_; }
 
   /// Seconds since the first timestamp (NaN past the last one); without timestamps 0.1 s a frame.
@@ -53,12 +53,12 @@ class RawDrive {
   const std::string& timestamps_path() const { return timestamps_path_; }
 
  private:
-  Neighbour at(const NumberedSequence::Place& place) const;
+  PairedFrame at(const NumberedSequence::Place& place) const;
 
-  std::string pictures_path_;
+  std::string images_path_;
   std::string timestamps_path_;
   std::string fault_;
-  NumberedSequence pictures_;
+  NumberedSequence images_;
   std::vector<double> times_s_;
 };
 
@@ -70,7 +70,7 @@ struct RawFrame {
   bool operator==(const RawFrame&) const = default;
 };
 
-/// Where the training pictures of KITTI object come from, as the devkit's two files tell: picture n
+/// Where the training images of KITTI object come from, as the devkit's two files tell: image n
 /// (from 0) is line rand[n] (from 1) of the mapping, whose lines read "DATE DRIVE FRAME".
 class RawMapping {
  public:
@@ -79,7 +79,7 @@ class RawMapping {
   RawMapping(std::string_view rand, const std::string& rand_path, std::string_view mapping,
              const std::string& mapping_path);
 
-  /// Nothing for a picture that the devkit does not know.
+  /// Nothing for an image that the devkit does not know.
   std::optional<RawFrame> find(std::int64_t object_number) const;
 
  private:

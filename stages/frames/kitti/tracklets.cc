@@ -13,9 +13,9 @@
 #include <string_view>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
-#include "stages/frames/kitti/calibration_file_internal.h"
+#include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 
 namespace eventgan {
@@ -69,7 +69,7 @@ Json json_value(std::string_view text) {
   return std::string(text);
 }
 
-/// boost's bookkeeping, which stands beside the data.
+/// boost's bookkeeping, which is beside the data.
 bool is_bookkeeping(std::string_view name) { return name == "count" || name == "item_version"; }
 
 void add_fields(const pugi::xml_node& parent, Json& object) {
@@ -229,7 +229,7 @@ std::optional<RawCalibration> read_raw_calibration(const SourceRoot& root,
   const CalibrationFile cam(root, cam_path);
   calibration.rectification = cam.read<9>("R_rect_00");
   calibration.projection = cam.read<12>("P_rect_02");
-  calibration.picture = to_size(cam.read<2>("S_rect_02"), root.written(cam_path));
+  calibration.image = to_size(cam.read<2>("S_rect_02"), root.written(cam_path));
   return calibration;
 }
 
@@ -278,7 +278,7 @@ void add_edge(const Point3& a, const Point3& b, const RawCalibration& calibratio
 /// To [-pi, pi].
 double wrapped(double angle) { return std::remainder(angle, 2 * std::numbers::pi); }
 
-/// The cuboid's outline cut to the picture; nothing if it is not in the picture.
+/// The cuboid's outline cut to the image; nothing if it is not in the image.
 std::optional<Rectangle> outline(const TrackletPose& pose, const RawCalibration& calibration) {
   const auto corner = corners(pose, calibration);
   Hull hull;
@@ -287,10 +287,10 @@ std::optional<Rectangle> outline(const TrackletPose& pose, const RawCalibration&
       if ((from & axis) == 0) add_edge(corner[from], corner[from | axis], calibration, hull);
     }
   }
-  // Where KITTI's own labels end: a box that reaches beyond the picture is 1241, 374 at the most of
+  // Where KITTI's own labels end: a box that reaches beyond the image is 1241, 374 at the most of
   // 1242 x 375 pixels.
-  const double right = calibration.picture.width - 1;
-  const double bottom = calibration.picture.height - 1;
+  const double right = calibration.image.width - 1;
+  const double bottom = calibration.image.height - 1;
   if (!(hull.box.left < right && hull.box.right > 0 && hull.box.top < bottom &&
         hull.box.bottom > 0)) {
     return std::nullopt;

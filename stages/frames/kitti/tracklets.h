@@ -23,7 +23,7 @@ struct TrackletPose {
   double x = 0, y = 0, z = 0;  ///< the middle of its underside, m, in the scanner's frame
   double rotation_z = 0;       ///< rad about the scanner's z; at 0 its length lies along x
   int occlusion = -1;          ///< 0 visible, 1 partly, 2 largely; -1 not annotated
-  int truncation = -1;  ///< 0 inside the picture, 1 cut, 2 outside, 99 behind the camera; -1 unset
+  int truncation = -1;  ///< 0 inside the image, 1 cut, 2 outside, 99 behind the camera; -1 unset
 };
 
 /// Everything the file says about one frame.
@@ -58,7 +58,7 @@ class Tracklets {
 /// A point in metres.
 using Point3 = std::array<double, 3>;
 
-/// How the laser scanner's points come to lie in the rectified left colour picture, by KITTI raw's
+/// How the laser scanner's points come to lie in the rectified left colour image, by KITTI raw's
 ///   x_rect = R_rect_00 (R x_velo + T),    (u, v, 1) ~ P_rect_02 (x_rect, 1).
 /// The scanner's x points forward, y left, z up; the rectified camera's x right, y down, z forward.
 struct RawCalibration {
@@ -66,7 +66,7 @@ struct RawCalibration {
   Point3 translation{};                   ///< T, m
   std::array<double, 9> rectification{};  ///< R_rect_00, row-major
   std::array<double, 12> projection{};    ///< P_rect_02, row-major [3][4]
-  ImageSize picture;                      ///< S_rect_02
+  ImageSize image;                        ///< S_rect_02
 
   Point3 to_rectified(const Point3& velodyne) const;
 
@@ -81,8 +81,8 @@ std::optional<RawCalibration> read_raw_calibration(const SourceRoot& root, const
 /// The tracklet as KITTI object would annotate it: the smallest upright rectangle around what the
 /// camera sees of its cuboid, cut at 0 and at the last pixel's centre (width - 1, height - 1),
 /// where KITTI's own labels end; box3d with the middle of the underside in the rectified frame.
-/// Nothing if it lies behind the camera or outside the picture. `truncation` is 0 if the annotators
-/// marked it as inside the picture, else unknown.
+/// Nothing if it lies behind the camera or outside the image. `truncation` is 0 if the annotators
+/// marked it as inside the image, else unknown.
 std::optional<Box> to_box(const TrackletPose& pose, const RawCalibration& calibration);
 
 }  // namespace eventgan

@@ -1,3 +1,5 @@
+#include "stages/frames/mpii/detail/mat_file.h"
+
 #include <zlib.h>
 
 #include <algorithm>
@@ -9,7 +11,6 @@
 
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/mpii/mat_file_internal.h"
 
 namespace eventgan {
 namespace {

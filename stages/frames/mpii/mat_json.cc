@@ -1,3 +1,5 @@
+#include "stages/frames/mpii/detail/mat_json.h"
+
 #include <utf8.h>
 
 #include <algorithm>
@@ -12,8 +14,6 @@
 #include <type_traits>
 #include <utility>
 #include <vector>
-
-#include "stages/frames/mpii/mat_json_internal.h"
 
 namespace eventgan {
 namespace {

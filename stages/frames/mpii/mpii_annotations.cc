@@ -1,14 +1,15 @@
+#include "stages/frames/mpii/detail/mpii_annotations.h"
+
 #include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/mat_file_internal.h"
-#include "stages/frames/mpii/mat_json_internal.h"
-#include "stages/frames/mpii/mpii_annotations_internal.h"
+#include "stages/frames/mpii/detail/mat_file.h"
+#include "stages/frames/mpii/detail/mat_json.h"
 
 namespace eventgan {
 

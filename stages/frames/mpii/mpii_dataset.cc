@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/mpii_annotations_internal.h"
+#include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/mpii_frames.h"
 
 namespace eventgan {
@@ -25,8 +25,8 @@ class MpiiDataset final : public Dataset {
 
   const LabelSchema& label_schema() const override { return mpii_label_schema(); }
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
-    return frames_.neighbour(frame, steps);
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
+    return frames_.paired_frame(frame, steps);
   }
   std::vector<std::string> notes() const override { return notes_; }
 
@@ -80,7 +80,7 @@ class MpiiDataset final : public Dataset {
       LabelledFrame frame = frames_.labelled(entry.image, entry.keyframe);
       frame.label_key = "annolist[" + std::to_string(i) + "]";
       if (frame.sequence.empty()) ++alone;
-      if (frames_.is_without_picture(frame, entry.image)) ++unsized;
+      if (frames_.is_without_image(frame, entry.image)) ++unsized;
       if (!frame.sequence.empty() && frame.sequence != frame.sample_id && misnamed++ == 0) {
         first_misnamed = entry.image + " in " + entry.keyframe;
       }
@@ -93,7 +93,7 @@ class MpiiDataset final : public Dataset {
     note(unlabelled, "images without annotation in " + places_.annotations);
     note(other_split, "annotated images left out, not of split " + split);
     note(alone, "annotated images without a sequence folder: they have no neighbours");
-    note(unsized, kWithoutPicture);
+    note(unsized, kWithoutImage);
     note(misnamed,
          "keyframes in a sequence not named as their image (first: " + first_misnamed + ")");
   }

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -119,11 +119,11 @@ std::optional<Keyframe> parse_keyframe(const std::string& keyframe) {
   return parsed;
 }
 
-Outcome<ImageSize> size_of(const fs::path& base, const std::string& picture) {
+Outcome<ImageSize> size_of(const fs::path& base, const std::string& image) {
   try {
-    return picture_file_size(base / picture);
+    return image_file_size(base / image);
   } catch (const std::runtime_error& error) {
-    return SampleFault{std::string(error.what()) + ", in " + picture};
+    return SampleFault{std::string(error.what()) + ", in " + image};
   }
 }
 
@@ -170,9 +170,9 @@ LabelledFrame MpiiFrames::labelled(const std::string& image, const std::string& 
       return labelled;
     }
   }
-  const auto picture = images_.find(image);
+  const auto entry = images_.find(image);
   labelled.frame.path =
-      picture != images_.end() ? picture->second : joined(image_folders_.front(), image);
+      entry != images_.end() ? entry->second : joined(image_folders_.front(), image);
   return labelled;
 }
 
@@ -182,35 +182,35 @@ const NumberedSequence& MpiiFrames::frames_of(const Sequence& sequence) const {
   return sequence.frames;
 }
 
-Neighbour MpiiFrames::neighbour(const LabelledFrame& labelled, int steps) const {
-  using State = Neighbour::State;
+PairedFrame MpiiFrames::paired_frame(const LabelledFrame& labelled, int steps) const {
+  using State = PairedFrame::State;
   const auto sequence = sequences_.find(labelled.sequence);
   if (sequence == sequences_.end()) {
     if (steps != 0) return {};
     const bool present = images_.contains(fs::path(labelled.frame.path).filename().string());
-    return {present ? State::kPresent : State::kHole, labelled.frame};
+    return {present ? State::kPresent : State::kMissing, labelled.frame};
   }
   const auto place = frames_of(sequence->second).at(labelled.frame.index, steps);
   if (place.state == State::kBeyond) return {};
-  if (steps == 0 && place.state == State::kHole) return {State::kHole, labelled.frame};
-  Neighbour neighbour{place.state, {}};
-  neighbour.frame.path = joined(sequence->second.folder, place.name);
-  neighbour.frame.index = place.number;
-  return neighbour;
+  if (steps == 0 && place.state == State::kMissing) return {State::kMissing, labelled.frame};
+  PairedFrame paired_frame{place.state, {}};
+  paired_frame.frame.path = joined(sequence->second.folder, place.name);
+  paired_frame.frame.index = place.number;
+  return paired_frame;
 }
 
 Outcome<LabelScale> MpiiFrames::label_scale(const std::string& image,
                                             const std::string& frame) const {
-  const auto picture = images_.find(image);
-  if (picture == images_.end() || picture->second == frame) return LabelScale{};
-  const Outcome<ImageSize> annotated = size_of(base_, picture->second);
+  const auto entry = images_.find(image);
+  if (entry == images_.end() || entry->second == frame) return LabelScale{};
+  const Outcome<ImageSize> annotated = size_of(base_, entry->second);
   if (is_fault(annotated)) return std::get<SampleFault>(annotated);
   const Outcome<ImageSize> stored = size_of(base_, frame);
   if (is_fault(stored)) return LabelScale{};
   const auto& from = std::get<ImageSize>(annotated);
   const auto& to = std::get<ImageSize>(stored);
   if (!have_one_shape(from, to)) {
-    return SampleFault{"expected a frame of the shape of " + picture->second + ", " +
+    return SampleFault{"expected a frame of the shape of " + entry->second + ", " +
                        to_string(from) + ", where it was annotated, got " + to_string(to) +
                        ", in " + frame};
   }
@@ -218,16 +218,16 @@ Outcome<LabelScale> MpiiFrames::label_scale(const std::string& image,
                     static_cast<double>(to.height) / from.height};
 }
 
-bool MpiiFrames::is_without_picture(const LabelledFrame& labelled, const std::string& image) const {
+bool MpiiFrames::is_without_image(const LabelledFrame& labelled, const std::string& image) const {
   return !labelled.sequence.empty() && !images_.contains(image);
 }
 
 std::string MpiiFrames::find_keyframe(const std::string& image) const {
   const auto sequence = sequences_.find(without_extension(image));
-  const auto picture = images_.find(image);
-  if (sequence == sequences_.end() || picture == images_.end()) return {};
+  const auto entry = images_.find(image);
+  if (sequence == sequences_.end() || entry == images_.end()) return {};
   for (const auto& [number, name] : frames_of(sequence->second).frames()) {
-    if (same_bytes(base_ / picture->second, base_ / sequence->second.folder / name)) {
+    if (same_bytes(base_ / entry->second, base_ / sequence->second.folder / name)) {
       return sequence->first + "/" + name;
     }
   }

@@ -41,30 +41,30 @@ bool same_bytes(const std::filesystem::path& a, const std::filesystem::path& b);
 /// How the folders that MPII's sequences are downloaded as begin; each holds many sequences.
 inline constexpr std::string_view kMpiiBatchPrefix = "mpii_human_pose_v1_sequences";
 
-/// The note for the labelled frames of which is_without_picture is true.
-inline constexpr const char* kWithoutPicture =
+/// The note for the labelled frames of which is_without_image is true.
+inline constexpr const char* kWithoutImage =
     "labelled frames of a sequence whose picture is not in images: their labels are taken to be in "
     "pixels of the frame";
 
-/// How many pixels of the labelled frame one of the annotated picture is.
+/// How many pixels of the labelled frame one of the annotated image is.
 struct LabelScale {
   double x = 1;
   double y = 1;
 };
 
-/// Where MPII's pictures lie: single ones in folders of images, and the videos around them as one
+/// Where MPII's images lie: single ones in folders of images, and the videos around them as one
 /// folder of numbered frames each. All paths are as the manifest writes them; relative ones start
 /// at `base`.
 ///
 /// A labelled frame with a sequence *is* its keyframe, FrameRef::index being the keyframe's number;
-/// one without is the single picture and has no neighbours. Times are unknown: the rate differs
+/// one without is the single image and has no paired frames. Times are unknown: the rate differs
 /// from video to video.
 ///
 /// Thread safety: const methods may be called from several threads; a sequence is listed when its
-/// first neighbour is asked for.
+/// first paired frame is asked for.
 class MpiiFrames {
  public:
-  /// A picture is looked for in `image_folders` in turn. `sequence_folders` hold folders named as
+  /// An image is looked for in `image_folders` in turn. `sequence_folders` hold folders named as
   /// the sequences, directly or inside the download's mpii_human_pose_v1_sequences_batchN. Absent
   /// folders count as empty. Throws InputError if a folder cannot be read.
   MpiiFrames(std::filesystem::path base, std::vector<std::string> image_folders,
@@ -75,18 +75,18 @@ class MpiiFrames {
   /// label_key.
   LabelledFrame labelled(const std::string& image, const std::string& keyframe) const;
 
-  /// As Dataset::neighbour. InputError if the sequence's folder cannot be read.
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const;
+  /// As Dataset::paired_frame. InputError if the sequence's folder cannot be read.
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const;
 
-  /// MPII was annotated on the pictures in `images`; a frame of its video may be stored in another
-  /// size. The ratio of the sizes of `frame` and of the picture `image`: 1 where they are one file,
-  /// or no picture of that name is there to tell. A fault if the sizes are not of one shape (with
+  /// MPII was annotated on the images in `images`; a frame of its video may be stored in another
+  /// size. The ratio of the sizes of `frame` and of the image `image`: 1 where they are one file,
+  /// or no image of that name is there to tell. A fault if the sizes are not of one shape (with
   /// one side made equal, the other differs by more than one pixel of the smaller of the two), or
-  /// the picture is there and cannot be read. A frame that cannot be read is left to its decoder.
+  /// the image is there and cannot be read. A frame that cannot be read is left to its decoder.
   Outcome<LabelScale> label_scale(const std::string& image, const std::string& frame) const;
 
-  /// True if `labelled` is a frame of a video, and the picture `image` is not there to compare.
-  bool is_without_picture(const LabelledFrame& labelled, const std::string& image) const;
+  /// True if `labelled` is a frame of a video, and the image `image` is not there to compare.
+  bool is_without_image(const LabelledFrame& labelled, const std::string& image) const;
 
   /// "NAME/00000053.jpg": the frame of sequence NAME whose file is byte for byte that of `image`;
   /// empty if there is none. For lists that do not say which frame was labelled. Reads files.
@@ -108,7 +108,7 @@ class MpiiFrames {
   std::map<std::string, Sequence, std::less<>> sequences_;
 };
 
-/// Moves labels from the annotated picture into the frame: a point as x' = (x + 0.5) s - 0.5, an
+/// Moves labels from the annotated image into the frame: a point as x' = (x + 0.5) s - 0.5, an
 /// edge as x' = x s, Person::scale with the root of the two factors' product.
 void scale_labels(const LabelScale& scale, std::vector<Person>& persons);
 

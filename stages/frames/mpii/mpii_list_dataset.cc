@@ -14,14 +14,14 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/detail/typed_array.h"
 #include "stages/base/archives/hdf5_arrays.h"
-#include "stages/base/archives/typed_array_internal.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/mpii/mpii_annotations_internal.h"
+#include "stages/frames/mpii/detail/mpii_annotations.h"
+#include "stages/frames/mpii/detail/mpii_list_dataset.h"
 #include "stages/frames/mpii/mpii_frames.h"
-#include "stages/frames/mpii/mpii_list_dataset_internal.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -233,7 +233,7 @@ class MpiiListDataset final : public Dataset {
       labelled_.push_back(frames_.labelled(image, keyframes.of(image, frames_)));
       labelled_.back().label_key = image;
       rows_.emplace(image, Rows{dump_json(rows), labelled_.back().frame.path});
-      if (frames_.is_without_picture(labelled_.back(), image)) ++unsized;
+      if (frames_.is_without_image(labelled_.back(), image)) ++unsized;
       if (spec.sequences && labelled_.back().sequence.empty()) ++alone;
     }
     sort_samples(labelled_, file_);
@@ -241,13 +241,13 @@ class MpiiListDataset final : public Dataset {
       notes_.push_back(std::to_string(alone) +
                        " images whose frame is in no sequence: they have no neighbours");
     }
-    if (unsized > 0) notes_.push_back(std::to_string(unsized) + " " + kWithoutPicture);
+    if (unsized > 0) notes_.push_back(std::to_string(unsized) + " " + kWithoutImage);
   }
 
   const LabelSchema& label_schema() const override { return mpii_label_schema(); }
   const std::vector<LabelledFrame>& labelled_frames() const override { return labelled_; }
-  Neighbour neighbour(const LabelledFrame& frame, int steps) const override {
-    return frames_.neighbour(frame, steps);
+  PairedFrame paired_frame(const LabelledFrame& frame, int steps) const override {
+    return frames_.paired_frame(frame, steps);
   }
   std::vector<std::string> notes() const override { return notes_; }
 

@@ -11,7 +11,7 @@ namespace eventgan {
 
 /// MPII as pose trainers keep it: the manifest's `annotations` is a JSON list of people ("image",
 /// "center", "scale", "joints", "joints_vis") or an HDF5 table of them (valid.h5, train.h5).
-/// Pictures are found by name in ROOT/images, then in ROOT. Rows of one image make one sample of
+/// Images are found by name in ROOT/images, then in ROOT. Rows of one image make one sample of
 /// several persons, in the file's order.
 ///
 /// Joints and centre become 0-based; centre and scale are otherwise as the file has them: those of
@@ -24,7 +24,7 @@ namespace eventgan {
 /// mpii_human_pose_v1_sequences_keyframes.mat beside the annotations, in or beside SEQUENCES, or in
 /// ROOT; without that file it is the frame whose file is byte for byte that of the image, which
 /// reads all of the sequences' file sizes. Images without such a frame, and all without
-/// `sequences`, have no neighbours.
+/// `sequences`, have no paired frames.
 ///
 /// Relative paths start at `base`. Everything is read at opening. Throws UsageError without
 /// `annotations`; InputError if a file or folder is missing or damaged.

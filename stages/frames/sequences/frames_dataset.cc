@@ -16,10 +16,10 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/json_text_internal.h"
+#include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/sequences/picture_folder.h"
+#include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/sequences/video_clip.h"
 #include "stages/frames/source_folders.h"
 
@@ -28,11 +28,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class PicturesDataset final : public Dataset {
+class ImagesDataset final : public Dataset {
  public:
-  PicturesDataset(const SourceSpec& spec, const fs::path& base)
+  ImagesDataset(const SourceSpec& spec, const fs::path& base)
       : root_(spec.root, base), frames_per_second_(spec.frames_per_second) {
-    PictureFolder top = list_picture_folder(root_.on_disk(""));
+    ImageFolder top = list_image_folder(root_.on_disk(""));
     const auto note = [this](std::size_t count, const std::string& what) {
       if (count == 0) return;
       notes_.push_back(std::to_string(count) + " " + what + " in " + root_.written(""));
@@ -42,13 +42,13 @@ class PicturesDataset final : public Dataset {
       add_sequence("", std::move(top));
     } else {
       note_unused(top, "");
-      std::size_t without_pictures = 0;
+      std::size_t without_images = 0;
       for (const std::string& name : top.folders) {
-        PictureFolder folder = list_picture_folder(root_.on_disk(name));
-        if (folder.frames.empty()) ++without_pictures;
+        ImageFolder folder = list_image_folder(root_.on_disk(name));
+        if (folder.frames.empty()) ++without_images;
         add_sequence(name, std::move(folder));
       }
-      note(without_pictures, "folders without pictures");
+      note(without_images, "folders without pictures");
     }
     if (labelled_.empty()) {
       throw InputError("expected images, folders of images, or videos, got none, in " +
@@ -63,11 +63,11 @@ class PicturesDataset final : public Dataset {
   std::vector<std::string> annotation_files() const override { return sidecars_; }
   std::vector<std::string> notes() const override { return notes_; }
 
-  Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
+  PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     const auto sequence = sequences_.find(labelled.sequence);
     if (sequence == sequences_.end()) return {};
     const auto place = sequence->second.at(labelled.frame.index, steps);
-    if (place.state == Neighbour::State::kBeyond) return {};
+    if (place.state == PairedFrame::State::kBeyond) return {};
     return {place.state, frame(sequence->first, place.number, place.name)};
   }
 
@@ -98,7 +98,7 @@ class PicturesDataset final : public Dataset {
   }
 
   /// Tells of the files in a folder that become neither frame nor label.
-  void note_unused(const PictureFolder& folder, const std::string& sequence) {
+  void note_unused(const ImageFolder& folder, const std::string& sequence) {
     const std::string place = " in " + root_.written(sequence);
     std::set<std::string> stems;
     for (const auto& [number, name] : folder.frames.frames()) {
@@ -117,7 +117,7 @@ class PicturesDataset final : public Dataset {
     }
   }
 
-  void add_sequence(const std::string& sequence, PictureFolder folder) {
+  void add_sequence(const std::string& sequence, ImageFolder folder) {
     note_unused(folder, sequence);
     for (const auto& [number, name] : folder.frames.frames()) {
       const fs::path below = fs::path(sequence) / name;
@@ -145,8 +145,8 @@ class PicturesDataset final : public Dataset {
 
 }  // namespace
 
-std::unique_ptr<Dataset> open_pictures_dataset(const SourceSpec& spec, const fs::path& base) {
-  return std::make_unique<PicturesDataset>(spec, base);
+std::unique_ptr<Dataset> open_images_dataset(const SourceSpec& spec, const fs::path& base) {
+  return std::make_unique<ImagesDataset>(spec, base);
 }
 
 std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
@@ -233,11 +233,11 @@ class VideosDataset final : public Dataset {
   std::vector<std::string> notes() const override { return notes_; }
   std::vector<std::string> annotation_files() const override { return annotation_files_; }
 
-  Neighbour neighbour(const LabelledFrame& labelled, int steps) const override {
+  PairedFrame paired_frame(const LabelledFrame& labelled, int steps) const override {
     const LabelledClip& clip = clips_.at(labelled.sequence);
     const std::int64_t number = labelled.frame.index + steps;
     if (number < 0 || number >= clip.video.frame_count) return {};
-    return {Neighbour::State::kPresent, clip.frame(number)};
+    return {PairedFrame::State::kPresent, clip.frame(number)};
   }
 
   Outcome<Annotation> annotation(const std::string& label_key) const override {
@@ -383,10 +383,10 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
   std::error_code error;
   const auto status = std::filesystem::status(root, error);
   if (std::filesystem::is_directory(status)) {
-    const PictureFolder top = list_picture_folder(root);
+    const ImageFolder top = list_image_folder(root);
     const bool has_videos = std::ranges::any_of(top.left_out, is_video_name);
     return top.frames.empty() && has_videos ? open_videos_dataset(spec, base)
-                                            : open_pictures_dataset(spec, base);
+                                            : open_images_dataset(spec, base);
   }
   if (std::filesystem::is_regular_file(status) && is_video_name(root)) {
     return open_videos_dataset(spec, base);

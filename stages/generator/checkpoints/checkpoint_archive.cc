@@ -64,7 +64,7 @@ using Kind = PickleNode::Kind;
 constexpr std::string_view kMagic = "\x6c\xfc\x9c\x46\xf9\x20\x6a\xa8\x50\x19";
 constexpr std::int64_t kProtocolVersion = 1001;
 
-/// Where a storage's values stand in the file.
+/// Where a storage's values are in the file.
 struct StorageExtent {
   std::uint64_t begin = 0;
   std::uint64_t size_bytes = 0;

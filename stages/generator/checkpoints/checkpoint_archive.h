@@ -75,7 +75,7 @@ class CheckpointArchive {
 std::unique_ptr<CheckpointArchive> open_zip_checkpoint(const std::filesystem::path& file);
 
 /// Opens a checkpoint of PyTorch 0.1.10 to 1.5 (later ones write it on request). One after another
-/// stand five pickles: the magic number; the protocol version 1001; facts about the machine that
+/// are five pickles: the magic number; the protocol version 1001; facts about the machine that
 /// wrote it, which must have been little endian; the data, whose tensors name storages by key; the
 /// list of these keys. Then for each key in that order the number of values (int64) and the values,
 /// little endian.

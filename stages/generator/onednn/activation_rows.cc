@@ -37,7 +37,7 @@ template <class T>
   }
 }
 
-/// The values of a row's pixel behind the phases' kernel: pixel x of the picture stands at
+/// The values of a row's pixel behind the phases' kernel: pixel x of the image is at
 /// (x + 1) / 2.
 [[gnu::always_inline]] inline const float* phase_of(const DecoderRow& row, std::ptrdiff_t i) {
   const std::ptrdiff_t x = i + row.column_phase;

@@ -42,8 +42,8 @@ struct DecoderRow {
   int column_phase = 0;  ///< the same of the first pixel
   /// [x, channel]: what the skip connection adds, bias included; may be overwritten.
   float* skip = nullptr;
-  /// [pixel, phase, channel]: the row of phase_kernel's output that holds this one, from the
-  /// pixel that holds the first one on.
+  /// [pixel, sub-pixel phase, channel]: the row of phase_kernel's output that holds this one, from
+  /// the pixel that holds the first one on.
   const float* phases = nullptr;
   /// Not null: [x, channel], in place of `phases`.
   const float* whole_row = nullptr;

@@ -48,7 +48,7 @@ BlockPool::Lease BlockPool::take(std::size_t size_bytes) {
     }
   }
   if (!block || block->size_bytes() < size_bytes) {
-    block.reset();  // first, so that old and new do not stand side by side
+    block.reset();  // first, so that old and new are not held side by side
     block.emplace(size_bytes);
   }
   return {*this, std::move(*block)};

@@ -1,7 +1,7 @@
+#include "stages/generator/onednn/detail/decoder_level.h"
+
 #include <algorithm>
 #include <cstring>
-
-#include "stages/generator/onednn/decoder_level_internal.h"
 
 namespace eventgan {
 namespace {

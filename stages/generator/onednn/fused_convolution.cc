@@ -1,6 +1,7 @@
+#include "stages/generator/onednn/detail/fused_convolution.h"
+
 #include <algorithm>
 
-#include "stages/generator/onednn/fused_convolution_internal.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {

@@ -22,8 +22,8 @@ struct LayerNumbers {
 
 /// The network's layers. Names are those of network_layout(), but each decoder has
 ///   decoders.N.skip         3x3 over the skip connection, with the layer's bias
-///   decoders.N.phases       2x2 over the small picture (decoder_kernels.h)
-///   decoders.N.last_row     3x3 over the doubled picture, for the last row of an odd height
+///   decoders.N.phases       2x2 over the small image (decoder_kernels.h)
+///   decoders.N.last_row     3x3 over the doubled image, for the last row of an odd height
 ///   decoders.N.last_column  the same with rows and columns exchanged, for an odd width
 /// none of which has an activation: their sum has. `head` and `pred` are float32 in every
 /// precision, since they cost little and their rounding errors go straight into the volume.

@@ -112,7 +112,7 @@ EVENTGAN_LANES_INLINE void read_row(const float* pixels, int width, std::ptrdiff
   };
   int x = 0;
   for (; x + kLanes <= width; x += kLanes) read(pixels + x * kWords, x);
-  // What stands behind the row may be anything, but its neighbour here is zero.
+  // What is behind the row may be anything, but its neighbour here is zero.
   if (x < width) {
     float rest[kWords * kLanes] = {};
     std::memcpy(rest, pixels + x * kWords, (width - x) * kWords * sizeof(float));
@@ -360,7 +360,7 @@ EVENTGAN_AVX512 void NarrowLayers::read_rows(const Stored* small, const Stored* 
   }
 }
 
-/// The sums over the doubled picture: pixel x at 1 + x.
+/// The sums over the doubled image: pixel x at 1 + x.
 template <class Stored>
 EVENTGAN_AVX512 void NarrowLayers::add_phases(const DecoderRow& edges, int y, float* rows) const {
   float* const sums_row = phase_planes(rows);

@@ -37,7 +37,7 @@ class NarrowLayers {
                BufferLayout& layout);
 
   // Rows are computed in order, from row 0 on, where `fit` says so. `block` is what `layout` is of;
-  // between two rows of a picture nothing else may write there.
+  // between two rows of an image nothing else may write there.
 
   /// Pixels that are computed at once, and may be written behind the end of a row of the head.
   static constexpr int kPixels = 32;

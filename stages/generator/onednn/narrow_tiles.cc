@@ -19,7 +19,7 @@ constexpr int kTileBytes = 64;  ///< of a row
 constexpr int kTileValues = kTileRows * kTileBytes / sizeof(Bfloat16);
 constexpr int kSums = 2 * kChannels;  ///< of a pair
 constexpr int kBlockSums = kTileRows * kSums;
-/// Values from a pair's inputs to the next one's: two pixels, but one of the small picture, which
+/// Values from a pair's inputs to the next one's: two pixels, but one of the small image, which
 /// has twice the channels.
 constexpr int kStep = 2 * kChannels;
 

@@ -21,7 +21,7 @@ class NarrowTiles {
   std::size_t buffer_bytes() const;
 
   /// Row y of the decoder, without bias and LeakyReLU: [x, channel] from pixel -1 on, and behind
-  /// pixel 0 a whole number of 32 pixels; valid until the next row. What lies outside the picture
+  /// pixel 0 a whole number of 32 pixels; valid until the next row. What lies outside the image
   /// is undefined.
   /// Rows are computed in order, from row 0 on, on a processor with AMX (bfloat16); between them
   /// nothing else may write to `buffer`, of whole cache lines. small, skip, edges: as

@@ -1,9 +1,10 @@
+#include "stages/generator/onednn/detail/network_layers.h"
+
 #include <algorithm>
 #include <stdexcept>
 #include <utility>
 
 #include "stages/generator/onednn/layer_numbers.h"
-#include "stages/generator/onednn/network_layers_internal.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/quantized_network.h"
 

@@ -1,8 +1,8 @@
+#include "stages/generator/onednn/detail/network_plan.h"
+
 #include <algorithm>
 #include <stdexcept>
 #include <type_traits>
-
-#include "stages/generator/onednn/network_plan_internal.h"
 
 namespace eventgan {
 namespace {
@@ -102,7 +102,7 @@ void NetworkPlan::plan_encoders(NetworkLayers& layers) {
     encoders_.emplace_back(setup, layers.at(numbered("encoders", level)), engine_);
     size = half_size(size);
   }
-  bottom_ = add_activations(size, base_channels_ << kNetworkLevels);
+  bottleneck_ = add_activations(size, base_channels_ << kNetworkLevels);
   between_ = add_activations(size, base_channels_ << kNetworkLevels);
 }
 
@@ -252,17 +252,17 @@ SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* 
     };
     run_head<Stored>(run, frames);
     for (int level = 0; level < kNetworkLevels; ++level) {
-      const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottom_;
+      const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
       encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
       count(target);
     }
     for (std::size_t i = 0; i < residuals_.size(); i += 2) {
-      residuals_[i].run(stream, at(bottom_), at(between_), run.scratch);
+      residuals_[i].run(stream, at(bottleneck_), at(between_), run.scratch);
       count(between_);
-      residuals_[i + 1].run(stream, at(between_), at(bottom_), run.scratch);
-      count(bottom_);
+      residuals_[i + 1].run(stream, at(between_), at(bottleneck_), run.scratch);
+      count(bottleneck_);
     }
-    const std::byte* small = at(bottom_);
+    const std::byte* small = at(bottleneck_);
     for (int level = 0; level < kNetworkLevels - 1; ++level) {
       run_decoder<Stored>(run, level, small);
       small = at(decoded_[level]);
@@ -339,7 +339,7 @@ SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
     return Activations{block + skips_[level].offset, sizes_[level],
                        value * (static_cast<std::size_t>(base_channels_) << level)};
   };
-  const auto at_bottom = [&](const Buffer& buffer) {
+  const auto at_bottleneck = [&](const Buffer& buffer) {
     return Activations{block + buffer.offset, half_size(sizes_.back()),
                        value * (static_cast<std::size_t>(base_channels_) << kNetworkLevels)};
   };
@@ -352,14 +352,14 @@ SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
     }
     // The last encoder, then the blocks' first and second convolutions in turns.
     Activations source = skip(kTiledEncoders);
-    Activations target = at_bottom(bottom_);
-    auto pixels = work.bottom.begin();
-    for (const PixelConvolution& convolution : layers.bottom) {
+    Activations target = at_bottleneck(bottleneck_);
+    auto pixels = work.bottleneck.begin();
+    for (const PixelConvolution& convolution : layers.bottleneck) {
       convolution.run(stream, tiles, *pixels++, source, target, counted);
       source = target;
-      target = at_bottom(source.data == block + bottom_.offset ? between_ : bottom_);
+      target = at_bottleneck(source.data == block + bottleneck_.offset ? between_ : bottleneck_);
     }
-    std::byte* small = block + bottom_.offset;
+    std::byte* small = block + bottleneck_.offset;
     for (int level = 0; level < kNetworkLevels - 1; ++level) {
       run_decoder_tiles<Stored>(run, layers, work, level, small);
       small = block + decoded_[level].offset;

@@ -16,9 +16,9 @@
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
+#include "stages/generator/onednn/detail/network_plan.h"
+#include "stages/generator/onednn/detail/tiled_layers.h"
 #include "stages/generator/onednn/narrow_layers.h"
-#include "stages/generator/onednn/network_plan_internal.h"
-#include "stages/generator/onednn/tiled_layers_internal.h"
 
 namespace eventgan {
 namespace {

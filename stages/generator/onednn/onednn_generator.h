@@ -22,10 +22,10 @@ struct OnednnSupport {
 OnednnSupport onednn_support(Precision precision);
 
 /// The fast engine: oneDNN's convolutions with bias and activation fused, weights laid out once for
-/// all picture sizes, and for each size a plan that is built on its first use and then runs in
+/// all image sizes, and for each size a plan that is built on its first use and then runs in
 /// buffers that are there already. The nearest doubling before a decoder's convolution is not
-/// computed: its four phases are one 2x2 convolution on the small picture (decoder_kernels.h),
-/// exact in real arithmetic for every picture size.
+/// computed: its four phases are one 2x2 convolution on the small image (decoder_kernels.h),
+/// exact in real arithmetic for every image size.
 ///
 /// One intra-operation thread per calling thread, set on its first call; how the kernels split
 /// their work, and with it the last bits, depends on that. What is kept as long as the generator

@@ -1,17 +1,17 @@
+#include "stages/generator/onednn/detail/tiled_layers.h"
+
 #include <algorithm>
 #include <cstring>
 #include <string>
 #include <utility>
-
-#include "stages/generator/onednn/tiled_layers_internal.h"
 
 namespace eventgan {
 namespace {
 
 using Type = dnnl::memory::data_type;
 
-// Larger pieces waste less around them, smaller ones compute less that nobody needs; the coarse
-// levels' weights are large, and each piece reads them again.
+// Larger tiles waste less around them, smaller ones compute less that nobody needs; the coarse
+// levels' weights are large, and each tile reads them again.
 constexpr std::array<ImageSize, kTiledEncoders> kEncoderTiles = {{{8, 16}, {8, 8}, {4, 8}}};
 constexpr std::array<ImageSize, kTiledDecoders> kDecoderPhases = {{{4, 8}, {8, 8}, {8, 16}}};
 constexpr int kPixelsAtOnce = 32;
@@ -20,9 +20,9 @@ std::string decoder_part(int level, const char* part) {
   return "decoders." + std::to_string(level) + "." + part;
 }
 
-/// A convolution without padding over a piece that has its surroundings with it.
-FusedConvolution over_piece(NetworkLayers& layers, const std::string& name, ImageSize output,
-                            Type type) {
+/// A convolution without padding over a tile that has its surroundings with it.
+FusedConvolution over_tile(NetworkLayers& layers, const std::string& name, ImageSize output,
+                           Type type) {
   LayerWeights& weights = layers.at(name);
   const int around = weights.numbers().kernel - 1;
   ConvolutionSetup setup;
@@ -31,7 +31,7 @@ FusedConvolution over_piece(NetworkLayers& layers, const std::string& name, Imag
   return FusedConvolution(setup, weights, layers.engine());
 }
 
-/// What a piece of an encoder's output sees.
+/// What a tile of an encoder's output sees.
 ImageSize encoder_input(ImageSize output) { return {2 * output.height + 1, 2 * output.width + 1}; }
 
 FusedConvolution encoder_convolution(NetworkLayers& layers, int level, ImageSize output) {
@@ -49,7 +49,7 @@ std::size_t value_bytes(const NetworkLayers& layers) {
 
 /// Copies the rectangle of `size` whose first pixel is (top, left), which may lie outside: there
 /// stand zeros.
-void copy_piece(const Activations& from, int top, int left, ImageSize size, std::byte* to) {
+void copy_tile(const Activations& from, int top, int left, ImageSize size, std::byte* to) {
   const std::size_t pixel = from.pixel_bytes;
   const int begin = std::clamp(-left, 0, size.width);
   const int end = std::clamp(from.size.width - left, begin, size.width);
@@ -85,7 +85,7 @@ EncoderTile::EncoderTile(NetworkLayers& layers, int level, ImageSize size, Buffe
 void EncoderTile::run(dnnl::stream& stream, std::byte* block, TilePlace place,
                       const Activations& source, const Activations& target,
                       SaturationCount* counted) const {
-  copy_piece(source, 2 * place.row - 1, 2 * place.column - 1, encoder_input(size_), block + input_);
+  copy_tile(source, 2 * place.row - 1, 2 * place.column - 1, encoder_input(size_), block + input_);
   convolution_.run(stream, block + input_, block + output_, block + scratch_);
   const int rows = std::min(size_.height, target.size.height - place.row);
   const int columns = std::min(size_.width, target.size.width - place.column);
@@ -145,8 +145,8 @@ PixelConvolution::PixelConvolution(NetworkLayers& layers, const std::string& nam
 
 void PixelConvolution::gather(std::byte* block, int i, int y, int x,
                               const Activations& source) const {
-  copy_piece(source, stride_ * y - 1, stride_ * x - 1, {side_, side_},
-             block + input_ + static_cast<std::size_t>(i) * side_ * side_ * source.pixel_bytes);
+  copy_tile(source, stride_ * y - 1, stride_ * x - 1, {side_, side_},
+            block + input_ + static_cast<std::size_t>(i) * side_ * side_ * source.pixel_bytes);
 }
 
 void PixelConvolution::run(dnnl::stream& stream, std::byte* block, const std::vector<int>& pixels,
@@ -200,8 +200,8 @@ void DecoderPixels::compute(dnnl::stream& stream, std::byte* block, std::span<co
 DecoderTile::DecoderTile(NetworkLayers& layers, int level, ImageSize phases, BufferLayout& layout)
     : phases_(phases),
       channels_(layers.at(decoder_part(level, "skip")).numbers().out_channels),
-      phase_sums_(over_piece(layers, decoder_part(level, "phases"), phases, layers.stored_type())),
-      skip_sums_(over_piece(layers, decoder_part(level, "skip"), size(), layers.stored_type())) {
+      phase_sums_(over_tile(layers, decoder_part(level, "phases"), phases, layers.stored_type())),
+      skip_sums_(over_tile(layers, decoder_part(level, "skip"), size(), layers.stored_type())) {
   const std::size_t value = value_bytes(layers);
   const std::size_t pixels = phases.pixel_count();
   small_buffer_ = layout.add(value * (phases.height + 1) * (phases.width + 1) *
@@ -214,11 +214,11 @@ DecoderTile::DecoderTile(NetworkLayers& layers, int level, ImageSize phases, Buf
 
 void DecoderTile::compute(dnnl::stream& stream, std::byte* block, TilePlace place,
                           const Activations& small, const Activations& skip) const {
-  // Phase pixel p sees the small picture's p - 1 and p; output pixel y the skip's y - 1 to y + 1.
-  copy_piece(small, place.row - 1, place.column - 1, {phases_.height + 1, phases_.width + 1},
-             block + small_buffer_);
-  copy_piece(skip, 2 * place.row - 2, 2 * place.column - 2, {size().height + 2, size().width + 2},
-             block + skip_buffer_);
+  // Phase pixel p sees the small image's p - 1 and p; output pixel y the skip's y - 1 to y + 1.
+  copy_tile(small, place.row - 1, place.column - 1, {phases_.height + 1, phases_.width + 1},
+            block + small_buffer_);
+  copy_tile(skip, 2 * place.row - 2, 2 * place.column - 2, {size().height + 2, size().width + 2},
+            block + skip_buffer_);
   phase_sums_.run(stream, block + small_buffer_, block + phase_sums_buffer_, block + scratch_);
   skip_sums_.run(stream, block + skip_buffer_, block + skip_sums_buffer_, block + scratch_);
 }
@@ -247,16 +247,16 @@ TiledLayers::TiledLayers(NetworkLayers& layers) {
   setup.source_type = setup.target_type = layers.stored_type();
   setup.stride = 2;
   setup.activation = Activation::kLeakyRelu;
-  bottom.emplace_back(layers, "encoders." + std::to_string(kTiledEncoders), setup, kPixelsAtOnce,
-                      layout);
+  bottleneck.emplace_back(layers, "encoders." + std::to_string(kTiledEncoders), setup,
+                          kPixelsAtOnce, layout);
   setup.stride = 1;
   setup.activation = Activation::kRelu;
   for (int block = 0; block < kResidualBlocks; ++block) {
     const std::string name = "resblocks." + std::to_string(block);
     setup.add_target = 0;
-    bottom.emplace_back(layers, name + ".conv1", setup, kPixelsAtOnce, layout);
+    bottleneck.emplace_back(layers, name + ".conv1", setup, kPixelsAtOnce, layout);
     setup.add_target = layers.residual_factor(block);
-    bottom.emplace_back(layers, name + ".conv2", setup, kPixelsAtOnce, layout);
+    bottleneck.emplace_back(layers, name + ".conv2", setup, kPixelsAtOnce, layout);
   }
   first_decoder.emplace(layers, 0, layout);
   for (int level = 1; level < kNetworkLevels; ++level) {
@@ -264,7 +264,7 @@ TiledLayers::TiledLayers(NetworkLayers& layers) {
                           layout);
   }
   const ImageSize size = decoders.back().size();
-  prediction_ = over_piece(layers, "pred", size, Type::f32);
+  prediction_ = over_tile(layers, "pred", size, Type::f32);
   const LayerNumbers& numbers = layers.at("pred").numbers();
   decoded_ = layout.add(sizeof(float) * size.pixel_count() * numbers.in_channels);
   predicted_ = layout.add(sizeof(float) * size.pixel_count() * numbers.out_channels);
@@ -278,29 +278,29 @@ const float* TiledLayers::predict(dnnl::stream& stream, std::byte* block) const 
 
 namespace {
 
-/// Rows (or columns) first..last of a picture.
+/// Rows (or columns) first..last of an image.
 struct Range {
   int first = 0;
   int last = 0;
 };
 
-/// What a decoder reads of the small picture for these rows of its output.
+/// What a decoder reads of the small image for these rows of its output.
 Range below_decoder(Range range) { return {(range.first - 1) >> 1, (range.last + 1) >> 1}; }
 
-/// What an encoder reads of the large picture.
+/// What an encoder reads of the large image.
 Range above_encoder(Range range) { return {2 * range.first - 1, 2 * range.last + 1}; }
 
-/// What a convolution reads of a picture of the same size.
+/// What a convolution reads of an image of the same size.
 Range around(Range range) { return {range.first - 1, range.last + 1}; }
 
-/// Pixels of a picture that are needed.
+/// Pixels of an image that are needed.
 class NeededPixels {
  public:
   explicit NeededPixels(ImageSize size) : size_(size), needed_(size.pixel_count()) {}
 
   ImageSize size() const { return size_; }
 
-  /// Beyond the picture nothing is.
+  /// Beyond the image nothing is.
   void add(Range rows, Range columns) {
     const int left = std::max(columns.first, 0);
     const int right = std::min(columns.last, size_.width - 1);
@@ -309,7 +309,7 @@ class NeededPixels {
     }
   }
 
-  /// Those that `reads` says another picture's needed pixels read.
+  /// Those that `reads` says another image's needed pixels read.
   void add_read_by(const NeededPixels& other, Range (*reads)(Range)) {
     other.visit_runs([&](int y, Range columns) { add(reads({y, y}), reads(columns)); });
   }
@@ -335,18 +335,18 @@ class NeededPixels {
   std::vector<std::uint8_t> needed_;
 };
 
-/// The pieces of `tile` pixels that hold the needed ones, whose place in the grid `in_grid` gives.
+/// The tiles of `tile` pixels that hold the needed ones, whose place in the grid `in_grid` gives.
 std::vector<TilePlace> places_of(const NeededPixels& needed, ImageSize tile, ImageSize grid,
                                  int (*in_grid)(int)) {
-  NeededPixels pieces(
+  NeededPixels tiles(
       {(grid.height + tile.height - 1) / tile.height, (grid.width + tile.width - 1) / tile.width});
   needed.visit_runs([&](int y, Range columns) {
     const int row = in_grid(y) / tile.height;
-    pieces.add({row, row},
-               {in_grid(columns.first) / tile.width, in_grid(columns.last) / tile.width});
+    tiles.add({row, row},
+              {in_grid(columns.first) / tile.width, in_grid(columns.last) / tile.width});
   });
   std::vector<TilePlace> places;
-  pieces.visit_runs([&](int row, Range columns) {
+  tiles.visit_runs([&](int row, Range columns) {
     for (int column = columns.first; column <= columns.last; ++column) {
       places.push_back({row * tile.height, column * tile.width});
     }
@@ -384,8 +384,8 @@ std::vector<int> phase_pixels(const NeededPixels& needed) {
 
 /// Multiplications in units of the square of the base width.
 double work_of(const TiledWork& work) {
-  const auto count = [](std::size_t pieces, ImageSize size) {
-    return static_cast<double>(pieces * size.pixel_count());
+  const auto count = [](std::size_t tiles, ImageSize size) {
+    return static_cast<double>(tiles * size.pixel_count());
   };
   double sum = 0;
   for (std::size_t level = 0; level < kTiledEncoders; ++level) {
@@ -394,9 +394,9 @@ double work_of(const TiledWork& work) {
   }
   constexpr double kBottom = 1 << kNetworkLevels;  // channels, in base widths
   constexpr double kTaps = 9;
-  for (std::size_t layer = 0; layer < kBottomLayers; ++layer) {
+  for (std::size_t layer = 0; layer < kBottleneckLayers; ++layer) {
     const double of_pixel = layer == 0 ? kTaps * kBottom * kBottom / 2 : kTaps * kBottom * kBottom;
-    sum += static_cast<double>(work.bottom[layer].size()) * of_pixel;
+    sum += static_cast<double>(work.bottleneck[layer].size()) * of_pixel;
   }
   // Of a pixel of the phases 4 x 4 from twice as many channels, and 4 x 9 beside it.
   constexpr double kPhasePixel = 68, kFirst = kBottom / 2;
@@ -423,22 +423,22 @@ TiledWork tiled_work(const TileMask& wanted) {
   for (std::size_t level = 1; level < kNetworkLevels; ++level) {
     levels[level].add_read_by(levels[level - 1], below_decoder);
   }
-  NeededPixels bottom(half_size(levels.back().size()));
-  bottom.add_read_by(levels.back(), below_decoder);
+  NeededPixels bottleneck(half_size(levels.back().size()));
+  bottleneck.add_read_by(levels.back(), below_decoder);
   work.first_decoder = phase_pixels(levels.back());
   for (std::size_t tiled = 0; tiled < kTiledDecoders; ++tiled) {
     work.decoders[tiled] =
         decoder_places(levels[kTiledDecoders - 1 - tiled], kDecoderPhases[tiled]);
   }
-  for (std::size_t layer = kBottomLayers; layer-- > 0;) {
-    work.bottom[layer] = pixels_of(bottom);
+  for (std::size_t layer = kBottleneckLayers; layer-- > 0;) {
+    work.bottleneck[layer] = pixels_of(bottleneck);
     if (layer == 0) break;
-    NeededPixels wider(bottom.size());
-    wider.add_read_by(bottom, around);
-    bottom = std::move(wider);
+    NeededPixels wider(bottleneck.size());
+    wider.add_read_by(bottleneck, around);
+    bottleneck = std::move(wider);
   }
   // Skip connections are read by the decoder beside them and by the next encoder.
-  NeededPixels coarse = std::move(bottom);
+  NeededPixels coarse = std::move(bottleneck);
   for (std::size_t level = kTiledEncoders; level > 0; --level) {
     NeededPixels skip(levels[level].size());
     skip.add_read_by(levels[level], around);
@@ -449,10 +449,10 @@ TiledWork tiled_work(const TileMask& wanted) {
 
   constexpr double kWholeWork = 18 + 36 + 68;  // encoders, residual blocks, decoders; of a pixel
   constexpr double kFixedWork = 4;             // head, clearing
-  constexpr double kPieceCost = 1.25;
+  constexpr double kTileCost = 1.25;
   const auto pixels = static_cast<double>(wanted.size.pixel_count());
   work.share =
-      (kPieceCost * work_of(work) + kFixedWork * pixels) / ((kWholeWork + kFixedWork) * pixels);
+      (kTileCost * work_of(work) + kFixedWork * pixels) / ((kWholeWork + kFixedWork) * pixels);
   return work;
 }
 

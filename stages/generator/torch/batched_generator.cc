@@ -18,7 +18,7 @@
 
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/pair_batches.h"
-#include "stages/generator/torch/network_forward_internal.h"
+#include "stages/generator/torch/detail/network_forward.h"
 #include "stages/generator/torch/torch_generator.h"
 
 namespace eventgan {

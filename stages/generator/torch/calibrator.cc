@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stages/generator/torch/network_forward_internal.h"
+#include "stages/generator/torch/detail/network_forward.h"
 
 namespace eventgan {
 namespace {

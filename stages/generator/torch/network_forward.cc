@@ -1,3 +1,5 @@
+#include "stages/generator/torch/detail/network_forward.h"
+
 #include <ATen/Context.h>
 #include <ATen/Functions.h>
 #include <ATen/Parallel.h>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "stages/generator/decoder_kernels.h"
-#include "stages/generator/torch/network_forward_internal.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {
@@ -37,7 +38,7 @@ at::Tensor every_second(const at::Tensor& x, int dimension, std::int64_t first,
   return x.slice(dimension, first, first + 2 * count, 2);
 }
 
-/// The last two positions of the doubled picture, or the only one.
+/// The last two positions of the doubled image, or the only one.
 at::Tensor doubled_end(const at::Tensor& x, int dimension, std::int64_t doubled_size) {
   const std::int64_t count = std::min<std::int64_t>(doubled_size, 2);
   return x.slice(dimension, x.size(dimension) - count);

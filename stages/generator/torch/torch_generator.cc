@@ -10,7 +10,7 @@
 
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
-#include "stages/generator/torch/network_forward_internal.h"
+#include "stages/generator/torch/detail/network_forward.h"
 
 namespace eventgan {
 namespace {
@@ -32,8 +32,8 @@ class TorchGenerator final : public Generator {
            ", " + at::get_mkldnn_version() + ", " + describe_training_gaps(training_gaps_);
   }
 
-  /// LibTorch holds a layer's input, its output and all phases of a decoder at once, beside the
-  /// skip connections: twice what the plan of buffers needs.
+  /// LibTorch holds a layer's input, its output and all sub-pixel phases of a decoder at once,
+  /// beside the skip connections: twice what the plan of buffers needs.
   std::size_t working_bytes(ImageSize size) const override {
     return 2 * activation_bytes(size, base_channels_, precision_ == Precision::kFloat32 ? 4 : 2);
   }

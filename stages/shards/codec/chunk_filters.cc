@@ -197,8 +197,8 @@ void add_rest(std::span<const std::byte> bytes, Sums& sums) {
 
 /// The sum over the same words in big endian: swapping the bytes of a 16-bit word multiplies it by
 /// 256 modulo 65535 (256 (256 h + l) = 65536 h + 256 l ≡ h + 256 l). HDF5 folds carries in instead
-/// of taking remainders, so a multiple of 65535 stands as 0xffff; only words that are all zero have
-/// the sum 0.
+/// of taking remainders, so a multiple of 65535 is stored as 0xffff; only words that are all zero
+/// have the sum 0.
 std::uint32_t big_endian(std::uint64_t sum, bool all_zero) {
   const auto remainder = static_cast<std::uint32_t>(sum % kModulus * 256 % kModulus);
   return remainder == 0 && !all_zero ? 0xffff : remainder;

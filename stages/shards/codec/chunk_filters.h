@@ -31,7 +31,7 @@ class Deflater {
   Deflater(const Deflater&) = delete;
   Deflater& operator=(const Deflater&) = delete;
 
-  /// The compressed bytes; they stand until the next call. At most 4 GiB, as a chunk of HDF5;
+  /// The compressed bytes; they are valid until the next call. At most 4 GiB, as a chunk of HDF5;
   /// throws std::length_error for more.
   std::span<const std::byte> deflate(std::span<const std::byte> bytes);
 
@@ -49,7 +49,7 @@ std::uint32_t fletcher32(std::span<const std::byte> bytes);
 /// Appends it as the filter does, in little endian.
 void append_fletcher32(std::vector<std::byte>& bytes);
 
-/// Whether `bytes` ends in the checksum of what stands before it.
+/// Whether `bytes` ends in the checksum of what is before it.
 bool ends_in_fletcher32(std::span<const std::byte> bytes);
 
 }  // namespace eventgan

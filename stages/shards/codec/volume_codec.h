@@ -25,7 +25,7 @@ struct VolumeWindow {
   }
 };
 
-/// One volume as it stands in the file: a whole HDF5 chunk after all filters.
+/// One volume as it is in the file: a whole HDF5 chunk after all filters.
 struct EncodedVolume {
   std::vector<std::byte> chunk;
   float scale = 1;  ///< value = code x scale (uint8); 1 for floats

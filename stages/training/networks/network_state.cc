@@ -1,3 +1,5 @@
+#include "stages/training/networks/detail/network_state.h"
+
 #include <ATen/core/grad_mode.h>
 
 #include <algorithm>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "manifests/values/gaussian_random.h"
-#include "stages/training/networks/network_state_internal.h"
 
 namespace eventgan {
 namespace {

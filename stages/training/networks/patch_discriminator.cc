@@ -1,7 +1,7 @@
+#include "stages/training/networks/detail/patch_discriminator.h"
+
 #include <torch/nn/modules/activation.h>
 #include <torch/nn/modules/conv.h>
-
-#include "stages/training/networks/patch_discriminator_internal.h"
 
 namespace eventgan {
 namespace {

@@ -1,7 +1,7 @@
+#include "stages/training/networks/detail/spectral_norm_conv.h"
+
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
-
-#include "stages/training/networks/spectral_norm_conv_internal.h"
 
 namespace eventgan {
 namespace {

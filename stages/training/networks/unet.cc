@@ -1,3 +1,5 @@
+#include "stages/training/networks/detail/unet.h"
+
 #include <ATen/core/grad_mode.h>
 #include <torch/nn/module.h>
 #include <torch/nn/modules/batchnorm.h>
@@ -6,8 +8,7 @@
 #include <torch/nn/options/conv.h>
 #include <torch/nn/pimpl.h>
 
-#include "stages/training/networks/spectral_norm_conv_internal.h"
-#include "stages/training/networks/unet_internal.h"
+#include "stages/training/networks/detail/spectral_norm_conv.h"
 
 namespace eventgan {
 namespace {

@@ -9,7 +9,7 @@
 namespace eventgan {
 
 /// Threads that live as long as this and do one piece of work each, together, whenever asked: an
-/// engine keeps settings and OpenMP its helpers by thread, which must not be made anew while time
+/// engine keeps settings and OpenMP its helpers by thread, which must not be made again while time
 /// runs.
 class InstanceThreads {
  public:

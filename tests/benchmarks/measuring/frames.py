@@ -40,8 +40,8 @@ def write_input(bench, size):
     height, width = size
     path = bench.scratch / f"input-{height}x{width}.raw"
     originals, _ = original_frames(bench)
-    pictures = [PIL.Image.open(frame).convert("L").resize((width, height), PIL.Image.BILINEAR) for frame in originals[-2:]]
-    (np.stack(pictures).astype(np.float32) / 127.5 - 1).tofile(path)
+    images = [PIL.Image.open(frame).convert("L").resize((width, height), PIL.Image.BILINEAR) for frame in originals[-2:]]
+    (np.stack(images).astype(np.float32) / 127.5 - 1).tofile(path)
     return path
 
 

@@ -17,7 +17,7 @@ class Table:
 
 @dataclasses.dataclass
 class Curves:
-    """One panel of the picture."""
+    """One panel of the image."""
     title: str
     x_label: str
     y_label: str

@@ -33,6 +33,6 @@ def spread(values):
 
 
 def rotated(items, turn):
-    """The items from a later start, so that over the rounds each stands at each place."""
+    """The items from a later start, so that over the rounds each is at each place."""
     turn %= len(items)
     return items[turn:] + items[:turn]

@@ -1,6 +1,6 @@
-// From a picture's file to the generator's input, step by step, on pictures of KITTI's size made
+// From an image's file to the generator's input, step by step, on images of KITTI's size made
 // here: smooth shades, edges and sensor noise, so that they compress about as photographs do.
-// Bytes per second are of what the step reads: the file, the colour picture, the grey one.
+// Bytes per second are of what the step reads: the file, the colour image, the grey one.
 //   build/release/tests/eventgan_frames_benchmark
 
 #include <benchmark/benchmark.h>
@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/pair_reader.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -24,9 +24,9 @@ constexpr int kFrames = 24;
 /// A street seen by a camera that moves on: frame by frame a little further to the left.
 cv::Mat street(int frame) {
   const cv::Size size(1242, 375);
-  cv::Mat picture(size, CV_8UC3);
+  cv::Mat image(size, CV_8UC3);
   for (int y = 0; y < size.height; ++y) {  // sky to road
-    picture.row(y).setTo(cv::Scalar(200 - y / 3, 170 - y / 4, 150 - y / 4));
+    image.row(y).setTo(cv::Scalar(200 - y / 3, 170 - y / 4, 150 - y / 4));
   }
   cv::RNG houses(7);
   for (int i = 0; i < 150; ++i) {
@@ -34,14 +34,14 @@ cv::Mat street(int frame) {
     const cv::Size side(houses.uniform(5, 120), houses.uniform(5, 60));
     const cv::Scalar shade(houses.uniform(20, 230), houses.uniform(20, 230),
                            houses.uniform(20, 230));
-    cv::rectangle(picture, cv::Rect(corner, side), shade, cv::FILLED);
+    cv::rectangle(image, cv::Rect(corner, side), shade, cv::FILLED);
   }
-  cv::GaussianBlur(picture, picture, cv::Size(3, 3), 0);
+  cv::GaussianBlur(image, image, cv::Size(3, 3), 0);
   cv::Mat noise(size, CV_16SC3);
   cv::RNG sensor(static_cast<std::uint64_t>(frame) + 1);
   sensor.fill(noise, cv::RNG::NORMAL, 0, 2);
-  cv::add(picture, noise, picture, cv::noArray(), CV_8U);
-  return picture;
+  cv::add(image, noise, image, cv::noArray(), CV_8U);
+  return image;
 }
 
 /// A drive in one format, written once.
@@ -89,7 +89,7 @@ ImageSpec kitti_spec() {
 void decode(benchmark::State& state, const Drive& drive) {
   std::int64_t bytes = 0;
   for (int frame = 0; auto _ : state) {
-    benchmark::DoNotOptimize(decode_picture_file(drive.path(frame)));
+    benchmark::DoNotOptimize(decode_image_file(drive.path(frame)));
     bytes += static_cast<std::int64_t>(std::filesystem::file_size(drive.path(frame)));
     frame = (frame + 1) % kFrames;
   }
@@ -97,8 +97,8 @@ void decode(benchmark::State& state, const Drive& drive) {
   state.SetItemsProcessed(state.iterations());
 }
 
-void decode_png_picture(benchmark::State& state) { decode(state, png_drive()); }
-void decode_jpeg_picture(benchmark::State& state) { decode(state, jpeg_drive()); }
+void decode_png_image(benchmark::State& state) { decode(state, png_drive()); }
+void decode_jpeg_image(benchmark::State& state) { decode(state, jpeg_drive()); }
 
 /// For comparison: what OpenCV takes, which forgives damage.
 void opencv_decodes_png(benchmark::State& state) {
@@ -110,8 +110,8 @@ void opencv_decodes_png(benchmark::State& state) {
 }
 
 void prepare(benchmark::State& state) {
-  const cv::Mat picture = street(0);
-  const ColourView view{{picture.rows, picture.cols}, picture.data};
+  const cv::Mat image = street(0);
+  const ColourView view{{image.rows, image.cols}, image.data};
   ImageSpec spec = kitti_spec();
   spec.grey = state.range(0) == 0 ? GreyOrder::kBeforeResize : GreyOrder::kAfterResize;
   for (auto _ : state) benchmark::DoNotOptimize(prepare_frame(view, spec));
@@ -122,8 +122,8 @@ void prepare(benchmark::State& state) {
 
 void grey_to_input(benchmark::State& state) {
   const PreparedFrame frame = [] {
-    const cv::Mat picture = street(0);
-    return prepare_frame({{picture.rows, picture.cols}, picture.data}, kitti_spec());
+    const cv::Mat image = street(0);
+    return prepare_frame({{image.rows, image.cols}, image.data}, kitti_spec());
   }();
   std::vector<float> input(frame.grey.size());
   for (auto _ : state) {
@@ -154,9 +154,9 @@ void read_pairs(benchmark::State& state, const Drive& drive) {
 void read_png_pairs(benchmark::State& state) { read_pairs(state, png_drive()); }
 void read_jpeg_pairs(benchmark::State& state) { read_pairs(state, jpeg_drive()); }
 
-BENCHMARK(decode_png_picture)->Unit(benchmark::kMillisecond);
+BENCHMARK(decode_png_image)->Unit(benchmark::kMillisecond);
 BENCHMARK(opencv_decodes_png)->Unit(benchmark::kMillisecond);
-BENCHMARK(decode_jpeg_picture)->Unit(benchmark::kMillisecond);
+BENCHMARK(decode_jpeg_image)->Unit(benchmark::kMillisecond);
 BENCHMARK(prepare)->ArgName("grey_last")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);
 BENCHMARK(grey_to_input)->Unit(benchmark::kMillisecond);
 BENCHMARK(read_png_pairs)->ArgName("sharing")->Arg(0)->Arg(1)->Unit(benchmark::kMillisecond);

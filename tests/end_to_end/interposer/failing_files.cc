@@ -47,7 +47,7 @@ using eventgan::interposer::is_watched;
 using eventgan::interposer::kill_process;
 using eventgan::interposer::Order;
 
-/// The function that this library stands before; `Function` as in decltype(::close).
+/// The function that this library interposes; `Function` as in decltype(::close).
 template <class Function>
 Function* next(const char* name) {
   return reinterpret_cast<Function*>(::dlsym(RTLD_NEXT, name));

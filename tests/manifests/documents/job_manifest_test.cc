@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <tuple>
 
-#include "manifests/documents/job_manifest_internal.h"
+#include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/manifest_fields.h"
 #include "manifests/values/faults.h"
 #include "tests/manifests/documents/manifest_cases.h"
@@ -236,7 +236,7 @@ TEST(ImageSpec, KeysGivenOneByOneNameNoPreset) {
   EXPECT_EQ(spec.blur, 3);
 }
 
-TEST(ImageSpec, WithoutSizeEveryPictureKeepsItsOwn) {
+TEST(ImageSpec, WithoutSizeEveryImageKeepsItsOwn) {
   EXPECT_EQ(read(R"({"preset": "demo"})").size, std::nullopt);
 }
 

@@ -1,3 +1,5 @@
+#include "manifests/documents/detail/json_text.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -5,8 +7,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include "manifests/documents/json_text_internal.h"
 
 namespace eventgan {
 namespace {

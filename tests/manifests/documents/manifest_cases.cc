@@ -266,14 +266,14 @@ std::vector<ManifestCase> source_cases() {
 
 std::vector<ManifestCase> setting_cases() {
   return {
-      {"pictures as large as they are", {{"/image/width", ""}, {"/image/height", ""}}, {}},
+      {"images as large as they are", {{"/image/width", ""}, {"/image/height", ""}}, {}},
       {"a width alone",
        {{"/image/height", ""}},
        {"$.image.height: expected an integer 16..8192, got nothing"}},
       {"a height alone",
        {{"/image/width", ""}},
        {"$.image.width: expected an integer 16..8192, got nothing"}},
-      {"the smallest picture", {{"/image/width", "16"}, {"/image/height", "16"}}, {}},
+      {"the smallest image", {{"/image/width", "16"}, {"/image/height", "16"}}, {}},
       {"sides out of range",
        {{"/image/width", "15"}, {"/image/height", "8193"}},
        {"$.image.height: expected an integer 16..8192, got 8193",

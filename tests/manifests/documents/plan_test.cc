@@ -204,7 +204,7 @@ TEST(PlanOutline, IsThePlanWithoutItsSamples) {
     EXPECT_EQ(outline.manifest_text, plan.manifest_text);
     EXPECT_EQ(outline.fingerprint, plan.fingerprint);
     ASSERT_EQ(outline.sources.size(), 2U);
-    EXPECT_EQ(outline.sources[0].without_partner_ids, plan.sources[0].without_partner_ids);
+    EXPECT_EQ(outline.sources[0].unpaired_ids, plan.sources[0].unpaired_ids);
     EXPECT_THAT(outline.shards,
                 ::testing::ElementsAre(ShardOutline{"job-train-00000-of-00002.h5", 0, {3, 4}, 2},
                                        ShardOutline{"job-train-00001-of-00002.h5", 1, {5, 6}, 1}));

@@ -49,7 +49,7 @@ const ManifestCase kSimulationCases[] = {
      {{"/sources/0/frames_per_picture", "7"}, {"/sources/0/max_displacement_px", "1"}},
      {R"($.sources[0].frames_per_picture: expected no such key for method "clip" (only for affine), got 7)",
       R"($.sources[0].max_displacement_px: expected no such key for method "clip" (only for affine), got 1)"}},
-    {"one picture", {{"/sources/1/frame_count", "1"}}, {}},
+    {"one image", {{"/sources/1/frame_count", "1"}}, {}},
     {"a clip of one frame",
      {{"/sources/0/frame_count", "1"}},
      {"$.sources[0].frame_count: expected 0 (to the end) or at least 2 frames, since events lie "

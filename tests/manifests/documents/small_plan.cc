@@ -12,8 +12,8 @@ Plan small_plan() {
   SourceSummary source;
   source.labelled_frames = 3;
   source.pairs_by_gap = {{1, 1}, {6, 1}};
-  source.without_partner = 1;
-  source.without_partner_ids = {"b"};
+  source.unpaired = 1;
+  source.unpaired_ids = {"b"};
   source.faults = 1;
   source.notes = {"a \"note\""};
   SourceSummary other;

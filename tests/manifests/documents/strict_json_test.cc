@@ -1,3 +1,5 @@
+#include "manifests/documents/detail/strict_json.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,8 +8,6 @@
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
-
-#include "manifests/documents/strict_json_internal.h"
 
 namespace eventgan {
 namespace {

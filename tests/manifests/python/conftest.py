@@ -31,6 +31,6 @@ def folder(example, tmp_path):
 def two_shards(folder):
     """The same with a second shard of the same samples."""
     shutil.copy(folder / NAME, folder / SECOND)
-    marker = (folder / NAME).with_suffix(".json").read_text()
-    (folder / SECOND).with_suffix(".json").write_text(marker.replace(NAME, SECOND))
+    record = (folder / NAME).with_suffix(".json").read_text()
+    (folder / SECOND).with_suffix(".json").write_text(record.replace(NAME, SECOND))
     return folder

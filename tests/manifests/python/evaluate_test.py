@@ -15,8 +15,8 @@ import pytest
 from conftest import NAME, SECOND, SOURCE
 
 from eventgan_shards import Shards
-from eventgan_shards.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Found, Truth, average_precisions, detection_scores,
-                                              kitti_average_precision, match_as_coco, match_as_voc, strongest)
+from eventgan_shards.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, average_precisions, detection_scores,
+                                              kitti_average_precision, match_as_coco, match_as_voc, non_maximum_suppression)
 from eventgan_shards.evaluate import Samples, evaluate_detections, evaluate_poses
 from eventgan_shards.pose_scores import Persons, head_lengths, pose_scores
 
@@ -28,13 +28,13 @@ CLASSES = {"Car": CAR, "Van": VAN}
 def truth_of(*rows):
     """Rows of image, label, left, top, right, bottom, ignore, difficulty."""
     rows = np.array(rows, float).reshape(-1, 8)
-    return Truth(rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:6], rows[:, 6] != 0, rows[:, 7].astype(int))
+    return GroundTruth(rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:6], rows[:, 6] != 0, rows[:, 7].astype(int))
 
 
 def found_of(*rows):
     """Rows of image, label, left, top, right, bottom, score."""
     rows = np.array(rows, float).reshape(-1, 7)
-    return Found.of(rows[:, 0], rows[:, 1], rows[:, 2:6], rows[:, 6])
+    return Detections.of(rows[:, 0], rows[:, 1], rows[:, 2:6], rows[:, 6])
 
 
 def test_scores_worked_out_by_hand():
@@ -83,7 +83,7 @@ def test_equal_scores_stay_in_the_order_of_the_list():
     right, wrong = [0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 20, 0, 30, 10, 0.5]
     assert detection_scores(found_of(right, wrong), truth, CLASSES)["Car"]["ap_voc"] == 1
     assert detection_scores(found_of(wrong, right), truth, CLASSES)["Car"]["ap_voc"] == 0.5
-    assert strongest(found_of([0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 0, 0, 10, 9, 0.5]), 0.2).tolist() == [True, False]
+    assert non_maximum_suppression(found_of([0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 0, 0, 10, 9, 0.5]), 0.2).tolist() == [True, False]
 
 
 @pytest.mark.parametrize(("truth", "found", "precision", "recall", "ap", "f1"), [
@@ -113,13 +113,13 @@ def scene(seed, images=30, each=8):
     image, label, xyxy = boxes_at_random(rng, images, each)
     ignore = rng.random(len(image)) < 0.15
     label = np.where(ignore & (rng.random(len(image)) < 0.5), DONT_CARE, label)
-    truth = Truth(image, label, xyxy, ignore, rng.integers(-1, 3, len(image)))
+    truth = GroundTruth(image, label, xyxy, ignore, rng.integers(-1, 3, len(image)))
     rows = rng.integers(0, len(image), 2 * len(image))
     moved = xyxy[rows] + rng.normal(0, 0.08, (len(rows), 4)) * np.tile(xyxy[rows, 2:] - xyxy[rows, :2], 2)
     extra = boxes_at_random(rng, images, each // 2)
     other = np.where(rng.random(len(rows)) < 0.1, 1 - label[rows] % 2, label[rows] % 2)
     found = [np.concatenate(pair) for pair in zip((image[rows], other, moved), extra)]
-    return Found.of(*found, rng.permutation(len(found[0])) / len(found[0])), truth
+    return Detections.of(*found, rng.permutation(len(found[0])) / len(found[0])), truth
 
 
 def iou_of(a, b, share=False):
@@ -150,9 +150,9 @@ def test_voc_s_matching_is_that_of_its_loop(seed):
         taken |= {best} if right else set()
         expected.append(best if right else -1)
         counts.append(right or not ignored_by_loops(found, truth, n, 0.5))
-    stands_for, counted = match_as_voc(found, truth)
-    assert stands_for.tolist() == expected and counted.tolist() == counts
-    assert 0.2 < np.mean(stands_for >= 0) < 0.8 and not counted.all()
+    matched_truth, counted = match_as_voc(found, truth)
+    assert matched_truth.tolist() == expected and counted.tolist() == counts
+    assert 0.2 < np.mean(matched_truth >= 0) < 0.8 and not counted.all()
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -259,7 +259,7 @@ def test_suppression_is_torchvision_s(iou):
     torch, ops = pytest.importorskip("torch"), pytest.importorskip("torchvision.ops")
     found, _ = scene(1)
     kept = ops.batched_nms(torch.from_numpy(found.xyxy), torch.from_numpy(found.score), torch.from_numpy(2 * found.image + found.label), iou)
-    assert np.flatnonzero(strongest(found, iou)).tolist() == kept.tolist()  # both from the highest score on
+    assert np.flatnonzero(non_maximum_suppression(found, iou)).tolist() == kept.tolist()  # both from the highest score on
     assert 0 < len(kept) < len(found.score) or iou == 1
 
 
@@ -358,8 +358,8 @@ def test_average_precision_is_yolov3_s(trainer, monkeypatch, seed):
     exec(source.replace("method = 'interp'", "method = 'continuous'"), utils.__dict__)
     found, truth = scene(seed)
     scores = detection_scores(found, truth, CLASSES)
-    stands_for, counts = match_as_voc(found, truth)
-    precision, recall, ap, f1, classes = utils.ap_per_class(stands_for[counts, None] >= 0, found.score[counts] + 0.2, found.label[counts],
+    matched_truth, counts = match_as_voc(found, truth)
+    precision, recall, ap, f1, classes = utils.ap_per_class(matched_truth[counts, None] >= 0, found.score[counts] + 0.2, found.label[counts],
                                                             truth.label[~truth.ignore])  # it looks at precision and recall at score 0.1
     assert classes.tolist() == [CAR, VAN]
     for key, values in (("ap_voc", ap[:, 0]), ("precision", precision[:, 0]), ("recall", recall[:, 0]), ("f1", f1[:, 0])):
@@ -438,10 +438,10 @@ def test_poses_without_a_head_or_a_person():
 def test_a_hundred_thousand_predictions_take_seconds():
     rng = np.random.default_rng(0)
     image, label, xyxy = boxes_at_random(rng, 10_000, 10)
-    truth = Truth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool), rng.integers(-1, 3, 50_000))
+    truth = GroundTruth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool), rng.integers(-1, 3, 50_000))
     start = time.process_time()
-    found = Found.of(image, label, xyxy + rng.normal(0, 2, xyxy.shape), rng.random(100_000))
-    found = found.rows(strongest(found, 0.5))
+    found = Detections.of(image, label, xyxy + rng.normal(0, 2, xyxy.shape), rng.random(100_000))
+    found = found.rows(non_maximum_suppression(found, 0.5))
     detection_scores(found, truth, CLASSES)
     for level in KITTI_LEVELS:
         kitti_average_precision(found, truth, CLASSES, "Car", level, found.xyxy[:, 3] - found.xyxy[:, 1])
@@ -453,11 +453,11 @@ def test_a_hundred_thousand_boxes_in_twelve_images():
     rng = np.random.default_rng(0)
     image, at = np.arange(100_000) % 12, np.arange(100_000) // 12 % 100
     corner = np.stack([at % 10, at // 10], 1) * 50.0
-    found = Found.of(image, np.zeros(len(image)), np.hstack([corner, corner + 40]) + rng.uniform(-1, 1, (len(image), 4)), rng.random(len(image)))
+    found = Detections.of(image, np.zeros(len(image)), np.hstack([corner, corner + 40]) + rng.uniform(-1, 1, (len(image), 4)), rng.random(len(image)))
     place = np.arange(100)
     corner = np.stack([place % 10, place // 10], 1) * 50.0
-    truth = Truth(np.repeat(np.arange(12), 100), np.zeros(1200, int), np.tile(np.hstack([corner, corner + 40]), (12, 1)), np.zeros(1200, bool), np.zeros(1200, int))
-    sure = strongest(found, 0.2)
+    truth = GroundTruth(np.repeat(np.arange(12), 100), np.zeros(1200, int), np.tile(np.hstack([corner, corner + 40]), (12, 1)), np.zeros(1200, bool), np.zeros(1200, int))
+    sure = non_maximum_suppression(found, 0.2)
     assert sure.sum() == 1200
     car = detection_scores(found, truth, CLASSES, sure=sure)["Car"]
     assert (car["right"], car["precision"], car["recall"]) == (1200, 1, 1)
@@ -533,8 +533,8 @@ def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
         if "labels/boxes/difficulty" in file:
             del file["labels/boxes/difficulty"]
         file["labels/boxes/difficulty"] = np.zeros(rows, np.int8)
-    marker = (folder / NAME).with_suffix(".json")
-    marker.write_text(json.dumps({**json.loads(marker.read_text()), "size_bytes": (folder / NAME).stat().st_size}))
+    record = (folder / NAME).with_suffix(".json")
+    record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": (folder / NAME).stat().st_size}))
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5])])
     result, _, _ = evaluate_detections(found, Samples(folder, None, None, None))
     assert result["classes"]["Car"]["easy"] == 2 and result["classes"]["Car"]["recall_easy"] == 0.5
@@ -610,7 +610,7 @@ def evaluate(*arguments, expect=0):
     return done.stdout + done.stderr
 
 
-def test_the_command_prints_tables_json_and_pictures(folder, tmp_path):
+def test_the_command_prints_tables_json_and_images(folder, tmp_path):
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
     said = evaluate("detections", found, "--truth", folder)
     assert "4 samples (3 without a prediction), 2 ground-truth boxes" in said

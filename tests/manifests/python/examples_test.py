@@ -69,10 +69,10 @@ def evaluate(what, out, data, *more):
     return json.loads(done.stdout)
 
 
-def assert_trained(out, steps, pictures):
+def assert_trained(out, steps, images):
     assert [row["step"] for row in history(out)] == steps
     assert all(np.isfinite(row["loss"]) for row in history(out)[1:])
-    assert len(list((out / "pictures").glob("*.png"))) == pictures
+    assert len(list((out / "pictures").glob("*.png"))) == images
     assert torch.load(out / "weights.pt", weights_only=True)
     assert not list(out.glob("*.new"))
 
@@ -82,7 +82,7 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "1", *options)
     assert "10 samples for training, 2 for validation, of another sequence" in said and "(untrained)" in said
     assert "resuming after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
-    assert_trained(tmp_path / "parts", [0, 1, 3], pictures=2)
+    assert_trained(tmp_path / "parts", [0, 1, 3], images=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
     (tmp_path / "ids.txt").write_text("\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
     scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--classes", "Car")
@@ -94,7 +94,7 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
 def test_keypoint_rcnn_learns(data, tmp_path):
     train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "2", "--batch", "1", "--scale", "0.5",
           "--regions", "8", "--every", "9")
-    assert_trained(tmp_path / "out", [0, 2], pictures=1)
+    assert_trained(tmp_path / "out", [0, 2], images=1)
     assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
 
 
@@ -102,7 +102,7 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")  # nothing beside it
     options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
-    assert_trained(tmp_path / "whole", [0, 2, 4, 6], pictures=1)
+    assert_trained(tmp_path / "whole", [0, 2, 4, 6], images=1)
     with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options), stdout=subprocess.DEVNULL, env=ONE_THREAD) as process:
         while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
             time.sleep(0.01)
@@ -126,7 +126,7 @@ def test_yolov3_learns(data, tmp_path):
           "--every", "9", "--classes", "Car,Van", "--test", data)
     scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object")
     assert scores["counts"]["samples"] == 12 and scores["counts"]["not_of_these_samples"] == 0
-    assert_trained(tmp_path / "out", [0, 2], pictures=2)
+    assert_trained(tmp_path / "out", [0, 2], images=2)
     assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
     said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes", "Bus", expect=1)
     assert "got Bus" in said and str(data) in said
@@ -152,13 +152,13 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     for folder in (camera / "events", camera / "labelled"):
         subprocess.run([PROGRAM, "verify", folder], check=True, capture_output=True)  # nothing has changed them
     if what == "detection":
-        learnt = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
-        factor = np.mean([s["volume"].mean() for s in learnt]) / np.mean([s["volume"].mean() for s in events])
+        train_shards = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
+        factor = np.mean([s["volume"].mean() for s in train_shards]) / np.mean([s["volume"].mean() for s in events])
         assert f"{camera / 'events'} times {factor:.2f}, as bright as those of {tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout
         for i in range(len(labelled)):
             seen, drawn = events.labels(i), labelled.labels(i)
             assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
-            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)  # the camera's picture is whole pixels high
+            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)  # the camera's image is whole pixels high
             np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
             np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
     else:
@@ -184,16 +184,16 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
     import cv2
     import training
 
-    def tested(shards, learnt=None, **options):
+    def tested(shards, train_shards=None, **options):
         args = argparse.Namespace(**{"test": None, "data": "data", "as_bright": False, "without_noise": False, **options})
-        return training.tested(args, learnt, shards, None)
+        return training.tested(args, train_shards, shards, None)
 
     shards, before = Shards(folder), {path: path.read_bytes() for path in folder.iterdir()}
     assert [sample["volume"].tolist() for sample in tested(shards)] == [sample["volume"].tolist() for sample in shards]
     mean = np.mean([sample["volume"].mean() for sample in shards])
     top = max(sample["volume"].max() for sample in shards)
-    learnt = shards.changed(lambda sample: np.full_like(sample["volume"], 2 * mean / top))
-    bright = tested(shards.changed(lambda sample: sample["volume"] / top), learnt, as_bright=True)
+    train_shards = shards.changed(lambda sample: np.full_like(sample["volume"], 2 * mean / top))
+    bright = tested(shards.changed(lambda sample: sample["volume"] / top), train_shards, as_bright=True)
     for i in range(len(shards)):
         np.testing.assert_allclose(bright[i]["volume"], np.minimum(2 * shards[i]["volume"] / top, 1), rtol=1e-6)
 
@@ -205,12 +205,12 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
 
     path = pathlib.Path(shards[0]["pair"]["next_path"])
     path.parent.mkdir(parents=True)
-    picture = np.arange(12 * 16, dtype=np.uint8).reshape(12, 16)
-    assert cv2.imwrite(str(path), picture)
+    canvas = np.arange(12 * 16, dtype=np.uint8).reshape(12, 16)
+    assert cv2.imwrite(str(path), canvas)
     volume = shards.changed(training.labelled_frame)[0]["volume"]  # of half its size
-    np.testing.assert_allclose(volume[0], picture.reshape(6, 2, 8, 2).mean((1, 3)) / 255, atol=0.6 / 255)
+    np.testing.assert_allclose(volume[0], canvas.reshape(6, 2, 8, 2).mean((1, 3)) / 255, atol=0.6 / 255)
     assert not volume[1:].any()
-    with pytest.raises(ValueError, match=f"expected a picture, .* got none, in {shards[1]['pair']['next_path']} "):
+    with pytest.raises(ValueError, match=f"expected an image, .* got none, in {shards[1]['pair']['next_path']} "):
         shards.changed(training.labelled_frame)[1]
     assert {path: path.read_bytes() for path in folder.iterdir()} == before
 

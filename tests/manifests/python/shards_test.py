@@ -168,8 +168,8 @@ def write_column(path, name, values=None):
             del file["pairs/" + name]
         if values is not None:
             file["pairs/" + name] = values
-    marker = path.with_suffix(".json")
-    marker.write_text(json.dumps({**json.loads(marker.read_text()), "size_bytes": path.stat().st_size}))
+    record = path.with_suffix(".json")
+    record.write_text(json.dumps({**json.loads(record.read_text()), "size_bytes": path.stat().st_size}))
 
 
 def test_a_frame_s_id_stands_for_all_its_samples(folder):
@@ -273,15 +273,15 @@ def test_columns(two_shards):
     assert shards.column("source_to_volume").shape == (8, 2, 3)
 
 
-def test_what_pictures_cover(folder):
+def test_what_images_cover(folder):
     with Shards(folder) as shards:
-        assert shards.picture_area().tolist() == [0, 0, 8, 6]
+        assert shards.image_area().tolist() == [0, 0, 8, 6]
     with h5py.File(folder / NAME, "r+") as file:  # 16 x 12 pixels at a quarter, with borders of 2, 1 and 2, 2
         del file["pairs/source_to_volume"]
         file["pairs/source_to_volume"] = [[[0.25, 0, 1.625], [0, 0.25, 0.625]]] * 5
-    assert Shards(folder / NAME).picture_area().tolist() == [2, 1, 6, 4]
+    assert Shards(folder / NAME).image_area().tolist() == [2, 1, 6, 4]
     with pytest.raises(ValueError, match="expected samples with images, got none"):
-        shards[:0].picture_area()
+        shards[:0].image_area()
 
 
 def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
@@ -295,7 +295,7 @@ def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
     with pytest.raises(ValueError, match="expected 2 finished shards, got 1 unfinished .demo-train-00001-of-00003.h5."):
         Shards(two_shards)
     (two_shards / "plan.json").unlink()
-    (two_shards / NAME).rename(two_shards / "other")  # a marker alone
+    (two_shards / NAME).rename(two_shards / "other")  # a commit record alone
     with pytest.raises(ValueError, match=f"expected 1 finished shards, got 1 unfinished .{NAME}."):
         Shards(two_shards)
     for none in (two_shards, two_shards.parent, []):
@@ -304,8 +304,8 @@ def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
 
 
 def test_a_description_that_misses_shards(folder):
-    marker = json.loads((folder / NAME).with_suffix(".json").read_text())
-    entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": marker["size_bytes"], "sha256": marker["sha256"]}
+    record = json.loads((folder / NAME).with_suffix(".json").read_text())
+    entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
     quarantined = [{"shard": NAME, "slot": 2}]
     (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "missing": [SECOND],
                                                      "quarantined": quarantined}))
@@ -316,10 +316,10 @@ def test_a_description_that_misses_shards(folder):
 
 @pytest.mark.parametrize("name", [f"../out/{NAME}", "{folder}/" + NAME, f"./{NAME}", "other.h5", f"{NAME}\n", f"..-train-{NAME}", 7])
 def test_names_in_a_description_that_are_no_shards_are_refused(folder, name):
-    marker = json.loads((folder / NAME).with_suffix(".json").read_text())
+    record = json.loads((folder / NAME).with_suffix(".json").read_text())
     name = name.format(folder=folder) if isinstance(name, str) else name
     (folder / "other.h5").write_bytes((folder / NAME).read_bytes())
-    entry = {"name": name, "split": "train", "samples": 5, "size_bytes": marker["size_bytes"], "sha256": marker["sha256"]}
+    entry = {"name": name, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
     (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "quarantined": []}))
     with pytest.raises(ValueError, match="expected the name of a shard beside it, got .*dataset.json"):
         Shards(folder)

@@ -53,7 +53,7 @@ TEST(Placement, SidesAreRoundedToTheNearestPixel) {
             (ImageSize{3, 10}));
 }
 
-TEST(Placement, WithoutSizeThePictureKeepsItsOwn) {
+TEST(Placement, WithoutSizeTheImageKeepsItsOwn) {
   for (const ImageFit fit : {ImageFit::kStretch, ImageFit::kLetterbox, ImageFit::kCrop}) {
     const Placement placement = place({375, 1242}, spec_of(std::nullopt, fit));
     EXPECT_EQ(placement, (Placement{{375, 1242}, {375, 1242}, {375, 1242}, 0, 0}));
@@ -70,14 +70,14 @@ TEST(Placement, MapsPointsAndEdgesByTheEquations) {
 }
 
 TEST(Placement, ShapesWithoutBoundsKeepOnePixel) {
-  // 10000 x 1 into 64 x 64: 0.0064 rows, but a picture has at least one.
+  // 10000 x 1 into 64 x 64: 0.0064 rows, but an image has at least one.
   EXPECT_EQ(place({1, 10000}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox)),
             (Placement{{1, 10000}, {1, 64}, {64, 64}, 0, 31}));
   EXPECT_EQ(place({1, 1}, spec_of(ImageSize{64, 32}, ImageFit::kCrop)),
             (Placement{{1, 1}, {64, 64}, {64, 32}, -16, 0}));
 }
 
-TEST(Placement, HugePicturesDoNotOverflow) {
+TEST(Placement, HugeImagesDoNotOverflow) {
   constexpr int kMost = std::numeric_limits<int>::max();
   EXPECT_EQ(place({kMost, kMost}, spec_of(ImageSize{8192, 8192}, ImageFit::kLetterbox)).scaled,
             (ImageSize{8192, 8192}));

@@ -281,7 +281,7 @@ TEST_P(ConversionGraph, TracesEachStageOfEachSample) {
             nlohmann::json(
                 {{"sample", "id4"}, {"shard", "s.h5"}, {"slot", 4}, {"pixels", 6}, {"bytes", 7}}));
   EXPECT_FALSE(arguments("read", 4).contains("waited_us"));
-  // A fault stands in the stage in which it arose.
+  // A fault is noted in the stage in which it arose.
   EXPECT_THAT(arguments("read", 1).at("fault").get<std::string>(),
               ::testing::StartsWith("expected a frame, got none"));
   EXPECT_FALSE(arguments("generate", 1).contains("fault"));

@@ -100,8 +100,8 @@ TEST_F(ConvertParts, SaysWhichPartUnlessItIsEverything) {
 }
 
 TEST_F(ConvertParts, WhatIsQuarantinedElsewhereCountsForTheLimits) {
-  testing::write_file(picture(0), "not a picture");  // spoils the first pair
-  testing::write_file(picture(11), "nor this");      // and the last
+  testing::write_file(image(0), "not an image");  // spoils the first pair
+  testing::write_file(image(11), "nor this");     // and the last
   manifest_.errors = {ErrorPolicy::kQuarantine, 1, 1.0};
   EXPECT_FALSE(run_part(0, 6).too_many_faults);
   const ConversionReport report = run_part(5, 6);

@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "manifests/documents/commit_record.h"
 #include "manifests/documents/job_manifest.h"
-#include "manifests/documents/marker.h"
 #include "manifests/values/faults.h"
 #include "pipeline/dataset/verify_folder.h"
 #include "pipeline/folder/output_folder.h"
@@ -19,7 +19,7 @@
 #include "stages/shards/shard_summary.h"
 #include "tests/pipeline/conversion/small_conversion.h"
 #include "tests/testing/hdf5_file.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 
 namespace eventgan {
 namespace {
@@ -28,14 +28,14 @@ namespace fs = std::filesystem;
 
 using Convert = testing::SmallConversion;
 
-TEST_F(Convert, WritesShardsMarkersAndPlan) {
+TEST_F(Convert, WritesShardsCommitRecordsAndPlan) {
   const ConversionReport report = run();
   EXPECT_EQ(report.planned, 11);
   EXPECT_EQ(report.written, 11);
   EXPECT_TRUE(report.quarantined.empty());
   EXPECT_TRUE(report.complete());
   EXPECT_FALSE(report.too_many_faults);
-  EXPECT_EQ(report.without_partner, 1);
+  EXPECT_EQ(report.unpaired, 1);
   EXPECT_GT(report.stored_bytes, 0);
   EXPECT_EQ(report.stage_seconds.size(), 4u);
   EXPECT_THAT(names("out"),
@@ -85,8 +85,7 @@ TEST_F(Convert, DoesNotDependOnTheOrderOfTheFileSystem) {
   run("before");
   // The same files under the same names, created in the opposite order.
   std::map<fs::path, std::string> files;
-  for (int frame = 0; frame < 12; ++frame)
-    files[picture(frame)] = testing::read_file(picture(frame));
+  for (int frame = 0; frame < 12; ++frame) files[image(frame)] = testing::read_file(image(frame));
   fs::remove_all(folder_ / "clip");
   for (auto file = files.rbegin(); file != files.rend(); ++file)
     testing::write_file(file->first, file->second);
@@ -190,8 +189,8 @@ TEST_F(Convert, RefusesAPlanThatSomeoneAltered) {
 
 TEST_F(Convert, QuarantinesWithinTheLimits) {
   // Spoils pairs (4, 5) and (5, 6): slots 4 and 5. The size, which the plan's hash tells, stays.
-  const std::string sound = testing::read_file(picture(5));
-  testing::write_file(picture(5), std::string(sound.size(), 'x'));
+  const std::string sound = testing::read_file(image(5));
+  testing::write_file(image(5), std::string(sound.size(), 'x'));
   manifest_.errors = {ErrorPolicy::kQuarantine, 2, 0.5};
   const ConversionReport report = run();
   EXPECT_FALSE(report.too_many_faults);
@@ -203,7 +202,7 @@ TEST_F(Convert, QuarantinesWithinTheLimits) {
   EXPECT_THAT(verify_folder(folder_ / "out").faults, ::testing::IsEmpty());
   // The other shards are what they are without the fault.
   const auto damaged = shards("out");
-  testing::write_file(picture(5), sound);
+  testing::write_file(image(5), sound);
   EXPECT_EQ(run("whole").written, 11);
   const auto whole = shards("whole");
   ASSERT_EQ(damaged.size(), 3u);
@@ -214,7 +213,7 @@ TEST_F(Convert, QuarantinesWithinTheLimits) {
 }
 
 TEST_F(Convert, BeyondTheLimitsFinishesTheShardAndStops) {
-  testing::write_file(picture(1), "");
+  testing::write_file(image(1), "");
   manifest_.errors = {ErrorPolicy::kQuarantine, 1, 1.0};
   const ConversionReport report = run();
   EXPECT_TRUE(report.too_many_faults);
@@ -229,7 +228,7 @@ TEST_F(Convert, BeyondTheLimitsFinishesTheShardAndStops) {
 }
 
 TEST_F(Convert, TheFractionIsOfTheWholePlan) {
-  testing::write_file(picture(11), "");
+  testing::write_file(image(11), "");
   manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0 / 11};
   EXPECT_FALSE(run("a").too_many_faults);
   manifest_.errors.max_fraction = 0.05;
@@ -237,7 +236,7 @@ TEST_F(Convert, TheFractionIsOfTheWholePlan) {
 }
 
 TEST_F(Convert, PolicyFailEndsAtTheFirstFaultAndLeavesNoPartOfAShard) {
-  testing::write_file(picture(6), "");
+  testing::write_file(image(6), "");
   manifest_.errors.policy = ErrorPolicy::kFail;
   EXPECT_THAT([&] { run(); },
               ::testing::ThrowsMessage<TooManyFaults>(::testing::HasSubstr("clip/f_16.png")));
@@ -272,7 +271,7 @@ TEST_F(Convert, ShowsProgressOfEveryPair) {
 }
 
 TEST_F(Convert, TheSameManifestGoesWithEveryKindOfGenerator) {
-  // Frames are 20 grey levels apart, so the difference has events; a flat picture has none however
+  // Frames are 20 grey levels apart, so the difference has events; a flat image has none however
   // it moves.
   std::map<std::string, std::string> first_shards;
   for (const std::string kind : {"network", "esim", "difference"}) {
@@ -303,18 +302,18 @@ TEST_F(Convert, TheSameManifestGoesWithEveryKindOfGenerator) {
   }
   EXPECT_NE(first_shards["esim"], first_shards["difference"]);
 
-  // A folder of one kind is not gone on with by another.
+  // A folder of one kind is not resumed by another.
   change(R"({ "weights": "untrained:1" })", R"({ "kind": "esim" })");
   EXPECT_THROW(run("network"), UsageError);
 }
 
-/// Six labelled KITTI pictures, each with three frames before it.
+/// Six labelled KITTI images, each with three frames before it.
 void write_kitti(const fs::path& root) {
   for (int i = 0; i < 6; ++i) {
     const std::string id = "00000" + std::to_string(i);
-    testing::write_flat_picture(root / "image_2" / (id + ".png"), {24, 36}, 10 + i);
+    testing::write_flat_image(root / "image_2" / (id + ".png"), {24, 36}, 10 + i);
     for (const char* before : {"_01", "_02", "_03"}) {
-      testing::write_flat_picture(root / "prev_2" / (id + before + ".png"), {24, 36}, 90 + 9 * i);
+      testing::write_flat_image(root / "prev_2" / (id + before + ".png"), {24, 36}, 90 + 9 * i);
     }
     testing::write_file(root / "label_2" / (id + ".txt"),
                         "Car 0.00 0 -1.58 " + std::to_string(3 + i) +
@@ -373,8 +372,8 @@ class ConvertMemory : public ::testing::TestWithParam<GeneratorKind> {
   std::string write_source() const {
     if (GetParam() != GeneratorKind::kEvents) {
       for (int frame = 0; frame < kFrames; ++frame) {
-        testing::write_flat_picture(folder_ / "clip" / (std::to_string(1000 + frame) + ".png"),
-                                    {3, 4}, 100 + 40 * (frame % 2));
+        testing::write_flat_image(folder_ / "clip" / (std::to_string(1000 + frame) + ".png"),
+                                  {3, 4}, 100 + 40 * (frame % 2));
       }
       return R"("dataset": "frames", "root": "clip", "pairs": { "gaps": [1], "side": "before" })";
     }
@@ -420,7 +419,7 @@ TEST_P(ConvertMemory, DoesNotGrowWithTheSamples) {
   ASSERT_EQ(convert(manifest, *loaded.generator, loaded.weights_hash, options).written, 80);
   const auto peak = [&](int shard) {
     const std::string name = "job-train-0000" + std::to_string(shard) + "-of-00004.json";
-    return parse_marker(testing::read_file(folder_ / "out" / name), name).peak_bytes;
+    return parse_commit_record(testing::read_file(folder_ / "out" / name), name).peak_bytes;
   };
   constexpr std::int64_t kVolume = 18 * 160 * 120 * sizeof(float);
   ASSERT_GT(peak(0), 0);

@@ -17,7 +17,7 @@
 #include "stages/shards/codec/volume_codec.h"
 #include "tests/stages/generator/engine_trials.h"
 
-// What becomes of pictures, weights and calibrations at the ends of what numbers can say, for every
+// What becomes of images, weights and calibrations at the ends of what numbers can say, for every
 // engine, precision and width of shipped weights: three tables of cases, each with its outcome,
 // which manifests/guides/numerics.md has for people. A pair goes the way of a conversion, from the
 // frames to the bytes of a chunk, in every type of storage.
@@ -61,14 +61,14 @@ std::vector<float> with_equal_frames(std::vector<float> frames) {
 
 // ---- The cases
 
-struct PictureCase {
+struct ImageCase {
   const char* name;
   ImageSize size;  // height, width
   std::vector<float> (*frames)(ImageSize);
 };
 
 /// The outcome of each is kVolume.
-const PictureCase kPictures[] = {
+const ImageCase kImages[] = {
     {"one pixel", {1, 1}, natural},
     {"one row", {1, 33}, natural},
     {"one column", {33, 1}, natural},
@@ -311,10 +311,10 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
   }
 };
 
-TEST_P(Extremes, Pictures) {
+TEST_P(Extremes, Images) {
   const auto generator = engine(ready(weights_));
   const auto reference = make_torch_generator(weights_);
-  for (const PictureCase& one : kPictures) {
+  for (const ImageCase& one : kImages) {
     const std::vector<float> frames = one.frames(one.size);
     expect_outcome(one.name, *generator, frames, one.size, Outcome::kVolume,
                    testing::generated(*reference, frames, one.size));
@@ -393,7 +393,7 @@ INSTANTIATE_TEST_SUITE_P(All, Extremes, ::testing::ValuesIn(all_engines()), [](c
 });
 
 /// 4096x4096 pixels: 33.6 million values a frame, past what 32-bit byte offsets reach.
-TEST(LargePictures, AreComputedAlikeByBothEngines) {
+TEST(LargeImages, AreComputedAlikeByBothEngines) {
   if (!onednn_support(Precision::kFloat32).able) GTEST_SKIP() << "one engine alone";
   constexpr ImageSize kLarge{4096, 4096};
   const Weights weights = untrained_weights(4, 1, 5);

@@ -19,12 +19,12 @@ class PlanSummary : public ::testing::Test {
     manifest_.sources[0].root = "kitti/training";
     manifest_.sources[0].dataset = DatasetKind::kKittiObject;
     manifest_.sources[0].pairs = {{1, 3}, PairSide::kBefore, PairChoice::kAll};
-    job_.without_partner_by_gap = {{{1, 3}, {3, 6}}};
+    job_.unpaired_by_gap = {{{1, 3}, {3, 6}}};
     SourceSummary source;
     source.labelled_frames = 12;
     source.pairs_by_gap = {{1, 2}, {3, 1}};
-    source.without_partner = 9;
-    source.without_partner_ids = {"a", "b", "c", "d", "e", "f"};
+    source.unpaired = 9;
+    source.unpaired_ids = {"a", "b", "c", "d", "e", "f"};
     source.faults = 1;
     source.notes = {"2 pictures without labels"};
     job_.plan.sources = {source};
@@ -76,8 +76,8 @@ TEST_F(PlanSummary, JsonHasTheSameNumbers) {
 
 TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {
   manifest_.sources[0].pairs.choose = PairChoice::kOne;
-  job_.plan.sources[0].without_partner = 2;
-  job_.plan.sources[0].without_partner_ids = {"a", "b"};
+  job_.plan.sources[0].unpaired = 2;
+  job_.plan.sources[0].unpaired_ids = {"a", "b"};
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
               ::testing::HasSubstr(
                   "  no paired frame  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
@@ -85,8 +85,8 @@ TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {
 }
 
 TEST_F(PlanSummary, SaysThatNothingIsMissing) {
-  job_.plan.sources[0].without_partner_ids = {};
-  job_.without_partner_by_gap = {{}};
+  job_.plan.sources[0].unpaired_ids = {};
+  job_.unpaired_by_gap = {{}};
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
               ::testing::HasSubstr("  no paired frame  0 of 24 labelled frames x gaps\n  to "));
 }

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/conversion/conversion_report.h"
 #include "pipeline/conversion/retry.h"
 
@@ -19,7 +19,7 @@ ConversionReport report() {
   result.planned = 10;
   result.written = 9;
   result.quarantined = {{3, "id", "expected an image, got rubbish, in a.png (id)"}};
-  result.without_partner = result.frames_without_partner = 2;
+  result.unpaired = result.unpaired_frames = 2;
   result.shards_planned = result.shards_done = result.plan_shards = 2;
   result.stored_bytes = 2'000'000;
   result.volume_bytes = 9'000'000;
@@ -38,12 +38,12 @@ TEST(ReportText, SaysWhatWasWrittenLostAndSpent) {
               ::testing::HasSubstr("quarantined: expected an image, got rubbish, in a.png (id)"));
 }
 
-TEST(ReportText, TellsPairsWithoutPartnerFromTheirFrames) {
+TEST(ReportText, TellsUnpairedFramesFromTheirPairs) {
   ConversionReport all = report();
   EXPECT_THAT(
       to_text(all),
       ::testing::HasSubstr("\n2 labelled frames without a paired frame (listed in plan.json)"));
-  all.without_partner = 7;
+  all.unpaired = 7;
   EXPECT_THAT(to_text(all),
               ::testing::HasSubstr("\n2 labelled frames without a paired frame for at least one of "
                                    "their gaps, 7 pairs in total (listed in plan.json)"));
@@ -74,13 +74,13 @@ TEST(ReportText, HasTheNotesOnTheInputs) {
   EXPECT_THAT(to_json(noted), ::testing::HasSubstr(R"("notes":["clip.mp4: 60 of 100 frames"])"));
 }
 
-TEST(AddShard, CountsItsMarker) {
+TEST(AddShard, CountsItsCommitRecord) {
   ConversionReport sum = report();
-  ShardMarker marker;
-  marker.size_bytes = 5;
-  marker.valid = 3;
-  marker.quarantined = {{0, "other", "reason"}};
-  add_shard(marker, 70, sum);
+  CommitRecord record;
+  record.size_bytes = 5;
+  record.valid = 3;
+  record.quarantined = {{0, "other", "reason"}};
+  add_shard(record, 70, sum);
   EXPECT_EQ(sum.shards_done, 3);
   EXPECT_EQ(sum.written, 12);
   EXPECT_EQ(sum.quarantined.size(), 2u);

@@ -21,7 +21,7 @@
 #include "stages/base/files/unfinished_files.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/testing/fake_generator.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/text_file.h"
 
@@ -42,11 +42,11 @@ class Retry : public ::testing::Test {
     manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0};
   }
 
-  fs::path picture(int frame) const {
+  fs::path image(int frame) const {
     return folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png");
   }
-  void spoil(int frame) const { testing::write_file(picture(frame), "not a picture"); }
-  void mend(int frame) const { testing::write_flat_picture(picture(frame), {20, 30}, 20 * frame); }
+  void spoil(int frame) const { testing::write_file(image(frame), "not an image"); }
+  void mend(int frame) const { testing::write_flat_image(image(frame), {20, 30}, 20 * frame); }
 
   ConversionReport run(const std::string& output = "out") {
     ConversionOptions options;
@@ -68,7 +68,7 @@ class Retry : public ::testing::Test {
     return bytes;
   }
 
-  /// Sample ids and volumes are those of a fresh run; plan hashes differ if pictures had other
+  /// Sample ids and volumes are those of a fresh run; plan hashes differ if images had other
   /// sizes.
   void expect_sound() const {
     EXPECT_THAT(verify_folder(out_, {.deep = true, .manifest = {}}).faults, IsEmpty());
@@ -117,23 +117,23 @@ TEST_F(Retry, RedoesOnlyWhatWasQuarantined) {
 }
 
 TEST_F(Retry, AFileOfTheSameSizeGivesTheShardsOfAFreshRun) {
-  // A picture whose bytes are wrong and whose size is right: the plan is the same, so all is.
-  std::string bytes = testing::read_file(picture(5));
+  // An image whose bytes are wrong and whose size is right: the plan is the same, so all is.
+  std::string bytes = testing::read_file(image(5));
   const std::string sound = bytes;
   bytes.replace(8, 8, "damaged!");
-  testing::write_file(picture(5), bytes);
+  testing::write_file(image(5), bytes);
   ASSERT_EQ(run().quarantined.size(), 2u);
-  testing::write_file(picture(5), sound);
+  testing::write_file(image(5), sound);
   EXPECT_EQ(again().mended, 2);
   EXPECT_FALSE(fs::exists(out_ / "amendments.json"));
   run("fresh");
   EXPECT_EQ(shards("out"), shards("fresh"));
 }
 
-TEST_F(Retry, AHoleThatWasFilledIsMended) {
-  fs::remove(picture(5));
+TEST_F(Retry, AMissingFrameThatWasAddedIsMended) {
+  fs::remove(image(5));
   const ConversionReport first = run();
-  // The labelled frame itself is gone with its picture; the pair of the one after it has a hole.
+  // The labelled frame itself is gone with its image; the pair of the one after it lacks a frame.
   ASSERT_EQ(first.quarantined.size(), 1u);
   mend(5);
   const RetryReport report = again();
@@ -240,9 +240,9 @@ TEST_F(Retry, ChangedInputsOfAPlanThatWasOnlyFrozenAreRecorded) {
   EXPECT_FALSE(look()) << "samples to redo";
 }
 
-TEST_F(Retry, AHoleThatWasFilledBeforeItsShardWasMadeIsConverted) {
+TEST_F(Retry, AMissingFrameThatWasAddedBeforeItsShardWasMadeIsConverted) {
   manifest_.errors = {ErrorPolicy::kFail, 0, 0};
-  fs::remove(picture(5));
+  fs::remove(image(5));
   EXPECT_THROW(run(), TooManyFaults);
   mend(5);
   EXPECT_THROW(run(), UsageError) << "inputs have changed";
@@ -269,7 +269,7 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   finalize(out_, {});
   for (int frame = 0; frame < 6; ++frame) mend(frame);
   for (int frame = 6; frame < 12; ++frame) {
-    testing::write_flat_picture(picture(frame), {40, 50}, 20 * frame);
+    testing::write_flat_image(image(frame), {40, 50}, 20 * frame);
   }
   RetryReport report = again();
   // The pair of the frames 5 and 6 is of two sizes, and never a pair.
@@ -281,7 +281,7 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
       out_, frozen, scan_shards(out_, frozen.plan.shards, frozen.hash, ScanDepth::kRows));
   std::map<int, int> heights;
   for (const ShardState& shard : parts.done) {
-    heights[shard.outline.volume_size.height] += shard.marker->valid;
+    heights[shard.outline.volume_size.height] += shard.record->valid;
   }
   EXPECT_EQ(heights, (std::map<int, int>{{20, 5}, {40, 5}}));
 
@@ -293,14 +293,14 @@ TEST_F(Retry, MendsASourceOfWhichNoSizeWasKnown) {
   EXPECT_TRUE(shards("out") == mended);
 }
 
-TEST_F(Retry, APictureOfUnknownSizeMendedWithinItsBytesIsTaken) {
-  const std::string sound = testing::read_file(picture(5));
-  const std::string next = testing::read_file(picture(6));
-  testing::write_file(picture(5), std::string(sound.size(), '?'));
-  testing::write_file(picture(6), std::string(next.size(), '?'));
+TEST_F(Retry, AnImageOfUnknownSizeMendedWithinItsBytesIsTaken) {
+  const std::string sound = testing::read_file(image(5));
+  const std::string next = testing::read_file(image(6));
+  testing::write_file(image(5), std::string(sound.size(), '?'));
+  testing::write_file(image(6), std::string(next.size(), '?'));
   ASSERT_EQ(run().quarantined.size(), 3u);  // pairs 4, 5 and 6
-  testing::write_file(picture(5), sound);
-  testing::write_file(picture(6), next);
+  testing::write_file(image(5), sound);
+  testing::write_file(image(6), next);
   EXPECT_THAT([&] { run(); },
               ::testing::ThrowsMessage<UsageError>(HasSubstr("`eventgan retry` accepts them")));
   EXPECT_EQ(again().mended, 3);
@@ -344,19 +344,20 @@ TEST_F(Retry, LeavesDamagedAndMissingShardsToConvert) {
   expect_sound();
 }
 
-TEST_F(Retry, KilledBetweenShardAndMarkerCostsConvertNothing) {
+TEST_F(Retry, KilledBetweenShardAndCommitRecordCostsConvertNothing) {
   spoil(5);
   run();
   mend(5);
   const std::string name = "job-train-00001-of-00003";
   const auto before = shards("out");
-  const std::string marker = testing::read_file(out_ / (name + ".json"));
+  const std::string record = testing::read_file(out_ / (name + ".json"));
   again();
-  // The shard is the new one, the marker the old one, the old shard left under a dead one's name.
+  // The shard is the new one, the commit record the old one, the old shard left under a dead one's
+  // name.
   const pid_t dead = ::fork();
   if (dead == 0) ::_exit(0);
   ::waitpid(dead, nullptr, 0);
-  testing::write_file(out_ / (name + ".json"), marker);
+  testing::write_file(out_ / (name + ".json"), record);
   testing::write_file(out_ / to_string(TemporaryName{name + ".h5", host_name(), dead, 0}),
                       before.at(name + ".h5"));
   const ConversionReport report = run();

@@ -13,7 +13,7 @@
 #include "stages/shards/codec/volume_codec.h"
 #include "tests/testing/fake_dataset.h"
 #include "tests/testing/fake_generator.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -25,8 +25,8 @@ namespace {
 class SampleStagesTest : public ::testing::Test {
  protected:
   SampleStagesTest() {
-    testing::write_flat_picture(folder_ / "clip" / "0000.png", {4, 6}, 51);
-    testing::write_flat_picture(folder_ / "clip" / "0001.png", {4, 6}, 102);
+    testing::write_flat_image(folder_ / "clip" / "0000.png", {4, 6}, 51);
+    testing::write_flat_image(folder_ / "clip" / "0001.png", {4, 6}, 102);
     auto dataset = std::make_unique<testing::FakeDataset>("clip", 2);
     dataset_ = dataset.get();
     datasets_.push_back(std::move(dataset));
@@ -81,7 +81,7 @@ class CameraDataset final : public Dataset {
  public:
   const LabelSchema& label_schema() const override { return schema_; }
   const std::vector<LabelledFrame>& labelled_frames() const override { return frames_; }
-  Neighbour neighbour(const LabelledFrame&, int) const override { return {}; }
+  PairedFrame paired_frame(const LabelledFrame&, int) const override { return {}; }
   ImageSize sensor_size(const std::string&) const override { return {2, 4}; }
   Outcome<EventWindow> events(const std::string&) const override {
     if (!fault.empty()) return SampleFault{fault};
@@ -284,15 +284,15 @@ TEST_F(SampleStagesTest, GeneratesWhatTheScopeWants) {
   // 24 x 40: 2 x 3 tiles.
   manifest_.generator.scope.scope = Scope::kMotion;
   manifest_.image.size = shard_.volume_size = {24, 40};
-  testing::write_flat_picture(folder_ / "clip" / "0000.png", {24, 40}, 51);
-  testing::write_flat_picture(folder_ / "clip" / "0001.png", {24, 40}, 51);
+  testing::write_flat_image(folder_ / "clip" / "0000.png", {24, 40}, 51);
+  testing::write_flat_image(folder_ / "clip" / "0001.png", {24, 40}, 51);
   const SampleMessage still = run();
   ASSERT_FALSE(still.failed()) << still.sample.fault;
   EXPECT_THAT(still.sample.tiles, ::testing::ElementsAre(0, 0, 0, 0, 0, 0));
   EXPECT_EQ(still.sample.statistics.flags, kFlagEmpty);
   EXPECT_EQ(generator_.calls(), 0);
 
-  testing::write_flat_picture(folder_ / "clip" / "0001.png", {24, 40}, 102);
+  testing::write_flat_image(folder_ / "clip" / "0001.png", {24, 40}, 102);
   const SampleMessage moving = run();
   EXPECT_THAT(moving.sample.tiles, ::testing::ElementsAre(1, 1, 1, 1, 1, 1));
   EXPECT_EQ(generator_.calls(), 1);
@@ -366,7 +366,7 @@ TEST_F(SampleStagesTest, AMalformedLabelIsAFault) {
   EXPECT_EQ(message.sample.fault, "expected a label, got rubbish, in label 1 (0001)");
 }
 
-TEST_F(SampleStagesTest, ALabelOutsideThePictureIsAFault) {
+TEST_F(SampleStagesTest, ALabelOutsideTheImageIsAFault) {
   Annotation annotation;
   annotation.original = "far away";
   annotation.boxes.resize(1);

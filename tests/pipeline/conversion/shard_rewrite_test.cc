@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/conversion/retry.h"
 #include "stages/shards/codec/volume_codec.h"
 #include "stages/shards/shard_check.h"
@@ -22,7 +22,7 @@ PlannedSample sample(const std::string& id, const std::string& next, const std::
   return {id, "", id, {{"p"}, {next}, 1, 0, 1}, fault};
 }
 
-/// Three shards of two samples; "b" and "e" were planned with a hole.
+/// Three shards of two samples; "b" and "e" were planned with a missing frame.
 Plan plan() {
   Plan plan;
   plan.name = "job";
@@ -34,31 +34,31 @@ Plan plan() {
   return plan;
 }
 
-ShardMarker marker(const PlannedShard& shard, const std::vector<int>& quarantined) {
-  ShardMarker marker;
-  marker.shard = shard.name;
-  marker.plan_hash = marker.sha256 = std::string(64, 'a');
-  marker.size_bytes = 1;
-  marker.samples = static_cast<int>(shard.samples.size());
+CommitRecord record(const PlannedShard& shard, const std::vector<int>& quarantined) {
+  CommitRecord record;
+  record.shard = shard.name;
+  record.plan_hash = record.sha256 = std::string(64, 'a');
+  record.size_bytes = 1;
+  record.samples = static_cast<int>(shard.samples.size());
   for (const int slot : quarantined) {
-    marker.quarantined.push_back(
+    record.quarantined.push_back(
         {slot, shard.samples[static_cast<std::size_t>(slot)].sample_id, "why"});
   }
-  marker.valid = marker.samples - static_cast<int>(quarantined.size());
-  marker.contents.boxes = marker.contents.persons = {0, 0};
-  return marker;
+  record.valid = record.samples - static_cast<int>(quarantined.size());
+  record.contents.boxes = record.contents.persons = {0, 0};
+  return record;
 }
 
-void put(const testing::TemporaryFolder& folder, const ShardMarker& marker) {
-  testing::write_file(folder / marker.shard, "x");
-  testing::write_file(folder / marker_name(marker.shard), to_json(marker));
+void put(const testing::TemporaryFolder& folder, const CommitRecord& record) {
+  testing::write_file(folder / record.shard, "x");
+  testing::write_file(folder / commit_record_name(record.shard), to_json(record));
 }
 
 TEST(FindQuarantined, LooksAtCommittedShardsAlone) {
   const testing::TemporaryFolder folder;
   const FrozenOutline frozen{outline_of(plan()), std::string(64, 'a')};
-  put(folder, marker(plan().shards[0], {}));
-  put(folder, marker(plan().shards[2], {0, 1}));
+  put(folder, record(plan().shards[0], {}));
+  put(folder, record(plan().shards[2], {0, 1}));
   QuarantinedSamples found = find_quarantined(folder.path(), frozen);
   EXPECT_THAT(found.shards, ElementsAre(2u));
   EXPECT_EQ(found.count, 2);
@@ -75,8 +75,8 @@ TEST(FindQuarantined, LooksAtCommittedShardsAlone) {
 TEST(PlanRetry, TakesQuarantinedSamplesAsTheyArePlanned) {
   Plan frozen = plan();
   frozen.shards[1].size_unknown = true;
-  const auto retried = plan_retry({{&frozen.shards[1], marker(frozen.shards[1], {1})},
-                                   {&frozen.shards[2], marker(frozen.shards[2], {0, 1})}});
+  const auto retried = plan_retry({{&frozen.shards[1], record(frozen.shards[1], {1})},
+                                   {&frozen.shards[2], record(frozen.shards[2], {0, 1})}});
   ASSERT_EQ(retried.size(), 2u);
   EXPECT_EQ(retried[0].name, frozen.shards[1].name);
   EXPECT_EQ(retried[0].volume_size, (ImageSize{2, 2}));
@@ -96,20 +96,24 @@ class ShardRewriteTest : public ::testing::Test {
  protected:
   ShardRewriteTest() : whole_(testing::example_shard()), broken_(whole_) {
     broken_.samples[0].valid = false;
-    broken_.samples[0].fault = "no such picture";
+    broken_.samples[0].fault = "no such image";
     broken_.samples[0].labels = {};
     broken_.samples[0].statistics = {};
     broken_.volumes[0].clear();
     before_ = write_shard(folder_.path(), broken_);
     before_.wall_seconds = 10;
     before_.stage_seconds = {{"read", 1.0}};
-    testing::write_file(marker_file(), to_json(before_));
+    testing::write_file(commit_record_file(), to_json(before_));
     bytes_before_ = testing::read_file(shard());
   }
 
   std::filesystem::path shard() const { return folder_ / before_.shard; }
-  std::filesystem::path marker_file() const { return folder_ / marker_name(before_.shard); }
-  ShardMarker marker() const { return parse_marker(testing::read_file(marker_file()), "marker"); }
+  std::filesystem::path commit_record_file() const {
+    return folder_ / commit_record_name(before_.shard);
+  }
+  CommitRecord record() const {
+    return parse_commit_record(testing::read_file(commit_record_file()), "marker");
+  }
 
   /// What the stages make of a slot.
   SampleMessage message(const testing::ExampleShard& from, std::size_t slot) const {
@@ -132,7 +136,7 @@ class ShardRewriteTest : public ::testing::Test {
   testing::TemporaryFolder folder_;
   testing::ExampleShard whole_;
   testing::ExampleShard broken_;
-  ShardMarker before_;
+  CommitRecord before_;
   std::string bytes_before_;
 };
 
@@ -144,9 +148,9 @@ TEST_F(ShardRewriteTest, AMendedSampleGivesTheShardThatWasMeantFromTheStart) {
   EXPECT_TRUE(rewrite.commit());
 
   const testing::TemporaryFolder other;
-  const ShardMarker expected = write_shard(other.path(), whole_);
+  const CommitRecord expected = write_shard(other.path(), whole_);
   EXPECT_EQ(testing::read_file(shard()), testing::read_file(other / expected.shard));
-  ShardMarker got = marker();
+  CommitRecord got = record();
   EXPECT_EQ(got.quarantined, expected.quarantined);
   EXPECT_THAT(got.contents.boxes, ElementsAre(2, 0, 0, 1, 0));
   EXPECT_EQ(got.stage_seconds["read"], 1 + 2 + 2);
@@ -155,7 +159,7 @@ TEST_F(ShardRewriteTest, AMendedSampleGivesTheShardThatWasMeantFromTheStart) {
   got.stage_seconds.clear();
   got.wall_seconds = 0;
   EXPECT_EQ(got, expected);
-  EXPECT_THAT(check_shard(shard(), marker()), IsEmpty());
+  EXPECT_THAT(check_shard(shard(), record()), IsEmpty());
   EXPECT_EQ(files(), 2) << "no temporary is left";
 }
 
@@ -166,7 +170,7 @@ TEST_F(ShardRewriteTest, NothingIsTouchedIfAllFailAsBefore) {
   EXPECT_FALSE(rewrite.commit());
   EXPECT_EQ(files(), 2);
   EXPECT_EQ(testing::read_file(shard()), bytes_before_);
-  EXPECT_EQ(marker(), before_);
+  EXPECT_EQ(record(), before_);
 }
 
 TEST_F(ShardRewriteTest, AnotherReasonIsRecorded) {
@@ -175,11 +179,11 @@ TEST_F(ShardRewriteTest, AnotherReasonIsRecorded) {
   rewrite.redo(0, message(broken_, 0));
   rewrite.redo(2, message(broken_, 2));
   EXPECT_TRUE(rewrite.commit());
-  EXPECT_EQ(testing::read_file(shard()), bytes_before_) << "reasons stand in the marker alone";
-  EXPECT_THAT(marker().quarantined,
-              ElementsAre(QuarantinedSample{0, "000000", "no such picture"},
+  EXPECT_EQ(testing::read_file(shard()), bytes_before_) << "reasons are in the commit record alone";
+  EXPECT_THAT(record().quarantined,
+              ElementsAre(QuarantinedSample{0, "000000", "no such image"},
                           QuarantinedSample{2, "000002", "expected an image, got text"}));
-  EXPECT_THAT(check_shard(shard(), marker()), IsEmpty());
+  EXPECT_THAT(check_shard(shard(), record()), IsEmpty());
 }
 
 TEST_F(ShardRewriteTest, AnAnnotationThatWasMendedIsKeptThoughTheSampleFails) {
@@ -188,7 +192,7 @@ TEST_F(ShardRewriteTest, AnAnnotationThatWasMendedIsKeptThoughTheSampleFails) {
   rewrite.redo(2, message(broken_, 2));
   EXPECT_TRUE(rewrite.commit());
   EXPECT_EQ(ShardReader(shard()).sample(2).annotation.original, "Car, mended");
-  EXPECT_EQ(marker().quarantined, before_.quarantined);
+  EXPECT_EQ(record().quarantined, before_.quarantined);
 }
 
 TEST_F(ShardRewriteTest, OneThatIsGivenUpLeavesTheShardAsItWas) {
@@ -199,26 +203,26 @@ TEST_F(ShardRewriteTest, OneThatIsGivenUpLeavesTheShardAsItWas) {
   }
   EXPECT_EQ(files(), 2);
   EXPECT_EQ(testing::read_file(shard()), bytes_before_);
-  EXPECT_EQ(marker(), before_);
+  EXPECT_EQ(record(), before_);
 }
 
 TEST_F(ShardRewriteTest, WhatAnotherHasPutInItsPlaceMeanwhileStays) {
   ShardRewrite rewrite(folder_.path(), before_);
   rewrite.redo(0, message(whole_, 0));
-  const ShardMarker others = write_shard(folder_.path(), whole_);
-  testing::write_file(marker_file(), to_json(others));
+  const CommitRecord others = write_shard(folder_.path(), whole_);
+  testing::write_file(commit_record_file(), to_json(others));
   const std::string bytes = testing::read_file(shard());
   EXPECT_THAT([&] { rewrite.commit(); },
               ::testing::ThrowsMessage<std::runtime_error>(::testing::HasSubstr(shard().string())));
   EXPECT_EQ(testing::read_file(shard()), bytes);
-  EXPECT_EQ(marker(), others);
+  EXPECT_EQ(record(), others);
 }
 
-TEST_F(ShardRewriteTest, OneWhoseMarkerIsGoneIsLeftAsItIs) {
+TEST_F(ShardRewriteTest, OneWhoseCommitRecordIsGoneIsLeftAsItIs) {
   {
     ShardRewrite rewrite(folder_.path(), before_);
     rewrite.redo(0, message(whole_, 0));
-    std::filesystem::remove(marker_file());
+    std::filesystem::remove(commit_record_file());
     EXPECT_THROW(rewrite.commit(), std::runtime_error);
   }
   EXPECT_EQ(testing::read_file(shard()), bytes_before_);

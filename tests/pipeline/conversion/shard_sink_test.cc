@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "stages/base/files/sha256.h"
@@ -43,8 +43,8 @@ class EarlierShardsTest : public testing::SmallConversion {
   std::filesystem::path shard(int number) const {
     return out(frozen_.plan.shards[static_cast<std::size_t>(number)].name);
   }
-  std::filesystem::path marker(int number) const {
-    return out(marker_name(frozen_.plan.shards[static_cast<std::size_t>(number)].name));
+  std::filesystem::path record(int number) const {
+    return out(commit_record_name(frozen_.plan.shards[static_cast<std::size_t>(number)].name));
   }
 
   void flip_a_bit(int number) const {
@@ -62,7 +62,7 @@ TEST_F(EarlierShardsTest, WholeShardsAreDone) {
     const EarlierShards earlier = check(threads);
     ASSERT_EQ(earlier.done.size(), 3u);
     EXPECT_EQ(earlier.done[1].shard, all_[1]);
-    EXPECT_EQ(earlier.done[2].marker.samples, 3);
+    EXPECT_EQ(earlier.done[2].record.samples, 3);
     EXPECT_THAT(earlier.left, IsEmpty());
     EXPECT_THAT(earlier.faults, IsEmpty());
   }
@@ -70,14 +70,14 @@ TEST_F(EarlierShardsTest, WholeShardsAreDone) {
 
 TEST_F(EarlierShardsTest, AMissingShardIsLeftWithoutAWord) {
   std::filesystem::remove(shard(1));
-  std::filesystem::remove(marker(1));
+  std::filesystem::remove(record(1));
   EXPECT_THAT(check().left, ElementsAre(all_[1]));
   EXPECT_THAT(check().faults, IsEmpty());
 }
 
 TEST_F(EarlierShardsTest, AnyDamageIsLeftAndNamed) {
   flip_a_bit(0);
-  std::filesystem::remove(marker(1));
+  std::filesystem::remove(record(1));
   std::filesystem::resize_file(shard(2), 7);
   const EarlierShards earlier = check();
   EXPECT_THAT(earlier.done, IsEmpty());
@@ -92,7 +92,7 @@ TEST_F(EarlierShardsTest, AnyDamageIsLeftAndNamed) {
 TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
   const auto whole = shards();
   flip_a_bit(0);
-  testing::write_file(marker(1), "{");
+  testing::write_file(record(1), "{");
   testing::write_file(shard(2), "");
   std::vector<std::string> warnings;
   ConversionOptions warned = options();
@@ -108,16 +108,16 @@ TEST_F(EarlierShardsTest, ConvertSaysSoAndMakesThemAgain) {
   EXPECT_THAT(check().left, IsEmpty());
 }
 
-TEST_F(EarlierShardsTest, AMarkerWithCountsThatAreNotTheShardsIsNamedAndMadeAgain) {
+TEST_F(EarlierShardsTest, ACommitRecordWithCountsThatAreNotTheShardsIsNamedAndMadeAgain) {
   const auto whole = shards();
-  ShardMarker wrong = parse_marker(testing::read_file(marker(0)), "");
+  CommitRecord wrong = parse_commit_record(testing::read_file(record(0)), "");
   std::swap(wrong.contents.gaps.begin()->second,
             wrong.contents.gaps[6]);  // as many samples, all of another gap
   wrong.contents.gaps.erase(wrong.contents.gaps.begin());
-  testing::write_file(marker(0), to_json(wrong));
+  testing::write_file(record(0), to_json(wrong));
   const EarlierShards earlier = check();
   EXPECT_THAT(earlier.left, ElementsAre(all_[0]));
-  EXPECT_THAT(earlier.faults, ElementsAre(::testing::AllOf(HasSubstr(marker(0).string()),
+  EXPECT_THAT(earlier.faults, ElementsAre(::testing::AllOf(HasSubstr(record(0).string()),
                                                            HasSubstr("expected samples by gap "),
                                                            HasSubstr("got 6: "))));
   const ConversionReport report = run();
@@ -142,12 +142,12 @@ TEST_F(EarlierShardsTest, OfNoShardsAreNone) {
 
 TEST_F(EarlierShardsTest, QuarantinedSamplesOfDoneShardsAreCounted) {
   EXPECT_EQ(count_quarantined(folder_ / "out", frozen_, all_, {2, {}, {}}), 0);
-  testing::write_file(picture(1), "");  // spoils pairs 0 and 1
+  testing::write_file(image(1), "");  // spoils pairs 0 and 1
   manifest_.errors = {ErrorPolicy::kQuarantine, 100, 1.0};
   run("spoilt");
   const FrozenPlan spoilt = read_frozen_plan(folder_ / "spoilt");
   EXPECT_EQ(count_quarantined(folder_ / "spoilt", spoilt, all_, {2, {}, {}}), 2);
-  std::filesystem::remove(out(marker_name(all_[0]->name), "spoilt"));
+  std::filesystem::remove(out(commit_record_name(all_[0]->name), "spoilt"));
   EXPECT_EQ(count_quarantined(folder_ / "spoilt", spoilt, all_, {2, {}, {}}), 0);
 }
 
@@ -204,7 +204,7 @@ class ShardSinkTest : public ::testing::Test {
   std::optional<ShardSink> sink_;
 };
 
-TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
+TEST_F(ShardSinkTest, CommitsEachShardWithItsCommitRecord) {
   const PlannedShard &a = frozen_.plan.shards[0], &b = frozen_.plan.shards[1];
   open_sink();
   EXPECT_TRUE(accept(a, 0));
@@ -217,17 +217,18 @@ TEST_F(ShardSinkTest, CommitsEachShardWithItsMarker) {
               ElementsAre("job-a-00000-of-00001.h5", "job-a-00000-of-00001.json",
                           "job-b-00000-of-00001.h5", "job-b-00000-of-00001.json"));
   ASSERT_EQ(sink_->committed().size(), 2u);
-  const ShardMarker& marker = sink_->committed()[0].marker;
+  const CommitRecord& record = sink_->committed()[0].record;
   EXPECT_EQ(sink_->committed()[0].shard, &a);
-  EXPECT_EQ(parse_marker(testing::read_file(folder_ / "job-a-00000-of-00001.json"), "a"), marker);
-  EXPECT_EQ(marker.sha256, sha256_of_file(folder_ / "job-a-00000-of-00001.h5"));
-  EXPECT_EQ(marker.valid, 1);
-  EXPECT_EQ(marker.quarantined.at(0).slot, 1);
-  EXPECT_EQ(marker.contents.boxes, (std::vector<std::int32_t>{0, 0}));
-  EXPECT_EQ(marker.contents.persons, (std::vector<std::int32_t>{0, 0}));
-  EXPECT_EQ(marker.contents.gaps, (std::map<int, std::int64_t>{{1, 1}, {2, 1}}));
-  EXPECT_GT(marker.wall_seconds, 0);
-  EXPECT_GT(marker.peak_bytes, 1 << 20);
+  EXPECT_EQ(parse_commit_record(testing::read_file(folder_ / "job-a-00000-of-00001.json"), "a"),
+            record);
+  EXPECT_EQ(record.sha256, sha256_of_file(folder_ / "job-a-00000-of-00001.h5"));
+  EXPECT_EQ(record.valid, 1);
+  EXPECT_EQ(record.quarantined.at(0).slot, 1);
+  EXPECT_EQ(record.contents.boxes, (std::vector<std::int32_t>{0, 0}));
+  EXPECT_EQ(record.contents.persons, (std::vector<std::int32_t>{0, 0}));
+  EXPECT_EQ(record.contents.gaps, (std::map<int, std::int64_t>{{1, 1}, {2, 1}}));
+  EXPECT_GT(record.wall_seconds, 0);
+  EXPECT_GT(record.peak_bytes, 1 << 20);
 }
 
 TEST_F(ShardSinkTest, AClaimStandsUntilTheShardIsThereAndTellsOfItsSamples) {
@@ -284,15 +285,15 @@ TEST_F(ShardSinkTest, AFileLostUnderWayIsAnErrorUnlessAnotherHasMadeTheShard) {
 
   accept(a, 0);
   std::filesystem::remove(folder_ / names_in(folder_.path()).at(0));
-  ShardMarker marker;  // another worker's, whose shard is of four bytes
-  marker.shard = a.name;
-  marker.plan_hash = frozen_.hash;
-  marker.sha256 = std::string(64, 'b');
-  marker.size_bytes = 4;
-  marker.samples = marker.valid = 2;
-  marker.contents.boxes = marker.contents.persons = {0, 0};
+  CommitRecord record;  // another worker's, whose shard is of four bytes
+  record.shard = a.name;
+  record.plan_hash = frozen_.hash;
+  record.sha256 = std::string(64, 'b');
+  record.size_bytes = 4;
+  record.samples = record.valid = 2;
+  record.contents.boxes = record.contents.persons = {0, 0};
   testing::write_file(folder_ / "job-a-00000-of-00001.h5", "made");
-  testing::write_file(folder_ / "job-a-00000-of-00001.json", to_json(marker));
+  testing::write_file(folder_ / "job-a-00000-of-00001.json", to_json(record));
   EXPECT_FALSE(accept(a, 1));
   EXPECT_THAT(sink_->committed(), IsEmpty());
   EXPECT_THAT(names_in(folder_.path()),

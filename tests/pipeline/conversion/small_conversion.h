@@ -23,7 +23,7 @@ class SmallConversion : public ::testing::Test {
  protected:
   SmallConversion() : manifest_(make_small_job(folder_, 12)) {}
 
-  std::filesystem::path picture(int frame) const {
+  std::filesystem::path image(int frame) const {
     return folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png");
   }
 

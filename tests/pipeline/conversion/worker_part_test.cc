@@ -8,7 +8,7 @@
 #include <map>
 #include <stdexcept>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "pipeline/conversion/shard_queue.h"
 #include "pipeline/folder/output_folder.h"
@@ -326,7 +326,7 @@ TEST_F(SharedFolderTest, AShardThatALivingWorkerWritesIsBusy) {
   const auto elsewhere = write_temporary(shard_.name, "elsewhere-1", 1);
   EXPECT_EQ(look(), ShardActivity::kBusy);
   std::filesystem::remove(elsewhere);
-  write_temporary(marker_name(shard_.name), "elsewhere-1", 1);
+  write_temporary(commit_record_name(shard_.name), "elsewhere-1", 1);
   EXPECT_EQ(look(), ShardActivity::kBusy);  // about to be committed
 }
 

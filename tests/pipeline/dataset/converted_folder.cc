@@ -1,6 +1,6 @@
 #include "tests/pipeline/dataset/converted_folder.h"
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "stages/base/files/atomic_file.h"
 #include "tests/testing/text_file.h"
 
@@ -46,7 +46,7 @@ Plan make_demo_plan() {
       {"cpu", "x86-64 avx2 fma"}, {"annotations", "0123"}, {"manifest $.seed", "7"}};
   plan.sources.resize(3);
   plan.sources[0].labelled_frames = 6;
-  plan.sources[0].without_partner = 1;
+  plan.sources[0].unpaired = 1;
   plan.sources[1].notes = {"clip.mp4: 60 of 100 frames"};
   plan.shards = {planned("demo-train-00000-of-00003.h5", 0, example_shard()),
                  planned("demo-val-00000-of-00001.h5", 1, example_shard()),
@@ -63,8 +63,8 @@ ConvertedFolder::ConvertedFolder(int count) : path_(folder_ / "out") {
   for (int number = 0; number < count; ++number) add(number);
 }
 
-std::filesystem::path ConvertedFolder::marker_file(int number) const {
-  return path_ / marker_name(plan().shards[at(number)].name);
+std::filesystem::path ConvertedFolder::commit_record_file(int number) const {
+  return path_ / commit_record_name(plan().shards[at(number)].name);
 }
 
 void ConvertedFolder::add(int number, void (*change)(ExampleShard&)) {
@@ -74,17 +74,18 @@ void ConvertedFolder::add(int number, void (*change)(ExampleShard&)) {
   example.header.split = number == 1 ? "val" : "train";
   example.header.plan_hash = plan_hash();
   if (change) change(example);
-  ShardMarker marker = write_shard(path_, example);
-  marker.plan_hash = plan_hash();
-  write_marker(number, marker);
+  CommitRecord record = write_shard(path_, example);
+  record.plan_hash = plan_hash();
+  write_commit_record(number, record);
 }
 
-void ConvertedFolder::write_marker(int number, const ShardMarker& marker) const {
-  write_file_atomically(marker_file(number), to_json(marker));
+void ConvertedFolder::write_commit_record(int number, const CommitRecord& record) const {
+  write_file_atomically(commit_record_file(number), to_json(record));
 }
 
-ShardMarker ConvertedFolder::marker(int number) const {
-  return parse_marker(read_file(marker_file(number)), marker_file(number).string());
+CommitRecord ConvertedFolder::record(int number) const {
+  return parse_commit_record(read_file(commit_record_file(number)),
+                             commit_record_file(number).string());
 }
 
 DatasetParts parts_of(const ConvertedFolder& folder) {

@@ -26,14 +26,14 @@ class ConvertedFolder {
 
   const std::filesystem::path& path() const { return path_; }
   std::filesystem::path shard(int number) const { return path_ / plan().shards[at(number)].name; }
-  std::filesystem::path marker_file(int number) const;
+  std::filesystem::path commit_record_file(int number) const;
   const Plan& plan() const { return frozen_.plan; }
   const std::string& plan_hash() const { return frozen_.hash; }
 
-  /// Writes shard `number` of the plan, and its marker after `change`.
+  /// Writes shard `number` of the plan, and its commit record after `change`.
   void add(int number, void (*change)(ExampleShard&) = nullptr);
-  void write_marker(int number, const ShardMarker& marker) const;
-  ShardMarker marker(int number) const;
+  void write_commit_record(int number, const CommitRecord& record) const;
+  CommitRecord record(int number) const;
 
  private:
   static std::size_t at(int number) { return static_cast<std::size_t>(number); }

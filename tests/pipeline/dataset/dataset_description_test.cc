@@ -17,20 +17,20 @@ using ::testing::HasSubstr;
 using testing::parts_of;
 
 TEST(DatasetCounts, AddUp) {
-  ShardMarker marker;
-  marker.samples = 3;
-  marker.valid = 2;
-  marker.size_bytes = 5'000'000'000;
-  marker.contents.boxes = {2147483647, 0, 2147483647};
-  marker.contents.persons = {1, 0, 4};
-  marker.contents.classes = {{"Car", 4'000'000'000}};
-  marker.contents.gaps = {{1, 3}};
+  CommitRecord record;
+  record.samples = 3;
+  record.valid = 2;
+  record.size_bytes = 5'000'000'000;
+  record.contents.boxes = {2147483647, 0, 2147483647};
+  record.contents.persons = {1, 0, 4};
+  record.contents.classes = {{"Car", 4'000'000'000}};
+  record.contents.gaps = {{1, 3}};
   DatasetCounts counts;
   EXPECT_EQ(counts.quarantined(), 0);
-  add(marker, counts);
-  marker.contents.classes = {{"Van", 1}};
-  marker.contents.gaps = {{1, 1}, {6, 2}};
-  add(marker, counts);
+  add(record, counts);
+  record.contents.classes = {{"Van", 1}};
+  record.contents.gaps = {{1, 1}, {6, 2}};
+  add(record, counts);
   EXPECT_EQ(counts.shards, 2);
   EXPECT_EQ(counts.samples, 6);
   EXPECT_EQ(counts.quarantined(), 2);
@@ -44,13 +44,13 @@ TEST(DatasetCounts, AddUp) {
 
 /// Adds a shard of one sample.
 void add_shard(DatasetParts& parts, const std::string& name, int source, ImageSize size) {
-  ShardMarker marker;
-  marker.shard = name;
-  marker.samples = 1;
-  marker.valid = 1;
-  marker.contents.boxes = {1};
-  marker.contents.persons = {0};
-  parts.done.push_back({{name, source, size, 1}, ShardCondition::kDone, marker});
+  CommitRecord record;
+  record.shard = name;
+  record.samples = 1;
+  record.valid = 1;
+  record.contents.boxes = {1};
+  record.contents.persons = {0};
+  parts.done.push_back({{name, source, size, 1}, ShardCondition::kDone, record});
 }
 
 /// Three sources, in this order: kitti_object train, kitti_object val, mpii train.
@@ -128,7 +128,7 @@ TEST(DatasetDescription, SaysWhatTheDatasetIs) {
   EXPECT_EQ(text["generator"], "a fake generator");
   EXPECT_EQ(text["program_version"], "0.1.0");
   EXPECT_EQ(text["fingerprint"]["cpu"], "x86-64 avx2 fma");
-  EXPECT_FALSE(text["fingerprint"].contains("manifest $.seed"));  // stands in the settings
+  EXPECT_FALSE(text["fingerprint"].contains("manifest $.seed"));  // is in the settings
   EXPECT_EQ(text["settings"]["seed"], 7);
   EXPECT_FALSE(text.contains("amendments"));
 }
@@ -149,7 +149,7 @@ TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
   EXPECT_EQ(text["counts"]["by_dataset"], (nlohmann::json{{"kitti_object", total}}));
   EXPECT_EQ(text["counts"]["by_split"]["val"]["samples"], 5);
   EXPECT_EQ(text["counts"]["by_split"]["train"]["samples"], 11);
-  const ShardMarker marker = folder.marker(1);
+  const CommitRecord record = folder.record(1);
   EXPECT_EQ(text["shards"][1], (nlohmann::json{{"name", "demo-val-00000-of-00001.h5"},
                                                {"split", "val"},
                                                {"dataset", "kitti_object"},
@@ -157,8 +157,8 @@ TEST(DatasetDescription, CountsInTotalByShardSplitAndDataset) {
                                                {"valid", 4},
                                                {"boxes", 3},
                                                {"persons", 3},
-                                               {"size_bytes", marker.size_bytes},
-                                               {"sha256", marker.sha256}}));
+                                               {"size_bytes", record.size_bytes},
+                                               {"sha256", record.sha256}}));
 }
 
 TEST(DatasetDescription, NamesQuarantinedSamplesWithTheirReason) {
@@ -227,7 +227,7 @@ TEST(DatasetText, WithoutAShardThereIsNothingToTell) {
 TEST(DatasetDescription, BytesThatAreNoUtf8AreReplaced) {
   const ConvertedFolder folder;
   DatasetParts parts = parts_of(folder);
-  parts.done[0].marker->quarantined[0].reason = "cannot read \xff.png";
+  parts.done[0].record->quarantined[0].reason = "cannot read \xff.png";
   EXPECT_NO_THROW(describe_dataset(parts, views_of(parts), {}));
 }
 

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "stages/base/files/sha256.h"
 #include "tests/pipeline/dataset/converted_folder.h"
@@ -38,7 +38,7 @@ TEST(DatasetParts, AreThePlansShardsAndAHeaderOfEachSource) {
   for (int i = 0; i < 4; ++i) {
     const ShardState& shard = parts.done[static_cast<std::size_t>(i)];
     EXPECT_EQ(shard.outline.name, folder.shard(i).filename());
-    EXPECT_EQ(shard.marker, folder.marker(i));
+    EXPECT_EQ(shard.record, folder.record(i));
   }
   EXPECT_EQ(parts.headers.size(), 3u);
   EXPECT_EQ(parts.headers.at(1).name, "demo-val-00000-of-00001.h5");
@@ -48,7 +48,7 @@ TEST(DatasetParts, AreThePlansShardsAndAHeaderOfEachSource) {
 
 TEST(DatasetParts, WhatIsNotDoneIsNamedWithTheReason) {
   const ConvertedFolder folder(3);
-  std::filesystem::remove(folder.marker_file(0));
+  std::filesystem::remove(folder.commit_record_file(0));
   testing::write_file(folder.shard(1), "short");
   const DatasetParts parts = parts_of(folder);
   EXPECT_EQ(parts.done.size(), 1u);
@@ -88,15 +88,15 @@ TEST(DatasetParts, AShardWithOtherBytesIsMissingAndIsNotOpened) {
   EXPECT_EQ(parts.headers.at(2).name, "demo-train-00002-of-00003.h5");  // its source's next
 }
 
-TEST(DatasetParts, AMarkerWithOtherCountsThanItsShardIsNamed) {
+TEST(DatasetParts, ACommitRecordWithOtherCountsThanItsShardIsNamed) {
   const ConvertedFolder folder;
-  ShardMarker marker = folder.marker(0);
-  ++marker.contents.persons[0];
-  testing::write_file(folder.marker_file(0), to_json(marker));
+  CommitRecord record = folder.record(0);
+  ++record.contents.persons[0];
+  testing::write_file(folder.commit_record_file(0), to_json(record));
   const DatasetParts parts = parts_of(folder);
   ASSERT_EQ(parts.missing.size(), 1u);
   EXPECT_THAT(parts.missing[0].faults,
-              ElementsAre(AllOf(HasSubstr(folder.marker_file(0).string()),
+              ElementsAre(AllOf(HasSubstr(folder.commit_record_file(0).string()),
                                 HasSubstr("expected number of persons in slot 0: "))));
 }
 
@@ -179,7 +179,7 @@ TEST(Finalize, TellsIfTheLimitsArePassed) {
   const FinalizationReport report =
       finalize(folder.path(), {false, ErrorSpec{ErrorPolicy::kQuarantine, 2, 0.5}});
   EXPECT_TRUE(report.too_many_faults);
-  EXPECT_TRUE(report.written);  // how many there are stands in dataset.json
+  EXPECT_TRUE(report.written);  // how many there are is in dataset.json
 }
 
 TEST(Finalize, AfterACrashBetweenTheTwoFilesItPutsThemRight) {

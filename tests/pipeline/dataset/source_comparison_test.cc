@@ -13,7 +13,7 @@
 #include "stages/shards/shard_tables.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/fake_generator.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -61,7 +61,7 @@ TEST_F(RowDifferences, OtherBytesAreToldAlone) {
   expected_.annotation.boxes.clear();
   expected_.labels.boxes.clear();
   EXPECT_THAT(found(expected_),
-              ElementsAre("expected the annotation as it stands in labels/0.txt, got other bytes"));
+              ElementsAre("expected the annotation as it is in labels/0.txt, got other bytes"));
 }
 
 TEST_F(RowDifferences, NameTheColumnAndBothValues) {
@@ -125,18 +125,18 @@ TEST_F(RowDifferences, AreFoundInEveryColumnThatTheGeneratorDoesNotMake) {
   }
 }
 
-/// Three KITTI pictures with a car each, converted into one shard; the picture of sample 2 was
+/// Three KITTI images with a car each, converted into one shard; the image of sample 2 was
 /// broken.
 class SourceComparisonTest : public ::testing::Test {
  protected:
   SourceComparisonTest() {
     for (int i = 0; i < 3; ++i) {
-      testing::write_flat_picture(picture(i), {24, 36}, 10 + i);
-      testing::write_flat_picture(kitti_ / "prev_2" / ("00000" + std::to_string(i) + "_01.png"),
-                                  {24, 36}, 90);
+      testing::write_flat_image(image(i), {24, 36}, 10 + i);
+      testing::write_flat_image(kitti_ / "prev_2" / ("00000" + std::to_string(i) + "_01.png"),
+                                {24, 36}, 90);
       write_label(i, "3.5");
     }
-    testing::write_file(picture(2), "broken");
+    testing::write_file(image(2), "broken");
     manifest_ = parse_job_manifest(R"({
       "format": "eventgan-manifest", "version": 1, "name": "job",
       "sources": [{ "dataset": "kitti_object", "root": "kitti",
@@ -151,7 +151,7 @@ class SourceComparisonTest : public ::testing::Test {
     plan_ = read_frozen_plan(folder_ / "out").plan;
   }
 
-  fs::path picture(int i) const {
+  fs::path image(int i) const {
     return kitti_ / "image_2" / ("00000" + std::to_string(i) + ".png");
   }
   fs::path label(int i) const {
@@ -201,12 +201,12 @@ TEST_F(SourceComparisonTest, OfAQuarantinedSampleTheBytesThatWereKeptMustBeRight
   EXPECT_THAT(faults(), IsEmpty());
 }
 
-TEST_F(SourceComparisonTest, NamesASampleWhosePictureHasAnotherSize) {
-  testing::write_flat_picture(picture(0), {24, 48}, 10);
+TEST_F(SourceComparisonTest, NamesASampleWhoseImageHasAnotherSize) {
+  testing::write_flat_image(image(0), {24, 48}, 10);
   EXPECT_THAT(faults(), ElementsAre("expected a source size of 48x24 as in "
                                     "kitti/image_2/000000.png, got 36x24 (sample 0, 000000)"));
-  fs::remove(picture(0));
-  EXPECT_THAT(faults(), IsEmpty()) << "labels can be compared without pictures";
+  fs::remove(image(0));
+  EXPECT_THAT(faults(), IsEmpty()) << "labels can be compared without images";
 }
 
 TEST_F(SourceComparisonTest, NamesASampleThatIsNotThePlannedOne) {
@@ -215,7 +215,7 @@ TEST_F(SourceComparisonTest, NamesASampleThatIsNotThePlannedOne) {
                                     HasSubstr("expected the planned sample 000000, got another")));
 }
 
-TEST_F(SourceComparisonTest, NamesASampleOfOtherFramesThanPlannedUnlessAHoleWasFilled) {
+TEST_F(SourceComparisonTest, NamesASampleOfOtherFramesThanPlannedUnlessAMissingFrameWasAdded) {
   plan_.shards[0].samples[0].pair.previous.path = "kitti/prev_2/000000_02.png";
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("000000_02.png"), HasSubstr("000000_01.png"))));
   plan_.shards[0].samples[0].fault = "expected a frame, got no file";

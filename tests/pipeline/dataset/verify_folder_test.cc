@@ -10,7 +10,7 @@
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/atomic_file.h"
 #include "tests/testing/fake_generator.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -69,7 +69,7 @@ class DatasetFaults : public ::testing::Test {
     const FrozenOutline frozen = read_frozen_outline(out_);
     std::vector<ShardState> shards = scan_shards(out_, frozen.plan.shards, frozen.hash);
     for (ShardState& shard : shards) {
-      if (!sound) shard.faults = {"not what its marker says"};
+      if (!sound) shard.faults = {"not what its commit record says"};
     }
     return dataset_faults(out_, frozen, shards);
   }
@@ -106,7 +106,7 @@ TEST_F(DatasetFaults, AViewWithOtherBytesIsNamed) {
                                           HasSubstr("in line"))));
 }
 
-TEST_F(DatasetFaults, ADescriptionThatTheMarkersDoNotGiveIsNamedWithItsFirstDifference) {
+TEST_F(DatasetFaults, ADescriptionThatTheCommitRecordsDoNotGiveIsNamedWithItsFirstDifference) {
   const std::string text = testing::read_file(description_);
   change(description_, "\"samples\": 6", "\"samples\": 7");
   EXPECT_THAT(faults(),
@@ -145,7 +145,7 @@ class VerifyFolder : public ::testing::Test {
   testing::TemporaryFolder folder_;
   const std::filesystem::path out_ = folder_ / "out";
   const std::filesystem::path shard_ = out_ / "job-train-00001-of-00002.h5";
-  const std::filesystem::path marker_ = out_ / "job-train-00001-of-00002.json";
+  const std::filesystem::path record_ = out_ / "job-train-00001-of-00002.json";
 };
 
 TEST_F(VerifyFolder, FindsNothingInASoundFolder) {
@@ -156,11 +156,11 @@ TEST_F(VerifyFolder, FindsNothingInASoundFolder) {
   EXPECT_EQ(check.valid, 6);
 }
 
-TEST_F(VerifyFolder, NamesAMissingMarkerAndAMissingShard) {
-  std::filesystem::remove(marker_);
+TEST_F(VerifyFolder, NamesAMissingCommitRecordAndAMissingShard) {
+  std::filesystem::remove(record_);
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("not committed")));
   std::filesystem::remove(shard_);
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr(marker_.string())));
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(record_.string())));
 }
 
 TEST_F(VerifyFolder, NamesADamagedShard) {
@@ -170,12 +170,12 @@ TEST_F(VerifyFolder, NamesADamagedShard) {
   EXPECT_THAT(faults(), ::testing::Contains(HasSubstr(shard_.string())));
 }
 
-TEST_F(VerifyFolder, NamesATornAndAForeignMarker) {
-  const std::string text = testing::read_file(marker_);
-  testing::write_file(marker_, text.substr(0, text.size() / 2));
-  EXPECT_THAT(faults(), ElementsAre(HasSubstr(marker_.string())));
-  testing::write_file(marker_, testing::read_file(out_ / "job-train-00000-of-00002.json"));
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(marker_.string()),
+TEST_F(VerifyFolder, NamesATornAndAForeignCommitRecord) {
+  const std::string text = testing::read_file(record_);
+  testing::write_file(record_, text.substr(0, text.size() / 2));
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr(record_.string())));
+  testing::write_file(record_, testing::read_file(out_ / "job-train-00000-of-00002.json"));
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(record_.string()),
                                           HasSubstr("got one of job-train-00000-of-00002.h5"))));
 }
 
@@ -189,13 +189,13 @@ TEST_F(VerifyFolder, NamesATruncatedAndAnEmptiedShard) {
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(shard_.string()), HasSubstr("got no file"))));
 }
 
-TEST_F(VerifyFolder, NamesAPlanThatIsNotTheMarkers) {
+TEST_F(VerifyFolder, NamesAPlanThatIsNotTheCommitRecords) {
   std::string plan = testing::read_file(out_ / "plan.json");
   plan.replace(plan.find("f_10.png"), 8, "f_11.png");
   testing::write_file(out_ / "plan.json", plan);
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr((out_ / "plan.json").string()),
                                           HasSubstr("that all commit records name")),
-                                    HasSubstr("00000-of-00002.json"), HasSubstr(marker_.string())));
+                                    HasSubstr("00000-of-00002.json"), HasSubstr(record_.string())));
   testing::write_file(out_ / "plan.json", plan.substr(0, plan.size() / 2));
   EXPECT_THAT([&] { faults(); }, ::testing::ThrowsMessage<std::runtime_error>(
                                      HasSubstr((out_ / "plan.json").string())));
@@ -203,8 +203,8 @@ TEST_F(VerifyFolder, NamesAPlanThatIsNotTheMarkers) {
 
 TEST_F(VerifyFolder, NamesAShardThatIsNotMadeYet) {
   std::filesystem::remove(shard_);
-  std::filesystem::remove(marker_);
-  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(marker_.string()), HasSubstr("not made yet"))));
+  std::filesystem::remove(record_);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr(record_.string()), HasSubstr("not made yet"))));
 }
 
 TEST_F(VerifyFolder, NamesADatasetThatIsNotOfTheShards) {
@@ -235,7 +235,7 @@ TEST_F(VerifyFolder, DeepComparesWithTheSourcesWhereTheyAreThere) {
   EXPECT_EQ(check.compared, 6);
   EXPECT_EQ(verify_folder(out_).compared, 0);
 
-  testing::write_flat_picture(folder_ / "clip/f_16.png", {20, 40}, 0);
+  testing::write_flat_image(folder_ / "clip/f_16.png", {20, 40}, 0);
   EXPECT_THAT(verify_folder(out_, deep).faults,
               ElementsAre(AllOf(HasSubstr(shard_.string()), HasSubstr("got 30x20"))));
 

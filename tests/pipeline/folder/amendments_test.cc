@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/sha256.h"
 #include "stages/base/files/unfinished_files.h"
@@ -130,15 +130,15 @@ class ShardBackupTest : public ::testing::Test {
     fs::rename(folder_ / "new", shard_);
   }
 
-  void write_marker_of(const std::string& content) const {
-    ShardMarker marker;
-    marker.shard = frozen_.plan.shards[0].name;
-    marker.plan_hash = frozen_.hash;
-    marker.sha256 = sha256_hex(content);
-    marker.size_bytes = static_cast<std::int64_t>(content.size());
-    marker.samples = marker.valid = 1;
-    marker.contents.boxes = marker.contents.persons = {0};
-    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(marker));
+  void write_commit_record_of(const std::string& content) const {
+    CommitRecord record;
+    record.shard = frozen_.plan.shards[0].name;
+    record.plan_hash = frozen_.hash;
+    record.sha256 = sha256_hex(content);
+    record.size_bytes = static_cast<std::int64_t>(content.size());
+    record.samples = record.valid = 1;
+    record.contents.boxes = record.contents.persons = {0};
+    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(record));
   }
 
   /// A backup as a process leaves it that is killed; `pid` is the process.
@@ -149,9 +149,9 @@ class ShardBackupTest : public ::testing::Test {
     return path;
   }
 
-  void write_marker_of_plan(const std::string& content, const std::string& plan_hash) {
+  void write_commit_record_of_plan(const std::string& content, const std::string& plan_hash) {
     const std::string own = std::exchange(frozen_.hash, plan_hash);
-    write_marker_of(content);
+    write_commit_record_of(content);
     frozen_.hash = own;
   }
 
@@ -202,8 +202,8 @@ TEST_F(ShardBackupTest, OfNoShardDoesNothing) {
   EXPECT_EQ(files(), 0);
 }
 
-TEST_F(ShardBackupTest, AfterAKillBetweenShardAndMarkerTheShardIsRestored) {
-  write_marker_of("before");
+TEST_F(ShardBackupTest, AfterAKillBetweenShardAndCommitRecordTheShardIsRestored) {
+  write_commit_record_of("before");
   leave_backup(dead_process(), "before");
   replace("after");
   restore_shards(folder_.path(), frozen_);
@@ -212,7 +212,7 @@ TEST_F(ShardBackupTest, AfterAKillBetweenShardAndMarkerTheShardIsRestored) {
 }
 
 TEST_F(ShardBackupTest, AfterAKillBeforeOrAfterThatTheBackupGoes) {
-  write_marker_of("after");  // both were replaced
+  write_commit_record_of("after");  // both were replaced
   leave_backup(dead_process(), "before");
   replace("after");
   restore_shards(folder_.path(), frozen_);
@@ -225,8 +225,8 @@ TEST_F(ShardBackupTest, AfterAKillBeforeOrAfterThatTheBackupGoes) {
   EXPECT_EQ(files(), 2);
 }
 
-TEST_F(ShardBackupTest, WhatIsNotTheMarkersDoesNotReplaceADamagedShard) {
-  write_marker_of("before");
+TEST_F(ShardBackupTest, WhatIsNotTheCommitRecordsDoesNotReplaceADamagedShard) {
+  write_commit_record_of("before");
   leave_backup(dead_process(), "befoer");  // a temporary of a writer that was killed
   replace("damage");
   restore_shards(folder_.path(), frozen_);
@@ -235,7 +235,7 @@ TEST_F(ShardBackupTest, WhatIsNotTheMarkersDoesNotReplaceADamagedShard) {
 }
 
 TEST_F(ShardBackupTest, ABackupOfALivingProcessIsItsOwn) {
-  write_marker_of("before");
+  write_commit_record_of("before");
   const fs::path backup = leave_backup(::getpid(), "before");
   replace("after");
   restore_shards(folder_.path(), frozen_);
@@ -252,7 +252,7 @@ TEST_F(ShardBackupTest, OfAnOldShardIsNotTakenForADeadWriters) {
 }
 
 TEST_F(ShardBackupTest, AShardThatIsGoneIsRestoredToo) {
-  write_marker_of("before");
+  write_commit_record_of("before");
   leave_backup(dead_process(), "before");
   fs::remove(shard_);
   restore_shards(folder_.path(), frozen_);
@@ -260,7 +260,7 @@ TEST_F(ShardBackupTest, AShardThatIsGoneIsRestoredToo) {
 }
 
 TEST_F(ShardBackupTest, WhoeverIsAtTheShardIsLeftToIt) {
-  write_marker_of("before");
+  write_commit_record_of("before");
   leave_backup(dead_process(), "before");
   const fs::path at_work = leave_backup(::getpid(), "aft");
   replace("after");
@@ -269,8 +269,8 @@ TEST_F(ShardBackupTest, WhoeverIsAtTheShardIsLeftToIt) {
   EXPECT_TRUE(fs::exists(at_work));
 }
 
-TEST_F(ShardBackupTest, AMarkerOfAnotherPlanVouchesForNothing) {
-  write_marker_of_plan("before", std::string(64, 'b'));
+TEST_F(ShardBackupTest, ACommitRecordOfAnotherPlanVouchesForNothing) {
+  write_commit_record_of_plan("before", std::string(64, 'b'));
   leave_backup(dead_process(), "before");
   replace("after");
   restore_shards(folder_.path(), frozen_);

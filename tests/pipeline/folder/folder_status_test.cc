@@ -8,7 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "pipeline/folder/output_folder.h"
 #include "tests/testing/temporary_folder.h"
@@ -33,7 +33,8 @@ TEST(FaultKind, IsWhatIsWrongWithoutWhere) {
 
 TEST(WorkerRate, IsUnknownBeforeTheFirstCommit) {
   EXPECT_FALSE(worker_rate({}, 3));
-  EXPECT_FALSE(worker_rate({{1, 10, 0}, {2, 0, 5}}, 1));  // markers that do not know their time
+  EXPECT_FALSE(
+      worker_rate({{1, 10, 0}, {2, 0, 5}}, 1));  // commit records that do not know their time
 }
 
 TEST(WorkerRate, IsSamplesASecond) {
@@ -46,10 +47,10 @@ TEST(WorkerRate, APauseDoesNotCount) {
 }
 
 TEST(WorkerRate, WhatIsLongPastDoesNotCount) {
-  std::vector<CommitRecord> records;
-  for (int i = 0; i < 100; ++i) records.push_back({double(i), 10, i < 80 ? 1.0 : 5.0});
-  EXPECT_DOUBLE_EQ(*worker_rate(records, 1), 2);    // the last 8
-  EXPECT_DOUBLE_EQ(*worker_rate(records, 20), 10);  // the last 60: 20 of 2 and 40 of 10 a second
+  std::vector<CommitTiming> timings;
+  for (int i = 0; i < 100; ++i) timings.push_back({double(i), 10, i < 80 ? 1.0 : 5.0});
+  EXPECT_DOUBLE_EQ(*worker_rate(timings, 1), 2);    // the last 8
+  EXPECT_DOUBLE_EQ(*worker_rate(timings, 20), 10);  // the last 60: 20 of 2 and 40 of 10 a second
 }
 
 constexpr char kA[] = "job-train-00000-of-00003.h5";
@@ -76,18 +77,18 @@ class FolderStatusTest : public ::testing::Test {
   void commit(const std::string& shard, double wall_seconds = 0,
               std::vector<QuarantinedSample> quarantined = {}) {
     testing::write_file(folder_ / shard, "12345");
-    ShardMarker marker;
-    marker.shard = shard;
-    marker.plan_hash = hash_;
-    marker.sha256 = std::string(64, 'a');
-    marker.size_bytes = 5;
-    marker.samples = 2;
-    marker.valid = 2 - static_cast<int>(quarantined.size());
-    marker.quarantined = std::move(quarantined);
-    marker.contents.boxes = marker.contents.persons = {0, 0};
-    marker.contents.gaps = {{1, 2}};
-    marker.wall_seconds = wall_seconds;
-    testing::write_file(folder_ / marker_name(shard), to_json(marker));
+    CommitRecord record;
+    record.shard = shard;
+    record.plan_hash = hash_;
+    record.sha256 = std::string(64, 'a');
+    record.size_bytes = 5;
+    record.samples = 2;
+    record.valid = 2 - static_cast<int>(quarantined.size());
+    record.quarantined = std::move(quarantined);
+    record.contents.boxes = record.contents.persons = {0, 0};
+    record.contents.gaps = {{1, 2}};
+    record.wall_seconds = wall_seconds;
+    testing::write_file(folder_ / commit_record_name(shard), to_json(record));
   }
 
   /// Parent and grandparent live as long as this process.
@@ -214,7 +215,7 @@ TEST_F(FolderStatusTest, NamesWhatIsDamagedAndCountsItAsMissing) {
 
 TEST_F(FolderStatusTest, WhatIsMadeAgainIsRunning) {
   testing::write_file(folder_ / kB, "12345");
-  write_temporary(marker_name(kB), "node7-1", 4242);
+  write_temporary(commit_record_name(kB), "node7-1", 4242);
   const FolderStatus now = status();
   EXPECT_EQ(now.shards_running, 1);
   EXPECT_THAT(now.damaged, IsEmpty());

@@ -183,7 +183,7 @@ TEST(FreezePlan, LeavesNothingOnAFullDisk) {
 
 TEST(FreezePlan, AfterARetryTheMendedInputsAreTheRightOnes) {
   const TemporaryFolder folder;
-  Plan holed = plan("w", "with a hole");
+  Plan holed = plan("w", "with a missing frame");
   holed.shards[0].samples[0].fault = "expected a frame, got no file, in p";
   const std::string hash = freeze_plan(folder.path(), holed).hash;
   EXPECT_THROW(freeze_plan(folder.path(), plan("w", "whole")), UsageError);
@@ -194,8 +194,9 @@ TEST(FreezePlan, AfterARetryTheMendedInputsAreTheRightOnes) {
   EXPECT_EQ(to_json(frozen.plan), to_json(holed)) << "the samples stay as they were frozen";
   EXPECT_THROW(freeze_plan(folder.path(), plan("v", "whole")), UsageError);
   // The inputs as they were would make other bytes than the retry has.
-  EXPECT_THAT([&] { freeze_plan(folder.path(), holed); },
-              ThrowsMessage<UsageError>(HasSubstr("frames: expected whole, got with a hole")));
+  EXPECT_THAT(
+      [&] { freeze_plan(folder.path(), holed); },
+      ThrowsMessage<UsageError>(HasSubstr("frames: expected whole, got with a missing frame")));
 }
 
 TEST(ReadFrozenPlan, SaysWhenThereIsNoneOrADamagedOne) {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <vector>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
@@ -27,13 +27,13 @@ class ReadGuarded : public ::testing::Test {
  protected:
   ReadGuarded() { testing::write_file(shard_, "bytes"); }
 
-  void write_marker_of(const std::string& bytes) const {
-    ShardMarker marker;
-    marker.shard = shard_.filename().string();
-    marker.plan_hash = std::string(64, 'a');
-    marker.sha256 = sha256_hex(bytes);
-    marker.size_bytes = static_cast<std::int64_t>(bytes.size());
-    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(marker));
+  void write_commit_record_of(const std::string& bytes) const {
+    CommitRecord record;
+    record.shard = shard_.filename().string();
+    record.plan_hash = std::string(64, 'a');
+    record.sha256 = sha256_hex(bytes);
+    record.size_bytes = static_cast<std::int64_t>(bytes.size());
+    testing::write_file(folder_ / "job-train-00000-of-00001.json", to_json(record));
   }
 
   /// Whether `read` runs in this very process.
@@ -53,17 +53,17 @@ class ReadGuarded : public ::testing::Test {
   const std::filesystem::path shard_ = folder_ / "job-train-00000-of-00001.h5";
 };
 
-TEST_F(ReadGuarded, WithItsMarkerBesideItTheBytesAreCompared) {
-  write_marker_of("bytes");
+TEST_F(ReadGuarded, WithItsCommitRecordBesideItTheBytesAreCompared) {
+  write_commit_record_of("bytes");
   EXPECT_TRUE(is_trusted());
-  write_marker_of("bytez");
+  write_commit_record_of("bytez");
   expect_damaged([]() -> int { throw std::logic_error("was read"); }, "SHA-256");
-  write_marker_of("byte");
+  write_commit_record_of("byte");
   expect_damaged([]() -> int { throw std::logic_error("was read"); },
                  "size in bytes in its commit record 4");
 }
 
-TEST_F(ReadGuarded, WithoutAMarkerOfItsOwnItIsReadApart) {
+TEST_F(ReadGuarded, WithoutACommitRecordOfItsOwnItIsReadApart) {
   EXPECT_FALSE(is_trusted());
   testing::write_file(folder_ / "job-train-00000-of-00001.json", "{");
   EXPECT_FALSE(is_trusted());
@@ -105,7 +105,7 @@ TEST_F(ReadGuarded, MoreMemoryThanThereIsIsDamage) {
 }
 
 TEST_F(ReadGuarded, PartsOfManyShardsAreReadApartAlways) {
-  write_marker_of("bytes");
+  write_commit_record_of("bytes");
   bool here = false;
   EXPECT_EQ(read_apart(folder_.path(), [&] { return here = true, 7; }), 7);
   EXPECT_FALSE(here);

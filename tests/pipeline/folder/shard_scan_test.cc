@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -26,21 +26,23 @@ const std::string kContent = "12345";
 class ShardStateTest : public ::testing::Test {
  protected:
   ShardStateTest() {
-    marker_.shard = shard_.name;
-    marker_.plan_hash = kPlan;
-    marker_.sha256 = sha256_hex(kContent);
-    marker_.size_bytes = 5;
-    marker_.samples = 2;
-    marker_.valid = 1;
-    marker_.quarantined = {{1, "b", "why"}};
-    marker_.contents.boxes = {1, 0};
-    marker_.contents.persons = {0, 0};
+    record_.shard = shard_.name;
+    record_.plan_hash = kPlan;
+    record_.sha256 = sha256_hex(kContent);
+    record_.size_bytes = 5;
+    record_.samples = 2;
+    record_.valid = 1;
+    record_.quarantined = {{1, "b", "why"}};
+    record_.contents.boxes = {1, 0};
+    record_.contents.persons = {0, 0};
     write_shard(kContent);
-    write_marker(to_json(marker_));
+    write_commit_record(to_json(record_));
   }
 
   void write_shard(const std::string& bytes) const { testing::write_file(shard_file_, bytes); }
-  void write_marker(const std::string& text) const { testing::write_file(marker_file_, text); }
+  void write_commit_record(const std::string& text) const {
+    testing::write_file(commit_record_file_, text);
+  }
 
   ShardState state() const { return shard_state(folder_.path(), shard_, kPlan); }
   ShardState hashed() const {
@@ -51,7 +53,7 @@ class ShardStateTest : public ::testing::Test {
     for (const ShardState& found : {state(), hashed()}) {
       EXPECT_EQ(found.condition, condition) << to_string(found.condition);
       EXPECT_FALSE(found.done());
-      EXPECT_FALSE(found.marker);
+      EXPECT_FALSE(found.record);
       EXPECT_THAT(found.faults, ElementsAre(HasSubstr(fault)));
     }
   }
@@ -59,71 +61,71 @@ class ShardStateTest : public ::testing::Test {
   testing::TemporaryFolder folder_;
   const ShardOutline shard_{"job-train-00000-of-00001.h5", 0, {2, 2}, 2};
   const std::filesystem::path shard_file_ = folder_ / "job-train-00000-of-00001.h5";
-  const std::filesystem::path marker_file_ = folder_ / "job-train-00000-of-00001.json";
-  ShardMarker marker_;
+  const std::filesystem::path commit_record_file_ = folder_ / "job-train-00000-of-00001.json";
+  CommitRecord record_;
 };
 
-TEST_F(ShardStateTest, IsDoneIfMarkerPlanAndSizeAgree) {
+TEST_F(ShardStateTest, IsDoneIfRecordPlanAndSizeAgree) {
   for (const ShardState& found : {state(), hashed()}) {
     EXPECT_TRUE(found.done());
-    EXPECT_EQ(found.marker, marker_);
+    EXPECT_EQ(found.record, record_);
     EXPECT_TRUE(found.sound());
     EXPECT_EQ(found.named_plan, kPlan);
-    EXPECT_EQ(found.committed, std::filesystem::last_write_time(marker_file_));
+    EXPECT_EQ(found.committed, std::filesystem::last_write_time(commit_record_file_));
   }
 }
 
-TEST_F(ShardStateTest, IsMissingWithoutShardAndMarkerAndThatIsNoFault) {
+TEST_F(ShardStateTest, IsMissingWithoutShardAndCommitRecordAndThatIsNoFault) {
   std::filesystem::remove(shard_file_);
-  std::filesystem::remove(marker_file_);
+  std::filesystem::remove(commit_record_file_);
   EXPECT_EQ(state().condition, ShardCondition::kMissing);
   EXPECT_THAT(hashed().faults, IsEmpty());
 }
 
-TEST_F(ShardStateTest, AShardWithoutMarkerIsNotCommitted) {
-  std::filesystem::remove(marker_file_);
+TEST_F(ShardStateTest, AShardWithoutCommitRecordIsNotCommitted) {
+  std::filesystem::remove(commit_record_file_);
   expect(ShardCondition::kUncommitted,
          shard_file_.string() +
              ": expected its commit record job-train-00000-of-00001.json beside it, got no file");
 }
 
-TEST_F(ShardStateTest, AMarkerWithoutShardIsNotDone) {
+TEST_F(ShardStateTest, ACommitRecordWithoutShardIsNotDone) {
   std::filesystem::remove(shard_file_);
   expect(ShardCondition::kNoShard, shard_file_.string() + ": expected the shard");
   std::filesystem::create_directory(shard_file_);
   expect(ShardCondition::kNoShard, "got no file");
 }
 
-TEST_F(ShardStateTest, ATornMarkerIsNotTrustedWhereverItEnds) {
-  const std::string text = to_json(marker_);
+TEST_F(ShardStateTest, ATornCommitRecordIsNotTrustedWhereverItEnds) {
+  const std::string text = to_json(record_);
   for (std::size_t end = 0; end + 1 < text.size(); end += 7) {  // the last byte is a newline
-    write_marker(text.substr(0, end));
-    ASSERT_EQ(state().condition, ShardCondition::kTornMarker) << end;
+    write_commit_record(text.substr(0, end));
+    ASSERT_EQ(state().condition, ShardCondition::kTornRecord) << end;
   }
-  write_marker("\xff\xfe not JSON");
-  expect(ShardCondition::kTornMarker, marker_file_.string() + ":");
+  write_commit_record("\xff\xfe not JSON");
+  expect(ShardCondition::kTornRecord, commit_record_file_.string() + ":");
   EXPECT_THAT(state().faults, ElementsAre(Not(HasSubstr("\n"))));
-  std::filesystem::remove(marker_file_);
-  std::filesystem::create_directory(marker_file_);
-  expect(ShardCondition::kTornMarker, marker_file_.string());
+  std::filesystem::remove(commit_record_file_);
+  std::filesystem::create_directory(commit_record_file_);
+  expect(ShardCondition::kTornRecord, commit_record_file_.string());
 }
 
-TEST_F(ShardStateTest, AMarkerOfAnotherPlanShardOrLengthIsForeign) {
-  ShardMarker other = marker_;
+TEST_F(ShardStateTest, ACommitRecordOfAnotherPlanShardOrLengthIsForeign) {
+  CommitRecord other = record_;
   other.plan_hash = std::string(64, 'b');
-  write_marker(to_json(other));
-  expect(ShardCondition::kForeignMarker,
+  write_commit_record(to_json(other));
+  expect(ShardCondition::kForeignRecord,
          "expected the commit record of plan " + kPlan + ", got one of");
-  other = marker_;
+  other = record_;
   other.shard = "job-train-00007-of-00008.h5";
-  write_marker(to_json(other));
-  expect(ShardCondition::kForeignMarker, "got one of job-train-00007-of-00008.h5");
-  other = marker_;
+  write_commit_record(to_json(other));
+  expect(ShardCondition::kForeignRecord, "got one of job-train-00007-of-00008.h5");
+  other = record_;
   other.samples = other.valid = 1;
   other.quarantined.clear();
   other.contents.boxes = other.contents.persons = {0};
-  write_marker(to_json(other));
-  expect(ShardCondition::kForeignMarker,
+  write_commit_record(to_json(other));
+  expect(ShardCondition::kForeignRecord,
          "expected the commit record of 2 samples, got one of 1 samples");
 }
 
@@ -140,13 +142,14 @@ TEST_F(ShardStateTest, AFlippedBitShowsInTheHashAlone) {
   EXPECT_TRUE(state().done());
   const ShardState found = hashed();
   EXPECT_EQ(found.condition, ShardCondition::kOtherBytes);
-  EXPECT_FALSE(found.marker);
+  EXPECT_FALSE(found.record);
   EXPECT_THAT(found.faults,
               ElementsAre(AllOf(StartsWith(shard_file_.string() + ": expected SHA-256 "),
                                 HasSubstr("got " + sha256_hex("12354")))));
 }
 
-/// Of 100 shards every third is done, the one after it has a torn marker, the next is not there.
+/// Of 100 shards every third is done, the one after it has a torn commit record, the next is not
+/// there.
 TEST(ShardStates, AreInTheOrderOfThePlan) {
   const testing::TemporaryFolder folder;
   std::vector<ShardOutline> shards;
@@ -154,24 +157,24 @@ TEST(ShardStates, AreInTheOrderOfThePlan) {
     const std::string name = "job-train-" + std::to_string(10000 + i) + "-of-10100.h5";
     shards.push_back({name, 0, {2, 2}, 1});
     if (i % 3 == 2) continue;
-    ShardMarker marker;
-    marker.shard = name;
-    marker.plan_hash = kPlan;
-    marker.sha256 = std::string(64, '0');
-    marker.size_bytes = 5;
-    marker.samples = marker.valid = 1;
-    marker.contents.boxes = marker.contents.persons = {0};
+    CommitRecord record;
+    record.shard = name;
+    record.plan_hash = kPlan;
+    record.sha256 = std::string(64, '0');
+    record.size_bytes = 5;
+    record.samples = record.valid = 1;
+    record.contents.boxes = record.contents.persons = {0};
     testing::write_file(folder / name, "shard");
-    testing::write_file(folder / marker_name(name), i % 3 == 0 ? to_json(marker) : "{");
+    testing::write_file(folder / commit_record_name(name), i % 3 == 0 ? to_json(record) : "{");
   }
   const std::vector<ShardState> states = scan_shards(folder.path(), shards, kPlan);
   ASSERT_EQ(states.size(), 100u);
   for (std::size_t i = 0; i < states.size(); ++i) {
-    constexpr ShardCondition kExpected[] = {ShardCondition::kDone, ShardCondition::kTornMarker,
+    constexpr ShardCondition kExpected[] = {ShardCondition::kDone, ShardCondition::kTornRecord,
                                             ShardCondition::kMissing};
     EXPECT_EQ(states[i].outline, shards[i]);
     EXPECT_EQ(states[i].condition, kExpected[i % 3]) << i;
-    EXPECT_EQ(states[i].marker ? states[i].marker->shard : "", i % 3 == 0 ? shards[i].name : "");
+    EXPECT_EQ(states[i].record ? states[i].record->shard : "", i % 3 == 0 ? shards[i].name : "");
   }
 }
 
@@ -195,7 +198,7 @@ TEST_F(ShardStateTest, AgainOnlyThoseThatAreAskedForAreLookedAt) {
 TEST_F(ShardStateTest, WhatIsLeftOutByARequestToStopCountsAsMissing) {
   const ScanOptions stopped{.threads = 1, .stop = [] { return true; }};
   for (const ShardState& state :
-       scan_shards(folder_.path(), {shard_}, kPlan, ScanDepth::kMarker, stopped)) {
+       scan_shards(folder_.path(), {shard_}, kPlan, ScanDepth::kRecord, stopped)) {
     EXPECT_EQ(state.condition, ShardCondition::kMissing);
     EXPECT_EQ(state.outline, shard_);
   }

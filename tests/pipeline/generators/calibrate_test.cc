@@ -61,7 +61,7 @@ TEST(CalibrationSamples, TakeOfEachSourceInProportion) {
 
 TEST(CalibrationSamples, LeaveOutKnownFaults) {
   Plan plan = plan_of({4, 4});
-  for (const int slot : {0, 1, 3}) plan.shards[0].samples[slot].fault = "a hole";
+  for (const int slot : {0, 1, 3}) plan.shards[0].samples[slot].fault = "a missing frame";
   const auto samples = choose_calibration_samples(plan, 32, 8);
   EXPECT_THAT(ids(samples, false), ::testing::ElementsAre("2", "4", "5", "6"));
   EXPECT_THAT(ids(samples, true), ::testing::ElementsAre("7"));
@@ -149,7 +149,7 @@ TEST_F(CalibratedFile, IsNamedInTheManifestFromItsFolder) {
             R"("generator": { "weights": "/elsewhere/w.safetensors", "precision": "int8" })");
 }
 
-/// 11 pairs of flat pictures, of which two are held out: the fifth or sixth and the last.
+/// 11 pairs of flat images, of which two are held out: the fifth or sixth and the last.
 class Calibrate : public ::testing::Test {
  protected:
   Calibrate() : manifest_(testing::make_small_job(folder_, 12)) {}

@@ -100,8 +100,8 @@ TEST_F(Fingerprint, NoticesWhateverTheInputsDecide) {
     return differences.size() == 1 && differences[0].starts_with("frames: ");
   };
   EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].labelled_frames = 1; }));
-  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].without_partner = 1; }));
-  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].without_partner_ids = {"x"}; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].unpaired = 1; }));
+  EXPECT_TRUE(differs([](Plan& plan) { plan.sources[0].unpaired_ids = {"x"}; }));
   EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].volume_size = {2, 1}; }));
   EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].samples[0].fault = "x"; }));
   EXPECT_TRUE(differs([](Plan& plan) { plan.shards[0].samples[0].sample_id = "x"; }));
@@ -109,7 +109,7 @@ TEST_F(Fingerprint, NoticesWhateverTheInputsDecide) {
   EXPECT_FALSE(differs([](Plan& plan) { plan.sources[0].notes = {"x"}; }));
 }
 
-TEST_F(Fingerprint, NoticesAPictureOfUnknownSizeThatWasMendedWithinItsBytes) {
+TEST_F(Fingerprint, NoticesAnImageOfUnknownSizeThatWasMendedWithinItsBytes) {
   const auto whole = make();
   plan_.shards[0].size_unknown = true;
   const auto differences = fingerprint_differences(make(), whole);

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/values/faults.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -58,7 +58,7 @@ TEST(ShardLayout, AShardHoldsOneSize) {
   EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("s1", "s3", "s4"));
 }
 
-TEST(ShardLayout, AnUnreadablePictureHasAShardOfItsOwnThatGuessesTheMostCommonSize) {
+TEST(ShardLayout, AnUnreadableImageHasAShardOfItsOwnThatGuessesTheMostCommonSize) {
   const auto shards =
       lay_out({{"train", {kSmall, {}, kLarge, {}, kLarge}}, {"train", {{}, kSmall}}}, 8);
   ASSERT_EQ(shards.size(), 6u);
@@ -77,7 +77,7 @@ TEST(ShardLayout, AnUnreadablePictureHasAShardOfItsOwnThatGuessesTheMostCommonSi
   EXPECT_EQ(shards[5].volume_size, kSmall);
 }
 
-TEST(ShardLayout, WhereNoPictureCanBeReadVolumesAreOnePixel) {
+TEST(ShardLayout, WhereNoImageCanBeReadVolumesAreOnePixel) {
   const auto shards = lay_out({{"train", {{}, {}}}}, 8);
   ASSERT_EQ(shards.size(), 2u);
   EXPECT_EQ(shards[0].volume_size, (ImageSize{1, 1}));
@@ -114,7 +114,7 @@ class MakePlan : public ::testing::Test {
     manifest_.directory = folder_.path();
     manifest_.output.samples_per_shard = 2;
     for (const char* name : {"f_00.png", "f_01.png", "f_02.png", "f_03.png"}) {
-      testing::write_flat_picture(folder_ / "clip" / name, {4, 6}, 100);
+      testing::write_flat_image(folder_ / "clip" / name, {4, 6}, 100);
     }
     SourceSpec source;
     source.dataset = DatasetKind::kFrames;
@@ -127,13 +127,13 @@ class MakePlan : public ::testing::Test {
   JobManifest manifest_;
 };
 
-TEST_F(MakePlan, CountsFramesPairsAndWhatHasNoPartner) {
+TEST_F(MakePlan, CountsFramesPairsAndWhatIsUnpaired) {
   const Plan plan = make_plan(manifest_, "w", "e").plan;
   EXPECT_EQ(plan.sample_count(), 3);
   ASSERT_EQ(plan.sources.size(), 1u);
   EXPECT_EQ(plan.sources[0].labelled_frames, 4);
-  EXPECT_EQ(plan.sources[0].without_partner, 1);
-  EXPECT_EQ(plan.sources[0].without_partner_ids.size(), 1u);
+  EXPECT_EQ(plan.sources[0].unpaired, 1);
+  EXPECT_EQ(plan.sources[0].unpaired_ids.size(), 1u);
   EXPECT_EQ(plan.sources[0].pairs_by_gap.at(1), 3);
   EXPECT_EQ(plan.shards.size(), 2u);
 }
@@ -144,8 +144,8 @@ TEST_F(MakePlan, KeepsTheSourcesSizeUnlessOneIsGiven) {
   EXPECT_EQ(make_plan(manifest_, "w", "e").plan.shards[0].volume_size, (ImageSize{16, 20}));
 }
 
-TEST_F(MakePlan, GroupsPicturesBySize) {
-  testing::write_flat_picture(folder_ / "clip" / "f_03.png", {8, 6}, 100);
+TEST_F(MakePlan, GroupsImagesBySize) {
+  testing::write_flat_image(folder_ / "clip" / "f_03.png", {8, 6}, 100);
   const Plan plan = make_plan(manifest_, "w", "e").plan;
   ASSERT_EQ(plan.shards.size(), 2u);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 6}));
@@ -153,7 +153,7 @@ TEST_F(MakePlan, GroupsPicturesBySize) {
 
 TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   for (const char* name : {"f_02.png", "f_03.png"}) {
-    testing::write_file(folder_ / "clip" / name, "not a picture");
+    testing::write_file(folder_ / "clip" / name, "not an image");
   }
   auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
   ASSERT_EQ(plan.shards.size(), 2u);  // of the pairs 0-1 and 1-2, and of 2-3
@@ -166,32 +166,32 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
                                                       ::testing::HasSubstr("eventgan retry"))));
   complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{4, 6})) << "the guess stays";
-  testing::write_flat_picture(folder_ / "clip" / "f_03.png", {8, 10}, 100);
+  testing::write_flat_image(folder_ / "clip" / "f_03.png", {8, 10}, 100);
   complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 10}));
   EXPECT_EQ(plan.shards[0].volume_size, (ImageSize{4, 6}));
 }
 
-TEST_F(MakePlan, AHoleThatWasFilledBecomesWhatItWouldBePlannedAsToday) {
+TEST_F(MakePlan, AMissingFrameThatWasAddedBecomesWhatItWouldBePlannedAsToday) {
   for (const PairChoice choice : {PairChoice::kOne, PairChoice::kAll}) {
     manifest_.sources[0].pairs.choose = choice;
     const Plan whole = make_plan(manifest_, "w", "e").plan;
     const PlannedSample& meant = whole.shards[0].samples.at(1);  // of f_01 and f_02
-    const std::string picture = testing::read_file(folder_ / "clip" / "f_01.png");
+    const std::string image = testing::read_file(folder_ / "clip" / "f_01.png");
     std::filesystem::remove(folder_ / "clip" / "f_01.png");
     auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
-    const PlannedSample& hole = plan.shards.at(0).samples.at(0);
-    ASSERT_EQ(hole.sample_id, meant.sample_id);
+    const PlannedSample& missing = plan.shards.at(0).samples.at(0);
+    ASSERT_EQ(missing.sample_id, meant.sample_id);
     const std::string before = to_json(plan);
     complete_plan(manifest_, datasets, plan);
-    EXPECT_EQ(to_json(plan), before) << "a hole still";
-    EXPECT_THAT(hole.fault, ::testing::HasSubstr("got no file"));
+    EXPECT_EQ(to_json(plan), before) << "a missing frame still";
+    EXPECT_THAT(missing.fault, ::testing::HasSubstr("got no file"));
 
-    testing::write_file(folder_ / "clip" / "f_01.png", picture);
+    testing::write_file(folder_ / "clip" / "f_01.png", image);
     complete_plan(manifest_, make_plan(manifest_, "w", "e").datasets, plan);
-    EXPECT_EQ(hole.fault, "");
-    EXPECT_EQ(hole.pair.previous.path, meant.pair.previous.path);
-    EXPECT_EQ(hole.pair.next.path, meant.pair.next.path);
+    EXPECT_EQ(missing.fault, "");
+    EXPECT_EQ(missing.pair.previous.path, meant.pair.previous.path);
+    EXPECT_EQ(missing.pair.next.path, meant.pair.next.path);
     EXPECT_EQ(plan.sample_count(), 2);
   }
 }
@@ -219,12 +219,12 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
   }
 }
 
-TEST_F(MakePlan, CountsForEachGapWhatHasNoPartner) {
+TEST_F(MakePlan, CountsForEachGapWhatIsUnpaired) {
   manifest_.sources[0].pairs.gaps = {1, 3, 6};
   const PlannedJob job = make_plan(manifest_, "w", "e");  // 4 frames
-  EXPECT_THAT(job.without_partner_by_gap,
+  EXPECT_THAT(job.unpaired_by_gap,
               ::testing::ElementsAre(std::map<int, std::int64_t>{{1, 1}, {3, 3}, {6, 4}}));
-  EXPECT_EQ(job.plan.sources[0].without_partner, 1) << "the others draw gap 1";
+  EXPECT_EQ(job.plan.sources[0].unpaired, 1) << "the others draw gap 1";
 }
 
 TEST_F(MakePlan, ALimitIsSharedByTheSources) {
@@ -260,7 +260,8 @@ TEST_F(MakePlan, ATrialTakesTheFirstPairsAsTheWholeJobHasThem) {
     EXPECT_EQ(trial.shards[0].samples[slot].pair.gap_frames,
               whole.shards[0].samples[slot].pair.gap_frames);
   }
-  EXPECT_EQ(trial.sources[0].labelled_frames, 3) << "one has no partner, the last is not asked";
+  EXPECT_EQ(trial.sources[0].labelled_frames, 3)
+      << "one has no paired frame, the last is not asked";
   EXPECT_THAT(fingerprint_differences(whole.fingerprint, trial.fingerprint),
               ::testing::Contains("limit: expected nothing, got 2"));
 }
@@ -271,7 +272,7 @@ TEST_F(MakePlan, StopsAtAnyFrameOrFile) {
               ++asked;
               return false;
             }});
-  EXPECT_EQ(asked, 4 + 3 * 2);  // labelled frames; the frames of the three that have a partner
+  EXPECT_EQ(asked, 4 + 3 * 2);  // labelled frames; the frames of the three that have a paired frame
   for (int last = 1; last <= 10; ++last) {
     asked = 0;
     EXPECT_THROW(make_plan(manifest_, "w", "e", {[&] { return ++asked == last; }}), Stopped);
@@ -290,7 +291,7 @@ TEST_F(MakePlan, AddingASourceDoesNotMoveThePairsOfAnother) {
   manifest_.sources[0].pairs.gaps = {1, 2, 3};
   const Plan alone = make_plan(manifest_, "w", "e").plan;
   for (const char* name : {"g_1.png", "g_2.png", "g_3.png"}) {
-    testing::write_flat_picture(folder_ / "other" / name, {4, 6}, 100);
+    testing::write_flat_image(folder_ / "other" / name, {4, 6}, 100);
   }
   SourceSpec other = manifest_.sources[0];
   other.root = "other";

@@ -48,7 +48,7 @@ TEST(ChoosePairs, SideSaysWhereTheLabelledFrameLies) {
 }
 
 TEST(ChoosePairs, AWindowOfEventsIsFromItsBeginToItsEnd) {
-  const FakeDataset dataset("root", 20);  // its neighbours -1 and 1 stand for the window's edges
+  const FakeDataset dataset("root", 20);  // its paired frames -1 and 1 stand for the window's edges
   SourceSpec spec;
   spec.dataset = DatasetKind::kRecording;
   for (const auto& [place, position] :
@@ -63,7 +63,7 @@ TEST(ChoosePairs, AWindowOfEventsIsFromItsBeginToItsEnd) {
     EXPECT_EQ(sample.pair.gap_frames, 0);
     EXPECT_EQ(sample.pair.label_index, 10);
     EXPECT_EQ(sample.pair.label_position, position);
-    EXPECT_EQ(result.without_partner.size(), 0u);
+    EXPECT_EQ(result.unpaired.size(), 0u);
     // A frozen plan may hold no times.
     const double begin_s = sample.pair.previous.time_s;
     sample.pair.previous.time_s = 0;
@@ -78,12 +78,12 @@ TEST(ChoosePairs, AllGivesEachGapAnIdOfItsOwn) {
   ASSERT_EQ(result.samples.size(), 2u);
   EXPECT_EQ(result.samples[0].sample_id, "0002@before1");
   EXPECT_EQ(result.samples[1].sample_id, "0002@before2");
-  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(3));
+  EXPECT_THAT(result.unpaired, ::testing::ElementsAre(3));
 }
 
 TEST(ChoosePairs, OneDrawsOnlyGapsWhoseFramesExist) {
   FakeDataset dataset("root", 20);
-  dataset.make_hole(9);
+  dataset.make_missing(9);
   const auto spec = source({1, 2, 3, 4, 5, 6}, PairSide::kBefore, PairChoice::kOne);
   for (std::uint64_t seed = 0; seed < 50; ++seed) {
     EXPECT_NE(choose(dataset, 10, spec, seed).samples.at(0).pair.gap_frames, 1);
@@ -113,21 +113,21 @@ TEST(ChoosePairs, DependsOnSeedDatasetAndSampleAlone) {
   EXPECT_LT(same, 40);  // of 100 draws of 6 about 17 agree by chance
 }
 
-TEST(ChoosePairs, BeyondTheSequenceThereIsNoPartnerAndNoSample) {
+TEST(ChoosePairs, BeyondTheSequenceThereIsNoPairedFrameAndNoSample) {
   const FakeDataset dataset("root", 3);
   const auto result = choose(dataset, 0, source({1, 2}, PairSide::kBefore, PairChoice::kOne));
   EXPECT_TRUE(result.samples.empty());
-  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(1, 2));
+  EXPECT_THAT(result.unpaired, ::testing::ElementsAre(1, 2));
 }
 
 TEST(ChoosePairs, OneTellsWhichGapsCouldNotBeDrawn) {
   const FakeDataset dataset("root", 3);
   const auto result = choose(dataset, 1, source({1, 2, 4}, PairSide::kBefore, PairChoice::kOne));
   EXPECT_EQ(result.samples.size(), 1u);
-  EXPECT_THAT(result.without_partner, ::testing::ElementsAre(2, 4));
+  EXPECT_THAT(result.unpaired, ::testing::ElementsAre(2, 4));
 }
 
-TEST(ChoosePairs, FramesFartherApartThanAskedAreNoPartners) {
+TEST(ChoosePairs, FramesFartherApartThanAskedAreNotPaired) {
   FakeDataset dataset("root", 20);  // a frame each 0.1 s
   auto spec = source({1, 2, 3, 4}, PairSide::kBefore, PairChoice::kAll);
   for (const double most : {0.3, 0.35}) {  // 12 * 0.1 - 9 * 0.1 is 0.30000000000000016
@@ -135,23 +135,23 @@ TEST(ChoosePairs, FramesFartherApartThanAskedAreNoPartners) {
     const auto result = choose(dataset, 12, spec);
     ASSERT_EQ(result.samples.size(), 3u) << most;
     EXPECT_EQ(result.samples.back().pair.gap_frames, 3);
-    EXPECT_THAT(result.without_partner, ::testing::ElementsAre(4));
+    EXPECT_THAT(result.unpaired, ::testing::ElementsAre(4));
   }
   spec.pairs.max_gap_s = 0.05;
   EXPECT_TRUE(choose(dataset, 12, spec).samples.empty());
-  dataset.make_hole(11);
+  dataset.make_missing(11);
   EXPECT_TRUE(choose(dataset, 12, spec).samples.empty()) << "nobody asked for that frame";
   spec.pairs.choose = PairChoice::kOne;
-  EXPECT_THAT(choose(dataset, 12, spec).without_partner, ::testing::ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(choose(dataset, 12, spec).unpaired, ::testing::ElementsAre(1, 2, 3, 4));
 }
 
-TEST(ChoosePairs, AHoleBecomesASampleThatNamesTheMissingFile) {
+TEST(ChoosePairs, AMissingFrameBecomesASampleThatNamesItsFile) {
   FakeDataset dataset("root", 20);
-  dataset.make_hole(8);
+  dataset.make_missing(8);
   const auto result = choose(dataset, 10, source({2}, PairSide::kBefore, PairChoice::kOne));
   ASSERT_EQ(result.samples.size(), 1u);
   EXPECT_EQ(result.samples[0].fault, "expected a frame, got no file, in root/0008.png (0010)");
-  dataset.make_hole(10);  // the labelled frame itself
+  dataset.make_missing(10);  // the labelled frame itself
   EXPECT_THAT(
       choose(dataset, 10, source({1}, PairSide::kBefore, PairChoice::kAll)).samples.at(0).fault,
       ::testing::HasSubstr("root/0010.png"));
@@ -165,7 +165,7 @@ TEST(ChoosePairs, AFrameAtFaultGivesThatFaultAndNoOtherDraw) {
     const auto sound = choose_pairs(dataset, frame, spec, 7);
     frame.fault = "expected a time, got none, in timestamps.txt";
     const auto faulty = choose_pairs(dataset, frame, spec, 7);
-    EXPECT_EQ(faulty.without_partner, sound.without_partner);
+    EXPECT_EQ(faulty.unpaired, sound.unpaired);
     ASSERT_EQ(faulty.samples.size(), sound.samples.size());
     for (std::size_t i = 0; i < sound.samples.size(); ++i) {
       EXPECT_EQ(faulty.samples[i].fault, frame.fault);

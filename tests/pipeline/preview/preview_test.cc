@@ -10,7 +10,7 @@
 #include "pipeline/conversion/convert.h"
 #include "stages/frames/decoding/frame_decoder.h"
 #include "tests/testing/fake_generator.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -35,7 +35,7 @@ TEST(ParseSlots, RefusesWhatIsNoSlot) {
   EXPECT_THROW(parse_slots("0", 0), UsageError);
 }
 
-/// Six samples, 11 to 16, in two shards of four and two: pictures 10 to 16, of which 13 is as
+/// Six samples, 11 to 16, in two shards of four and two: images 10 to 16, of which 13 is as
 /// bright as 12, and 15 is 60 levels brighter than 14. So the emptiest sample is 13, and the
 /// fullest 15.
 class Preview : public ::testing::Test {
@@ -44,8 +44,8 @@ class Preview : public ::testing::Test {
     const JobManifest job = testing::make_small_job(folder_, 7);
     constexpr int kGreys[] = {0, 20, 40, 40, 60, 120, 140};
     for (int frame = 0; frame < 7; ++frame) {
-      testing::write_flat_picture(folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png"),
-                                  {20, 30}, kGreys[frame]);
+      testing::write_flat_image(folder_ / "clip" / ("f_" + std::to_string(10 + frame) + ".png"),
+                                {20, 30}, kGreys[frame]);
     }
     ConversionOptions options;
     options.output = folder_ / "out";
@@ -58,9 +58,9 @@ class Preview : public ::testing::Test {
   std::vector<std::string> draw(const std::string& where) {
     warnings_.clear();
     std::vector<std::string> names;
-    for (const auto& picture : preview(folder_ / where, options_, warnings_)) {
-      EXPECT_GT(std::filesystem::file_size(picture), 100u);
-      names.push_back(picture.filename());
+    for (const auto& image : preview(folder_ / where, options_, warnings_)) {
+      EXPECT_GT(std::filesystem::file_size(image), 100u);
+      names.push_back(image.filename());
     }
     return names;
   }
@@ -131,7 +131,7 @@ TEST_F(Preview, AClassThatNoBoxHasIsRefused) {
   EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<UsageError>(HasSubstr("without boxes")));
 }
 
-TEST_F(Preview, ASheetIsOnePicture) {
+TEST_F(Preview, ASheetIsOneImage) {
   options_.sheet = true;
   EXPECT_THAT(draw("out"), ElementsAre("sheet.png"));
 }

@@ -116,7 +116,7 @@ TEST(FlowPath, AddsUpOverThreeIntervals) {
   EXPECT_FLOAT_EQ(path->x_px[2], 3);
 }
 
-TEST(FlowPath, IsUnknownBeyondThePictureAndWhereTheFlowIs) {
+TEST(FlowPath, IsUnknownBeyondTheImageAndWhereTheFlowIs) {
   const float unknown = std::numeric_limits<float>::quiet_NaN();
   const auto recording =
       recording_of({row_flow({0, 0, 0, 0, 0.5f}), row_flow({unknown, 1, 1, 1, 1})});
@@ -131,7 +131,7 @@ TEST(FlowPath, IsUnknownBeyondThePictureAndWhereTheFlowIs) {
   EXPECT_TRUE(std::isnan(down->y_px[5]));
 }
 
-TEST(FlowPath, OfAPictureOfOnePixel) {
+TEST(FlowPath, OfAnImageOfOnePixel) {
   const FlowField still{{1, 1}, {0}, {0}};
   const auto path = flow_path(recording_of({still, still}, {1, 1}), {0, 2});
   ASSERT_TRUE(path.has_value());
@@ -244,13 +244,13 @@ TEST(CompareVolumes, AnUnsoundVolumeIsToldWithItsMethodAndFrames) {
   }
 }
 
-TEST(CompareVolumes, DrawsAPictureOfEachInterval) {
+TEST(CompareVolumes, DrawsAnImageOfEachInterval) {
   const testing::TemporaryFolder folder;
   const FakeRecording recording = moving_bar_recording({12, 16}, 3);
   const std::vector<FrameInterval> intervals{{0, 1}, {0, 2}};
   const auto methods = perfect_method(recording, 2);
   ComparisonRun run = run_on(1);
-  run.pictures = folder.path();
+  run.images = folder.path();
   compare_volumes(recording, intervals, methods, run);
   EXPECT_TRUE(std::filesystem::exists(folder / "000000-000001.png"));
   EXPECT_TRUE(std::filesystem::exists(folder / "000000-000002.png"));

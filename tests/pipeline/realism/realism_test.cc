@@ -69,13 +69,13 @@ TEST(MeasureRealism, SameSeedSameReport) {
   EXPECT_NE(scores(1, 1), scores(2, 1));
 }
 
-TEST(MeasureRealism, MakesThePicturesFolder) {
+TEST(MeasureRealism, MakesTheImagesFolder) {
   const testing::TemporaryFolder folder;
   RealismOptions options = models_only();
-  options.pictures = folder / "new/pictures";
+  options.images = folder / "new/pictures";
   options.last_frame = 1;
   measure_realism(moving_bar_recording({12, 16}, 3), options);
-  EXPECT_TRUE(std::filesystem::exists(options.pictures / "000000-000001.png"));
+  EXPECT_TRUE(std::filesystem::exists(options.images / "000000-000001.png"));
 }
 
 TEST(MeasureRealism, RefusesOptionsThatCannotBe) {

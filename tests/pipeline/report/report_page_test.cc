@@ -29,7 +29,7 @@ Survey huge_survey() {
     SourceSurvey& numbers = survey.sources.emplace_back();
     numbers.counts.samples = 1000;
     numbers.events_per_pixel.add(1e-9 * (i + 1));
-    if (i < Survey::kPicturedSources) numbers.picked.resize(5, {"random", name, 1, name});
+    if (i < Survey::kShownSources) numbers.picked.resize(5, {"random", name, 1, name});
     survey.counts.classes[name] = i + 1;
     survey.classes[name] = {10, 3};
     survey.joints[name] = {10, 3};
@@ -40,9 +40,9 @@ Survey huge_survey() {
   survey.quarantined.resize(Survey::kMostQuarantined,
                             {kHostile, 1, kHostile, std::string(5000, '"')});
   for (int i = 0; i < 20'000; ++i) {
-    ShardMarker marker;
-    marker.samples = marker.valid = 64;
-    survey.parts.done.push_back({{kHostile, 0, {}, 64}, ShardCondition::kDone, marker});
+    CommitRecord record;
+    record.samples = record.valid = 64;
+    survey.parts.done.push_back({{kHostile, 0, {}, 64}, ShardCondition::kDone, record});
     survey.parts.missing.push_back({{kHostile, 0, {}, 64}});
   }
   survey.counts.samples = survey.counts.valid = 1'280'000;
@@ -59,13 +59,13 @@ TEST(ReportPage, IsSmallAndWithoutForeignMarkupForAnyJob) {
   context.folder = "out";
   context.file = "out/report.html";
   context.warning = "<i>";
-  int pictures = 0;
-  context.picture = [&](const PickedSample&) {
-    ++pictures;
-    return std::string(PageContext::kMostPictureBytes, 'x');
+  int images = 0;
+  context.image = [&](const PickedSample&) {
+    ++images;
+    return std::string(PageContext::kMostImageBytes, 'x');
   };
   const std::string page = report_page(huge_survey(), context);
-  EXPECT_EQ(pictures, 5 * Survey::kPicturedSources);
+  EXPECT_EQ(images, 5 * Survey::kShownSources);
   EXPECT_LT(page.size(), 5'000'000u);
   EXPECT_THAT(page, Not(HasSubstr("<script")));
   EXPECT_THAT(page, Not(HasSubstr("<i>")));
@@ -77,7 +77,7 @@ TEST(ReportPage, LinksLeadFromThePageToTheShards) {
   Survey survey;
   survey.header.volume = {9, {2, 2}};
   survey.parts.done.push_back(
-      {{"a b-00000-of-00001.h5", 0, {}, 1}, ShardCondition::kDone, ShardMarker{}});
+      {{"a b-00000-of-00001.h5", 0, {}, 1}, ShardCondition::kDone, CommitRecord{}});
   PageContext context;
   context.folder = "/data/ö/out";
   context.file = "/data/pages/report.html";

@@ -26,16 +26,16 @@ TEST(LogHistogram, BinsAreSixthsOfADecade) {
   EXPECT_EQ(histogram.zeros, 2);
 }
 
-/// Eight samples of flat pictures, each 20 grey levels brighter than the one before, in two shards
-/// of four; picture 13 is damaged, so that samples 13 and 14 are in quarantine.
+/// Eight samples of flat images, each 20 grey levels brighter than the one before, in two shards
+/// of four; image 13 is damaged, so that samples 13 and 14 are in quarantine.
 class SurveyFolder : public ::testing::Test {
  protected:
   void make(const std::string& damaged) {
     JobManifest job = testing::make_small_job(folder_, 9);
     job.errors.max_fraction = 1;
     if (!damaged.empty()) {
-      const std::filesystem::path picture = folder_ / "clip" / damaged;
-      std::filesystem::resize_file(picture, std::filesystem::file_size(picture) - 20);
+      const std::filesystem::path image = folder_ / "clip" / damaged;
+      std::filesystem::resize_file(image, std::filesystem::file_size(image) - 20);
     }
     ConversionOptions options;
     options.output = folder_ / "out";
@@ -52,7 +52,7 @@ TEST_F(SurveyFolder, HasTheNumbersOfEverySample) {
   EXPECT_EQ(survey.counts.samples, 8);
   EXPECT_EQ(survey.counts.quarantined(), 0);
   EXPECT_EQ(survey.gaps.at(1).samples, 8);
-  EXPECT_EQ(survey.gaps.at(1).least_s, std::nullopt) << "pictures have no time";
+  EXPECT_EQ(survey.gaps.at(1).least_s, std::nullopt) << "images have no time";
   EXPECT_TRUE(survey.flags.empty());
   EXPECT_TRUE(survey.stage_seconds.contains("generate"));
   EXPECT_GT(survey.peak_bytes, 1 << 20);

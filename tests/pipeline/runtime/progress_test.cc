@@ -119,7 +119,7 @@ TEST(ProgressDisplay, IsDrawnAnewWhenTheTerminalIsResized) {
       out, ProgressStyle::kAuto, [&] { return width; }, clock.get(), [&](auto) { return text; });
   width = 60;
   display.refresh();
-  EXPECT_EQ(out.str(), "");  // nothing stands there yet
+  EXPECT_EQ(out.str(), "");  // nothing is there yet
   display.update([](auto) {}, /*at_once=*/true);
   const std::string drawn = "\r\x1b[K\x1b[?7l" + fitted_line(text, 60) + "\x1b[?7h\r";
   EXPECT_EQ(out.str(), drawn);

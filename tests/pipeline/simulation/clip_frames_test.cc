@@ -9,7 +9,7 @@
 #include "pipeline/simulation/scene.h"
 #include "tests/pipeline/simulation/moving_clip.h"
 #include "tests/stages/frames/decoding/test_video.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -26,27 +26,27 @@ ColourFrame columns(int height, const std::vector<int>& values) {
   return frame;
 }
 
-TEST(SensorPicture, IsGreyByBt601) {
+TEST(SensorImage, IsGreyByBt601) {
   // 0.114 x 200 = 22.8 of blue alone.
   const ColourFrame blue{{1, 1}, {200, 0, 0}};
-  EXPECT_EQ(sensor_picture(blue, std::nullopt), (GreyImage{{1, 1}, {23}}));
+  EXPECT_EQ(sensor_image(blue, std::nullopt), (GreyImage{{1, 1}, {23}}));
 }
 
-TEST(SensorPicture, ShrinksByAveragingAndCutsAroundTheCentre) {
+TEST(SensorImage, ShrinksByAveragingAndCutsAroundTheCentre) {
   // 8 x 2 covers 2 x 1 by the scale 1/2: 4 x 1, of which the middle two are left.
   const ColourFrame frame = columns(2, {0, 0, 10, 30, 100, 200, 0, 0});
-  EXPECT_EQ(sensor_picture(frame, ImageSize{1, 2}), (GreyImage{{1, 2}, {20, 150}}));
+  EXPECT_EQ(sensor_image(frame, ImageSize{1, 2}), (GreyImage{{1, 2}, {20, 150}}));
 }
 
-TEST(SensorPicture, GrowsToCover) {
-  const GreyImage picture = sensor_picture(columns(2, {50, 50}), ImageSize{6, 4});
-  EXPECT_EQ(picture, (GreyImage{{6, 4}, std::vector<std::uint8_t>(24, 50)}));
+TEST(SensorImage, GrowsToCover) {
+  const GreyImage image = sensor_image(columns(2, {50, 50}), ImageSize{6, 4});
+  EXPECT_EQ(image, (GreyImage{{6, 4}, std::vector<std::uint8_t>(24, 50)}));
 }
 
-TEST(SensorPicture, OfItsOwnSizeIsUntouched) {
+TEST(SensorImage, OfItsOwnSizeIsUntouched) {
   const ColourFrame frame = columns(3, {0, 255, 3});
-  EXPECT_EQ(sensor_picture(frame, ImageSize{3, 3}), sensor_picture(frame, std::nullopt));
-  EXPECT_EQ(sensor_picture(frame, std::nullopt).pixels,
+  EXPECT_EQ(sensor_image(frame, ImageSize{3, 3}), sensor_image(frame, std::nullopt));
+  EXPECT_EQ(sensor_image(frame, std::nullopt).pixels,
             (std::vector<std::uint8_t>{0, 255, 3, 0, 255, 3, 0, 255, 3}));
 }
 
@@ -54,8 +54,8 @@ class ClipFramesTest : public ::testing::Test {
  protected:
   /// Frame i is flat, of value 10 i.
   void write_frame(int number, ImageSize size = {20, 30}) {
-    testing::write_flat_picture(folder_ / "clip" / ("f" + std::to_string(number) + ".png"), size,
-                                10 * number);
+    testing::write_flat_image(folder_ / "clip" / ("f" + std::to_string(number) + ".png"), size,
+                              10 * number);
   }
 
   ClipFrames open(const std::string& source, const std::string& more = "") {
@@ -157,7 +157,7 @@ TEST_F(ClipFramesTest, RefusesWhatIsNoClipOrTooShort) {
 TEST_F(ClipFramesTest, RefusesFramesThatCannotBeUsed) {
   write_frame(0);
   write_frame(1, {21, 30});
-  testing::write_file(folder_ / "clip/f2.png", "no picture");
+  testing::write_file(folder_ / "clip/f2.png", "no image");
   ClipFrames clip = open(R"({"path": "clip"})");
   clip.frame(0);
   EXPECT_THROW(clip.frame(1), InputError);
@@ -204,7 +204,7 @@ TEST_F(ClipSceneTest, SeesTheSquareMove) {
   EXPECT_NEAR(flow.x_px.at(outside), 0, 0.5);
 }
 
-/// A smooth picture, which bilinear interpolation renders well.
+/// A smooth image, which bilinear interpolation renders well.
 GreyImage waves(ImageSize size) {
   GreyImage image{size, {}};
   for (int y = 0; y < size.height; ++y) {
@@ -225,7 +225,7 @@ TEST(AffineScene, FramesFollowEachOtherByTheirFlow) {
   int intervals = 0;
   for (GreyImage before = scene.frame(); const auto interval = scene.advance();
        before = scene.frame(), ++intervals) {
-    // 11 px in 4 parts are at most 2.75 px each: 3 pictures at most 1 px apart.
+    // 11 px in 4 parts are at most 2.75 px each: 3 images at most 1 px apart.
     EXPECT_EQ(interval->steps(), 3);
     const FlowDisplacement flow = interval->flow();
     for (int y = 8; y < size.height - 8; ++y) {

@@ -23,19 +23,19 @@ void write_moving_clip(const std::filesystem::path& folder, ImageSize size, int 
   std::filesystem::create_directories(folder);
   const int side = size.height / 2;
   for (int frame = 0; frame < frames; ++frame) {
-    cv::Mat picture(size.height, size.width, CV_8UC1);
+    cv::Mat image(size.height, size.width, CV_8UC1);
     const int left = 4 + kStep_px * frame;
     for (int y = 0; y < size.height; ++y) {
       for (int x = 0; x < size.width; ++x) {
         const bool inside = x >= left && x < left + side && y >= side / 2 && y < side / 2 + side;
         const int value = inside ? 160 + texture(x - left, y) : 30 + texture(x + 500, y);
-        picture.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(value);
+        image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(value);
       }
     }
     char name[16];
     std::snprintf(name, sizeof name, "%03d.png", frame);
-    if (!cv::imwrite((folder / name).string(), picture)) {
-      throw std::runtime_error("cannot write a picture in " + folder.string());
+    if (!cv::imwrite((folder / name).string(), image)) {
+      throw std::runtime_error("cannot write an image in " + folder.string());
     }
   }
 }

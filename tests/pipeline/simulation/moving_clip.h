@@ -8,7 +8,7 @@
 
 namespace eventgan::testing {
 
-/// Writes the pictures 000.png, 001.png ... of a textured square that moves 2 pixels to the right
+/// Writes the images 000.png, 001.png ... of a textured square that moves 2 pixels to the right
 /// from each to the next, over a darker texture that stands still.
 void write_moving_clip(const std::filesystem::path& folder, ImageSize size, int frames);
 

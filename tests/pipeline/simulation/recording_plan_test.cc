@@ -33,7 +33,7 @@ TEST(RecordingSettings, OfOtherSourcesDoNotMatter) {
   EXPECT_NE(settings(R"({"path": "clip"})"), settings(R"({"path": "clip"})", R"(, "seed": 1)"));
 }
 
-TEST(RecordingSettings, HowManyPicturesFollowDoesNotMatter) {
+TEST(RecordingSettings, HowManyImagesFollowDoesNotMatter) {
   EXPECT_EQ(settings(R"({"path": "clip", "method": "affine", "frame_count": 1})"),
             settings(R"({"path": "clip", "method": "affine", "frame_count": 9})"));
 }
@@ -75,10 +75,10 @@ TEST(RecordingPlan, AClipIsOneRecording) {
   ASSERT_EQ(recordings.size(), 1u);
   EXPECT_EQ(recordings[0].file, "/out/a.hdf5");
   EXPECT_EQ(recordings[0].frame_count, 4);
-  EXPECT_EQ(recordings[0].picture, std::nullopt);
+  EXPECT_EQ(recordings[0].image, std::nullopt);
 }
 
-TEST(RecordingPlan, APictureIsOneEach) {
+TEST(RecordingPlan, AnImageIsOneEach) {
   const testing::TemporaryFolder folder;
   testing::write_moving_clip(folder / "clip", {16, 16}, 4);
   const auto recordings = plan(
@@ -86,7 +86,7 @@ TEST(RecordingPlan, APictureIsOneEach) {
   ASSERT_EQ(recordings.size(), 2u);
   EXPECT_EQ(recordings[0].name, "clip-000");
   EXPECT_EQ(recordings[1].file, "/out/clip-001.hdf5");
-  EXPECT_EQ(recordings[1].picture, 1);  // position, not number
+  EXPECT_EQ(recordings[1].image, 1);  // position, not number
   EXPECT_EQ(recordings[1].frame_count, 9);
   EXPECT_NE(recordings[0].settings, recordings[1].settings);
 }

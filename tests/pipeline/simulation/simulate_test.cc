@@ -24,13 +24,13 @@ namespace {
 /// A bright half-plane that moves 2 px to the right in each of two intervals.
 AffineScene moving_edge() {
   const ImageSize size{8, 32};
-  GreyImage picture{size, {}};
+  GreyImage image{size, {}};
   for (int y = 0; y < size.height; ++y) {
-    for (int x = 0; x < size.width; ++x) picture.pixels.push_back(x < 16 ? 200 : 50);
+    for (int x = 0; x < size.width; ++x) image.pixels.push_back(x < 16 ? 200 : 50);
   }
   AffineMotion motion;
   motion.matrix = {1, 0, 6, 0, 1, 0};
-  return AffineScene(picture, motion, 3, 0.1);
+  return AffineScene(image, motion, 3, 0.1);
 }
 
 SensorSpec quiet_sensor() {
@@ -214,7 +214,7 @@ TEST_F(Simulate, CountsFramesAsItGoes) {
 }
 
 TEST_F(Simulate, ABrokenFrameLeavesNoHalfRecording) {
-  testing::write_file(folder_ / "clip/002.png", "no picture");
+  testing::write_file(folder_ / "clip/002.png", "no image");
   EXPECT_THROW(run("out", 1, false, R"({"path": "clip"})"), InputError);
   EXPECT_TRUE(files("out").empty());
 }

@@ -36,7 +36,7 @@ TEST(OnGrid, TakesBothAxesAndEachChannelAlone) {
               ElementsAreArray({1, 1, 2, 2, 1, 1, 2, 2, 3, 3, 4, 4, 3, 3, 4, 4}));
 }
 
-TEST(OnGrid, KeepsTheEventsPerPixelOfTheWholePicture) {
+TEST(OnGrid, KeepsTheEventsPerPixelOfTheWholeImage) {
   const Placement from = stretched({70, 90}, {35, 45});
   const Placement to = stretched({70, 90}, {47, 61});
   std::vector<float> values(from.volume.pixel_count());
@@ -48,9 +48,9 @@ TEST(OnGrid, KeepsTheEventsPerPixelOfTheWholePicture) {
   EXPECT_NEAR(mean(mapped), mean(values), 1e-3);
 }
 
-TEST(OnGrid, FollowsThePictureThroughItsOffsets) {
+TEST(OnGrid, FollowsTheImageThroughItsOffsets) {
   // A source of four columns at half its size behind a border of one, and whole but for a column
-  // cut off on either side: columns 1 and 2 of the source, halves of the small picture's pixels.
+  // cut off on either side: columns 1 and 2 of the source, halves of the small image's pixels.
   const Placement letterbox{{1, 4}, {1, 2}, {1, 4}, 1, 0};
   const Placement crop{{1, 4}, {1, 4}, {1, 2}, -1, 0};
   EXPECT_THAT(on_grid({9, 5, 7, 9}, 1, letterbox, crop), ElementsAre(FloatEq(5), FloatEq(7)));
@@ -59,7 +59,7 @@ TEST(OnGrid, FollowsThePictureThroughItsOffsets) {
               ElementsAre(FloatEq(0), FloatEq(3), FloatEq(4), FloatEq(0)));
 }
 
-TEST(OnGrid, OfTheSamePlacementChangesNothingAndRefusesOthersPictures) {
+TEST(OnGrid, OfTheSamePlacementChangesNothingAndRefusesOthersImages) {
   const Placement same = stretched({5, 5}, {1, 2});
   EXPECT_THAT(on_grid({0.1f, 0.2f}, 1, same, same), ElementsAre(0.1f, 0.2f));
   EXPECT_THROW(on_grid({1, 2, 3}, 1, same, same), std::invalid_argument);

@@ -175,8 +175,8 @@ TEST(TradeoffJson, HasNullForWhatIsNotKnown) {
   EXPECT_EQ(json["not_run"][0]["reason"], "no calibration");
 }
 
-TEST(TradeoffPicture, NamesEachPointAndNumbersTheFront) {
-  const std::string svg = tradeoff_picture(small_report());
+TEST(TradeoffChart, NamesEachPointAndNumbersTheFront) {
+  const std::string svg = tradeoff_chart(small_report());
   for (const char* name : {"a", "b", "c", "d"}) {
     EXPECT_THAT(svg, HasSubstr(std::string("<title>") + name + " float32 x1 float16: "));
   }
@@ -185,12 +185,12 @@ TEST(TradeoffPicture, NamesEachPointAndNumbersTheFront) {
   EXPECT_THAT(svg, HasSubstr("not to a camera"));
 }
 
-TEST(TradeoffPicture, IsDrawnAlsoOfOneAndOfNothing) {
+TEST(TradeoffChart, IsDrawnAlsoOfOneAndOfNothing) {
   TradeoffReport report = small_report();
   report.trials.resize(1);
-  EXPECT_THAT(tradeoff_picture(report), HasSubstr(" mark\""));
+  EXPECT_THAT(tradeoff_chart(report), HasSubstr(" mark\""));
   report.trials.clear();
-  EXPECT_THAT(tradeoff_picture(report), HasSubstr("nothing to show"));
+  EXPECT_THAT(tradeoff_chart(report), HasSubstr("nothing to show"));
 }
 
 TEST(KeptTrials, AreNotKeptThroughALink) {

@@ -9,7 +9,7 @@
 
 #include "manifests/values/faults.h"
 #include "tests/testing/fake_recording.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/small_job.h"
 #include "tests/testing/temporary_folder.h"
 
@@ -137,7 +137,7 @@ TEST(MeasureTradeoff, FramesOfTheSameNameAndSizeAreOthersIfTheirPixelsAre) {
   measure_tradeoff(manifest, options);
   const auto frame = folder / "clip" / "f_11.png";
   const auto size = std::filesystem::file_size(frame);
-  testing::write_flat_picture(frame, {20, 30}, 21);
+  testing::write_flat_image(frame, {20, 30}, 21);
   ASSERT_EQ(std::filesystem::file_size(frame), size);
   total = 0;
   measure_tradeoff(manifest, options);

@@ -8,7 +8,7 @@
 namespace eventgan::testing {
 
 /// The text of a manifest of a tiny training on `bar.hdf5`: networks of base width 2, crop 48x48,
-/// batches of 2; 2 steps of flow, 2 of reconstruction, 4 of the generator; checkpoints and pictures
+/// batches of 2; 2 steps of flow, 2 of reconstruction, 4 of the generator; checkpoints and images
 /// never but where a phase or a run ends.
 std::string small_training_text();
 

@@ -139,7 +139,7 @@ CropReader reader_of(FakeRecording recording) {
   return CropReader(std::move(recordings), kBins);
 }
 
-TEST(CentreCrop, LiesInTheMiddleAndInsideThePicture) {
+TEST(CentreCrop, LiesInTheMiddleAndInsideTheImage) {
   const CropBox middle = centre_crop({10, 20}, {4, 5});
   EXPECT_EQ(middle.top, 3);
   EXPECT_EQ(middle.left, 7);

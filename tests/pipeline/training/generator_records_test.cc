@@ -90,7 +90,7 @@ TEST(ValidationPairs, AreConsecutiveFramesInTheMiddle) {
 
 TEST(ValidationPairs, AreSpreadEvenlyWhereThereAreMany) {
   const CropReader reader = reader_of({33});
-  const ValidationPairs pairs(reader, {100, 100});  // larger than the picture: all of it
+  const ValidationPairs pairs(reader, {100, 100});  // larger than the image: all of it
   ASSERT_EQ(pairs.samples().size(), 16u);
   for (int i = 0; i < 16; ++i) {
     EXPECT_EQ(pairs.samples()[i].origin, "fake recording frames " + std::to_string(2 * i) + "-" +

@@ -38,14 +38,14 @@ TEST(TrainingFolder, DiscardsItsOwnFilesOnly) {
                                                folder.validation(),
                                                folder.weights(),
                                                folder.latest_weights(),
-                                               folder.picture({TrainingPhase::kGenerator, 12})};
+                                               folder.image({TrainingPhase::kGenerator, 12})};
   for (const auto& file : own) testing::write_file(file, "x");
   testing::write_file(root / "notes.txt", "mine");
-  testing::write_file(folder.pictures() / "mine.png", "mine");
+  testing::write_file(folder.images() / "mine.png", "mine");
   folder.discard();
   for (const auto& file : own) EXPECT_FALSE(std::filesystem::exists(file)) << file;
   EXPECT_TRUE(std::filesystem::exists(root / "notes.txt"));
-  EXPECT_TRUE(std::filesystem::exists(folder.pictures() / "mine.png"));
+  EXPECT_TRUE(std::filesystem::exists(folder.images() / "mine.png"));
 }
 
 TEST(TrainingFolder, ReachesNothingThroughALink) {
@@ -66,14 +66,14 @@ TEST(TrainingFolder, ReachesNothingThroughALink) {
   }
 }
 
-TEST(TrainingFolder, DiscardsPicturesOfItsOwnNamesAlone) {
+TEST(TrainingFolder, DiscardsImagesOfItsOwnNamesAlone) {
   const testing::TemporaryFolder root;
   const TrainingFolder folder{root.path()};
   folder.prepare();
   for (const char* mine : {"generator-best.png", "generator-.png", "generator-12.png.png"}) {
-    testing::write_file(folder.pictures() / mine, "mine");
+    testing::write_file(folder.images() / mine, "mine");
     folder.discard();
-    EXPECT_TRUE(std::filesystem::exists(folder.pictures() / mine)) << mine;
+    EXPECT_TRUE(std::filesystem::exists(folder.images() / mine)) << mine;
   }
 }
 
@@ -347,13 +347,13 @@ TEST_F(SmallTraining, LeavesAFolderAloneThatAnotherRunWritesTo) {
   EXPECT_TRUE(fs::exists(folder_ / "out/checkpoints/latest.safetensors"));
 }
 
-TEST_F(SmallTraining, DrawsPictures) {
+TEST_F(SmallTraining, DrawsImages) {
   train("out", {}, "\"picture_minutes\": 1000", "\"picture_minutes\": 0");
   EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-1.png"));
   EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
 }
 
-TEST_F(SmallTraining, DrawsAPictureAfterItsLastStepHoweverFewThereAre) {
+TEST_F(SmallTraining, DrawsAnImageAfterItsLastStepHoweverFewThereAre) {
   train("out");  // in far less than the 1000 minutes between two
   EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
   EXPECT_FALSE(fs::exists(folder_ / "out/pictures/generator-1.png"));

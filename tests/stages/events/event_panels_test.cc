@@ -6,9 +6,9 @@
 #include <stdexcept>
 #include <vector>
 
-#include "stages/events/pictures/comparison_picture.h"
-#include "stages/events/pictures/preview_picture.h"
-#include "stages/events/pictures/time_panel_internal.h"
+#include "stages/events/images/comparison_image.h"
+#include "stages/events/images/detail/time_panel.h"
+#include "stages/events/images/preview_image.h"
 #include "tests/testing/temporary_folder.h"
 
 namespace eventgan {
@@ -106,11 +106,11 @@ TEST(WriteComparisonPng, ShowsFramesVolumesAndEventsABin) {
   const testing::TemporaryFolder folder;
   const auto file = folder / "pairs.png";
   write_comparison_png(std::vector{pair_of({8, 160}), pair_of({8, 160})}, file);
-  const cv::Mat picture = cv::imread(file.string());
+  const cv::Mat image = cv::imread(file.string());
   // Panels of 160x8 enlarged twice, 6 pixels between them, 22 above and below each row.
-  EXPECT_EQ(picture.size(), cv::Size(5 * 326 + 6, 2 * (16 + 44)));
+  EXPECT_EQ(image.size(), cv::Size(5 * 326 + 6, 2 * (16 + 44)));
   const auto middle = [&](int panel) {
-    return picture.at<cv::Vec3b>(22 + 3, 6 + panel * 326 + 5);  // row 1, column 2, enlarged
+    return image.at<cv::Vec3b>(22 + 3, 6 + panel * 326 + 5);  // row 1, column 2, enlarged
   };
   EXPECT_EQ(middle(0), cv::Vec3b(128, 128, 128));
   EXPECT_EQ(middle(1), cv::Vec3b(128, 128, 128));
@@ -118,7 +118,7 @@ TEST(WriteComparisonPng, ShowsFramesVolumesAndEventsABin) {
   EXPECT_GT(middle(3)[2], 200);  // late: red
   // Two bins: their middles at a quarter and at three quarters. The real line, the second colour,
   // rises from nothing to the largest, 95 % of the height; the generated one stays at the bottom.
-  const auto plot = [&](int x, int y) { return picture.at<cv::Vec3b>(22 + y, 6 + 4 * 326 + x); };
+  const auto plot = [&](int x, int y) { return image.at<cv::Vec3b>(22 + y, 6 + 4 * 326 + x); };
   EXPECT_GT(plot(240, 0)[0], 100);
   EXPECT_EQ(plot(240, 8), cv::Vec3b(0, 0, 0));
   EXPECT_GT(plot(240, 15)[0], 100);

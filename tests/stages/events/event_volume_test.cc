@@ -58,7 +58,7 @@ TEST(EventVolume, NoBinCountIndexesBeyondTheLastBin) {
   }
 }
 
-TEST(EventVolume, RefusesEventsOutsideThePictureAndTimesThatAreNotFinite) {
+TEST(EventVolume, RefusesEventsOutsideTheImageAndTimesThatAreNotFinite) {
   for (const Event bad : {Event{5, 0, 0, true}, Event{-1, 0, 0, true}, Event{0, 4, 0, true},
                           Event{0, 0, std::numeric_limits<double>::quiet_NaN(), true}}) {
     EXPECT_THROW(event_volume({&bad, 1}, kShape), std::invalid_argument);
@@ -116,7 +116,7 @@ TEST(PlacedEvents, ComeToThePixelThatTheirCentreFallsIn) {
                         {0, 0, 1, true}, {2, 0, 2, false}, {3, 0, 2, true}, {5, 0, 3, true}}));
 }
 
-TEST(PlacedEvents, LieInsideTheBordersAndAreCutWithThePicture) {
+TEST(PlacedEvents, LieInsideTheBordersAndAreCutWithTheImage) {
   std::vector<Event> letterboxed{{0, 0, 1, true}, {3, 1, 2, true}};
   place_events({{2, 4}, {2, 4}, {6, 4}, 0, 2}, letterboxed);  // two rows of border above
   EXPECT_EQ(letterboxed, (std::vector<Event>{{0, 2, 1, true}, {3, 3, 2, true}}));

@@ -142,7 +142,7 @@ TEST(MotionDirection, StillEmptyAndUnknownHaveNoPixels) {
   EXPECT_EQ(empty.fraction(), 0);
 }
 
-TEST(MotionDirection, PicturesSmallerThanTheWindow) {
+TEST(MotionDirection, ImagesSmallerThanTheWindow) {
   const std::vector<float> volume(2 * 9 * 2 * 3, 1.0f);
   const std::vector<float> flow(6, 2.0f);
   EXPECT_EQ(motion_direction(volume, {9, {2, 3}}, flow, flow).pixels, 0);

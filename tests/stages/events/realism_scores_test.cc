@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-#include "stages/events/realism/motion_direction_internal.h"
+#include "stages/events/realism/detail/motion_direction.h"
 
 namespace eventgan {
 namespace {

@@ -119,7 +119,7 @@ TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
   EXPECT_EQ(find("people").dataset, DatasetKind::kMpii) << "it has more than the list";
 }
 
-TEST_F(FindSource, PicturesTellNoTimes) {
+TEST_F(FindSource, ImagesTellNoTimes) {
   write("pictures/1.png");
   EXPECT_THAT(find("pictures").remarks, Contains(HasSubstr("frames_per_second")));
   write("videos/1.mp4");

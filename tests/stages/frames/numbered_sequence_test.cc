@@ -47,7 +47,7 @@ TEST(Counted, NamesTwentyAtMost) {
   EXPECT_EQ(std::ranges::count(many, 'a'), 20);
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 using Stride = NumberedSequence::Stride;
 
 NumberedSequence every_fifth() {
@@ -107,7 +107,7 @@ TEST(NumberedSequence, AnAbsentFolderIsEmptyAndAFileIsAnError) {
   EXPECT_EQ(absent.stride(), 1);
   EXPECT_EQ(absent.at(3, 1).state, State::kBeyond);
   EXPECT_EQ(absent.at(3, -1).state, State::kBeyond);
-  EXPECT_EQ(absent.at(3, 0).state, State::kHole);
+  EXPECT_EQ(absent.at(3, 0).state, State::kMissing);
 
   write_file(folder / "file", "");
   EXPECT_THROW(NumberedSequence::list(folder / "file"), InputError);
@@ -118,50 +118,51 @@ TEST(NumberedSequence, AnInferredStrideIsTheSmallestDifference) {
   EXPECT_EQ(NumberedSequence({{4, "4.png"}}, Stride::kInferred).stride(), 1);
 }
 
-TEST(NumberedSequence, WhereEveryFrameIsStoredFarFramesAreNoNeighbours) {
+TEST(NumberedSequence, WhereEveryFrameIsStoredFarFramesAreNoPairedFrames) {
   const TemporaryFolder folder;
   for (const char* name : {"1.png", "40.png"}) write_file(folder / name, "");
   const NumberedSequence sequence = NumberedSequence::list(folder.path());
   EXPECT_EQ(sequence.stride(), 1);
-  EXPECT_EQ(sequence.at(1, 1).state, State::kHole);
+  EXPECT_EQ(sequence.at(1, 1).state, State::kMissing);
   EXPECT_EQ(sequence.at(1, 1).name, "2.png");
-  EXPECT_EQ(sequence.at(40, -1).state, State::kHole);
+  EXPECT_EQ(sequence.at(40, -1).state, State::kMissing);
   EXPECT_EQ(sequence.at(40, 1).state, State::kBeyond);
 
   const auto inferred =
-      NumberedSequence::list(folder.path(), "", kPictureExtensions, Stride::kInferred);
+      NumberedSequence::list(folder.path(), "", kImageExtensions, Stride::kInferred);
   EXPECT_EQ(inferred.at(1, 1).name, "40.png");
 }
 
-TEST(NumberedSequence, FindsFramesHolesAndTheEnd) {
+TEST(NumberedSequence, FindsFramesMissingOnesAndTheEnd) {
   const NumberedSequence sequence = every_fifth();
   const auto found = sequence.at(6, -1);
   EXPECT_EQ(found.state, State::kPresent);
   EXPECT_EQ(found.number, 1);
   EXPECT_EQ(found.name, "img_000001.jpg");
 
-  const auto hole = sequence.at(6, 1);
-  EXPECT_EQ(hole.state, State::kHole);
-  EXPECT_EQ(hole.number, 11);
-  EXPECT_EQ(hole.name, "img_000011.jpg");
+  const auto missing = sequence.at(6, 1);
+  EXPECT_EQ(missing.state, State::kMissing);
+  EXPECT_EQ(missing.number, 11);
+  EXPECT_EQ(missing.name, "img_000011.jpg");
 
   EXPECT_EQ(sequence.at(6, 2).state, State::kPresent);
   EXPECT_EQ(sequence.at(6, 3).state, State::kBeyond);
   EXPECT_EQ(sequence.at(6, -2).state, State::kBeyond);
 }
 
-TEST(NumberedSequence, AFrameThatIsNotThereIsAHoleWithNeighbours) {
+TEST(NumberedSequence, AMissingFrameHasPairedFrames) {
   const NumberedSequence sequence = every_fifth();
-  EXPECT_EQ(sequence.at(11, 0).state, State::kHole);
+  EXPECT_EQ(sequence.at(11, 0).state, State::kMissing);
   EXPECT_EQ(sequence.at(11, 1).state, State::kPresent);
-  EXPECT_EQ(sequence.at(21, 0).state, State::kHole);  // even past the end: its label says it exists
+  EXPECT_EQ(sequence.at(21, 0).state,
+            State::kMissing);  // even past the end: its label says it exists
   EXPECT_EQ(sequence.at(21, -1).number, 16);
 }
 
 TEST(NumberedSequence, FindsByNumberWhateverTheStride) {
   const NumberedSequence sequence = every_fifth();
   EXPECT_EQ(sequence.find(6).state, State::kPresent);
-  EXPECT_EQ(sequence.find(7).state, State::kHole);
+  EXPECT_EQ(sequence.find(7).state, State::kMissing);
   EXPECT_EQ(sequence.find(0).state, State::kBeyond);
   EXPECT_EQ(sequence.find(17).state, State::kBeyond);
   EXPECT_EQ(sequence.find(-5).state, State::kBeyond);

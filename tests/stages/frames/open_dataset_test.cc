@@ -126,7 +126,7 @@ TEST(OpenDataset, OpensTheKindTheManifestNames) {
   }
 }
 
-// What stands behind a NUL is lost in a shard and to the file system: two names could be one.
+// What is behind a NUL is lost in a shard and to the file system: two names could be one.
 TEST(OpenDataset, RefusesNamesWithNul) {
   const TemporaryFolder folder;
   SourceSpec spec;

@@ -203,7 +203,7 @@ TEST_F(VideoLabelsTest, OfManyFramesAreReadInNoTime) {
   EXPECT_EQ(read(text + "}")->size(), 200'000u);
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 /// clip.avi: seven grey frames at 20 Hz.
 class VideoDatasetTest : public ::testing::Test {
@@ -229,11 +229,11 @@ TEST_F(VideoDatasetTest, EveryFrameIsASample) {
   EXPECT_EQ(frame.sequence, "clip");
   EXPECT_EQ(frame.frame, (FrameRef{"v/clip.avi", 5, 5}));
   EXPECT_DOUBLE_EQ(frame.frame.time_s, 5.0 / 20);
-  EXPECT_EQ(dataset->neighbour(frame, 0).frame, frame.frame);
-  EXPECT_EQ(dataset->neighbour(frame, 1).frame, (FrameRef{"v/clip.avi", 6, 6}));
-  EXPECT_EQ(dataset->neighbour(frame, 2).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frame, -5).frame, (FrameRef{"v/clip.avi", 0, 0}));
-  EXPECT_EQ(dataset->neighbour(frame, -6).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, 0).frame, frame.frame);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"v/clip.avi", 6, 6}));
+  EXPECT_EQ(dataset->paired_frame(frame, 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, -5).frame, (FrameRef{"v/clip.avi", 0, 0}));
+  EXPECT_EQ(dataset->paired_frame(frame, -6).state, State::kBeyond);
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(frame.label_key)), Annotation{});
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
@@ -251,7 +251,7 @@ TEST_F(VideoDatasetTest, FramesThatComeUnevenlyHaveTheirOwnTimes) {
   ASSERT_EQ(frames.size(), 5u);
   const double steps_s[] = {0.1, 0.5, 0.1, 0.5};
   for (std::size_t i = 1; i < 5; ++i) {
-    const FramePair pair{dataset->neighbour(frames[i], -1).frame, frames[i].frame};
+    const FramePair pair{dataset->paired_frame(frames[i], -1).frame, frames[i].frame};
     EXPECT_NEAR(pair.gap_s(), steps_s[i - 1], 1e-9);
   }
   spec_.frames_per_second = 10;
@@ -330,9 +330,9 @@ TEST_F(VideoFolderTest, EachVideoIsASequence) {
   EXPECT_EQ(frames[4].sample_id, "clip/000001");
   EXPECT_EQ(frames[4].sequence, "clip");
   // The end of one video is not the beginning of the next.
-  EXPECT_EQ(dataset->neighbour(frames[2], 1).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frames[3], -1).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frames[3], 6).frame, (FrameRef{"v/clip.avi", 6, 6}));
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[3], -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[3], 6).frame, (FrameRef{"v/clip.avi", 6, 6}));
   EXPECT_DOUBLE_EQ(frames[4].frame.time_s, 1.0 / 20);  // each at its own rate
   EXPECT_DOUBLE_EQ(frames[1].frame.time_s, 1.0 / 25);
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(frames[1].label_key)).original, "\"one\"");
@@ -362,7 +362,7 @@ TEST_F(VideoFolderTest, AVideoThatCannotBeReadIsLeftOutWithItsReason) {
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("v/a.mp4")));
 }
 
-TEST_F(VideoFolderTest, PicturesCountBeforeVideosAndVideosBeforeFolders) {
+TEST_F(VideoFolderTest, ImagesCountBeforeVideosAndVideosBeforeFolders) {
   std::filesystem::create_directory(folder_ / "v/pictures");
   testing::write_file(folder_ / "v/pictures/1.png", "");
   EXPECT_EQ(open()->labelled_frames().front().sample_id, "clip/000000");

@@ -79,7 +79,7 @@ class Engines : public ::testing::TestWithParam<EngineCase> {
 };
 
 TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
-  // The steps of int8 suit pictures like those it was calibrated on: a few pixels' values may be
+  // The steps of int8 suit images like those it was calibrated on: a few pixels' values may be
   // small against them.
   const bool whole_numbers = GetParam().precision == Precision::kInt8;
   const ImageSize usual{48, 64};
@@ -138,7 +138,7 @@ TEST_P(Engines, EqualsThePublishedNetworkWhateverRanBefore) {
   EXPECT_EQ(cases, 6);
 }
 
-/// A sixth of a picture's rows and columns of tiles at a place drawn by the seed; for even seeds
+/// A sixth of an image's rows and columns of tiles at a place drawn by the seed; for even seeds
 /// its last tile too.
 TileMask some_tiles(ImageSize size, int origin_y, int origin_x, std::uint64_t seed) {
   TileMask mask{size, 16, origin_y, origin_x, {}};

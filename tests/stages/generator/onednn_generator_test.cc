@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "stages/generator/onednn/network_plan_internal.h"
+#include "stages/generator/onednn/detail/network_plan.h"
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
 

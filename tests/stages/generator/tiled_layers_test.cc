@@ -1,9 +1,9 @@
+#include "stages/generator/onednn/detail/tiled_layers.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
-
-#include "stages/generator/onednn/tiled_layers_internal.h"
 
 namespace eventgan {
 namespace {
@@ -34,16 +34,16 @@ std::array<int, 4> rectangle(const std::vector<int>& pixels, int width) {
 
 TEST(TiledWork, GoesBackThroughTheNetwork) {
   // Tile (10, 20) of 480 x 640: rows 160 to 175, which read rows 79 to 88 of the last decoder's
-  // small picture, 39 to 44, 19 to 22, and 9 to 11 of the bottom's 30; columns 320 to 335 read 159
-  // to 168, 79 to 84, 39 to 42, and 19 to 21 of its 40.
+  // small image, 39 to 44, 19 to 22, and 9 to 11 of the bottleneck's 30; columns 320 to 335 read
+  // 159 to 168, 79 to 84, 39 to 42, and 19 to 21 of its 40.
   const TiledWork work = tiled_work(tiles({480, 640}, 10, 10, 20, 20));
   // The last residual convolution, and one pixel more for each before it.
-  EXPECT_EQ(rectangle(work.bottom[4], 40), (std::array{9, 11, 19, 21}));
-  EXPECT_EQ(rectangle(work.bottom[3], 40), (std::array{8, 12, 18, 22}));
-  EXPECT_EQ(rectangle(work.bottom[0], 40), (std::array{5, 15, 15, 25}));
+  EXPECT_EQ(rectangle(work.bottleneck[4], 40), (std::array{9, 11, 19, 21}));
+  EXPECT_EQ(rectangle(work.bottleneck[3], 40), (std::array{8, 12, 18, 22}));
+  EXPECT_EQ(rectangle(work.bottleneck[0], 40), (std::array{5, 15, 15, 25}));
   // The first decoder's phases of rows 19 to 22 and columns 39 to 42 are 10 and 11, 20 and 21.
   EXPECT_EQ(rectangle(work.first_decoder, 41), (std::array{10, 11, 20, 21}));
-  // The last one's pieces are 16 rows from -1 on and 32 columns: rows 159 to 174 and 175; columns
+  // The last one's tiles are 16 rows from -1 on and 32 columns: rows 159 to 174 and 175; columns
   // 319 to 350.
   const auto& last = work.decoders.back();
   ASSERT_EQ(last.size(), 2u);
@@ -53,15 +53,15 @@ TEST(TiledWork, GoesBackThroughTheNetwork) {
   EXPECT_LT(work.share, 0.15);
 }
 
-TEST(TiledWork, EndsAtThePicture) {
+TEST(TiledWork, EndsAtTheImage) {
   const TiledWork work = tiled_work(tiles({33, 17}, 0, 2, 0, 1));
-  EXPECT_EQ(rectangle(work.bottom[0], 2), (std::array{0, 2, 0, 1}));
-  EXPECT_EQ(rectangle(work.bottom[4], 2), (std::array{0, 2, 0, 1}));
+  EXPECT_EQ(rectangle(work.bottleneck[0], 2), (std::array{0, 2, 0, 1}));
+  EXPECT_EQ(rectangle(work.bottleneck[4], 2), (std::array{0, 2, 0, 1}));
   EXPECT_GT(work.share, 1);
 }
 
-TEST(TiledWork, OfAWholePictureIsMoreThanItsOwn) {
-  // Whole pieces, each with its surroundings, of all layers.
+TEST(TiledWork, OfAWholeImageIsMoreThanItsOwn) {
+  // Whole tiles, each with its surroundings, of all layers.
   EXPECT_GT(tiled_work(tiles({320, 480}, 0, 19, 0, 29)).share, 1);
 }
 

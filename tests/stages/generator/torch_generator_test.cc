@@ -202,7 +202,7 @@ TEST(Calibrator, EightBitsStayNearThePublishedNetwork) {
   EXPECT_LT(testing::relative_error(volume, expected), 0.02);
 }
 
-TEST(Calibrator, ConstantPicturesAndDeadChannelsAreHarmless) {
+TEST(Calibrator, ConstantImagesAndDeadChannelsAreHarmless) {
   Weights weights = untrained_weights(2, 3, 5);
   for (Convolution& layer : weights.convolutions) {
     if (layer.name == "pred") continue;
@@ -220,7 +220,7 @@ TEST(Calibrator, ConstantPicturesAndDeadChannelsAreHarmless) {
   }
 }
 
-TEST(Calibrator, TakesPicturesOfOnePixel) {
+TEST(Calibrator, TakesImagesOfOnePixel) {
   Calibrator calibrator(untrained_weights(1, 3, 5));
   calibrator.add(std::vector<float>{0.5f, -0.5f}, {1, 1});
   EXPECT_NO_THROW(calibrator.calibration("one pixel"));

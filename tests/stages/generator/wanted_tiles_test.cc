@@ -58,7 +58,7 @@ TEST(WantedTiles, HoldPixelsThatAreNoNumber) {
 }
 
 TEST(WantedTiles, LieOnTheVolumesGrid) {
-  // The content stands at row 10, column 20 of the volume: its first tiles begin 10 and 4 before
+  // The content is at row 10, column 20 of the volume: its first tiles begin 10 and 4 before
   // it.
   const ImageSize content{32, 40};
   const TileMask mask =

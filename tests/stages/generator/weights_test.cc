@@ -101,13 +101,13 @@ std::vector<float> random_values(std::size_t count, std::uint64_t seed) {
   return values;
 }
 
-/// Value of channel c at (y, x) of a picture [channel, y, x]; 0 beyond it.
-double at(const std::vector<float>& picture, int height, int width, int c, int y, int x) {
+/// Value of channel c at (y, x) of an image [channel, y, x]; 0 beyond it.
+double at(const std::vector<float>& image, int height, int width, int c, int y, int x) {
   if (y < 0 || x < 0 || y >= height || x >= width) return 0;
-  return picture[(static_cast<std::size_t>(c) * height + y) * width + x];
+  return image[(static_cast<std::size_t>(c) * height + y) * width + x];
 }
 
-TEST(PhaseKernel, EqualsTheConvolutionOfTheDoubledPicture) {
+TEST(PhaseKernel, EqualsTheConvolutionOfTheDoubledImage) {
   const int height = 4, width = 5;
   const auto kernel = random_values(kOut * kIn * 9, 1);
   const auto small = random_values(kIn * height * width, 2);

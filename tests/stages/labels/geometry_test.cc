@@ -26,7 +26,7 @@ std::vector<Placement> random_placements() {
   return placements;
 }
 
-/// Points of and around the largest source picture.
+/// Points of and around the largest source image.
 std::vector<double> coordinates() { return {-1000.5, -1, -0.5, 0, 0.25, 17, 1241, 1999.5, 3000}; }
 
 TEST(Geometry, PointsComeBack) {
@@ -74,7 +74,7 @@ TEST(Geometry, PointsMapByTheRecordedMatrix) {
   }
 }
 
-TEST(Geometry, AStretchedPictureFillsTheVolume) {
+TEST(Geometry, AStretchedImageFillsTheVolume) {
   const Placement placement{{375, 1242}, {260, 861}, {260, 861}, 0, 0};
   EXPECT_EQ(to_volume(placement, Rectangle{0, 0, 1242, 375}), (Rectangle{0, 0, 861, 260}));
 }
@@ -104,7 +104,7 @@ TEST(Geometry, AMappedCameraProjectsToMappedPoints) {
   }
 }
 
-TEST(Clip, CutsToThePictureAndIsNeverInsideOut) {
+TEST(Clip, CutsToTheImageAndIsNeverInsideOut) {
   const ImageSize size{50, 100};
   for (const double left : {-30.0, -10.0, 0.0, 40.0, 100.0, 130.0}) {
     for (const double top : {-30.0, 0.0, 20.0, 50.0, 70.0}) {

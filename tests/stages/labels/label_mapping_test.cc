@@ -16,10 +16,10 @@ using ::testing::HasSubstr;
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
-/// A KITTI picture in a volume of half its size.
+/// A KITTI image in a volume of half its size.
 const Placement kHalf{{375, 1242}, {188, 621}, {188, 621}, 0, 0};
 
-/// The same picture at its own size, cut to its middle: columns 421..820 and rows 100..274.
+/// The same image at its own size, cut to its middle: columns 421..820 and rows 100..274.
 const Placement kMiddle{{375, 1242}, {375, 1242}, {175, 400}, -421, -100};
 
 Box box(double left, double top, double right, double bottom) {
@@ -88,7 +88,7 @@ TEST(MapLabels, DontCareStaysIgnored) {
   EXPECT_TRUE(mapped({"", {dont_care}, {}}, kHalf).boxes[0].ignore);
 }
 
-TEST(MapLabels, ABoxToIgnoreMayLieOutsideThePictureButMustBeABox) {
+TEST(MapLabels, ABoxToIgnoreMayLieOutsideTheImageButMustBeABox) {
   Box dont_care = box(1300, 20, 1400, 90);
   dont_care.ignore = true;
   const auto labels = mapped({"", {dont_care}, {}}, kHalf);
@@ -108,7 +108,7 @@ TEST(MapLabels, BoxesAtAndSlightlyBeyondTheBorderAreFine) {
   EXPECT_EQ(fault(box(100, 100, 100, 120)), "");  // no width, but inside
 }
 
-TEST(MapLabels, ABoxOutsideThePictureIsAFaultThatNamesIt) {
+TEST(MapLabels, ABoxOutsideTheImageIsAFaultThatNamesIt) {
   const std::string reason = fault(Annotation{"", {box(0, 0, 1, 1), box(1300, 20, 1400, 90)}, {}});
   EXPECT_EQ(reason,
             "expected an overlap with the image of 1242x375 pixels, got left 1300, top 20, "
@@ -150,7 +150,7 @@ TEST(MapLabels, MissingPointsStayAndOthersMove) {
   EXPECT_FALSE(labels.persons[0].camera);
 }
 
-TEST(MapLabels, ScaleHeadBoxCentreAndCameraFollowThePicture) {
+TEST(MapLabels, ScaleHeadBoxCentreAndCameraFollowTheImage) {
   const Placement placement{{100, 100}, {25, 400}, {25, 400}, 0, 0};  // x4 wide, /4 high
   Person one = person({{{10, 10}, 1}});
   one.center = {9.5, 9.5};
@@ -275,7 +275,7 @@ TEST(MapLabels, ABoxWithoutAreaIsKeptAndIgnored) {
   EXPECT_DOUBLE_EQ(labels.boxes[0].unclipped.left, labels.boxes[0].unclipped.right);
 }
 
-TEST(MapLabels, ABoxFarBeyondThePictureIsCutAndKeptUncut) {
+TEST(MapLabels, ABoxFarBeyondTheImageIsCutAndKeptUncut) {
   // kHalf: x / 2.
   const VolumeBox wide = mapped({"", {box(-1e6, 0, 1e6, 375)}, {}}, kHalf).boxes[0];
   EXPECT_EQ(wide.clipped, (Rectangle{0, 0, 621, 188}));

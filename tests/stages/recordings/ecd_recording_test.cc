@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/ecd_recording.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -8,8 +10,7 @@
 #include <string>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/ecd_event_file_internal.h"
-#include "stages/recordings/ecd_recording_internal.h"
+#include "stages/recordings/detail/ecd_event_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -349,7 +350,7 @@ TEST_F(EcdRecordingTest, RefusesOtherSizesAndDamage) {
   const EcdRecording recording = open();
   EXPECT_THAT([&] { recording.frame(2); },
               ThrowsMessage<InputError>(HasSubstr("one size, 4x3, got 3x4")));
-  write("c.pgm", "no picture");
+  write("c.pgm", "no image");
   EXPECT_THAT([&] { recording.frame(2); }, ThrowsMessage<InputError>(HasSubstr("c.pgm")));
 }
 
@@ -364,7 +365,7 @@ TEST_F(EcdRecordingTest, OpensOnlyWholeFolders) {
   EXPECT_THAT(open().events_between(0, 0), IsEmpty());
   std::filesystem::remove(folder_ / "events.txt");
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("events.txt")));
-  write("a.pgm", "no picture");
+  write("a.pgm", "no image");
   write("events.txt", "");
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("a.pgm")));
 }

@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/frame_intervals.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,8 +9,7 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/event_check_internal.h"
-#include "stages/recordings/frame_intervals_internal.h"
+#include "stages/recordings/detail/event_check.h"
 
 namespace eventgan {
 namespace {
@@ -135,7 +136,7 @@ TEST(EventBoundariesTest, AsksOnceForEachFrame) {
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
-// Pictures of 4x3 (width x height), events in (1, 2].
+// Images of 4x3 (width x height), events in (1, 2].
 EventCheck check() { return {ImageSize{3, 4}, 1.0, 2.0}; }
 
 TEST(EventCheckTest, TakesTheCornersAndBothEndsOfTheTime) {
@@ -173,7 +174,7 @@ TEST(EventCheckTest, RefusesOtherPolarities) {
   }
 }
 
-TEST(EventCheckTest, RefusesPixelsOutsideThePicture) {
+TEST(EventCheckTest, RefusesPixelsOutsideTheImage) {
   for (const double x : {-1.0, 4.0, 0.5, 1e300, kNan, kInfinity, -kInfinity}) {
     EXPECT_THAT(
         [&] {

@@ -1,3 +1,5 @@
+#include "stages/recordings/detail/hdf5_recording.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -5,8 +7,7 @@
 #include <numeric>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/hdf5_recording_internal.h"
-#include "stages/recordings/hdf5_table_internal.h"
+#include "stages/recordings/detail/hdf5_table.h"
 #include "stages/recordings/mvsec_writer.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/temporary_folder.h"

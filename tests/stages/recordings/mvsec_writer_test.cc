@@ -8,7 +8,7 @@
 #include <span>
 
 #include "manifests/values/faults.h"
-#include "stages/recordings/growing_dataset_internal.h"
+#include "stages/recordings/detail/growing_dataset.h"
 #include "stages/recordings/recording.h"
 #include "tests/stages/recordings/small_recording.h"
 #include "tests/testing/fake_recording.h"

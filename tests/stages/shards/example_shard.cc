@@ -15,7 +15,7 @@ namespace {
 
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
-// Pictures of 16 x 12 pixels become volumes of 8 x 6: s = 1/2 on both axes, so a point maps as (x +
+// Images of 16 x 12 pixels become volumes of 8 x 6: s = 1/2 on both axes, so a point maps as (x +
 // 0.5) / 2 - 0.5 = x / 2 - 0.25 and an edge as x / 2.
 Point half(const Point& p) {
   return p == kMissingPoint ? p : Point{p.x / 2 - 0.25, p.y / 2 - 0.25};
@@ -192,12 +192,12 @@ ExampleShard unlabelled_shard() {
   return shard;
 }
 
-ShardMarker write_shard(const std::filesystem::path& folder, const ExampleShard& example) {
+CommitRecord write_shard(const std::filesystem::path& folder, const ExampleShard& example) {
   const VolumeCodec codec(example.header.dtype, example.header.deflate_level);
-  ShardMarker marker;
-  marker.shard = example.header.name;
-  marker.plan_hash = example.header.plan_hash;
-  marker.samples = example.header.sample_count;
+  CommitRecord record;
+  record.shard = example.header.name;
+  record.plan_hash = example.header.plan_hash;
+  record.samples = example.header.sample_count;
   ShardWriter writer(folder, example.header);
   for (std::size_t slot = 0; slot < example.samples.size(); ++slot) {
     ShardSample sample = example.samples[slot];
@@ -207,17 +207,17 @@ ShardMarker write_shard(const std::filesystem::path& folder, const ExampleShard&
       if (encoded.saturated) sample.statistics.flags |= kFlagSaturated;
       if (encoded.vanished) sample.statistics.flags |= kFlagVanished;
       sample.scale = encoded.scale;
-      ++marker.valid;
+      ++record.valid;
     } else {
-      marker.quarantined.push_back({static_cast<int>(slot), sample.sample_id, sample.fault});
+      record.quarantined.push_back({static_cast<int>(slot), sample.sample_id, sample.fault});
     }
     writer.append(sample, encoded.chunk);
   }
   ShardReceipt receipt = writer.commit();
-  marker.sha256 = receipt.sha256;
-  marker.size_bytes = receipt.size_bytes;
-  marker.contents = std::move(receipt.contents);
-  return marker;
+  record.sha256 = receipt.sha256;
+  record.size_bytes = receipt.size_bytes;
+  record.contents = std::move(receipt.contents);
+  return record;
 }
 
 }  // namespace eventgan::testing

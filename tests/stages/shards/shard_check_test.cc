@@ -34,18 +34,18 @@ TEST(ContentsFaults, AreNoneIfAllIsTheSame) {
   EXPECT_THAT(contents_faults({}, {}), IsEmpty());
 }
 
-TEST(ContentsFaults, SayWhatTheMarkerHasAndWhatTheShardHas) {
-  ShardContents marker = kShard;
-  marker.boxes = {1, 1, 1};
-  EXPECT_THAT(contents_faults(marker, kShard),
+TEST(ContentsFaults, SayWhatTheCommitRecordHasAndWhatTheShardHas) {
+  ShardContents record = kShard;
+  record.boxes = {1, 1, 1};
+  EXPECT_THAT(contents_faults(record, kShard),
               ElementsAre("expected number of boxes in slot 0: 1, got 2"));
-  marker = kShard;
-  marker.persons = {0, 0};
-  EXPECT_THAT(contents_faults(marker, kShard),
+  record = kShard;
+  record.persons = {0, 0};
+  EXPECT_THAT(contents_faults(record, kShard),
               ElementsAre("expected number of slots with a count of persons 2, got 3"));
-  marker = kShard;
-  marker.classes["Car"] = 1;
-  EXPECT_THAT(contents_faults(marker, kShard),
+  record = kShard;
+  record.classes["Car"] = 1;
+  EXPECT_THAT(contents_faults(record, kShard),
               ElementsAre("expected boxes by class Car: 1, Van: 1, got Car: 2, Van: 1"));
 }
 
@@ -61,19 +61,19 @@ TEST(ContentsFaults, AreAllTold) {
 class ShardCheck : public ::testing::Test {
  protected:
   void write(const testing::ExampleShard& example) {
-    marker_ = write_shard(folder_.path(), example);
-    shard_ = folder_ / marker_.shard;
+    record_ = write_shard(folder_.path(), example);
+    shard_ = folder_ / record_.shard;
   }
 
-  /// Changes the file with HDF5 itself and makes the marker agree again, as if a faulty program had
-  /// written both.
+  /// Changes the file with HDF5 itself and makes the commit record agree again, as if a faulty
+  /// program had written both.
   void change(const std::function<void(hid_t)>& work) {
     const hid_t file = H5Fopen(shard_.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
     ASSERT_GE(file, 0);
     work(file);
     ASSERT_GE(H5Fclose(file), 0);
-    marker_.sha256 = sha256_of_file(shard_);
-    marker_.size_bytes = static_cast<std::int64_t>(std::filesystem::file_size(shard_));
+    record_.sha256 = sha256_of_file(shard_);
+    record_.size_bytes = static_cast<std::int64_t>(std::filesystem::file_size(shard_));
   }
 
   /// Overwrites all numbers of a dataset.
@@ -87,14 +87,14 @@ class ShardCheck : public ::testing::Test {
   }
 
   std::vector<std::string> faults() {
-    const std::vector<std::string> found = check_shard(shard_, marker_);
+    const std::vector<std::string> found = check_shard(shard_, record_);
     EXPECT_THAT(found, Each(StartsWith(shard_.string() + ": ")));
     return found;
   }
 
   testing::TemporaryFolder folder_;
   std::filesystem::path shard_;
-  ShardMarker marker_;
+  CommitRecord record_;
 };
 
 TEST_F(ShardCheck, SoundShardsHaveNoFaults) {
@@ -156,32 +156,32 @@ TEST_F(ShardCheck, AFlippedBitAnywhereIsFound) {
     std::string flipped = bytes;
     flipped[i] = static_cast<char>(flipped[i] ^ 4);
     testing::write_file(shard_, flipped);
-    ASSERT_THAT(faults(), ElementsAre(HasSubstr("expected SHA-256 " + marker_.sha256))) << i;
+    ASSERT_THAT(faults(), ElementsAre(HasSubstr("expected SHA-256 " + record_.sha256))) << i;
   }
 }
 
-TEST_F(ShardCheck, CountsOfTheMarkerAreComparedWithTheRows) {
+TEST_F(ShardCheck, CountsOfTheCommitRecordAreComparedWithTheRows) {
   write(testing::example_shard());
-  EXPECT_THAT(count_faults(shard_, marker_), IsEmpty());
-  const ShardMarker sound = marker_;
-  const auto found = [&](const std::function<void(ShardMarker&)>& change) {
-    marker_ = sound;
-    change(marker_);
-    return count_faults(shard_, marker_);
+  EXPECT_THAT(count_faults(shard_, record_), IsEmpty());
+  const CommitRecord sound = record_;
+  const auto found = [&](const std::function<void(CommitRecord&)>& change) {
+    record_ = sound;
+    change(record_);
+    return count_faults(shard_, record_);
   };
   // Rows of the example's five samples: boxes 2 0 0 1 0, persons 2 0 0 0 1; slot 2 in quarantine.
-  EXPECT_THAT(found([](auto& marker) { marker.contents.persons[4] = 2; }),
+  EXPECT_THAT(found([](auto& record) { record.contents.persons[4] = 2; }),
               ElementsAre("expected number of persons in slot 4: 1, got 2"));
   EXPECT_THAT(
-      found([](auto& marker) { std::swap(marker.contents.boxes[0], marker.contents.boxes[1]); }),
+      found([](auto& record) { std::swap(record.contents.boxes[0], record.contents.boxes[1]); }),
       ElementsAre("expected number of boxes in slot 0: 2, got 0"));
-  EXPECT_THAT(found([](auto& marker) {
-                marker.contents.gaps = {{3, 5}};
+  EXPECT_THAT(found([](auto& record) {
+                record.contents.gaps = {{3, 5}};
               }),
               ElementsAre("expected samples by gap 2: 5, got 3: 5"));
-  EXPECT_THAT(found([](auto& marker) { marker.quarantined[0].slot = 1; }),
+  EXPECT_THAT(found([](auto& record) { record.quarantined[0].slot = 1; }),
               ElementsAre("expected the 1 samples with valid = 0 as quarantined, got others"));
-  EXPECT_THAT(found([](auto& marker) { marker.quarantined[0].sample_id = "x"; }),
+  EXPECT_THAT(found([](auto& record) { record.quarantined[0].sample_id = "x"; }),
               ElementsAre("expected the 1 samples with valid = 0 as quarantined, got others"));
 }
 
@@ -199,7 +199,7 @@ TEST_F(ShardCheck, SeveralAtATimeFindTheSame) {
   std::vector<std::thread> threads;
   for (auto& mine : found) {
     threads.emplace_back([&] {
-      for (int i = 0; i < 20; ++i) mine = check_shard(shard_, marker_);
+      for (int i = 0; i < 20; ++i) mine = check_shard(shard_, record_);
     });
   }
   for (std::thread& thread : threads) thread.join();
@@ -210,7 +210,7 @@ TEST_F(ShardCheck, ATruncatedOrMissingFileIsFound) {
   write(testing::example_shard());
   std::filesystem::resize_file(shard_, 1000);
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected size in bytes " +
-                                              std::to_string(marker_.size_bytes) + ", got 1000")));
+                                              std::to_string(record_.size_bytes) + ", got 1000")));
   std::filesystem::remove(shard_);
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("No such file")));
 }
@@ -218,37 +218,37 @@ TEST_F(ShardCheck, ATruncatedOrMissingFileIsFound) {
 TEST_F(ShardCheck, AFileThatIsNoShardIsFound) {
   write(testing::example_shard());
   testing::write_file(shard_, "not HDF5");
-  marker_.size_bytes = 8;
-  marker_.sha256 = sha256_hex("not HDF5");
+  record_.size_bytes = 8;
+  record_.sha256 = sha256_hex("not HDF5");
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("cannot open")));
 }
 
-TEST_F(ShardCheck, AMarkerOfAnotherShardIsFound) {
+TEST_F(ShardCheck, ACommitRecordOfAnotherShardIsFound) {
   write(testing::example_shard());
-  marker_.plan_hash = std::string(64, 'c');
-  marker_.samples = 6;
+  record_.plan_hash = std::string(64, 'c');
+  record_.samples = 6;
   EXPECT_THAT(faults(), AllOf(Contains(HasSubstr("expected plan hash cccc")),
                               Contains(HasSubstr("expected number of samples 6, got 5"))));
-  marker_.shard = "demo-train-00001-of-00002.h5";
+  record_.shard = "demo-train-00001-of-00002.h5";
   EXPECT_THAT(faults(), Contains(HasSubstr("expected file name demo-train-00001-of-00002.h5")));
 }
 
 TEST_F(ShardCheck, CountsThatDifferAreFound) {
   write(testing::example_shard());
-  marker_.valid = 5;
+  record_.valid = 5;
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected number of valid samples 5, got 4")));
-  marker_.valid = 4;
-  marker_.quarantined[0].slot = 1;
+  record_.valid = 4;
+  record_.quarantined[0].slot = 1;
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("those that the commit record lists")));
 }
 
-TEST_F(ShardCheck, RowsOtherThanTheMarkerSaysAreFound) {
+TEST_F(ShardCheck, RowsOtherThanTheCommitRecordSaysAreFound) {
   write(testing::example_shard());
-  marker_.contents.boxes[0] = 1;
-  marker_.contents.persons[4] = 2;
-  marker_.contents.classes["Car"] = 1;
-  marker_.contents.gaps = {{1, 5}};
-  marker_.contents.optional_columns.clear();
+  record_.contents.boxes[0] = 1;
+  record_.contents.persons[4] = 2;
+  record_.contents.classes["Car"] = 1;
+  record_.contents.gaps = {{1, 5}};
+  record_.contents.optional_columns.clear();
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("boxes in slot 0"), HasSubstr("persons in slot 4"),
                                     HasSubstr("boxes by class"), HasSubstr("samples by gap 1: 5"),
                                     HasSubstr("optional columns none")));

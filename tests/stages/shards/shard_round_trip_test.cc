@@ -64,7 +64,7 @@ void expect_same(const VolumeLabels& got, const VolumeLabels& expected) {
   EXPECT_EQ(got.projection, expected.projection);
 }
 
-/// All fields; `fault` is in the marker.
+/// All fields; `fault` is in the commit record.
 void expect_same(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.valid, expected.valid);
   EXPECT_EQ(got.sample_id, expected.sample_id);
@@ -165,16 +165,16 @@ TEST(ShardRoundTrip, MoreRowsThanAChunkOfAColumn) {
 
 void expect_same_copy(const ExampleShard& example) {
   const TemporaryFolder folder;
-  const ShardMarker marker = write_shard(folder.path(), example);
+  const CommitRecord record = write_shard(folder.path(), example);
   const std::filesystem::path copies = folder / "copies";
   std::filesystem::create_directory(copies);
-  const ShardReader reader(folder / marker.shard);
+  const ShardReader reader(folder / record.shard);
   ShardWriter writer(copies, reader.header());
   for (int slot = 0; slot < reader.header().sample_count; ++slot) {
     writer.append(reader.sample(slot), reader.stored_chunk(slot));
   }
-  EXPECT_EQ(writer.commit().sha256, marker.sha256);
-  EXPECT_EQ(testing::read_file(copies / marker.shard), testing::read_file(folder / marker.shard));
+  EXPECT_EQ(writer.commit().sha256, record.sha256);
+  EXPECT_EQ(testing::read_file(copies / record.shard), testing::read_file(folder / record.shard));
 }
 
 TEST(ShardCopy, HasTheSameBytes) {

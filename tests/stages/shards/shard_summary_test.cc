@@ -20,7 +20,7 @@ using ::testing::Pair;
 TEST(ShardContents, AreWhatTheWriterHasStored) {
   const testing::TemporaryFolder folder;
   const testing::ExampleShard example = testing::example_shard();
-  const ShardMarker marker = write_shard(folder.path(), example);
+  const CommitRecord record = write_shard(folder.path(), example);
 
   std::vector<std::int32_t> boxes, persons;
   std::map<std::string, std::int64_t> classes;
@@ -35,12 +35,12 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
     }
   }
   EXPECT_EQ(boxes, (std::vector<std::int32_t>{2, 0, 0, 1, 0}));
-  EXPECT_EQ(marker.contents.boxes, boxes);
-  EXPECT_EQ(marker.contents.persons, persons);
-  EXPECT_EQ(marker.contents.classes, classes);
-  EXPECT_EQ(marker.contents.gaps, gaps);
+  EXPECT_EQ(record.contents.boxes, boxes);
+  EXPECT_EQ(record.contents.persons, persons);
+  EXPECT_EQ(record.contents.classes, classes);
+  EXPECT_EQ(record.contents.gaps, gaps);
   EXPECT_THAT(
-      marker.contents.optional_columns,
+      record.contents.optional_columns,
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
                   "/pairs/drive", "/labels/projection", "/labels/projection_source",
@@ -52,9 +52,9 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
 TEST(ShardOverview, HasItsColumnsAndNoOthers) {
   const testing::TemporaryFolder folder;
   const testing::ExampleShard example = testing::example_shard();
-  const ShardMarker marker = write_shard(folder.path(), example);
-  const ShardOverview overview = read_overview(folder / marker.shard);
-  EXPECT_EQ(overview.header.name, marker.shard);
+  const CommitRecord record = write_shard(folder.path(), example);
+  const ShardOverview overview = read_overview(folder / record.shard);
+  EXPECT_EQ(overview.header.name, record.shard);
   const ShardTables& tables = overview.tables;
   ASSERT_EQ(tables.valid.size(), example.samples.size());
   std::size_t boxes = 0;
@@ -82,12 +82,12 @@ TEST(ShardOverview, HasItsColumnsAndNoOthers) {
 
 TEST(ShardContents, OfAShardWithoutLabelsAreZeros) {
   const testing::TemporaryFolder folder;
-  const ShardMarker marker = write_shard(folder.path(), testing::unlabelled_shard());
-  EXPECT_EQ(marker.contents.boxes, std::vector<std::int32_t>{0});
-  EXPECT_EQ(marker.contents.persons, std::vector<std::int32_t>{0});
-  EXPECT_TRUE(marker.contents.classes.empty());
-  EXPECT_EQ(marker.contents.gaps.size(), 1u);
-  EXPECT_THAT(marker.contents.optional_columns,
+  const CommitRecord record = write_shard(folder.path(), testing::unlabelled_shard());
+  EXPECT_EQ(record.contents.boxes, std::vector<std::int32_t>{0});
+  EXPECT_EQ(record.contents.persons, std::vector<std::int32_t>{0});
+  EXPECT_TRUE(record.contents.classes.empty());
+  EXPECT_EQ(record.contents.gaps.size(), 1u);
+  EXPECT_THAT(record.contents.optional_columns,
               ElementsAre("/pairs/prev_time_s", "/pairs/next_time_s", "/pairs/subject",
                           "/pairs/camera", "/pairs/drive"));
 }

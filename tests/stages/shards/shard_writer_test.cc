@@ -9,7 +9,7 @@
 
 #include "stages/base/files/sha256.h"
 #include "stages/shards/codec/volume_codec.h"
-#include "stages/shards/shard_objects_internal.h"
+#include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_reader.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/full_disk.h"
@@ -103,8 +103,8 @@ TEST(ShardWriter, ReplacesAnOlderShard) {
   const TemporaryFolder folder;
   const ExampleShard example = unlabelled_shard();
   testing::write_file(folder / example.header.name, "older");
-  const ShardMarker marker = write_shard(folder.path(), example);
-  EXPECT_EQ(sha256_of_file(folder / example.header.name), marker.sha256);
+  const CommitRecord record = write_shard(folder.path(), example);
+  EXPECT_EQ(sha256_of_file(folder / example.header.name), record.sha256);
 }
 
 TEST(ShardWriter, SameSamplesSameBytes) {

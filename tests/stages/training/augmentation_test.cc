@@ -13,7 +13,7 @@ namespace {
 
 AugmentationSpec no_change() { return {.flip = false}; }
 
-/// A value that says where it stands; frames and volume differ by 1000.
+/// A value that says where it is; frames and volume differ by 1000.
 float mark(int plane, int y, int x) { return static_cast<float>(100 * plane + 10 * y + x) / 1e4f; }
 
 TrainingSample marked_sample(int bins, ImageSize size) {
@@ -106,12 +106,12 @@ TEST(DrawAugmentation, IsAFunctionOfItsArguments) {
   EXPECT_GT(places.size(), 15u);
 }
 
-TEST(DrawAugmentation, TakesAPictureOfExactlyTheCropAndRefusesASmallerOne) {
+TEST(DrawAugmentation, TakesAnImageOfExactlyTheCropAndRefusesASmallerOne) {
   const Augmentation drawn = draw_augmentation({5, 6}, {5, 6}, {}, CounterRandom(1));
   EXPECT_EQ(drawn.top, 0);
   EXPECT_EQ(drawn.left, 0);
-  for (const ImageSize picture : {ImageSize{4, 6}, {5, 5}, {0, 0}}) {
-    EXPECT_THROW(draw_augmentation(picture, {5, 6}, {}, CounterRandom(1)), std::invalid_argument);
+  for (const ImageSize image : {ImageSize{4, 6}, {5, 5}, {0, 0}}) {
+    EXPECT_THROW(draw_augmentation(image, {5, 6}, {}, CounterRandom(1)), std::invalid_argument);
   }
   EXPECT_THROW(draw_augmentation({5, 6}, {0, 6}, {}, CounterRandom(1)), std::invalid_argument);
 }

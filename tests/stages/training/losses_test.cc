@@ -77,17 +77,17 @@ TEST(Ssim, IsWhatTheDefinitionSays) {
   }
 }
 
-TEST(Ssim, IsOneForEqualPictures) {
-  const at::Tensor picture = random_tensor({3, 1, 13, 7}, 3).to(at::kFloat);
-  EXPECT_NEAR(ssim(picture, picture).item<double>(), 1, 1e-6);
-  EXPECT_NEAR(image_loss(picture, picture).item<double>(), -1, 1e-6);
+TEST(Ssim, IsOneForEqualImages) {
+  const at::Tensor image = random_tensor({3, 1, 13, 7}, 3).to(at::kFloat);
+  EXPECT_NEAR(ssim(image, image).item<double>(), 1, 1e-6);
+  EXPECT_NEAR(image_loss(image, image).item<double>(), -1, 1e-6);
   for (const float grey : {-1.0f, 0.0f, 0.3f, 1.0f}) {
     const at::Tensor constant = at::full({1, 1, 20, 20}, grey);
     EXPECT_NEAR(ssim(constant, constant).item<double>(), 1, 1e-6) << grey;
   }
 }
 
-TEST(Ssim, OfConstantPicturesIsWhatTheDefinitionSays) {
+TEST(Ssim, OfConstantImagesIsWhatTheDefinitionSays) {
   // Their variance is rounding alone, and may come out below zero.
   for (const auto& [a, b] :
        {std::pair{0.0, 0.0}, {1.0, 1.0}, {-1.0, 1.0}, {0.0, 1.0}, {0.3, 0.3}}) {
@@ -114,17 +114,17 @@ TEST(ImageLoss, HasTheGradientOfDifferences) {
 }
 
 TEST(ImageLoss, LetsNanThrough) {
-  const at::Tensor picture = at::zeros({1, 1, 20, 20});
-  at::Tensor spoiled = picture.clone();
+  const at::Tensor image = at::zeros({1, 1, 20, 20});
+  at::Tensor spoiled = image.clone();
   spoiled[0][0][0][0].fill_(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_TRUE(std::isnan(image_loss(spoiled, picture).item<double>()));
-  EXPECT_TRUE(std::isnan(ssim(picture, spoiled).item<double>()));
+  EXPECT_TRUE(std::isnan(image_loss(spoiled, image).item<double>()));
+  EXPECT_TRUE(std::isnan(ssim(image, spoiled).item<double>()));
 }
 
-TEST(ImageLoss, RefusesPicturesOfOtherShapes) {
-  const at::Tensor pictures = at::zeros({2, 1, 4, 4});
-  EXPECT_THROW(image_loss(pictures, at::zeros({1, 1, 4, 4})), std::invalid_argument);
-  EXPECT_THROW(ssim(pictures, at::zeros({2, 1, 4, 5})), std::invalid_argument);
+TEST(ImageLoss, RefusesImagesOfOtherShapes) {
+  const at::Tensor images = at::zeros({2, 1, 4, 4});
+  EXPECT_THROW(image_loss(images, at::zeros({1, 1, 4, 4})), std::invalid_argument);
+  EXPECT_THROW(ssim(images, at::zeros({2, 1, 4, 5})), std::invalid_argument);
   EXPECT_THROW(ssim(at::zeros({2, 3, 4, 4}), at::zeros({2, 3, 4, 4})), std::invalid_argument);
 }
 

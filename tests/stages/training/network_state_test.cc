@@ -1,3 +1,5 @@
+#include "stages/training/networks/detail/network_state.h"
+
 #include <ATen/Functions.h>
 #include <ATen/core/grad_mode.h>
 #include <ATen/ops/full.h>
@@ -8,8 +10,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stages/training/networks/network_state_internal.h"
-#include "stages/training/networks/spectral_norm_conv_internal.h"
+#include "stages/training/networks/detail/spectral_norm_conv.h"
 #include "tests/stages/training/network_cases.h"
 
 namespace eventgan {

@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "stages/training/networks/network_state_internal.h"
-#include "stages/training/networks/patch_discriminator_internal.h"
-#include "stages/training/networks/unet_internal.h"
+#include "stages/training/networks/detail/network_state.h"
+#include "stages/training/networks/detail/patch_discriminator.h"
+#include "stages/training/networks/detail/unet.h"
 #include "tests/stages/training/network_cases.h"
 #include "tests/testing/golden_numbers.h"
 #include "tests/testing/shared_data.h"
@@ -15,7 +15,7 @@ namespace {
 
 constexpr UNetSettings kGenerator{2, 18, 8, false, SpectralNormPlace::kDecoders};
 
-at::Tensor picture(std::vector<std::int64_t> shape) {
+at::Tensor image(std::vector<std::int64_t> shape) {
   return at::sin(at::arange(c10::multiply_integers(shape), at::kFloat) * 0.7f).view(shape);
 }
 
@@ -94,12 +94,12 @@ TEST(UNet, HasSpectralNormWhereItIsWanted) {
                                       "decoders.2.conv2d", "decoders.3.conv2d"));
 }
 
-TEST(UNet, GivesThePicturesSizeAndItsRoundedUpHalves) {
+TEST(UNet, GivesTheImagesSizeAndItsRoundedUpHalves) {
   for (const bool multi_scale : {false, true}) {
     UNet network(UNetSettings{2, 3, 1, multi_scale, SpectralNormPlace::kNone});
     initialize(*network, 1);
     network->eval();
-    const auto outputs = network->forward(picture({2, 2, 33, 18}));
+    const auto outputs = network->forward(image({2, 2, 33, 18}));
     EXPECT_THAT(outputs.back().sizes().vec(), ::testing::ElementsAre(2, 3, 33, 18));
     if (!multi_scale) continue;
     EXPECT_THAT(outputs[0].sizes().vec(), ::testing::ElementsAre(2, 3, 5, 3));
@@ -117,7 +117,7 @@ TEST(UNet, OutputsHaveASlopeBelowZeroOnlyWhileTheyLearn) {
     initialize(*network, 1);
     network->train(!evaluates);
     const at::AutoGradMode gradients(learns);
-    return network->forward(picture({2, 2, 32, 32}))[0].detach();
+    return network->forward(image({2, 2, 32, 32}))[0].detach();
   };
   const at::Tensor plain = outputs(0, true, false);
   const at::Tensor sloped = outputs(kSlope, true, false);
@@ -132,7 +132,7 @@ TEST(UNet, TakesASinglePixel) {
   UNet network(UNetSettings{2, 3, 1, false, SpectralNormPlace::kDecoders});
   initialize(*network, 1);
   network->eval();
-  EXPECT_THAT(network->forward(picture({1, 2, 1, 1}))[0].sizes().vec(),
+  EXPECT_THAT(network->forward(image({1, 2, 1, 1}))[0].sizes().vec(),
               ::testing::ElementsAre(1, 3, 1, 1));
 }
 
@@ -140,7 +140,7 @@ TEST(UNet, BatchNormMovesAtThePublishedSpeeds) {
   UNet network(UNetSettings{1, 2, 1, false, SpectralNormPlace::kNone});
   initialize(*network, 1);
   StateDict state;
-  network->forward(picture({2, 1, 32, 32}));
+  network->forward(image({2, 1, 32, 32}));
   save_network(*network, state, "");
   // Of a running variance of 1 a step leaves 1 - momentum, and adds momentum · variance, small
   // here: inputs of a layer are shrunk by the initialisation's gain of 0.14.
@@ -159,7 +159,7 @@ TEST(UNet, GradientsAreThoseOfCentralDifferences) {
     UNet network(UNetSettings{2, 3, 2, multi_scale, SpectralNormPlace::kNone});
     initialize(*network, 3);
     network->to(at::kDouble);
-    const at::Tensor input = picture({2, 2, 32, 24}).to(at::kDouble);
+    const at::Tensor input = image({2, 2, 32, 24}).to(at::kDouble);
     std::vector<at::Tensor> used;
     for (const auto& item : network->named_parameters()) {
       if (!multi_scale || !item.key().starts_with("pred.")) used.push_back(item.value());
@@ -189,7 +189,7 @@ TEST(PatchDiscriminator, EqualsThePublishedOne) {
   EXPECT_EQ(own.size(), published.size());
 }
 
-TEST(PatchDiscriminator, GivesOneLogitForTheSmallestPicture) {
+TEST(PatchDiscriminator, GivesOneLogitForTheSmallestImage) {
   PatchDiscriminator network(4, 2, 2);
   initialize(*network, 1);
   const int side = PatchDiscriminatorImpl::smallest_side();

@@ -12,7 +12,7 @@
 #include "manifests/values/faults.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/torch/torch_generator.h"
-#include "stages/training/training_networks_internal.h"
+#include "stages/training/detail/training_networks.h"
 #include "tests/stages/training/small_training.h"
 
 namespace eventgan {
@@ -300,7 +300,7 @@ TEST(Trainer, LoadNamesWhatIsMissing) {
 
 class TrainedGenerator : public ::testing::TestWithParam<std::pair<SpectralNormPlace, double>> {};
 
-TEST_P(TrainedGenerator, FoldedEqualsItsOwnPictureWhichChangesNothing) {
+TEST_P(TrainedGenerator, FoldedEqualsItsOwnImageWhichChangesNothing) {
   TrainingManifest manifest = testing::small_training();
   manifest.network.spectral_norm = GetParam().first;
   manifest.network.difference_gain = GetParam().second;

@@ -7,9 +7,9 @@
 #include <numeric>
 #include <stdexcept>
 
+#include "stages/training/detail/training_batch.h"
+#include "stages/training/detail/update_loss.h"
 #include "stages/training/trainer.h"
-#include "stages/training/training_batch_internal.h"
-#include "stages/training/update_loss_internal.h"
 #include "tests/stages/training/small_training.h"
 
 // What training is for: 50 steps lower every loss, and a training that stops and goes on is the

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stages/base/archives/numpy_arrays_internal.h"
+#include "stages/base/archives/detail/numpy_arrays.h"
 #include "stages/base/archives/zip_archive.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/shared_data.h"
@@ -268,7 +268,7 @@ TEST(NpyArrayTest, ReadsHuman36mLists) {
   EXPECT_EQ(names.text(0), "S1/S1_Directions_1.54138969/S1_Directions_1.54138969_000001.jpg");
   const TypedArray joints = parse_npy(archive.read("part.npy"), "part.npy");
   EXPECT_THAT(joints.shape, ElementsAre(4, 17, 3));
-  // The same joint stands in h36m_coco.json as 473.6835632324219.
+  // The same joint is in h36m_coco.json as 473.6835632324219.
   EXPECT_NEAR(joints.number(0), 473.6835632324219, 1e-9);
 }
 

@@ -6,8 +6,8 @@
 #include <span>
 #include <stdexcept>
 
+#include "stages/base/archives/detail/pickle_cursor.h"
 #include "stages/base/archives/pickle.h"
-#include "stages/base/archives/pickle_cursor_internal.h"
 
 // Pickles that no honest writer makes: each is refused with a message, whatever it says.
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "stages/base/archives/typed_array_internal.h"
+#include "stages/base/archives/detail/typed_array.h"
 
 namespace eventgan {
 namespace {

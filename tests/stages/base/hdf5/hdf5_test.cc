@@ -1,11 +1,12 @@
+#include "stages/base/hdf5/detail/hdf5.h"
+
 #include <gtest/gtest.h>
 
 #include <atomic>
 #include <thread>
 #include <vector>
 
-#include "stages/base/hdf5/hdf5_internal.h"
-#include "stages/base/hdf5/hdf5_output_file_internal.h"
+#include "stages/base/hdf5/detail/hdf5_output_file.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
 

@@ -9,14 +9,14 @@
 #include <vector>
 
 #include "stages/events/simulation/sensor.h"
-#include "tests/stages/events/simulation/simulated_pictures.h"
+#include "tests/stages/events/simulation/simulated_images.h"
 
 namespace eventgan {
 namespace {
 
 using testing::exact_sensor;
 using ::testing::IsEmpty;
-using testing::log_picture;
+using testing::log_image;
 using ::testing::SizeIs;
 
 constexpr std::size_t kManyPixels = 20000;
@@ -142,14 +142,14 @@ TEST(PixelNoise, ArrivalsRise) {
 
 constexpr ImageSize kNoisySize{30, 40};
 
-/// Events of a picture that stays as it is for `duration_s`, shown in `steps` steps from t = 0.
+/// Events of an image that stays as it is for `duration_s`, shown in `steps` steps from t = 0.
 std::vector<Event> watch_still(const SensorSpec& spec, double duration_s, int steps,
                                std::uint64_t seed = 1) {
   Sensor sensor(spec, kNoisySize, CounterRandom(seed));
   std::vector<Event> events;
   for (int step = 0; step <= steps; ++step) {
     for (const Event& event :
-         sensor.step(log_picture(kNoisySize, -1, spec), duration_s * step / steps)) {
+         sensor.step(log_image(kNoisySize, -1, spec), duration_s * step / steps)) {
       events.push_back(event);
     }
   }
@@ -185,12 +185,12 @@ TEST(SensorNoise, LeakAddsToTheSlopeOfTheIntensity) {
   spec.leak_rate_hz = 1;  // the level falls by 0.2 a second
   constexpr ImageSize kOnePixel{1, 1};
   Sensor falling(spec, kOnePixel, CounterRandom(1));
-  falling.step(log_picture(kOnePixel, -1, spec), 0);
-  EXPECT_THAT(falling.step(log_picture(kOnePixel, -3, spec), 10), IsEmpty());
+  falling.step(log_image(kOnePixel, -1, spec), 0);
+  EXPECT_THAT(falling.step(log_image(kOnePixel, -3, spec), 10), IsEmpty());
   Sensor rising(spec, kOnePixel, CounterRandom(1));
-  rising.step(log_picture(kOnePixel, -3, spec), 0);
+  rising.step(log_image(kOnePixel, -3, spec), 0);
   // 0.1 + 0.2 log units a second against 0.2: an event each 2/3 s.
-  const std::vector<Event> events = rising.step(log_picture(kOnePixel, -2, spec), 10.1);
+  const std::vector<Event> events = rising.step(log_image(kOnePixel, -2, spec), 10.1);
   ASSERT_THAT(events, SizeIs(15));
   EXPECT_NEAR(events[14].t_s, 15 * 0.2 / (1 / 10.1 + 0.2), 1e-4);
 }
@@ -235,10 +235,10 @@ TEST(SensorNoise, ANoiseEventSetsTheLevelAnew) {
   noisy.shot_noise_rate_hz = 50;
   Sensor moving(noisy, kNoisySize, CounterRandom(1));
   Sensor still(noisy, kNoisySize, CounterRandom(1));
-  moving.step(log_picture(kNoisySize, -3, noisy), 0);
-  still.step(log_picture(kNoisySize, -3, noisy), 0);
-  const std::vector<Event> while_moving = moving.step(log_picture(kNoisySize, -2.5, noisy), 5);
-  EXPECT_EQ(while_moving, still.step(log_picture(kNoisySize, -3, noisy), 5));
+  moving.step(log_image(kNoisySize, -3, noisy), 0);
+  still.step(log_image(kNoisySize, -3, noisy), 0);
+  const std::vector<Event> while_moving = moving.step(log_image(kNoisySize, -2.5, noisy), 5);
+  EXPECT_EQ(while_moving, still.step(log_image(kNoisySize, -3, noisy), 5));
 }
 
 TEST(SensorNoise, SameSeedSameEventsOtherSeedOthers) {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <tuple>
 
-#include "tests/stages/events/simulation/simulated_pictures.h"
+#include "tests/stages/events/simulation/simulated_images.h"
 
 namespace eventgan {
 namespace {
@@ -17,27 +17,27 @@ namespace {
 using testing::exact_sensor;
 using testing::intensity_at;
 using ::testing::IsEmpty;
-using testing::log_picture;
+using testing::log_image;
 using ::testing::SizeIs;
 
 constexpr ImageSize kOnePixel{1, 1};
 
-/// Float logarithms of the pictures are good to some 1e-7; times scale with 1 / change.
+/// Float logarithms of the images are good to some 1e-7; times scale with 1 / change.
 constexpr double kTolerance = 3e-6;
 
 TEST(Sensor, SignalsEachCrossingOfALineAtItsTime) {
   const SensorSpec spec = exact_sensor(0.3);
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -2, spec), 5), IsEmpty());
-  const std::vector<Event> rise = sensor.step(log_picture(kOnePixel, -1, spec), 7);
-  // floor(1 / 0.3) events, each where -2 + (t - 5) / 2 stands k 0.3 above -2.
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -2, spec), 5), IsEmpty());
+  const std::vector<Event> rise = sensor.step(log_image(kOnePixel, -1, spec), 7);
+  // floor(1 / 0.3) events, each where -2 + (t - 5) / 2 is k 0.3 above -2.
   ASSERT_THAT(rise, SizeIs(3));
   for (int k = 1; k <= 3; ++k) {
     EXPECT_NEAR(rise[k - 1].t_s, 5 + 2 * 0.3 * k, kTolerance);
     EXPECT_TRUE(rise[k - 1].positive);
   }
-  // The level stands at -1.1; going down from -1 it is crossed by 0.3 at -1.4, -1.7, -2.0.
-  const std::vector<Event> fall = sensor.step(log_picture(kOnePixel, -1.95, spec), 8.9);
+  // The level is at -1.1; going down from -1 it is crossed by 0.3 at -1.4, -1.7, -2.0.
+  const std::vector<Event> fall = sensor.step(log_image(kOnePixel, -1.95, spec), 8.9);
   ASSERT_THAT(fall, SizeIs(2));
   EXPECT_NEAR(fall[0].t_s, 7 + 2 * 0.4, kTolerance);
   EXPECT_NEAR(fall[1].t_s, 7 + 2 * 0.7, kTolerance);
@@ -48,10 +48,10 @@ TEST(Sensor, SignalsEachCrossingOfALineAtItsTime) {
 TEST(Sensor, RemembersItsLevelOverManySmallSteps) {
   const SensorSpec spec = exact_sensor(0.25);
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), 0);
+  sensor.step(log_image(kOnePixel, -3, spec), 0);
   std::vector<double> times;
   for (int step = 1; step <= 1000; ++step) {
-    for (const Event& event : sensor.step(log_picture(kOnePixel, -3 + 0.0021 * step, spec), step)) {
+    for (const Event& event : sensor.step(log_image(kOnePixel, -3 + 0.0021 * step, spec), step)) {
       times.push_back(event.t_s);
     }
   }
@@ -64,9 +64,9 @@ TEST(Sensor, TakesEachPolaritysThreshold) {
   SensorSpec spec = exact_sensor(0.2);
   spec.negative_threshold = 0.45;
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -2, spec), 0);
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1.5, spec), 1), SizeIs(2));  // level -1.6
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -2.6, spec), 2), SizeIs(2));  // -2.05, -2.5
+  sensor.step(log_image(kOnePixel, -2, spec), 0);
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -1.5, spec), 1), SizeIs(2));  // level -1.6
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -2.6, spec), 2), SizeIs(2));  // -2.05, -2.5
 }
 
 TEST(Sensor, SeesAMovingEdgeOfKnownContrast) {
@@ -77,13 +77,13 @@ TEST(Sensor, SeesAMovingEdgeOfKnownContrast) {
   Sensor sensor(spec, kSize, CounterRandom(1));
   std::vector<Event> events;
   for (int edge = 0; edge <= kSize.width; ++edge) {
-    std::vector<float> picture;
+    std::vector<float> image;
     for (int y = 0; y < kSize.height; ++y) {
       for (int x = 0; x < kSize.width; ++x) {
-        picture.push_back(intensity_at(x < edge ? -1.5 : -0.5, spec));
+        image.push_back(intensity_at(x < edge ? -1.5 : -0.5, spec));
       }
     }
-    const std::vector<Event> seen = sensor.step(picture, 1e-3 * edge);
+    const std::vector<Event> seen = sensor.step(image, 1e-3 * edge);
     events.insert(events.end(), seen.begin(), seen.end());
   }
   ASSERT_THAT(events, SizeIs(3 * kSize.pixel_count()));
@@ -104,11 +104,11 @@ TEST(Sensor, OrdersByTimeThenRowThenColumn) {
   constexpr ImageSize kSize{4, 5};
   const SensorSpec spec = exact_sensor(0.1);
   Sensor sensor(spec, kSize, CounterRandom(1));
-  sensor.step(log_picture(kSize, -3, spec), 0);
-  std::vector<float> picture = log_picture(kSize, -2.55, spec);
-  picture[7] = intensity_at(-3.45, spec);
-  picture[11] = intensity_at(-1, spec);
-  const std::vector<Event> events = sensor.step(picture, 1);
+  sensor.step(log_image(kSize, -3, spec), 0);
+  std::vector<float> image = log_image(kSize, -2.55, spec);
+  image[7] = intensity_at(-3.45, spec);
+  image[11] = intensity_at(-1, spec);
+  const std::vector<Event> events = sensor.step(image, 1);
   EXPECT_THAT(events, SizeIs(19 * 4 + 20 - 1));  // pixel 11 has floor(2 / 0.1) or one less
   EXPECT_TRUE(std::ranges::is_sorted(events, {}, [](const Event& event) {
     return std::tuple(event.t_s, event.y, event.x, event.positive);
@@ -120,9 +120,9 @@ TEST(Sensor, PixelsDifferByTheirThresholdSpread) {
   SensorSpec spec = exact_sensor(0.5);
   spec.threshold_spread = 0.05;
   Sensor sensor(spec, kSize, CounterRandom(1));
-  sensor.step(log_picture(kSize, -2, spec), 0);
+  sensor.step(log_image(kSize, -2, spec), 0);
   // To 0.5 exactly: pixels whose threshold is below the mean signal, half of them.
-  const std::vector<Event> events = sensor.step(log_picture(kSize, -1.5, spec), 1);
+  const std::vector<Event> events = sensor.step(log_image(kSize, -1.5, spec), 1);
   EXPECT_NEAR(static_cast<double>(events.size()), 1250, 4 * 25);
 }
 
@@ -131,17 +131,17 @@ TEST(Sensor, StaysSilentWithoutMotionOrNoise) {
   SensorSpec spec;
   Sensor sensor(spec, kSize, CounterRandom(1));
   for (int step = 0; step < 50; ++step) {
-    EXPECT_THAT(sensor.step(log_picture(kSize, -1, spec), step), IsEmpty());
+    EXPECT_THAT(sensor.step(log_image(kSize, -1, spec), step), IsEmpty());
   }
 }
 
-/// Events of a log intensity that climbs by 1 a second from -3, shown in `steps` pictures a second.
+/// Events of a log intensity that climbs by 1 a second from -3, shown in `steps` images a second.
 std::vector<Event> climb(const SensorSpec& spec, int steps) {
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
   std::vector<Event> events;
   for (int step = 0; step <= steps; ++step) {
     const double t_s = static_cast<double>(step) / steps;
-    for (const Event& event : sensor.step(log_picture(kOnePixel, -3 + t_s, spec), t_s)) {
+    for (const Event& event : sensor.step(log_image(kOnePixel, -3 + t_s, spec), t_s)) {
       events.push_back(event);
     }
   }
@@ -163,12 +163,12 @@ TEST(SensorRefractory, WhatIsPassedMeanwhileIsLost) {
   SensorSpec spec = exact_sensor(0.3);
   spec.refractory_s = 1;
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), 0);
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1, spec), 0.01), SizeIs(1));
+  sensor.step(log_image(kOnePixel, -3, spec), 0);
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -1, spec), 0.01), SizeIs(1));
   // From 1.0015 s on the level is -1, where the pixel was when it woke.
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1, spec), 2), IsEmpty());
-  EXPECT_THAT(sensor.step(log_picture(kOnePixel, -1.29, spec), 3), IsEmpty());
-  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -1.31, spec), 4);
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -1, spec), 2), IsEmpty());
+  EXPECT_THAT(sensor.step(log_image(kOnePixel, -1.29, spec), 3), IsEmpty());
+  const std::vector<Event> events = sensor.step(log_image(kOnePixel, -1.31, spec), 4);
   ASSERT_THAT(events, SizeIs(1));
   EXPECT_FALSE(events[0].positive);
   EXPECT_NEAR(events[0].t_s, 3.5, 1e-4);
@@ -178,10 +178,10 @@ TEST(SensorRefractory, WakesWithinAStep) {
   SensorSpec spec = exact_sensor(0.5);
   spec.refractory_s = 0.5;
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), 0);
-  ASSERT_THAT(sensor.step(log_picture(kOnePixel, -2.4, spec), 0.6), SizeIs(1));  // at 0.5
+  sensor.step(log_image(kOnePixel, -3, spec), 0);
+  ASSERT_THAT(sensor.step(log_image(kOnePixel, -2.4, spec), 0.6), SizeIs(1));  // at 0.5
   // Wakes at 1.0 with the level on the line from (0.6, -2.4) to (2.6, -0.4), at -2: next at -1.5.
-  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -0.4, spec), 2.6);
+  const std::vector<Event> events = sensor.step(log_image(kOnePixel, -0.4, spec), 2.6);
   ASSERT_THAT(events, SizeIs(2));
   EXPECT_NEAR(events[0].t_s, 1.5, 1e-5);
   EXPECT_NEAR(events[1].t_s, 2.5, 1e-5);  // woke at 2.0 and -1
@@ -193,8 +193,8 @@ TEST(SensorRefractory, DeadTimeLowersTheRateOfNoise) {
   spec.shot_noise_rate_hz = 20;
   spec.refractory_s = 0.05;
   Sensor sensor(spec, kSize, CounterRandom(3));
-  sensor.step(log_picture(kSize, -1, spec), 0);
-  const std::vector<Event> events = sensor.step(log_picture(kSize, -1, spec), 10);
+  sensor.step(log_image(kSize, -1, spec), 0);
+  const std::vector<Event> events = sensor.step(log_image(kSize, -1, spec), 10);
   // A renewal process with mean wait R + 1/r = 0.1 s and variance 1/r^2: 100 events a pixel of
   // variance T / (r^2 mean^3) = 25, and on average (1/r^2 / mean^2 - 1)/2 + ... below 1 off that.
   const double pixels = 1600;
@@ -246,7 +246,7 @@ TEST(SensorExtremes, EventsThatDoNotFitIntoMemoryAreRefusedWithTheSettings) {
               5 * std::sqrt(30000));
 }
 
-TEST(SensorExtremes, BlackAndSaturatedPicturesStaySilent) {
+TEST(SensorExtremes, BlackAndSaturatedImagesStaySilent) {
   for (const float value : {0.0f, 1.0f, std::numeric_limits<float>::max()}) {
     Sensor sensor(SensorSpec{}, kPushedSize, CounterRandom(1));
     sensor.step(std::vector<float>(15, value), 0);
@@ -257,9 +257,9 @@ TEST(SensorExtremes, BlackAndSaturatedPicturesStaySilent) {
 TEST(SensorExtremes, TinyStepsEnd) {
   const SensorSpec spec = exact_sensor(0.3);
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), 0);
+  sensor.step(log_image(kOnePixel, -3, spec), 0);
   const double smallest = std::numeric_limits<double>::denorm_min();
-  const std::vector<Event> events = sensor.step(log_picture(kOnePixel, -2, spec), smallest);
+  const std::vector<Event> events = sensor.step(log_image(kOnePixel, -2, spec), smallest);
   ASSERT_THAT(events, SizeIs(3));
   for (const Event& event : events) EXPECT_EQ(event.t_s, smallest);
 }
@@ -269,23 +269,23 @@ TEST(SensorExtremes, LateTimesCostNoEvents) {
   constexpr double kNow = 1.7e9;
   const SensorSpec spec = exact_sensor(0.3);
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), kNow);
+  sensor.step(log_image(kOnePixel, -3, spec), kNow);
   double before = kNow;
   for (int step = 1; step <= 4; ++step) {
     const double t_s = kNow + 1e-6 * step;
     const std::vector<Event> events =
-        sensor.step(log_picture(kOnePixel, -3 + 0.95 * step, spec), t_s);
+        sensor.step(log_image(kOnePixel, -3 + 0.95 * step, spec), t_s);
     EXPECT_THAT(events, SizeIs(3));  // 3.2, 6.3, 9.5, 12.7 thresholds in all
     for (const Event& event : events) EXPECT_TRUE(event.t_s > before && event.t_s <= t_s);
     before = t_s;
   }
 }
 
-TEST(SensorExtremes, RefusesWhatIsNoPictureAndGoesOnUnchanged) {
+TEST(SensorExtremes, RefusesWhatIsNoImageAndGoesOnUnchanged) {
   const SensorSpec spec = exact_sensor(0.3);
   Sensor sensor(spec, kOnePixel, CounterRandom(1));
-  sensor.step(log_picture(kOnePixel, -3, spec), 1);
-  const std::vector<float> bright = log_picture(kOnePixel, -2, spec);
+  sensor.step(log_image(kOnePixel, -3, spec), 1);
+  const std::vector<float> bright = log_image(kOnePixel, -2, spec);
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   EXPECT_THROW(sensor.step(bright, 1), std::invalid_argument);
   EXPECT_THROW(sensor.step(bright, 0.5), std::invalid_argument);

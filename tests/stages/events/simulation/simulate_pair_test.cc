@@ -12,7 +12,7 @@
 #include "stages/events/simulation/affine_motion.h"
 #include "stages/events/simulation/flow_interval.h"
 #include "stages/events/simulation/sensor.h"
-#include "tests/stages/events/simulation/simulated_pictures.h"
+#include "tests/stages/events/simulation/simulated_images.h"
 
 namespace eventgan {
 namespace {
@@ -21,13 +21,13 @@ using testing::exact_sensor;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using testing::texture;
-using testing::textured_picture;
+using testing::textured_image;
 
 TEST(LinearIntensity, IsTheGreyValueOver255) {
   EXPECT_THAT(linear_intensity({{1, 3}, {0, 51, 255}}), ::testing::ElementsAre(0.0f, 0.2f, 1.0f));
 }
 
-TEST(LinearIntensity, RefusesWhatIsNoPicture) {
+TEST(LinearIntensity, RefusesWhatIsNoImage) {
   EXPECT_THROW(linear_intensity({}), std::invalid_argument);
   EXPECT_THROW(linear_intensity({{0, 4}, {}}), std::invalid_argument);
   EXPECT_THROW(linear_intensity({{2, 2}, {1, 2, 3}}), std::invalid_argument);
@@ -63,28 +63,28 @@ TEST(RandomAffineMotion, RefusesBadDisplacements) {
   }
 }
 
-TEST(RenderAffine, IsThePictureAtTheStart) {
-  const GreyImage picture = textured_picture({37, 53});
-  const AffineMotion motion = random_affine_motion(picture.size, 6, CounterRandom(1));
-  EXPECT_EQ(render_affine(picture, motion, 0), linear_intensity(picture));
+TEST(RenderAffine, IsTheImageAtTheStart) {
+  const GreyImage image = textured_image({37, 53});
+  const AffineMotion motion = random_affine_motion(image.size, 6, CounterRandom(1));
+  EXPECT_EQ(render_affine(image, motion, 0), linear_intensity(image));
 }
 
 TEST(RenderAffine, MovesTheWayOfTheMatrix) {
-  const GreyImage picture{{1, 5}, {10, 20, 30, 40, 50}};
-  const std::vector<float> moved = render_affine(picture, shift(2, 0), 1);
+  const GreyImage image{{1, 5}, {10, 20, 30, 40, 50}};
+  const std::vector<float> moved = render_affine(image, shift(2, 0), 1);
   // Right by two; mirrored about the first pixel at the left.
   EXPECT_EQ(moved, linear_intensity({{1, 5}, {30, 20, 10, 20, 30}}));
-  const std::vector<float> halfway = render_affine(picture, shift(3, 0), 0.5);
+  const std::vector<float> halfway = render_affine(image, shift(3, 0), 0.5);
   EXPECT_NEAR(halfway[3] * 255, 25, 1e-4);  // bilinear between 20 and 30
 }
 
-TEST(RenderAffine, TakesAPictureOfOnePixel) {
+TEST(RenderAffine, TakesAnImageOfOnePixel) {
   EXPECT_EQ(render_affine({{1, 1}, {51}}, shift(3, 2), 1), std::vector<float>{0.2f});
 }
 
 TEST(AffineInterval, TakesStepsOfAPixelAtMost) {
   const auto steps = [](const AffineMotion& motion) {
-    return AffineInterval(textured_picture({9, 9}), motion).steps();
+    return AffineInterval(textured_image({9, 9}), motion).steps();
   };
   EXPECT_EQ(steps({}), 1);
   EXPECT_EQ(steps(shift(0.2, 0)), 1);
@@ -96,12 +96,12 @@ TEST(AffineInterval, TakesStepsOfAPixelAtMost) {
   }
 }
 
-TEST(AffineInterval, FlowLeadsFromThePictureToTheLastRendered) {
-  const GreyImage picture = textured_picture({60, 80});
+TEST(AffineInterval, FlowLeadsFromTheImageToTheLastRendered) {
+  const GreyImage image = textured_image({60, 80});
   for (std::uint64_t seed = 0; seed < 5; ++seed) {
-    const AffineMotion motion = random_affine_motion(picture.size, 6, CounterRandom(seed));
-    const AffineInterval interval(picture, motion);
-    EXPECT_EQ(interval.size(), picture.size);
+    const AffineMotion motion = random_affine_motion(image.size, 6, CounterRandom(seed));
+    const AffineInterval interval(image, motion);
+    EXPECT_EQ(interval.size(), image.size);
     const FlowDisplacement flow = interval.flow();
     const std::vector<float> last = interval.render(interval.steps());
     double largest = 0;
@@ -139,7 +139,7 @@ TEST(AffineInterval, FlowLeadsFromThePictureToTheLastRendered) {
 
 constexpr ImageSize kPairSize{90, 120};
 
-/// PSNR in dB of a rendered picture against the texture moved right by dx, `margin` px inside.
+/// PSNR in dB of a rendered image against the texture moved right by dx, `margin` px inside.
 double psnr(const std::vector<float>& rendered, double dx, int margin) {
   double squares = 0;
   int count = 0;
@@ -154,8 +154,8 @@ double psnr(const std::vector<float>& rendered, double dx, int margin) {
 }
 
 TEST(FlowInterval, BeginsAndEndsWithTheFrames) {
-  const GreyImage previous = textured_picture(kPairSize);
-  const GreyImage next = textured_picture(kPairSize, 6);
+  const GreyImage previous = textured_image(kPairSize);
+  const GreyImage next = textured_image(kPairSize, 6);
   const FlowInterval interval(previous, next);
   EXPECT_EQ(interval.size(), kPairSize);
   EXPECT_EQ(interval.render(0), linear_intensity(previous));
@@ -163,7 +163,7 @@ TEST(FlowInterval, BeginsAndEndsWithTheFrames) {
 }
 
 TEST(FlowInterval, MovesATextureAlongItsShift) {
-  const FlowInterval interval(textured_picture(kPairSize), textured_picture(kPairSize, 6));
+  const FlowInterval interval(textured_image(kPairSize), textured_image(kPairSize, 6));
   EXPECT_GE(interval.steps(), 6);
   EXPECT_LE(interval.steps(), 8);
   for (int step = 1; step < interval.steps(); ++step) {
@@ -177,7 +177,7 @@ TEST(FlowInterval, MovesATextureAlongItsShift) {
 
 TEST(FlowInterval, FlowIsTheShift) {
   const FlowDisplacement flow =
-      FlowInterval(textured_picture(kPairSize), textured_picture(kPairSize, 4, -3)).flow();
+      FlowInterval(textured_image(kPairSize), textured_image(kPairSize, 4, -3)).flow();
   double error = 0;
   for (int y = 15; y < kPairSize.height - 15; ++y) {
     for (int x = 15; x < kPairSize.width - 15; ++x) {
@@ -189,13 +189,13 @@ TEST(FlowInterval, FlowIsTheShift) {
 }
 
 TEST(FlowInterval, StaysStillBetweenEqualFrames) {
-  const GreyImage picture = textured_picture(kPairSize);
-  const FlowInterval interval(picture, picture);
+  const GreyImage image = textured_image(kPairSize);
+  const FlowInterval interval(image, image);
   EXPECT_EQ(interval.steps(), 1);
   for (const float x : interval.flow().x_px) EXPECT_NEAR(x, 0, 0.01);
 }
 
-TEST(FlowInterval, ABrighteningPictureWithoutTextureFades) {
+TEST(FlowInterval, ABrighteningImageWithoutTextureFades) {
   const GreyImage dark{kPairSize, std::vector<std::uint8_t>(kPairSize.pixel_count(), 0)};
   const GreyImage bright{kPairSize, std::vector<std::uint8_t>(kPairSize.pixel_count(), 255)};
   const FlowInterval interval(dark, bright);
@@ -206,7 +206,7 @@ TEST(FlowInterval, ABrighteningPictureWithoutTextureFades) {
 
 TEST(FlowInterval, TakesTheSmallestAndOddSizes) {
   for (const ImageSize size : {ImageSize{1, 1}, {1, 40}, {7, 3}, {33, 65}, {200, 5}}) {
-    const FlowInterval interval(textured_picture(size), textured_picture(size, 2));
+    const FlowInterval interval(textured_image(size), textured_image(size, 2));
     for (int step = 0; step <= interval.steps(); ++step) {
       const std::vector<float> rendered = interval.render(step);
       ASSERT_EQ(rendered.size(), size.pixel_count());
@@ -216,29 +216,28 @@ TEST(FlowInterval, TakesTheSmallestAndOddSizes) {
 }
 
 TEST(FlowInterval, DoesNotDependOnTheNumberOfThreads) {
-  const auto picture_at = [](int threads) {
+  const auto image_at = [](int threads) {
     const int before = cv::getNumThreads();
     cv::setNumThreads(threads);
-    const FlowInterval interval(textured_picture(kPairSize), textured_picture(kPairSize, 5, 2));
+    const FlowInterval interval(textured_image(kPairSize), textured_image(kPairSize, 5, 2));
     const std::vector<float> rendered = interval.render(2);
     cv::setNumThreads(before);
     return rendered;
   };
-  EXPECT_EQ(picture_at(1), picture_at(3));
+  EXPECT_EQ(image_at(1), image_at(3));
 }
 
 TEST(FlowInterval, RefusesFramesOfTwoSizesAndNone) {
-  EXPECT_THROW(FlowInterval(textured_picture({9, 8}), textured_picture({8, 9})),
-               std::invalid_argument);
+  EXPECT_THROW(FlowInterval(textured_image({9, 8}), textured_image({8, 9})), std::invalid_argument);
   EXPECT_THROW(FlowInterval(GreyImage{}, GreyImage{}), std::invalid_argument);
 }
 
 TEST(SimulateInterval, AnAffinelyMovedEdgeFiresAlongItsWay) {
   // Bright (255) up to x = 7, dark (51) right of it, moved right by 4 px in 0.4 s: pixels 8..11
   // brighten one after the other, 0.1 s each, by ln(1.001/0.201) = 1.605: 5 events of 0.3.
-  GreyImage picture{{2, 14}, {}};
-  for (int i = 0; i < 28; ++i) picture.pixels.push_back(i % 14 <= 7 ? 255 : 51);
-  const AffineInterval interval(picture, {{1, 0, 4, 0, 1, 0}});
+  GreyImage image{{2, 14}, {}};
+  for (int i = 0; i < 28; ++i) image.pixels.push_back(i % 14 <= 7 ? 255 : 51);
+  const AffineInterval interval(image, {{1, 0, 4, 0, 1, 0}});
   const SensorSpec spec = exact_sensor(0.3);
   const std::vector<Event> events = simulate_interval(interval, spec, 0.4, CounterRandom(1));
   ASSERT_THAT(events, SizeIs(4 * 5 * 2));
@@ -254,15 +253,15 @@ TEST(SimulateInterval, AnAffinelyMovedEdgeFiresAlongItsWay) {
 }
 
 TEST(SimulateInterval, RefusesADurationOfNothing) {
-  const AffineInterval interval(textured_picture({4, 4}), {});
+  const AffineInterval interval(textured_image({4, 4}), {});
   EXPECT_THROW(simulate_interval(interval, {}, 0, CounterRandom(1)), std::invalid_argument);
   EXPECT_THROW(simulate_interval(interval, {}, -1, CounterRandom(1)), std::invalid_argument);
 }
 
 TEST(FeedInterval, GoesOnWhereTheIntervalBeforeEnded) {
   const SensorSpec spec = exact_sensor(0.1);
-  const GreyImage picture = textured_picture({20, 30});
-  const AffineInterval there(picture, {{1, 0, 3, 0, 1, 0}});
+  const GreyImage image = textured_image({20, 30});
+  const AffineInterval there(image, {{1, 0, 3, 0, 1, 0}});
   Sensor sensor(spec, there.size(), CounterRandom(1));
   sensor.step(there.render(0), 1);
   std::vector<Event> events;
@@ -276,23 +275,23 @@ TEST(FeedInterval, GoesOnWhereTheIntervalBeforeEnded) {
   EXPECT_LE(events.back().t_s, 1.7);
 }
 
-TEST(SimulateAffine, AStillPictureGivesNoEvents) {
-  EXPECT_THAT(simulate_affine(textured_picture({30, 40}), 0, SensorSpec{}, 0.1, CounterRandom(1)),
+TEST(SimulateAffine, AStillImageGivesNoEvents) {
+  EXPECT_THAT(simulate_affine(textured_image({30, 40}), 0, SensorSpec{}, 0.1, CounterRandom(1)),
               IsEmpty());
 }
 
 TEST(SimulateAffine, IsAFunctionOfTheSeed) {
-  const GreyImage picture = textured_picture({30, 40});
+  const GreyImage image = textured_image({30, 40});
   const auto events = [&](std::uint64_t seed) {
-    return simulate_affine(picture, 6, exact_sensor(0.1), 0.1, CounterRandom(seed));
+    return simulate_affine(image, 6, exact_sensor(0.1), 0.1, CounterRandom(seed));
   };
   EXPECT_THAT(events(1), ::testing::Not(IsEmpty()));
   EXPECT_EQ(events(1), events(1));
   EXPECT_NE(events(1), events(2));
-  EXPECT_THROW(simulate_affine(picture, -1, {}, 0.1, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROW(simulate_affine(image, -1, {}, 0.1, CounterRandom(1)), std::invalid_argument);
 }
 
-TEST(SimulateAffine, TakesAPictureOfOnePixel) {
+TEST(SimulateAffine, TakesAnImageOfOnePixel) {
   EXPECT_THAT(simulate_affine({{1, 1}, {9}}, 6, SensorSpec{}, 0.1, CounterRandom(1)), IsEmpty());
 }
 

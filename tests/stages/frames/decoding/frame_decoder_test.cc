@@ -11,9 +11,9 @@
 #include <thread>
 #include <vector>
 
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/video_frames.h"
-#include "tests/stages/base/pictures/test_pictures.h"
+#include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -23,7 +23,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::EndsWith;
-using testing::gradient_picture;
+using testing::gradient_image;
 using ::testing::HasSubstr;
 using testing::opencv_read;
 using testing::same_pixels;
@@ -31,10 +31,10 @@ using ::testing::StartsWith;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-TEST(ImageSizeProbe, PicturesAndVideos) {
+TEST(ImageSizeProbe, ImagesAndVideos) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.png", "b.jpg", "c.bmp"}) {
-    cv::imwrite((folder / name).string(), gradient_picture({31, 57}));
+    cv::imwrite((folder / name).string(), gradient_image({31, 57}));
     EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{31, 57})) << name;
   }
   testing::write_counting_video(folder / "clip.avi", 3);
@@ -44,7 +44,7 @@ TEST(ImageSizeProbe, PicturesAndVideos) {
 TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.png", "b.jpg"}) {
-    cv::imwrite((folder / name).string(), gradient_picture({120, 160}));
+    cv::imwrite((folder / name).string(), gradient_image({120, 160}));
     const auto size = std::filesystem::file_size(folder / name);
     std::filesystem::resize_file(folder / name, size * 3 / 4);
     EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{120, 160})) << name;
@@ -54,7 +54,7 @@ TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
 TEST(ImageSizeProbe, FaultsNameTheFile) {
   const TemporaryFolder folder;
   write_file(folder / "empty.png", "");
-  write_file(folder / "words.txt", "no picture");
+  write_file(folder / "words.txt", "no image");
   write_file(folder / "zeros.mp4", std::string(4096, '\0'));
   for (const std::string name : {"empty.png", "words.txt", "zeros.mp4", "none.jpg"}) {
     const auto outcome = probe_image_size(folder / name);
@@ -65,7 +65,7 @@ TEST(ImageSizeProbe, FaultsNameTheFile) {
   }
 }
 
-FrameRef picture_ref(const std::string& path) {
+FrameRef image_ref(const std::string& path) {
   FrameRef frame;
   frame.path = path;
   return frame;
@@ -79,8 +79,8 @@ TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
   const TemporaryFolder folder;
   const FrameDecoder decoder(folder.path());
   for (const std::string name : {"a.png", "b.jpg", "c.bmp", "d.ppm", "e.tiff", "f.webp"}) {
-    ASSERT_TRUE(cv::imwrite((folder / name).string(), gradient_picture({12, 20})));
-    const auto outcome = decoder.decode(picture_ref(name));
+    ASSERT_TRUE(cv::imwrite((folder / name).string(), gradient_image({12, 20})));
+    const auto outcome = decoder.decode(image_ref(name));
     ASSERT_EQ(fault(outcome), "no fault");
     EXPECT_TRUE(same_pixels(std::get<ColourFrame>(outcome), opencv_read(folder / name))) << name;
   }
@@ -90,12 +90,12 @@ TEST(FrameDecoder, ATruncatedWebpIsAFault) {
   const TemporaryFolder folder;
   const FrameDecoder decoder(folder.path());
   for (const int quality : {80, 101}) {  // beyond 100: without loss
-    ASSERT_TRUE(cv::imwrite((folder / "a.webp").string(), gradient_picture({120, 160}),
+    ASSERT_TRUE(cv::imwrite((folder / "a.webp").string(), gradient_image({120, 160}),
                             {cv::IMWRITE_WEBP_QUALITY, quality}));
     const std::string whole = testing::read_file(folder / "a.webp");
     for (std::size_t length = whole.size() - 1; length > 0; length = length * 9 / 10) {
       write_file(folder / "a.webp", whole.substr(0, length));
-      EXPECT_NE(fault(decoder.decode(picture_ref("a.webp"))), "no fault")
+      EXPECT_NE(fault(decoder.decode(image_ref("a.webp"))), "no fault")
           << length << " of " << whole.size() << " bytes, quality " << quality;
     }
   }
@@ -103,42 +103,41 @@ TEST(FrameDecoder, ATruncatedWebpIsAFault) {
 
 TEST(FrameDecoder, FormatIsToldByContentNotByName) {
   const TemporaryFolder folder;
-  cv::imwrite((folder / "a.png").string(), gradient_picture({12, 20}));
+  cv::imwrite((folder / "a.png").string(), gradient_image({12, 20}));
   std::filesystem::rename(folder / "a.png", folder / "a.jpg");
-  EXPECT_EQ(fault(FrameDecoder(folder.path()).decode(picture_ref("a.jpg"))), "no fault");
+  EXPECT_EQ(fault(FrameDecoder(folder.path()).decode(image_ref("a.jpg"))), "no fault");
 }
 
 TEST(FrameDecoder, FaultsSayWhatIsWrongAndNameTheFile) {
   const TemporaryFolder folder;
   const FrameDecoder decoder(folder.path());
   write_file(folder / "sub/empty.png", "");
-  write_file(folder / "text.png", "This is no picture.\n");
+  write_file(folder / "text.png", "This is no image.\n");
   write_file(folder / "short.jpg", "\xff\xd8\xff");
   std::filesystem::create_directory(folder / "folder.png");
-  cv::imwrite((folder / "cut.bmp").string(), gradient_picture({12, 20}));
+  cv::imwrite((folder / "cut.bmp").string(), gradient_image({12, 20}));
   std::filesystem::resize_file(folder / "cut.bmp", 300);
 
-  EXPECT_EQ(fault(decoder.decode(picture_ref("sub/empty.png"))),
+  EXPECT_EQ(fault(decoder.decode(image_ref("sub/empty.png"))),
             "expected an image, got an empty file, in sub/empty.png");
-  EXPECT_EQ(fault(decoder.decode(picture_ref("none.png"))),
-            "expected a file, got none, in none.png");
-  EXPECT_EQ(fault(decoder.decode(picture_ref("text.png"))),
+  EXPECT_EQ(fault(decoder.decode(image_ref("none.png"))), "expected a file, got none, in none.png");
+  EXPECT_EQ(fault(decoder.decode(image_ref("text.png"))),
             "expected an image, got a file of another kind, in text.png");
-  EXPECT_EQ(fault(decoder.decode(picture_ref("folder.png"))),
+  EXPECT_EQ(fault(decoder.decode(image_ref("folder.png"))),
             "expected a file, got a folder or device, in folder.png");
-  EXPECT_THAT(fault(decoder.decode(picture_ref("short.jpg"))),
+  EXPECT_THAT(fault(decoder.decode(image_ref("short.jpg"))),
               AllOf(HasSubstr("expected a whole JPEG, got "), HasSubstr(", in short.jpg")));
-  EXPECT_EQ(fault(decoder.decode(picture_ref("cut.bmp"))),
+  EXPECT_EQ(fault(decoder.decode(image_ref("cut.bmp"))),
             "expected a whole image, got a damaged one, in cut.bmp");
 }
 
 TEST(FrameDecoder, OpencvTellsNobodyElseWhatIsWrong) {
   const TemporaryFolder folder;
-  cv::imwrite((folder / "cut.bmp").string(), gradient_picture({12, 20}));
+  cv::imwrite((folder / "cut.bmp").string(), gradient_image({12, 20}));
   std::filesystem::resize_file(folder / "cut.bmp", 300);
   silence_decoders();
   ::testing::internal::CaptureStderr();
-  const std::string reason = fault(FrameDecoder(folder.path()).decode(picture_ref("cut.bmp")));
+  const std::string reason = fault(FrameDecoder(folder.path()).decode(image_ref("cut.bmp")));
   std::cerr << "from us\n";
   EXPECT_EQ(::testing::internal::GetCapturedStderr(), "from us\n");
   EXPECT_THAT(reason, HasSubstr("got a damaged one"));
@@ -148,7 +147,7 @@ TEST(FrameDecoder, VideoFramesAreFoundByCountingInAnyOrder) {
   const TemporaryFolder folder;
   testing::write_counting_video(folder / "clip.avi", 100);
   const FrameDecoder decoder(folder.path(), 6);
-  // Forward, within the kept frames, far back (opens anew), the last one.
+  // Forward, within the kept frames, far back (opens again), the last one.
   for (const int position : {0, 5, 3, 80, 75, 0, 99}) {
     const auto outcome = decoder.decode(testing::video_ref("clip.avi", position));
     ASSERT_EQ(fault(outcome), "no fault");
@@ -161,7 +160,7 @@ TEST(FrameDecoder, KeepsAsManyFramesAsToldAndOpensAnewForEarlierOnes) {
   testing::write_counting_video(folder / "clip.avi", 100);
   const FrameDecoder decoder(folder.path(), 70);
   ASSERT_EQ(fault(decoder.decode(testing::video_ref("clip.avi", 99))), "no fault");
-  // The open video outlives its name; opening it anew fails.
+  // The open video outlives its name; opening it again fails.
   std::filesystem::remove(folder / "clip.avi");
   for (const int position : {30, 99, 31}) {  // the latest 70 are 30..99
     const auto outcome = decoder.decode(testing::video_ref("clip.avi", position));
@@ -208,7 +207,7 @@ TEST(FrameDecoder, SeveralThreadsReadOneVideo) {
 TEST(FrameDecoder, VideoFaults) {
   const TemporaryFolder folder;
   testing::write_counting_video(folder / "clip.avi", 10);
-  write_file(folder / "words.txt", "FFmpeg would draw these words as a picture.\n");
+  write_file(folder / "words.txt", "FFmpeg would draw these words as an image.\n");
   const FrameDecoder decoder(folder.path());
 
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("clip.avi", 10))),

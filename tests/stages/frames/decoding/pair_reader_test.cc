@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "tests/stages/base/pictures/test_pictures.h"
+#include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -37,8 +37,8 @@ FramePair pair_of(const std::string& previous, const std::string& next) {
   return pair;
 }
 
-PreparedPair read(const TemporaryFolder& folder, const cv::Mat& picture, const ImageSpec& spec) {
-  cv::imwrite((folder / "a.png").string(), picture);
+PreparedPair read(const TemporaryFolder& folder, const cv::Mat& image, const ImageSpec& spec) {
+  cv::imwrite((folder / "a.png").string(), image);
   auto outcome = PairReader(folder.path(), spec).read(pair_of("a.png", "a.png"));
   if (is_fault(outcome)) throw std::runtime_error(std::get<SampleFault>(outcome).reason);
   return std::get<PreparedPair>(outcome);
@@ -54,9 +54,9 @@ TEST(PairReader, GreyIsWeightedAndScaledToMinusOneToOne) {
               ElementsAre(FloatEq((128.0f / 255.0f - 0.5f) * 2.0f), FloatEq(1.0f)));
 }
 
-TEST(PairReader, WithoutASizeThePictureKeepsItsOwn) {
+TEST(PairReader, WithoutASizeTheImageKeepsItsOwn) {
   const TemporaryFolder folder;
-  const PreparedPair pair = read(folder, testing::gradient_picture({5, 7}), {});
+  const PreparedPair pair = read(folder, testing::gradient_image({5, 7}), {});
   EXPECT_EQ(pair.content, (ImageSize{5, 7}));
   EXPECT_EQ(pair.placement.volume, (ImageSize{5, 7}));
   EXPECT_EQ(pair.input.size(), 2u * 5 * 7);
@@ -64,12 +64,12 @@ TEST(PairReader, WithoutASizeThePictureKeepsItsOwn) {
 
 TEST(PairReader, StretchesBilinearly) {
   const TemporaryFolder folder;
-  const cv::Mat picture = (cv::Mat_<std::uint8_t>(2, 4) << 0, 100, 20, 40,  //
-                           50, 150, 60, 80);
+  const cv::Mat image = (cv::Mat_<std::uint8_t>(2, 4) << 0, 100, 20, 40,  //
+                         50, 150, 60, 80);
   ImageSpec spec;
   spec.size = ImageSize{1, 2};
   // Halved in both directions, a pixel's centre falls between four: their means are 75 and 50.
-  const PreparedPair pair = read(folder, picture, spec);
+  const PreparedPair pair = read(folder, image, spec);
   EXPECT_THAT(levels(pair), ElementsAre(75, 50, 75, 50));
   EXPECT_EQ(pair.content, (ImageSize{1, 2}));
 }
@@ -81,29 +81,29 @@ TEST(PairReader, GreyBeforeAndAfterResizingRoundDifferently) {
   // mean of 0, 1, 1, 1 to 1. Red's mean is 1 too: 0.342 + 0.299 = 0.641 rounds to 1. With red 0, 2,
   // 0, 0: grey first is 0, 1.054 -> 1, 0, 0 with mean 0.25 -> 0; grey last, blue 3 and red 1: 0.641
   // -> 1.
-  cv::Mat picture(2, 2, CV_8UC3);
-  picture.at<cv::Vec3b>(0, 0) = {0, 0, 0};
-  picture.at<cv::Vec3b>(0, 1) = {4, 0, 2};
-  picture.at<cv::Vec3b>(1, 0) = {4, 0, 0};
-  picture.at<cv::Vec3b>(1, 1) = {4, 0, 0};
+  cv::Mat image(2, 2, CV_8UC3);
+  image.at<cv::Vec3b>(0, 0) = {0, 0, 0};
+  image.at<cv::Vec3b>(0, 1) = {4, 0, 2};
+  image.at<cv::Vec3b>(1, 0) = {4, 0, 0};
+  image.at<cv::Vec3b>(1, 1) = {4, 0, 0};
   ImageSpec spec;
   spec.size = ImageSize{1, 1};
   spec.grey = GreyOrder::kBeforeResize;
-  EXPECT_THAT(levels(read(folder, picture, spec)), ElementsAre(0, 0));
+  EXPECT_THAT(levels(read(folder, image, spec)), ElementsAre(0, 0));
   spec.grey = GreyOrder::kAfterResize;
-  EXPECT_THAT(levels(read(folder, picture, spec)), ElementsAre(1, 1));
+  EXPECT_THAT(levels(read(folder, image, spec)), ElementsAre(1, 1));
 }
 
-TEST(PairReader, BlursTheResizedPictureBeforeItIsCut) {
+TEST(PairReader, BlursTheResizedImageBeforeItIsCut) {
   const TemporaryFolder folder;
   // One row of four, resized to itself, cropped to the middle two. The 3x1 kernel is 1/4 1/2 1/4
   // and takes in 200 and 40 from outside the crop: (200 + 0 + 100)/4 = 75, (0 + 200 + 40)/4 = 60.
-  const cv::Mat picture = (cv::Mat_<std::uint8_t>(1, 4) << 200, 0, 100, 40);
+  const cv::Mat image = (cv::Mat_<std::uint8_t>(1, 4) << 200, 0, 100, 40);
   ImageSpec spec;
   spec.size = ImageSize{1, 2};
   spec.fit = ImageFit::kCrop;
   spec.blur = 3;
-  const PreparedPair pair = read(folder, picture, spec);
+  const PreparedPair pair = read(folder, image, spec);
   EXPECT_THAT(levels(pair), ElementsAre(75, 60, 75, 60));
   EXPECT_EQ(pair.content_x, 0);
   EXPECT_EQ(pair.content, (ImageSize{1, 2}));
@@ -124,8 +124,8 @@ TEST(PairReader, LetterboxLeavesTheBordersOut) {
 
 TEST(PairReader, FramesOfDifferentSizesAreAFault) {
   const TemporaryFolder folder;
-  cv::imwrite((folder / "a.png").string(), testing::gradient_picture({5, 7}));
-  cv::imwrite((folder / "b.png").string(), testing::gradient_picture({5, 8}));
+  cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
+  cv::imwrite((folder / "b.png").string(), testing::gradient_image({5, 8}));
   const auto outcome = PairReader(folder.path(), {}).read(pair_of("a.png", "b.png"));
   EXPECT_EQ(std::get<SampleFault>(outcome).reason,
             "expected two frames of one size, got 7x5 in a.png and 8x5, in b.png");
@@ -133,7 +133,7 @@ TEST(PairReader, FramesOfDifferentSizesAreAFault) {
 
 TEST(PairReader, ABadFrameOfEitherSideIsAFault) {
   const TemporaryFolder folder;
-  cv::imwrite((folder / "a.png").string(), testing::gradient_picture({5, 7}));
+  cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
   const PairReader reader(folder.path(), {});
   for (const auto& pair : {pair_of("none.png", "a.png"), pair_of("a.png", "none.png")}) {
     const auto outcome = reader.read(pair);

@@ -5,7 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "tests/stages/base/pictures/test_pictures.h"
+#include "tests/stages/base/images/test_images.h"
 
 namespace eventgan {
 namespace {
@@ -14,7 +14,7 @@ ColourFrame plain_frame(ImageSize size, std::uint8_t value) {
   return {size, std::vector<std::uint8_t>(3 * size.pixel_count(), value)};
 }
 
-TEST(PlacedPicture, BordersAreBlack) {
+TEST(PlacedImage, BordersAreBlack) {
   // 2x2 enlarged to 4x4 in the middle of 4x8.
   const Placement placement{{2, 2}, {4, 4}, {4, 8}, /*offset_x=*/2, /*offset_y=*/0};
   const auto placed = place_colour(plain_frame({2, 2}, 200), placement);
@@ -24,14 +24,14 @@ TEST(PlacedPicture, BordersAreBlack) {
   }
 }
 
-TEST(PlacedPicture, CropKeepsTheMiddle) {
+TEST(PlacedImage, CropKeepsTheMiddle) {
   ColourFrame frame = plain_frame({1, 4}, 0);
   for (int x = 0; x < 4; ++x) frame.bgr[3 * x + 1] = static_cast<std::uint8_t>(10 * x);
   const Placement placement{{1, 4}, {1, 4}, {1, 2}, /*offset_x=*/-1, /*offset_y=*/0};
   EXPECT_EQ(place_colour(frame, placement), (std::vector<std::uint8_t>{0, 10, 0, 0, 20, 0}));
 }
 
-TEST(PlacedPicture, RefusesAFrameOfAnotherSize) {
+TEST(PlacedImage, RefusesAFrameOfAnotherSize) {
   const Placement placement{{2, 2}, {2, 2}, {2, 2}, 0, 0};
   EXPECT_THROW(place_colour(plain_frame({2, 3}, 0), placement), std::invalid_argument);
 }
@@ -42,7 +42,7 @@ TEST(VisiblePart, StretchIsTheWholeVolume) {
   EXPECT_EQ(part.volume_x + part.volume_y + part.scaled_x + part.scaled_y, 0);
 }
 
-TEST(VisiblePart, LetterboxIsTheWholePicture) {
+TEST(VisiblePart, LetterboxIsTheWholeImage) {
   const VisiblePart part = visible_part({{10, 20}, {5, 10}, {9, 10}, 0, 2});
   EXPECT_EQ(part.size, (ImageSize{5, 10}));
   EXPECT_EQ(part.volume_y, 2);
@@ -57,7 +57,7 @@ TEST(VisiblePart, CropIsTheWholeVolumeCutFromTheMiddle) {
   EXPECT_EQ(part.volume_x, 0);
 }
 
-ColourView view_of(const cv::Mat& picture) { return {{picture.rows, picture.cols}, picture.data}; }
+ColourView view_of(const cv::Mat& image) { return {{image.rows, image.cols}, image.data}; }
 
 TEST(PreparedFrame, EveryLevelBecomesTheSameFloatAsItsEquation) {
   std::vector<std::uint8_t> levels(256);
@@ -74,12 +74,12 @@ TEST(PreparedFrame, EveryLevelBecomesTheSameFloatAsItsEquation) {
 
 TEST(PreparedFrame, KeepsOnlyTheVisiblePartAndTheSizeItCameFrom) {
   // 4x8 into 4x4: two columns are cut on either side.
-  cv::Mat picture(4, 8, CV_8UC3);
-  for (int x = 0; x < 8; ++x) picture.col(x).setTo(cv::Scalar::all(10 * x));
+  cv::Mat image(4, 8, CV_8UC3);
+  for (int x = 0; x < 8; ++x) image.col(x).setTo(cv::Scalar::all(10 * x));
   ImageSpec spec;
   spec.size = ImageSize{4, 4};
   spec.fit = ImageFit::kCrop;
-  const PreparedFrame frame = prepare_frame(view_of(picture), spec);
+  const PreparedFrame frame = prepare_frame(view_of(image), spec);
   EXPECT_EQ(frame.placement.source, (ImageSize{4, 8}));
   std::vector<std::uint8_t> expected;
   for (int y = 0; y < 4; ++y) expected.insert(expected.end(), {20, 30, 40, 50});
@@ -87,15 +87,15 @@ TEST(PreparedFrame, KeepsOnlyTheVisiblePartAndTheSizeItCameFrom) {
 }
 
 TEST(PreparedFrame, AnotherSpecPreparesTheSameFrameOtherwise) {
-  const cv::Mat picture = testing::gradient_picture({20, 30});
+  const cv::Mat image = testing::gradient_image({20, 30});
   ImageSpec spec;
   spec.size = ImageSize{16, 16};
-  const auto plain = prepare_frame(view_of(picture), spec).grey;
+  const auto plain = prepare_frame(view_of(image), spec).grey;
   spec.blur = 3;
-  const auto blurred = prepare_frame(view_of(picture), spec).grey;
+  const auto blurred = prepare_frame(view_of(image), spec).grey;
   spec.size = ImageSize{17, 16};
   EXPECT_NE(plain, blurred);
-  EXPECT_EQ(prepare_frame(view_of(picture), spec).grey.size(), 16u * 17);
+  EXPECT_EQ(prepare_frame(view_of(image), spec).grey.size(), 16u * 17);
 }
 
 TEST(PreparedFrame, WhatCannotBePlacedIsRefused) {

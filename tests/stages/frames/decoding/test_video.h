@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
-#include "stages/base/pictures/picture_file.h"
+#include "stages/base/images/image_file.h"
 
 namespace eventgan::testing {
 
@@ -35,7 +35,7 @@ inline std::string matroska_element(std::string_view id, const std::string& cont
   return element + content;
 }
 
-/// Such a video as Matroska (RFC 9559) of JPEG pictures, frame i shown at times_ms[i], at most
+/// Such a video as Matroska (RFC 9559) of JPEG images, frame i shown at times_ms[i], at most
 /// 32767 milliseconds after the first: OpenCV writes even times alone.
 inline void write_timed_video(const std::filesystem::path& path, const std::vector<int>& times_ms) {
   using namespace std::string_literals;

@@ -122,8 +122,8 @@ TEST_F(Dhp19Test, CutsTheTwoCamerasIntoWindows) {
   EXPECT_EQ(dataset->label_schema().joint_names, kNames);
   const LabelledFrame& frame = dataset->labelled_frames()[1];
   EXPECT_EQ(frame.frame.path, "dhp19/DVS_movies/S1/session1/mov1.h5");
-  EXPECT_EQ(dataset->neighbour(frame, -1).frame.index, 3);
-  EXPECT_EQ(dataset->neighbour(frame, 1).frame.index, 5);
+  EXPECT_EQ(dataset->paired_frame(frame, -1).frame.index, 3);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).frame.index, 5);
   const auto window = std::get<EventWindow>(dataset->events(frame.label_key));
   EXPECT_EQ(window.sensor, (ImageSize{260, 346}));
   ASSERT_EQ(window.events.size(), 3u);

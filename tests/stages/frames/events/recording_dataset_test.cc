@@ -48,7 +48,8 @@ class RecordingDatasetTest : public ::testing::Test {
   /// Begin and end of a sample's window.
   static std::array<double, 2> window(const Dataset& dataset, std::size_t sample) {
     const LabelledFrame& frame = dataset.labelled_frames().at(sample);
-    return {dataset.neighbour(frame, -1).frame.time_s, dataset.neighbour(frame, 1).frame.time_s};
+    return {dataset.paired_frame(frame, -1).frame.time_s,
+            dataset.paired_frame(frame, 1).frame.time_s};
   }
 
   static std::vector<Event> events(const Dataset& dataset, std::size_t sample) {
@@ -70,9 +71,9 @@ TEST_F(RecordingDatasetTest, WithoutLabelsEachFrameEndsItsInterval) {
   EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[2], all_[3]));
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[4], all_[5]));
   const LabelledFrame& frame = dataset->labelled_frames()[0];
-  EXPECT_EQ(dataset->neighbour(frame, -1).frame, (FrameRef{"drive.h5", 0, 0}));
-  EXPECT_EQ(dataset->neighbour(frame, 1).frame, (FrameRef{"drive.h5", 1, 1}));
-  EXPECT_EQ(dataset->neighbour(frame, 2).state, Neighbour::State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, -1).frame, (FrameRef{"drive.h5", 0, 0}));
+  EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"drive.h5", 1, 1}));
+  EXPECT_EQ(dataset->paired_frame(frame, 2).state, PairedFrame::State::kBeyond);
   EXPECT_EQ(dataset->sensor_size(frame.label_key), (ImageSize{3, 4}));
   EXPECT_EQ(std::get<Annotation>(dataset->annotation(frame.label_key)), Annotation{});
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());

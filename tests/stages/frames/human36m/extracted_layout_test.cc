@@ -1,3 +1,5 @@
+#include "stages/frames/human36m/detail/extracted_layout.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +11,6 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/human36m/extracted_layout_internal.h"
 #include "stages/frames/human36m/human36m_dataset.h"
 #include "stages/labels/label_mapping.h"
 #include "tests/testing/npy_bytes.h"
@@ -50,7 +51,7 @@ TEST(ExtractedNameTest, RefusesOtherNames) {
   }
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 const std::string kVideo = "S1_Walking_1.7";
 
@@ -91,7 +92,7 @@ class ExtractedLayoutTest : public ::testing::Test {
  protected:
   ExtractedLayoutTest() { std::filesystem::create_directories(folder_ / "h36m"); }
 
-  void add_pictures(const std::vector<std::string>& paths) {
+  void add_images(const std::vector<std::string>& paths) {
     for (const std::string& path : paths) testing::write_file(folder_ / "h36m" / path, "");
   }
   void add_npz(const std::map<std::string, std::string>& arrays,
@@ -107,10 +108,10 @@ class ExtractedLayoutTest : public ::testing::Test {
 };
 
 TEST_F(ExtractedLayoutTest, GivesEveryRowAsASample) {
-  add_pictures({"S1/" + kVideo + "/" + kVideo + "_000001.jpg",
-                "S1/" + kVideo + "/" + kVideo + "_000006.jpg",
-                "S1/" + kVideo + "/" + kVideo + "_000016.jpg",
-                "S1/" + kVideo + "/" + kVideo + "_000006_mask.png"});
+  add_images({"S1/" + kVideo + "/" + kVideo + "_000001.jpg",
+              "S1/" + kVideo + "/" + kVideo + "_000006.jpg",
+              "S1/" + kVideo + "/" + kVideo + "_000016.jpg",
+              "S1/" + kVideo + "/" + kVideo + "_000006_mask.png"});
   // A bare name and a path.
   add_npz(members({kVideo + "_000006.jpg", "S1/" + kVideo + "/" + kVideo + "_000001.jpg"}));
   const auto dataset = open();
@@ -125,11 +126,11 @@ TEST_F(ExtractedLayoutTest, GivesEveryRowAsASample) {
   EXPECT_EQ(frames[1].frame.time_s, 0.1);  // five frames of a fiftieth of a second
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("h36m/a.npz"));
 
-  EXPECT_EQ(dataset->neighbour(frames[1], -1).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frames[1], 1).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.path,
+  EXPECT_EQ(dataset->paired_frame(frames[1], -1).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 1).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 1).frame.path,
             "h36m/S1/" + kVideo + "/" + kVideo + "_000016.jpg");
-  EXPECT_EQ(dataset->neighbour(frames[1], 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 2).state, State::kBeyond);
 }
 
 TEST_F(ExtractedLayoutTest, ReadsThePersonOfARow) {
@@ -293,17 +294,17 @@ TEST_F(ExtractedLayoutTest, ValuesThatAreNotFiniteAreAFaultOfTheirRow) {
 }
 
 TEST_F(ExtractedLayoutTest, ReadsOneFolderOfManyVideosOnce) {
-  add_pictures({"all/S1_A.7_000001.jpg", "all/S1_A.7_000006.jpg", "all/S5_B.8_000001.jpg",
-                "all/S5_B.8_000003.png", "all/S5_B.8_000003.jpg"});
+  add_images({"all/S1_A.7_000001.jpg", "all/S1_A.7_000006.jpg", "all/S5_B.8_000001.jpg",
+              "all/S5_B.8_000003.png", "all/S5_B.8_000003.jpg"});
   add_npz(members({"all/S1_A.7_000001.jpg", "./all/S5_B.8_000001.jpg"}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
-  EXPECT_EQ(dataset->neighbour(frames[0], 1).frame.index, 6);
-  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.path, "h36m/all/S5_B.8_000003.jpg");
+  EXPECT_EQ(dataset->paired_frame(frames[0], 1).frame.index, 6);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 1).frame.path, "h36m/all/S5_B.8_000003.jpg");
 }
 
-TEST_F(ExtractedLayoutTest, TellsOfPicturesWithoutLabels) {
-  add_pictures(
+TEST_F(ExtractedLayoutTest, TellsOfImagesWithoutLabels) {
+  add_images(
       {"S1/" + kVideo + "/" + kVideo + "_000001.jpg", "S1/S1_Eating.7/S1_Eating.7_000001.jpg"});
   add_npz(members({kVideo + "_000001.jpg"}));
   EXPECT_THAT(open()->notes(),
@@ -311,9 +312,9 @@ TEST_F(ExtractedLayoutTest, TellsOfPicturesWithoutLabels) {
                                   "h36m/S1/S1_Eating.7"));
 }
 
-TEST_F(ExtractedLayoutTest, PicturesLeftOutAreCountedAndNamed) {
-  add_pictures({"all/S1_A.7_000001.jpg", "all/S1_A.7_000001.png", "all/S1_A.7_000006.webp",
-                "all/S1_A.7_000006_mask.png", "all/S1_A.7_000011.JPG", "all/readme.txt"});
+TEST_F(ExtractedLayoutTest, ImagesLeftOutAreCountedAndNamed) {
+  add_images({"all/S1_A.7_000001.jpg", "all/S1_A.7_000001.png", "all/S1_A.7_000006.webp",
+              "all/S1_A.7_000006_mask.png", "all/S1_A.7_000011.JPG", "all/readme.txt"});
   add_npz(members({"all/S1_A.7_000001.jpg"}));
   EXPECT_THAT(open()->notes(),
               ::testing::Contains("4 pictures left out in h36m/all: S1_A.7_000001.png, "
@@ -335,8 +336,8 @@ TEST_F(ExtractedLayoutTest, ReadsSharedData) {
   EXPECT_DOUBLE_EQ(frames[1].frame.time_s, 2060 / 50.0);
   for (const LabelledFrame& frame : frames) {
     EXPECT_TRUE(std::filesystem::exists(data / frame.frame.path));
-    EXPECT_EQ(dataset->neighbour(frame, 0).state, State::kPresent);
-    EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
+    EXPECT_EQ(dataset->paired_frame(frame, 0).state, State::kPresent);
+    EXPECT_EQ(dataset->paired_frame(frame, 1).state, State::kBeyond);
   }
   const auto outcome = dataset->annotation(frames[0].label_key);
   ASSERT_FALSE(is_fault(outcome));
@@ -402,7 +403,7 @@ Point projected(const Intrinsics& camera, const LensDistortion& lens,
           camera.focal_y * (b * d + lens.p1 * r2) + camera.centre_y};
 }
 
-TEST_F(RealPeopleTest, CameraAndDistortionProjectTheJointsInThePictureAndInTheVolume) {
+TEST_F(RealPeopleTest, CameraAndDistortionProjectTheJointsInTheImageAndInTheVolume) {
   for (const Annotation& annotation : annotations_) {
     const Person& person = annotation.persons.at(0);
     ASSERT_TRUE(person.camera && person.distortion);

@@ -20,7 +20,7 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
-using State = Neighbour::State;
+using State = PairedFrame::State;
 using Datasets = std::map<std::string, testing::Hdf5Dataset>;
 
 SourceSpec fetch_spec(const std::string& root) {
@@ -33,8 +33,8 @@ SourceSpec fetch_spec(const std::string& root) {
 
 class FetchLayoutTest : public ::testing::Test {
  protected:
-  void add_pictures(const std::string& camera, const std::vector<int>& numbers,
-                    const std::string& action = "S1/Walking-1") {
+  void add_images(const std::string& camera, const std::vector<int>& numbers,
+                  const std::string& action = "S1/Walking-1") {
     for (const int number : numbers) {
       char name[32];
       std::snprintf(name, sizeof(name), "img_%06d.jpg", number);
@@ -52,8 +52,8 @@ class FetchLayoutTest : public ::testing::Test {
 };
 
 TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
-  add_pictures("7", {1, 6, 11});
-  add_pictures("8", {1, 6});
+  add_images("7", {1, 6, 11});
+  add_images("8", {1, 6});
   add_annotations(fetch_annotations({{8, 6}, {7, 11}, {7, 1}}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
@@ -75,7 +75,7 @@ TEST_F(FetchLayoutTest, GivesEveryRowAsASample) {
 }
 
 TEST_F(FetchLayoutTest, ReadsThePersonOfARow) {
-  add_pictures("7", {1, 6});
+  add_images("7", {1, 6});
   add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
   const auto dataset = open();
   const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
@@ -177,7 +177,7 @@ TEST_F(FetchLayoutTest, ACameraThatDoesNotProjectTheJointsIsNotClaimed) {
 }
 
 TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
-  add_pictures("7", {1, 6});
+  add_images("7", {1, 6});
   auto datasets = fetch_annotations({{7, 1}, {7, 6}});
   datasets["pose/other"] = {{2, 1}, std::vector<double>{0.1, 1.0 / 3}};
   datasets["float"] = {{2}, std::vector<float>{0.5f, 0.1f}};
@@ -202,69 +202,69 @@ TEST_F(FetchLayoutTest, OriginalHoldsEveryFieldOfTheRow) {
 }
 
 TEST_F(FetchLayoutTest, RowsAsManyAsIntrinsicsAreNotMixedUp) {
-  add_pictures("7", {1, 6, 11, 16});
+  add_images("7", {1, 6, 11, 16});
   add_annotations(fetch_annotations({{7, 1}, {7, 6}, {7, 11}, {7, 16}}));
   const auto outcome = open()->annotation("S1/Walking-1/annot.h5#0");
   const auto original = nlohmann::json::parse(std::get<Annotation>(outcome).original);
   EXPECT_EQ(original["intrinsics/7"].size(), 4u);
 }
 
-TEST_F(FetchLayoutTest, NeighboursCountFramesThatAreStoredOrLabelled) {
-  add_pictures("7", {1, 6, 16, 21});  // 11 and 26 are labelled, but lost
+TEST_F(FetchLayoutTest, PairedFramesCountFramesThatAreStoredOrLabelled) {
+  add_images("7", {1, 6, 16, 21});  // 11 and 26 are labelled, but lost
   add_annotations(fetch_annotations({{7, 6}, {7, 11}, {7, 26}}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
   ASSERT_EQ(frames[0].frame.index, 6);
-  const Neighbour before = dataset->neighbour(frames[0], -1);
+  const PairedFrame before = dataset->paired_frame(frames[0], -1);
   EXPECT_EQ(before.state, State::kPresent);
   EXPECT_EQ(before.frame.index, 1);
   EXPECT_EQ(before.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000001.jpg");
-  EXPECT_EQ(dataset->neighbour(frames[0], 0).state, State::kPresent);
-  const Neighbour hole = dataset->neighbour(frames[0], 1);
-  EXPECT_EQ(hole.state, State::kHole);
-  EXPECT_EQ(hole.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000011.jpg");
-  EXPECT_EQ(dataset->neighbour(frames[0], 2).frame.index, 16);
-  EXPECT_NEAR(dataset->neighbour(frames[0], 2).frame.time_s, 0.3, 1e-12);
-  EXPECT_EQ(dataset->neighbour(frames[0], 4).state, State::kHole);
-  EXPECT_EQ(dataset->neighbour(frames[0], 4).frame.index, 26);
-  EXPECT_EQ(dataset->neighbour(frames[0], 5).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frames[0], -2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 0).state, State::kPresent);
+  const PairedFrame missing = dataset->paired_frame(frames[0], 1);
+  EXPECT_EQ(missing.state, State::kMissing);
+  EXPECT_EQ(missing.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000011.jpg");
+  EXPECT_EQ(dataset->paired_frame(frames[0], 2).frame.index, 16);
+  EXPECT_NEAR(dataset->paired_frame(frames[0], 2).frame.time_s, 0.3, 1e-12);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 4).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 4).frame.index, 26);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 5).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[0], -2).state, State::kBeyond);
 }
 
-TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNoHoles) {
+TEST_F(FetchLayoutTest, FramesKeptAtIrregularTimesAreNotMissing) {
   // As h36m-fetch selects them: those at which a joint has moved by 40 mm.
   const std::vector<int> kept = {1, 14, 16, 17, 30};
-  add_pictures("7", kept);
+  add_images("7", kept);
   add_annotations(fetch_annotations({{7, 1}, {7, 14}, {7, 16}, {7, 17}, {7, 30}}));
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
   for (int i = 0; i < 5; ++i) {
     for (int step = -i; step < 5 - i; ++step) {
-      const Neighbour found = dataset->neighbour(frames[static_cast<std::size_t>(i)], step);
+      const PairedFrame found = dataset->paired_frame(frames[static_cast<std::size_t>(i)], step);
       EXPECT_EQ(found.state, State::kPresent);
       EXPECT_EQ(found.frame.index, kept[static_cast<std::size_t>(i + step)]);
     }
   }
-  EXPECT_NEAR(dataset->neighbour(frames[0], 1).frame.time_s - frames[0].frame.time_s, 13 / 50.0,
+  EXPECT_NEAR(dataset->paired_frame(frames[0], 1).frame.time_s - frames[0].frame.time_s, 13 / 50.0,
               1e-12);
 }
 
-TEST_F(FetchLayoutTest, RowsWithoutPictureStayLabelled) {
+TEST_F(FetchLayoutTest, RowsWithoutImageStayLabelled) {
   add_annotations(fetch_annotations({{7, 1}, {7, 6}}));
   const auto dataset = open();
   ASSERT_EQ(dataset->labelled_frames().size(), 2u);
-  const Neighbour itself = dataset->neighbour(dataset->labelled_frames()[1], 0);
-  EXPECT_EQ(itself.state, State::kHole);
+  const PairedFrame itself = dataset->paired_frame(dataset->labelled_frames()[1], 0);
+  EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame.path, "h36m/S1/Walking-1/imageSequence/7/img_000006.jpg");
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], -1).state, State::kHole);
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], -1).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 1).state, State::kBeyond);
 }
 
-TEST_F(FetchLayoutTest, TellsOfPicturesWithoutLabelsAndCamerasWithoutIntrinsics) {
-  add_pictures("7", {1});
-  add_pictures("8", {1});
-  add_pictures("9", {1});
-  add_pictures("7", {1}, "S5/Eating");
+TEST_F(FetchLayoutTest, TellsOfImagesWithoutLabelsAndCamerasWithoutIntrinsics) {
+  add_images("7", {1});
+  add_images("8", {1});
+  add_images("9", {1});
+  add_images("7", {1}, "S5/Eating");
   add_annotations(fetch_annotations({{7, 1}, {8, 1}}));
   const auto dataset = open();
   EXPECT_THAT(dataset->notes(),
@@ -276,7 +276,7 @@ TEST_F(FetchLayoutTest, TellsOfPicturesWithoutLabelsAndCamerasWithoutIntrinsics)
 }
 
 TEST_F(FetchLayoutTest, FilesLeftOutAreCountedAndNamed) {
-  add_pictures("7", {1, 6});
+  add_images("7", {1, 6});
   const auto camera = folder_ / "h36m/S1/Walking-1/imageSequence/7";
   testing::write_file(camera / "img_000006.png", "");
   testing::write_file(camera / "frame_000011.jpg", "");
@@ -385,12 +385,12 @@ TEST_F(FetchLayoutTest, ReadsSharedData) {
                                                   HasSubstr("Directions-1/annot.h5"))));
   EXPECT_EQ(dataset->label_schema().joint_names.size(), 32u);
   for (const LabelledFrame& frame : frames) {
-    EXPECT_EQ(dataset->neighbour(frame, 0).state, State::kPresent);
+    EXPECT_EQ(dataset->paired_frame(frame, 0).state, State::kPresent);
     EXPECT_TRUE(std::filesystem::exists(data / frame.frame.path));
     EXPECT_FALSE(is_fault(dataset->annotation(frame.label_key)));
   }
-  EXPECT_EQ(dataset->neighbour(frames[0], 6).frame.index, 31);
-  EXPECT_EQ(dataset->neighbour(frames[0], 9).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 6).frame.index, 31);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 9).state, State::kBeyond);
   const auto outcome = dataset->annotation(frames[17].label_key);
   EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);
 }

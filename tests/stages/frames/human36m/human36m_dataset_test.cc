@@ -1,3 +1,5 @@
+#include "stages/frames/human36m/detail/human36m_dataset.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -6,9 +8,8 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/human36m/camera_book_internal.h"
-#include "stages/frames/human36m/human36m_dataset_internal.h"
-#include "stages/frames/human36m/pose_table_internal.h"
+#include "stages/frames/human36m/detail/camera_book.h"
+#include "stages/frames/human36m/detail/pose_table.h"
 #include "tests/stages/frames/human36m/human36m_fixture.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
@@ -78,7 +79,7 @@ TEST(DeriveFrame, TakesAnnotatedJointsAlone) {
   EXPECT_DOUBLE_EQ(person.scale, 0.12);
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
   std::vector<NumberedSequence::Frame> frames;
@@ -89,35 +90,35 @@ NumberedSequence stored(const std::vector<std::int64_t>& numbers) {
 }
 
 TEST(FrameFolderTest, CountsStoredFramesWhateverTheirNumbers) {
-  // Labels lie farther apart than pictures.
+  // Labels lie farther apart than images.
   const FrameFolder folder("root/7", "img_", stored({1000, 1005, 1006, 1040}), {1000, 1040});
-  const Neighbour next = folder.neighbour(1000, 1);
+  const PairedFrame next = folder.paired_frame(1000, 1);
   EXPECT_EQ(next.state, State::kPresent);
   EXPECT_EQ(next.frame.path, "root/7/img_001005.png");
-  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1006);
-  EXPECT_EQ(folder.neighbour(1000, 3).frame.index, 1040);
-  EXPECT_EQ(folder.neighbour(1000, 4).state, State::kBeyond);
-  EXPECT_EQ(folder.neighbour(1040, -3).frame.index, 1000);
-  EXPECT_EQ(folder.neighbour(1040, -4).state, State::kBeyond);
+  EXPECT_EQ(folder.paired_frame(1000, 2).frame.index, 1006);
+  EXPECT_EQ(folder.paired_frame(1000, 3).frame.index, 1040);
+  EXPECT_EQ(folder.paired_frame(1000, 4).state, State::kBeyond);
+  EXPECT_EQ(folder.paired_frame(1040, -3).frame.index, 1000);
+  EXPECT_EQ(folder.paired_frame(1040, -4).state, State::kBeyond);
 }
 
-TEST(FrameFolderTest, ALabelledFrameWithoutPictureCountsAsAHole) {
+TEST(FrameFolderTest, ALabelledFrameWithoutImageCountsAsMissing) {
   const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {1010, 1000, 1003, 1003});
-  const Neighbour hole = folder.neighbour(1000, 1);
-  EXPECT_EQ(hole.state, State::kHole);
-  EXPECT_EQ(hole.frame.path, "root/7/img_001003.png");
-  EXPECT_EQ(folder.neighbour(1000, 2).frame.index, 1005);
-  EXPECT_EQ(folder.neighbour(1003, 0).state, State::kHole);
-  EXPECT_EQ(folder.neighbour(1005, 1).state, State::kHole);
-  EXPECT_EQ(folder.neighbour(1005, 2).state, State::kBeyond);
+  const PairedFrame missing = folder.paired_frame(1000, 1);
+  EXPECT_EQ(missing.state, State::kMissing);
+  EXPECT_EQ(missing.frame.path, "root/7/img_001003.png");
+  EXPECT_EQ(folder.paired_frame(1000, 2).frame.index, 1005);
+  EXPECT_EQ(folder.paired_frame(1003, 0).state, State::kMissing);
+  EXPECT_EQ(folder.paired_frame(1005, 1).state, State::kMissing);
+  EXPECT_EQ(folder.paired_frame(1005, 2).state, State::kBeyond);
 }
 
 TEST(FrameFolderTest, AFrameThatIsNotThereHasThoseBesideIt) {
   const FrameFolder folder("root/7", "img_", stored({1000, 1005}), {});
-  EXPECT_EQ(folder.neighbour(1002, 0).state, State::kHole);
-  EXPECT_EQ(folder.neighbour(1002, 1).frame.index, 1005);
-  EXPECT_EQ(folder.neighbour(1002, -1).frame.index, 1000);
-  EXPECT_EQ(folder.neighbour(1002, 2).state, State::kBeyond);
+  EXPECT_EQ(folder.paired_frame(1002, 0).state, State::kMissing);
+  EXPECT_EQ(folder.paired_frame(1002, 1).frame.index, 1005);
+  EXPECT_EQ(folder.paired_frame(1002, -1).frame.index, 1000);
+  EXPECT_EQ(folder.paired_frame(1002, 2).state, State::kBeyond);
 }
 
 TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
@@ -126,10 +127,10 @@ TEST(FrameFolderTest, NamesAbsentFramesLikeTheStoredOnes) {
   EXPECT_EQ(FrameFolder("r", "img_", {}, {}).frame(1234567).path, "r/img_1234567.jpg");
 }
 
-TEST(FrameFolderTest, EmptyFolderHasNoNeighbours) {
+TEST(FrameFolderTest, EmptyFolderHasNoPairedFrames) {
   const FrameFolder folder("r", "img_", {}, {});
-  EXPECT_EQ(folder.neighbour(1, 1).state, State::kBeyond);
-  EXPECT_EQ(folder.neighbour(1, 0).state, State::kHole);
+  EXPECT_EQ(folder.paired_frame(1, 1).state, State::kBeyond);
+  EXPECT_EQ(folder.paired_frame(1, 0).state, State::kMissing);
 }
 
 TableColumns columns() {

@@ -25,7 +25,7 @@ using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 constexpr int kJoints = 32;
 
@@ -187,17 +187,17 @@ TEST_F(OfficialLayoutTest, AStepIsAFrameOfThoseTaken) {
   ASSERT_EQ(frames.size(), 3u);
   EXPECT_EQ(frames[1].sample_id, "S1/Walking/54138969/000006");
   EXPECT_EQ(frames[1].label_key, "S1/MyPoseFeatures/D2_Positions/Walking.54138969.cdf#5");
-  const Neighbour before = dataset->neighbour(frames[1], -1);
+  const PairedFrame before = dataset->paired_frame(frames[1], -1);
   EXPECT_EQ(before.state, State::kPresent);
   EXPECT_EQ(before.frame.index, 1);
   EXPECT_EQ(before.frame.video_frame, 0);
-  EXPECT_EQ(dataset->neighbour(frames[1], 0).frame.index, 6);
-  EXPECT_EQ(dataset->neighbour(frames[1], 1).frame.video_frame, 10);
-  EXPECT_NEAR(dataset->neighbour(frames[1], 1).frame.time_s - before.frame.time_s, 0.2, 1e-12);
-  EXPECT_EQ(dataset->neighbour(frames[1], 2).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frames[1], -2).state, State::kBeyond);
-  // A frame without a pose is a neighbour like any other.
-  EXPECT_EQ(open(1)->neighbour(open(1)->labelled_frames().back(), 1).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 0).frame.index, 6);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 1).frame.video_frame, 10);
+  EXPECT_NEAR(dataset->paired_frame(frames[1], 1).frame.time_s - before.frame.time_s, 0.2, 1e-12);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[1], -2).state, State::kBeyond);
+  // A frame without a pose is a paired frame like any other.
+  EXPECT_EQ(open(1)->paired_frame(open(1)->labelled_frames().back(), 1).state, State::kPresent);
 }
 
 TEST_F(OfficialLayoutTest, PosesBeyondTheVideosEndAreTold) {
@@ -245,7 +245,8 @@ TEST_F(OfficialLayoutTest, AVideoThatCannotBeReadIsAFaultOfItsFrames) {
   ASSERT_EQ(frames.size(), 4u);
   EXPECT_THAT(frames[0].fault, AllOf(HasSubstr("expected a video, got "),
                                      EndsWith("S1/Videos/Directions.54138969.mp4")));
-  EXPECT_EQ(dataset->neighbour(frames[0], 1).state, State::kPresent) << "the fault is the frame's";
+  EXPECT_EQ(dataset->paired_frame(frames[0], 1).state, State::kPresent)
+      << "the fault is the frame's";
   EXPECT_EQ(dataset->notes()[0], "2 videos whose samples will be quarantined: " + frames[0].fault +
                                      ", " + frames[2].fault);
   EXPECT_EQ(frames[2].fault,
@@ -301,8 +302,8 @@ TEST_F(OfficialLayoutTest, PairsOfAThinnedVideoAreItsFrames) {
   add_poses("Walking", 61);
   const auto dataset = open(5);
   const LabelledFrame& last = dataset->labelled_frames().back();  // frame 61
-  const FramePair pair{dataset->neighbour(last, -6).frame, dataset->neighbour(last, 0).frame, 6,
-                       last.frame.index, 1};
+  const FramePair pair{dataset->paired_frame(last, -6).frame, dataset->paired_frame(last, 0).frame,
+                       6, last.frame.index, 1};
   EXPECT_NEAR(pair.gap_s(), 0.6, 1e-12);
   const auto outcome = PairReader(folder_.path(), {}).read(pair);
   ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;

@@ -184,7 +184,7 @@ TEST(KittiLabel, AScoreMustBeANumber) {
 }
 
 // The object devkit's readme: "truncated: Float from 0 (non-truncated) to 1 (truncated)",
-// "occluded: Integer (0,1,2,3)"; -1 stands where DontCare has none.
+// "occluded: Integer (0,1,2,3)"; -1 is where DontCare has none.
 TEST(KittiLabel, TruncatedAndOccludedHaveTheirRanges) {
   for (const char* token : {"-1", "0", "0.50", "1.00"}) EXPECT_EQ(fault(car_with(1, token)), "");
   for (const char* token : {"1.5", "1.01", "2", "-0.5", "-2"}) {

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/values/faults.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -21,55 +21,55 @@ using testing::read_file;
 using testing::TemporaryFolder;
 using testing::write_file;
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
-TEST(ObjectPictures, FindsThePictureAndTheThreeBeforeIt) {
+TEST(ObjectImages, FindsTheImageAndTheThreeBeforeIt) {
   const TemporaryFolder folder;
   for (const char* name : {"image_2/001497.png", "prev_2/001497_01.png", "prev_2/001497_02.jpg",
                            "prev_2/001497_03.webp", "prev_2/001498_01.png"}) {
     write_file(folder / name, "");
   }
-  const ObjectPictures pictures(SourceRoot(".", folder.path()));
+  const ObjectImages images(SourceRoot(".", folder.path()));
   const char* expected[] = {"image_2/001497.png", "prev_2/001497_01.png", "prev_2/001497_02.jpg",
                             "prev_2/001497_03.webp"};
   for (int back = 0; back <= 3; ++back) {
-    const auto place = pictures.at(1497, "001497", -back);
+    const auto place = images.at(1497, "001497", -back);
     EXPECT_EQ(place.state, State::kPresent);
     EXPECT_EQ(place.path, expected[back]);
   }
 }
 
-TEST(ObjectPictures, AMissingPreviousFrameIsAHoleIfOneFurtherBackIsThere) {
+TEST(ObjectImages, AnAbsentPreviousFrameIsMissingIfOneFurtherBackIsThere) {
   const TemporaryFolder folder;
   for (const char* name : {"image_2/000001.png", "prev_2/000001_02.png"}) {
     write_file(folder / name, "");
   }
-  const ObjectPictures pictures(SourceRoot(".", folder.path()));
-  EXPECT_EQ(pictures.at(1, "000001", -1).state, State::kHole);
-  EXPECT_EQ(pictures.at(1, "000001", -1).path, "prev_2/000001_01.png");
-  EXPECT_EQ(pictures.at(1, "000001", -2).state, State::kPresent);
-  EXPECT_EQ(pictures.at(1, "000001", -3).state, State::kBeyond);
+  const ObjectImages images(SourceRoot(".", folder.path()));
+  EXPECT_EQ(images.at(1, "000001", -1).state, State::kMissing);
+  EXPECT_EQ(images.at(1, "000001", -1).path, "prev_2/000001_01.png");
+  EXPECT_EQ(images.at(1, "000001", -2).state, State::kPresent);
+  EXPECT_EQ(images.at(1, "000001", -3).state, State::kBeyond);
 }
 
-TEST(ObjectPictures, AMissingPictureIsAHoleEvenWithoutOthers) {
+TEST(ObjectImages, AnAbsentImageIsMissingEvenWithoutOthers) {
   const TemporaryFolder folder;
   write_file(folder / "image_2/000001.png", "");
-  const ObjectPictures pictures(SourceRoot(".", folder.path()));
-  EXPECT_EQ(pictures.at(7, "000007", 0).state, State::kHole);
-  EXPECT_EQ(pictures.at(7, "000007", 0).path, "image_2/000007.png");
-  EXPECT_EQ(pictures.at(7, "000007", -1).state, State::kBeyond);
+  const ObjectImages images(SourceRoot(".", folder.path()));
+  EXPECT_EQ(images.at(7, "000007", 0).state, State::kMissing);
+  EXPECT_EQ(images.at(7, "000007", 0).path, "image_2/000007.png");
+  EXPECT_EQ(images.at(7, "000007", -1).state, State::kBeyond);
 }
 
-TEST(ObjectPictures, NeedsAFolderOfPictures) {
+TEST(ObjectImages, NeedsAFolderOfImages) {
   const TemporaryFolder folder;
-  EXPECT_THROW(ObjectPictures(SourceRoot(".", folder.path())), InputError);
+  EXPECT_THROW(ObjectImages(SourceRoot(".", folder.path())), InputError);
 }
 
 constexpr const char* kLabel =
     "Car 0.00 0 1.85 387.63 181.54 423.81 203.12 1.67 1.87 3.69 -16.53 2.39 58.49 1.57\n";
 constexpr const char* kDrive = "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/";
 
-/// The object pictures 0, 1 and 2 are the raw frames 4 and 30 of drive 52 and 9 of a drive that is
+/// The object images 0, 1 and 2 are the raw frames 4 and 30 of drive 52 and 9 of a drive that is
 /// not there.
 class KittiObjectDatasetTest : public ::testing::Test {
  protected:
@@ -135,14 +135,14 @@ TEST_F(KittiObjectDatasetTest, EveryLabelFileIsALabelledFrame) {
 TEST_F(KittiObjectDatasetTest, PreviousFramesCountBackFromZeroAtTenHertz) {
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[0];
-  const Neighbour two_back = dataset->neighbour(frame, -2);
+  const PairedFrame two_back = dataset->paired_frame(frame, -2);
   EXPECT_EQ(two_back.state, State::kPresent);
   EXPECT_EQ(two_back.frame.path, "training/prev_2/000000_02.png");
   EXPECT_EQ(two_back.frame.index, -2);
   EXPECT_DOUBLE_EQ(frame.frame.time_s - two_back.frame.time_s, 0.2);
-  EXPECT_EQ(dataset->neighbour(frame, 0).frame, frame.frame);
+  EXPECT_EQ(dataset->paired_frame(frame, 0).frame, frame.frame);
   for (const int steps : {-6, -4, -3, 1, 6}) {
-    EXPECT_EQ(dataset->neighbour(frame, steps).state, State::kBeyond) << steps;
+    EXPECT_EQ(dataset->paired_frame(frame, steps).state, State::kBeyond) << steps;
   }
 }
 
@@ -165,18 +165,18 @@ TEST_F(KittiObjectDatasetTest, AMalformedOrVanishedLabelIsAFaultThatNamesIt) {
               HasSubstr("in training/label_2/000009.txt"));
 }
 
-TEST_F(KittiObjectDatasetTest, ALabelWithoutAPictureIsAHoleAndTheOtherWayRoundANote) {
+TEST_F(KittiObjectDatasetTest, ALabelWithoutAnImageIsAMissingFrameAndTheOtherWayRoundANote) {
   write("training/label_2/000007.txt", kLabel);
   write("training/image_2/000008.png");
   const auto dataset = open();
   EXPECT_THAT(ids(*dataset), ElementsAre("000000", "000001", "000002", "000007"));
-  const Neighbour itself = dataset->neighbour(dataset->labelled_frames()[3], 0);
-  EXPECT_EQ(itself.state, State::kHole);
+  const PairedFrame itself = dataset->paired_frame(dataset->labelled_frames()[3], 0);
+  EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame.path, "training/image_2/000007.png");
   EXPECT_THAT(dataset->notes(), ElementsAre("1 pictures without labels in training/image_2"));
 }
 
-TEST_F(KittiObjectDatasetTest, TheMappingGivesSequenceNumbersAndNeighboursOnBothSides) {
+TEST_F(KittiObjectDatasetTest, TheMappingGivesSequenceNumbersAndPairedFramesOnBothSides) {
   add_raw();
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[0];
@@ -184,21 +184,21 @@ TEST_F(KittiObjectDatasetTest, TheMappingGivesSequenceNumbersAndNeighboursOnBoth
   EXPECT_EQ(frame.frame.index, 4);
   EXPECT_EQ(frame.frame.path, "training/image_2/000000.png");
 
-  const auto path = [&](int steps) { return dataset->neighbour(frame, steps).frame.path; };
+  const auto path = [&](int steps) { return dataset->paired_frame(frame, steps).frame.path; };
   EXPECT_EQ(path(-1), "training/prev_2/000000_01.png");
   EXPECT_EQ(path(-2), "training/prev_2/000000_02.png");
   EXPECT_EQ(path(-3), std::string(kDrive) + "data/0000000001.png");  // prev_2 has no _03
   EXPECT_EQ(path(-4), std::string(kDrive) + "data/0000000000.png");
   EXPECT_EQ(path(3), std::string(kDrive) + "data/0000000007.png");
   for (const int steps : {-4, -3, -2, -1, 0, 1, 2, 3, 5}) {
-    const Neighbour neighbour = dataset->neighbour(frame, steps);
-    EXPECT_EQ(neighbour.state, State::kPresent) << steps;
-    EXPECT_EQ(neighbour.frame.index, 4 + steps);
-    EXPECT_DOUBLE_EQ(neighbour.frame.time_s, 0.1 * (4 + steps));
+    const PairedFrame paired_frame = dataset->paired_frame(frame, steps);
+    EXPECT_EQ(paired_frame.state, State::kPresent) << steps;
+    EXPECT_EQ(paired_frame.frame.index, 4 + steps);
+    EXPECT_DOUBLE_EQ(paired_frame.frame.time_s, 0.1 * (4 + steps));
   }
-  EXPECT_EQ(dataset->neighbour(frame, 4).state, State::kHole);  // 8 is absent, 9 is there
+  EXPECT_EQ(dataset->paired_frame(frame, 4).state, State::kMissing);  // 8 is absent, 9 is there
   EXPECT_EQ(path(4), std::string(kDrive) + "data/0000000008.png");
-  EXPECT_EQ(dataset->neighbour(frame, -5).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, -5).state, State::kBeyond);
 }
 
 TEST_F(KittiObjectDatasetTest, TimestampsTimeThePreviousFramesToo) {
@@ -210,25 +210,25 @@ TEST_F(KittiObjectDatasetTest, TimestampsTimeThePreviousFramesToo) {
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[0];
   EXPECT_EQ(frame.frame.time_s, 5);
-  EXPECT_EQ(dataset->neighbour(frame, 0).frame.time_s, 5);
-  EXPECT_EQ(dataset->neighbour(frame, -1).frame.time_s, 3.25);
+  EXPECT_EQ(dataset->paired_frame(frame, 0).frame.time_s, 5);
+  EXPECT_EQ(dataset->paired_frame(frame, -1).frame.time_s, 3.25);
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("devkit/mapping/train_mapping.txt", "devkit/mapping/train_rand.txt",
                           std::string(kDrive) + "timestamps.txt", "training/label_2/000000.txt",
                           "training/label_2/000001.txt", "training/label_2/000002.txt"));
 }
 
-// Frames 4 and 30 of the drive and the pictures 0 and 1 that are the same.
-TEST_F(KittiObjectDatasetTest, AMappingThatContradictsThePicturesIsAFaultThatNamesBoth) {
+// Frames 4 and 30 of the drive and the images 0 and 1 that are the same.
+TEST_F(KittiObjectDatasetTest, AMappingThatContradictsTheImagesIsAFaultThatNamesBoth) {
   add_raw();
-  const auto write_picture = [&](const std::string& path, int value) {
-    testing::write_flat_picture(folder_ / path, {4, 6}, value);
+  const auto write_image = [&](const std::string& path, int value) {
+    testing::write_flat_image(folder_ / path, {4, 6}, value);
   };
-  write_picture("training/image_2/000000.png", 40);
-  write_picture(std::string(kDrive) + "data/0000000004.png", 40);
+  write_image("training/image_2/000000.png", 40);
+  write_image(std::string(kDrive) + "data/0000000004.png", 40);
   EXPECT_EQ(open()->labelled_frames()[0].fault, "");
 
-  write_picture(std::string(kDrive) + "data/0000000004.png", 41);
+  write_image(std::string(kDrive) + "data/0000000004.png", 41);
   const std::string fault = "expected the picture " + std::string(kDrive) +
                             "data/0000000004.png, to which devkit/mapping/train_mapping.txt leads, "
                             "got another, in training/image_2/000000.png";
@@ -240,14 +240,14 @@ TEST_F(KittiObjectDatasetTest, AMappingThatContradictsThePicturesIsAFaultThatNam
               Contains("no frame of 2011_09_26_drive_0052_sync can be used: " + fault));
 }
 
-TEST_F(KittiObjectDatasetTest, PicturesWrittenAnewAreComparedByTheirPixels) {
+TEST_F(KittiObjectDatasetTest, ImagesWrittenAnewAreComparedByTheirPixels) {
   add_raw();
   // Without loss, but not the same bytes.
-  testing::write_flat_picture(folder_ / "training/image_2/000000.bmp", {4, 6}, 40);
+  testing::write_flat_image(folder_ / "training/image_2/000000.bmp", {4, 6}, 40);
   std::filesystem::remove(folder_ / "training/image_2/000000.png");
   std::filesystem::rename(folder_ / "training/image_2/000000.bmp",
                           folder_ / "training/image_2/000000.png");
-  testing::write_flat_picture(folder_ / (std::string(kDrive) + "data/0000000004.png"), {4, 6}, 40);
+  testing::write_flat_image(folder_ / (std::string(kDrive) + "data/0000000004.png"), {4, 6}, 40);
   EXPECT_EQ(open()->labelled_frames()[0].fault, "");
 }
 
@@ -255,16 +255,16 @@ TEST_F(KittiObjectDatasetTest, WhereTheLabelledFrameIsNotStoredAPreviousOneIsCom
   add_raw();
   std::filesystem::remove(folder_ / (std::string(kDrive) + "data/0000000004.png"));
   std::filesystem::remove(folder_ / (std::string(kDrive) + "data/0000000030.png"));
-  testing::write_flat_picture(folder_ / "training/prev_2/000000_01.png", {4, 6}, 1);
-  testing::write_flat_picture(folder_ / (std::string(kDrive) + "data/0000000003.png"), {4, 6}, 2);
+  testing::write_flat_image(folder_ / "training/prev_2/000000_01.png", {4, 6}, 1);
+  testing::write_flat_image(folder_ / (std::string(kDrive) + "data/0000000003.png"), {4, 6}, 2);
   EXPECT_THAT(open()->labelled_frames()[1].fault,
               AllOf(HasSubstr("data/0000000003.png"), HasSubstr("prev_2/000000_01.png")));
 }
 
 TEST_F(KittiObjectDatasetTest, ADriveOfWhichNothingCanBeComparedIsNoted) {
   add_raw();
-  write("training/image_2/000000.png", "no picture");
-  write("training/image_2/000001.png", "no picture");
+  write("training/image_2/000000.png", "no image");
+  write("training/image_2/000001.png", "no image");
   for (const char* name : {"000000_01", "000000_02"}) {
     std::filesystem::remove(folder_ / ("training/prev_2/" + std::string(name) + ".png"));
   }
@@ -274,7 +274,7 @@ TEST_F(KittiObjectDatasetTest, ADriveOfWhichNothingCanBeComparedIsNoted) {
                                          "devkit/mapping/train_mapping.txt says"));
 }
 
-TEST_F(KittiObjectDatasetTest, APreviousPictureBeforeFrameZeroContradictsTheMapping) {
+TEST_F(KittiObjectDatasetTest, APreviousImageBeforeFrameZeroContradictsTheMapping) {
   add_raw();
   write("devkit/mapping/train_mapping.txt",
         "2011_09_26 2011_09_26_drive_0052_sync 0000000030\n"
@@ -321,11 +321,11 @@ TEST_F(KittiObjectDatasetTest, WithoutItsDriveAFrameFallsBackOnThePreviousFrames
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[2];
   EXPECT_EQ(frame.frame.index, 9);
-  EXPECT_EQ(dataset->neighbour(frame, -1).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frame, -1).frame.index, 8);
-  EXPECT_EQ(dataset->neighbour(frame, -2).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[3], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, -1).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frame, -1).frame.index, 8);
+  EXPECT_EQ(dataset->paired_frame(frame, -2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[3], 1).state, State::kBeyond);
   EXPECT_THAT(dataset->notes(),
               ElementsAre("1 labelled frames that devkit/mapping/train_mapping.txt does not know",
                           "1 labelled frames whose raw drive is missing in raw"));
@@ -356,10 +356,10 @@ TEST_F(KittiObjectDatasetTest, TheDevkitAloneNamesTheDrives) {
   const LabelledFrame& frame = dataset->labelled_frames()[0];
   EXPECT_EQ(frame.sequence, "2011_09_26_drive_0052_sync");
   EXPECT_EQ(frame.frame.index, 4);
-  EXPECT_EQ(dataset->neighbour(frame, -2).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frame, -2).frame.index, 2);
-  EXPECT_EQ(dataset->neighbour(frame, -3).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, -2).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frame, -2).frame.index, 2);
+  EXPECT_EQ(dataset->paired_frame(frame, -3).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).state, State::kBeyond);
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
@@ -392,13 +392,13 @@ TEST(KittiObjectData, RealFramesReachSixStepsThroughTheMapping) {
   const LabelledFrame& frame = dataset->labelled_frames()[3];
   EXPECT_EQ(frame.frame.index, 7);
   for (int steps = -6; steps <= 6; ++steps) {
-    const Neighbour neighbour = dataset->neighbour(frame, steps);
-    EXPECT_EQ(neighbour.state, State::kPresent) << steps;
-    EXPECT_EQ(neighbour.frame.index, 7 + steps);
-    EXPECT_TRUE(std::filesystem::is_regular_file(data / neighbour.frame.path));
+    const PairedFrame paired_frame = dataset->paired_frame(frame, steps);
+    EXPECT_EQ(paired_frame.state, State::kPresent) << steps;
+    EXPECT_EQ(paired_frame.frame.index, 7 + steps);
+    EXPECT_TRUE(std::filesystem::is_regular_file(data / paired_frame.frame.path));
   }
-  EXPECT_THAT(dataset->neighbour(frame, -3).frame.path, HasSubstr("prev_2/001497_03.png"));
-  EXPECT_THAT(dataset->neighbour(frame, -4).frame.path, HasSubstr("data/0000000003.png"));
+  EXPECT_THAT(dataset->paired_frame(frame, -3).frame.path, HasSubstr("prev_2/001497_03.png"));
+  EXPECT_THAT(dataset->paired_frame(frame, -4).frame.path, HasSubstr("data/0000000003.png"));
   EXPECT_THAT(dataset->notes(),
               ElementsAre("3 labelled frames whose raw drive is missing in kitti_raw"));
   for (const LabelledFrame& labelled : dataset->labelled_frames()) {

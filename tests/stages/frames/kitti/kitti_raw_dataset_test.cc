@@ -20,7 +20,7 @@ using ::testing::SizeIs;
 using testing::tracklet_xml;
 using testing::write_file;
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 const std::string kFirst = "2011_09_26/2011_09_26_drive_0001_sync";
 const std::string kSecond = "2011_09_28/2011_09_28_drive_0002_sync";
@@ -63,7 +63,7 @@ Annotation annotation_of(const Dataset& dataset, std::size_t frame) {
   return std::get<Annotation>(dataset.annotation(dataset.labelled_frames().at(frame).label_key));
 }
 
-TEST_F(KittiRawDatasetTest, EveryPictureIsALabelledFrame) {
+TEST_F(KittiRawDatasetTest, EveryImageIsALabelledFrame) {
   const auto dataset = open();
   ASSERT_THAT(dataset->labelled_frames(), SizeIs(6));
   const LabelledFrame& frame = dataset->labelled_frames()[4];
@@ -77,13 +77,13 @@ TEST_F(KittiRawDatasetTest, EveryPictureIsALabelledFrame) {
   EXPECT_THAT(dataset->annotation_files(), IsEmpty());
 }
 
-TEST_F(KittiRawDatasetTest, NeighboursStayInTheDrive) {
+TEST_F(KittiRawDatasetTest, PairedFramesStayInTheDrive) {
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[2];
-  EXPECT_EQ(dataset->neighbour(frame, -2).frame.path,
+  EXPECT_EQ(dataset->paired_frame(frame, -2).frame.path,
             "raw/" + kFirst + "/image_02/data/0000000000.png");
-  EXPECT_EQ(dataset->neighbour(frame, 0).frame, frame.frame);
-  EXPECT_EQ(dataset->neighbour(frame, 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, 0).frame, frame.frame);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).state, State::kBeyond);
 }
 
 TEST_F(KittiRawDatasetTest, WithoutTrackletsAnnotationsAreEmpty) {
@@ -123,7 +123,7 @@ TEST_F(KittiRawDatasetTest, WithoutCalibrationThereAreNoBoxesAndANoteSaysSo) {
   EXPECT_THAT(dataset->notes()[0], HasSubstr("no boxes from the tracklets of 1 drives"));
 }
 
-TEST_F(KittiRawDatasetTest, TrackletsBeyondThePicturesAreNoted) {
+TEST_F(KittiRawDatasetTest, TrackletsBeyondTheImagesAreNoted) {
   write(kFirst + "/tracklet_labels.xml",
         testing::tracklets_xml(tracklet_xml("Car", "2", pose_xml("12") + pose_xml("12"))));
   write_calibration();
@@ -134,20 +134,20 @@ TEST_F(KittiRawDatasetTest, TrackletsBeyondThePicturesAreNoted) {
                           "/tracklet_labels.xml"));
 }
 
-TEST_F(KittiRawDatasetTest, ATrackletsFrameWithoutPictureInsideADriveIsAHole) {
+TEST_F(KittiRawDatasetTest, ATrackletsFrameWithoutImageInsideADriveIsMissing) {
   write_tracklets();  // frames 1 and 2
   write_calibration();
   write(kFirst + "/image_02/data/0000000003.png");
   std::filesystem::remove(folder_ / ("raw/" + kFirst + "/image_02/data/0000000002.png"));
   std::filesystem::remove(folder_ / ("raw/" + kSecond + "/image_02/data/0000000001.png"));
   const auto dataset = open();
-  // Of the second drive's hole nothing is labelled.
+  // Of the second drive's missing frame nothing is labelled.
   ASSERT_THAT(dataset->labelled_frames(), SizeIs(4 + 2));
   const LabelledFrame& lost = dataset->labelled_frames()[2];
   EXPECT_EQ(lost.sample_id, "2011_09_26_drive_0001_sync/0000000002");
   EXPECT_EQ(lost.label_key, kFirst + "#2");
-  EXPECT_EQ(dataset->neighbour(lost, 0).state, State::kHole);
-  EXPECT_EQ(dataset->neighbour(lost, 0).frame.path,
+  EXPECT_EQ(dataset->paired_frame(lost, 0).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(lost, 0).frame.path,
             "raw/" + kFirst + "/image_02/data/0000000002.png");
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
@@ -214,7 +214,7 @@ TEST(KittiRawData, RealDriveHasTwentyOneFrames) {
   const auto dataset = open_kitti_raw_dataset(spec, data);
   ASSERT_THAT(dataset->labelled_frames(), SizeIs(21));
   EXPECT_EQ(dataset->labelled_frames()[7].sample_id, "2011_09_26_drive_0052_sync/0000000007");
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[7], -6).frame.index, 1);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[7], -6).frame.index, 1);
 }
 
 TEST_F(KittiRawDatasetTest, UnreadableTrackletsAreAFaultOfTheirDriveAloneAndNotNone) {

@@ -58,7 +58,7 @@ TEST(TrackingLabels, TruncationTwoIsAnObjectToIgnore) {
   }
 }
 
-// As the training labels have it: the unknown location and rotation_y stand before the unknown
+// As the training labels have it: the unknown location and rotation_y come before the unknown
 // size.
 TEST(TrackingLabels, DontCareHasTheUnknownThreeDimensionalBox) {
   const TrackingLabels labels(
@@ -113,7 +113,7 @@ TEST(TrackingLabels, ALineOfAnUnknownFrameIsAFaultOfAll) {
   }
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 constexpr const char* kFirstLine =
     "0 2 Van 0 1 -1.79 296.7 161.7 455.2 292.3 2 1.8 4.4 -4.5 1.8 13 -2\n";
@@ -122,8 +122,8 @@ constexpr const char* kThird =
 constexpr const char* kNinth =
     "9 2 Van 0 1 -1.79 290.7 161.7 455.2 292.3 2 1.8 4.4 -4.5 1.8 13 -2\n";
 
-/// Sequence 0001 with pictures 0..3 and labels for 0, 2 and 9; 0002 with labels alone; 0003 with
-/// pictures alone.
+/// Sequence 0001 with images 0..3 and labels for 0, 2 and 9; 0002 with labels alone; 0003 with
+/// images alone.
 class KittiTrackingDatasetTest : public ::testing::Test {
  protected:
   KittiTrackingDatasetTest() {
@@ -144,7 +144,7 @@ class KittiTrackingDatasetTest : public ::testing::Test {
   SourceSpec spec_;
 };
 
-TEST_F(KittiTrackingDatasetTest, EveryPictureAndEveryLabelOfALabelledSequenceIsALabelledFrame) {
+TEST_F(KittiTrackingDatasetTest, EveryImageAndEveryLabelOfALabelledSequenceIsALabelledFrame) {
   const auto dataset = open();
   std::vector<std::string> ids;
   for (const auto& frame : dataset->labelled_frames()) ids.push_back(frame.sample_id);
@@ -182,16 +182,16 @@ TEST_F(KittiTrackingDatasetTest, AKeyOfAnotherFormIsAFault) {
   }
 }
 
-TEST_F(KittiTrackingDatasetTest, NeighboursAreTheSequencesPictures) {
+TEST_F(KittiTrackingDatasetTest, PairedFramesAreTheSequencesImages) {
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
-  EXPECT_EQ(dataset->neighbour(frames[2], -2).frame.path, "tracking/image_02/0001/000000.png");
-  EXPECT_EQ(dataset->neighbour(frames[2], 1).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frames[2], 2).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(frames[2], -3).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[2], -2).frame.path, "tracking/image_02/0001/000000.png");
+  EXPECT_EQ(dataset->paired_frame(frames[2], 1).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frames[2], 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[2], -3).state, State::kBeyond);
 }
 
-TEST_F(KittiTrackingDatasetTest, LostPicturesAreHolesHoweverManyAreLost) {
+TEST_F(KittiTrackingDatasetTest, LostImagesAreMissingHoweverManyAreLost) {
   for (const char* name : {"000000", "000001", "000002"}) {
     std::filesystem::remove(folder_ / ("tracking/image_02/0001/" + std::string(name) + ".png"));
   }
@@ -199,18 +199,18 @@ TEST_F(KittiTrackingDatasetTest, LostPicturesAreHolesHoweverManyAreLost) {
   const auto dataset = open();  // 3 and 5 are left: every second frame is not what is stored
   const LabelledFrame& third = dataset->labelled_frames()[2];
   ASSERT_EQ(third.frame.index, 3);
-  EXPECT_EQ(dataset->neighbour(third, 1).state, State::kHole);
-  EXPECT_EQ(dataset->neighbour(third, 1).frame.path, "tracking/image_02/0001/000004.png");
-  EXPECT_EQ(dataset->neighbour(third, 2).frame.index, 5);
+  EXPECT_EQ(dataset->paired_frame(third, 1).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(third, 1).frame.path, "tracking/image_02/0001/000004.png");
+  EXPECT_EQ(dataset->paired_frame(third, 2).frame.index, 5);
 }
 
-TEST_F(KittiTrackingDatasetTest, ALabelWithoutAPictureIsAHole) {
+TEST_F(KittiTrackingDatasetTest, ALabelWithoutAnImageIsAMissingFrame) {
   const auto dataset = open();
-  const Neighbour ninth = dataset->neighbour(dataset->labelled_frames()[4], 0);
-  EXPECT_EQ(ninth.state, State::kHole);
+  const PairedFrame ninth = dataset->paired_frame(dataset->labelled_frames()[4], 0);
+  EXPECT_EQ(ninth.state, State::kMissing);
   EXPECT_EQ(ninth.frame.path, "tracking/image_02/0001/000009.png");
-  const Neighbour without_folder = dataset->neighbour(dataset->labelled_frames()[5], 0);
-  EXPECT_EQ(without_folder.state, State::kHole);
+  const PairedFrame without_folder = dataset->paired_frame(dataset->labelled_frames()[5], 0);
+  EXPECT_EQ(without_folder.state, State::kMissing);
   EXPECT_EQ(without_folder.frame.path, "tracking/image_02/0002/000000.png");
 }
 
@@ -218,9 +218,9 @@ TEST_F(KittiTrackingDatasetTest, NoFrameIsBeforeNumberZero) {
   std::filesystem::remove(folder_ / "tracking/image_02/0001/000000.png");
   const auto dataset = open();
   const LabelledFrame& first = dataset->labelled_frames()[0];
-  EXPECT_EQ(dataset->neighbour(first, 0).state, State::kHole);
-  EXPECT_EQ(dataset->neighbour(first, -1).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(first, -1).frame.path, "");
+  EXPECT_EQ(dataset->paired_frame(first, 0).state, State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(first, -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(first, -1).frame.path, "");
 }
 
 TEST_F(KittiTrackingDatasetTest, FilesLeftOutAreCountedAndNamed) {
@@ -256,7 +256,7 @@ TEST_F(KittiTrackingDatasetTest, AnUnreadableLabelFileIsAFaultOfItsSequenceAlone
               "tracking/label_02/0001.txt");
     ++faults;
   }
-  EXPECT_EQ(faults, 4u);  // its pictures
+  EXPECT_EQ(faults, 4u);  // its images
 
   std::filesystem::remove(folder_ / "tracking/label_02/0001.txt");
   std::filesystem::create_directory(folder_ / "tracking/label_02/0001.txt");

@@ -92,7 +92,7 @@ TEST(Timestamps, ALastLineThatIsCutShortIsAFault) {
   }
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 constexpr const char* kFolder = "2011_09_26/2011_09_26_drive_0052_sync";
 
@@ -115,7 +115,7 @@ class RawDriveTest : public ::testing::Test {
 };
 
 TEST_F(RawDriveTest, FindsAFrameByItsNumber) {
-  const Neighbour frame = open().frame(2);
+  const PairedFrame frame = open().frame(2);
   EXPECT_EQ(frame.state, State::kPresent);
   EXPECT_EQ(frame.frame.path,
             "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data/0000000002.png");
@@ -125,16 +125,16 @@ TEST_F(RawDriveTest, FindsAFrameByItsNumber) {
 
 TEST_F(RawDriveTest, AStepIsOneFrameWhateverIsStored) {
   const RawDrive drive = open();
-  EXPECT_EQ(drive.frame(3).state, State::kHole);
+  EXPECT_EQ(drive.frame(3).state, State::kMissing);
   EXPECT_EQ(drive.frame(3).frame.path,
             "raw/2011_09_26/2011_09_26_drive_0052_sync/image_02/data/0000000003.png");
   EXPECT_EQ(drive.frame(5).state, State::kBeyond);
   EXPECT_EQ(drive.frame(-1).state, State::kBeyond);
-  EXPECT_EQ(drive.neighbour(2, 1).state, State::kHole);
-  EXPECT_EQ(drive.neighbour(2, 1).frame.index, 3);
-  EXPECT_EQ(drive.neighbour(2, -2).frame.index, 0);
-  EXPECT_EQ(drive.neighbour(2, 2).state, State::kPresent);
-  EXPECT_EQ(drive.neighbour(2, 3).state, State::kBeyond);
+  EXPECT_EQ(drive.paired_frame(2, 1).state, State::kMissing);
+  EXPECT_EQ(drive.paired_frame(2, 1).frame.index, 3);
+  EXPECT_EQ(drive.paired_frame(2, -2).frame.index, 0);
+  EXPECT_EQ(drive.paired_frame(2, 2).state, State::kPresent);
+  EXPECT_EQ(drive.paired_frame(2, 3).state, State::kBeyond);
 }
 
 TEST_F(RawDriveTest, TimesAreTenAStepWithoutTimestamps) {
@@ -180,7 +180,7 @@ TEST_F(RawDriveTest, DamagedTimestampsAreAFaultOfTheDriveAndItsTimesUnknown) {
 
 TEST_F(RawDriveTest, AnAbsentDriveHasNoFrames) {
   const RawDrive drive(SourceRoot("raw", folder_.path()), "2011_09_26/none");
-  EXPECT_TRUE(drive.pictures().empty());
+  EXPECT_TRUE(drive.images().empty());
   EXPECT_EQ(drive.frame(0).state, State::kBeyond);
 }
 
@@ -200,7 +200,7 @@ TEST(RawMapping, LeadsThroughThePermutationCountedFromOne) {
   EXPECT_EQ(mapping.find(2), (RawFrame{"2011_09_26", "2011_09_26_drive_0005_sync", 109}));
 }
 
-TEST(RawMapping, KnowsNoOtherPictures) {
+TEST(RawMapping, KnowsNoOtherImages) {
   const RawMapping mapping = parse("2,3,1\n", kMapping);
   EXPECT_EQ(mapping.find(3), std::nullopt);
   EXPECT_EQ(mapping.find(-1), std::nullopt);

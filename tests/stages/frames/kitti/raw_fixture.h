@@ -5,7 +5,7 @@
 namespace eventgan::testing {
 
 /// A scanner in the camera's place, looking the same way, and a camera of focal length 100 px whose
-/// middle is (50, 20) in a picture of 100 x 40 pixels. So the scanner's (x, y, z) is the camera's
+/// middle is (50, 20) in an image of 100 x 40 pixels. So the scanner's (x, y, z) is the camera's
 /// (-y, -z, x) and is seen at (50 - 100 y/x, 20 - 100 z/x).
 inline constexpr const char* kVeloToCam =
     "calib_time: 15-Mar-2012 11:37:16\n"

@@ -10,7 +10,7 @@
 #include <numbers>
 #include <utility>
 
-#include "stages/frames/kitti/calibration_file_internal.h"
+#include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "tests/stages/frames/kitti/raw_fixture.h"
 #include "tests/testing/temporary_folder.h"
@@ -182,7 +182,7 @@ TEST(RawCalibration, TakesAPointThroughBothFrames) {
                                 "R_rect_00: 0 1 0 -1 0 0 0 0 1\n"
                                 "P_rect_02: 100 0 50 200 0 100 20 0 0 0 1 0\n");
   ASSERT_TRUE(calibration);
-  EXPECT_EQ(calibration->picture, (ImageSize{375, 1242}));
+  EXPECT_EQ(calibration->image, (ImageSize{375, 1242}));
   // R (5, 1, 2) + T = (-1, -2, 5) + (0.5, 0.25, -1) = (-0.5, -1.75, 4); then x = y, y = -x.
   EXPECT_THAT(calibration->to_rectified({5, 1, 2}), ElementsAre(-1.75, 0.5, 4));
   // u = (100 (-1.75) + 50 4 + 200) / 4, v = (100 0.5 + 20 4) / 4.
@@ -256,7 +256,7 @@ TEST(HasFullRank, WhateverTheUnitOfARow) {
 constexpr double kPi = std::numbers::pi;
 
 /// As tests/stages/frames/kitti/raw_fixture.h: the scanner's (x, y, z) is seen at
-/// (50 - 100 y/x, 20 - 100 z/x) in a picture of 100 x 40 pixels.
+/// (50 - 100 y/x, 20 - 100 z/x) in an image of 100 x 40 pixels.
 const RawCalibration kCalibration{{0, -1, 0, 0, 0, -1, 1, 0, 0},
                                   {0, 0, 0},
                                   {1, 0, 0, 0, 1, 0, 0, 0, 1},
@@ -327,16 +327,16 @@ TEST(TrackletBox, RotationYTurnsTheLengthAsRotationZDoes) {
   }
 }
 
-TEST(TrackletBox, IsCutToThePicture) {
+TEST(TrackletBox, IsCutToTheImage) {
   const auto box = to_box(car(12, 5, -1), kCalibration);  // left edge at 50 - 100 5.5/10 = -5
   ASSERT_TRUE(box);
   EXPECT_EQ(box->xyxy.left, 0);
   EXPECT_NEAR(box->xyxy.right, 50 - 100 * 4.5 / 14, 1e-9);  // of the front, 14 m away
 }
 
-TEST(TrackletBox, AnObjectBesideTheCameraReachesToThePicturesEdge) {
+TEST(TrackletBox, AnObjectBesideTheCameraReachesToTheImagesEdge) {
   // From 2 m behind the camera to 2 m before it, half a metre to a metre and a half to the left.
-  // Its right edge is the far inner one, 50 - 100 0.5/2; on the left it runs out of the picture.
+  // Its right edge is the far inner one, 50 - 100 0.5/2; on the left it runs out of the image.
   const auto box = to_box(car(0, 1, -1), kCalibration);
   ASSERT_TRUE(box);
   EXPECT_NEAR(box->xyxy.right, 25, 1e-9);
@@ -346,13 +346,13 @@ TEST(TrackletBox, AnObjectBesideTheCameraReachesToThePicturesEdge) {
 }
 
 TEST(TrackletBox, EndsAtTheLastPixelAsKittisOwnLabelsDo) {
-  // From 2 m behind the camera to 2 m before it, to its right: out of the picture on that side.
+  // From 2 m behind the camera to 2 m before it, to its right: out of the image on that side.
   const auto box = to_box(car(0, -1, -1), kCalibration);
   ASSERT_TRUE(box);
   EXPECT_EQ(box->xyxy, (Rectangle{75, 0, 99, 39}));  // 50 + 100 0.5/2; 100 x 40 pixels
 }
 
-TEST(TrackletBox, NothingBehindTheCameraOrOutsideThePictureIsSeen) {
+TEST(TrackletBox, NothingBehindTheCameraOrOutsideTheImageIsSeen) {
   EXPECT_FALSE(to_box(car(-12, 0, -1), kCalibration));
   EXPECT_FALSE(to_box(car(12, 20, -1), kCalibration));
   EXPECT_FALSE(to_box(car(12, 0, 10), kCalibration));

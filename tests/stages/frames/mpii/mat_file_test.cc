@@ -1,3 +1,5 @@
+#include "stages/frames/mpii/detail/mat_file.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
@@ -9,8 +11,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/mat_file_internal.h"
-#include "stages/frames/mpii/mat_json_internal.h"
+#include "stages/frames/mpii/detail/mat_json.h"
 #include "tests/stages/frames/mpii/mat_writer.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -1,3 +1,5 @@
+#include "stages/frames/mpii/detail/mpii_annotations.h"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -5,7 +7,6 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/mpii_annotations_internal.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -57,7 +58,7 @@ TEST(MpiiPersons, FormsOfVisibility) {
 }
 
 TEST(MpiiPersons, AJointAtZeroIsNotAnnotated) {
-  // Pixels count from 1. At 0 on one axis alone it lies just outside the picture.
+  // Pixels count from 1. At 0 on one axis alone it lies just outside the image.
   const auto persons =
       parse_mpii_persons(with_points(R"([{"x": 0, "y": 0, "id": 3, "is_visible": 1},
                       {"x": 0, "y": 5, "id": 4, "is_visible": 1}])"));

@@ -6,9 +6,9 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "stages/frames/mpii/mpii_annotations_internal.h"
+#include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "tests/stages/frames/mpii/mpii_fixture.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -22,7 +22,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 std::vector<std::string> mpii_ids(const Dataset& dataset) {
   std::vector<std::string> found;
@@ -35,8 +35,8 @@ class MpiiDatasetTest : public ::testing::Test {
   MpiiDatasetTest() {
     spec_.dataset = DatasetKind::kMpii;
     spec_.root = "m";
-    testing::write_flat_picture(folder_ / "m/images/b.jpg", {48, 64}, 100);
-    testing::write_flat_picture(folder_ / "m/sequences/b/00000007.jpg", {48, 64}, 100);
+    testing::write_flat_image(folder_ / "m/images/b.jpg", {48, 64}, 100);
+    testing::write_flat_image(folder_ / "m/sequences/b/00000007.jpg", {48, 64}, 100);
     testing::write_file(folder_ / "m/sequences/b/00000008.jpg", "b8");
   }
   void write_four() {
@@ -76,8 +76,8 @@ TEST_F(MpiiDatasetTest, LabelsStayWithTheirImage) {
   EXPECT_EQ(frame.label_key, "annolist[1]");
   EXPECT_EQ(dataset->label_place(frame.label_key), "m/mpii_human_pose_v1_u12_1.mat:annolist[1]");
   EXPECT_EQ(frame.frame, (FrameRef{"m/sequences/b/00000007.jpg", 7}));
-  EXPECT_EQ(dataset->neighbour(frame, 1).frame, (FrameRef{"m/sequences/b/00000008.jpg", 8}));
-  EXPECT_EQ(dataset->neighbour(frame, 2).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frame, 1).frame, (FrameRef{"m/sequences/b/00000008.jpg", 8}));
+  EXPECT_EQ(dataset->paired_frame(frame, 2).state, State::kBeyond);
 
   const auto outcome = dataset->annotation(frame.label_key);
   ASSERT_FALSE(is_fault(outcome));
@@ -118,7 +118,7 @@ TEST_F(MpiiDatasetTest, RefusesTwoImagesOfOneName) {
 
 TEST_F(MpiiDatasetTest, NotesKeyframesInASequenceOfAnotherName) {
   mat::write_mpii(folder_ / "m", {{"a.jpg", mat::two_persons(), true, "b/00000008.jpg"}});
-  testing::write_flat_picture(folder_ / "m/images/a.jpg", {48, 64}, 100);
+  testing::write_flat_image(folder_ / "m/images/a.jpg", {48, 64}, 100);
   EXPECT_THAT(open()->notes(),
               ElementsAre("1 keyframes in a sequence not named as their image (first: a.jpg in "
                           "b/00000008.jpg)"));
@@ -129,7 +129,7 @@ class MpiiFrameOfAnotherSize : public MpiiDatasetTest {
  protected:
   MpiiFrameOfAnotherSize() { write_four(); }
   Outcome<Annotation> annotation_at(ImageSize frame) {
-    testing::write_flat_picture(folder_ / "m/sequences/b/00000007.jpg", frame, 100);
+    testing::write_flat_image(folder_ / "m/sequences/b/00000007.jpg", frame, 100);
     return open()->annotation("annolist[1]");
   }
 };
@@ -169,7 +169,7 @@ TEST_F(MpiiFrameOfAnotherSize, AnotherShapeIsAFaultThatNamesBoth) {
   }
 }
 
-TEST_F(MpiiFrameOfAnotherSize, WithoutThePictureNothingTells) {
+TEST_F(MpiiFrameOfAnotherSize, WithoutTheImageNothingTells) {
   std::filesystem::remove(folder_ / "m/images/b.jpg");
   const auto annotation = std::get<Annotation>(annotation_at({96, 128}));
   EXPECT_EQ(annotation.persons.at(0).joints[0].at, (Point{710, 620}));
@@ -179,8 +179,8 @@ TEST_F(MpiiFrameOfAnotherSize, WithoutThePictureNothingTells) {
                   "1 labelled frames of a sequence whose picture is not in images")));
 }
 
-TEST_F(MpiiFrameOfAnotherSize, APictureThatCannotBeReadIsAFault) {
-  testing::write_file(folder_ / "m/images/b.jpg", "no picture");
+TEST_F(MpiiFrameOfAnotherSize, AnImageThatCannotBeReadIsAFault) {
+  testing::write_file(folder_ / "m/images/b.jpg", "no image");
   const auto annotation = annotation_at({48, 64});
   ASSERT_TRUE(is_fault(annotation));
   EXPECT_THAT(std::get<SampleFault>(annotation).reason, HasSubstr("in m/images/b.jpg (sample b)"));
@@ -197,13 +197,13 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   EXPECT_EQ(juggler.frame.path, spec.root + "/sequences/000000001/00000007.jpg");
   // Frames 1..13 are there, 7 is labelled: six on either side.
   for (int step = -6; step <= 6; ++step) {
-    const Neighbour neighbour = dataset->neighbour(juggler, step);
-    EXPECT_EQ(neighbour.state, State::kPresent) << step;
-    EXPECT_EQ(neighbour.frame.index, 7 + step);
-    EXPECT_TRUE(std::filesystem::exists(neighbour.frame.path));
+    const PairedFrame paired_frame = dataset->paired_frame(juggler, step);
+    EXPECT_EQ(paired_frame.state, State::kPresent) << step;
+    EXPECT_EQ(paired_frame.frame.index, 7 + step);
+    EXPECT_TRUE(std::filesystem::exists(paired_frame.frame.path));
   }
-  EXPECT_EQ(dataset->neighbour(juggler, 7).state, State::kBeyond);
-  EXPECT_EQ(dataset->neighbour(juggler, -7).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(juggler, 7).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(juggler, -7).state, State::kBeyond);
 
   const auto annotation = std::get<Annotation>(dataset->annotation(juggler.label_key));
   ASSERT_EQ(annotation.persons.size(), 2u);
@@ -222,8 +222,8 @@ TEST(MpiiDatasetOnSharedData, ReadsTheJuggler) {
   EXPECT_EQ(original["act"]["act_name"], "soccer, juggling");
   EXPECT_EQ(original["annolist_keyframes"]["image"]["name"], "000000001/00000007.jpg");
 
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 0).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(dataset->labelled_frames()[1], 1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 0).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[1], 1).state, State::kBeyond);
 }
 
 }  // namespace

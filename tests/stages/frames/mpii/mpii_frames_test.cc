@@ -90,7 +90,7 @@ TEST(SameBytes, ComparesSizeAndContent) {
   EXPECT_FALSE(same_bytes(folder / "absent", folder / "absent"));
 }
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 /// Images a, b; sequence a with frames 5, 6, 7, 9 and keyframe 7; sequence c in a batch folder.
 class MpiiFramesTest : public ::testing::Test {
@@ -116,38 +116,38 @@ TEST_F(MpiiFramesTest, AKeyframeWithAFolderIsTheLabelledFrame) {
   EXPECT_EQ(labelled.frame, (FrameRef{"m/sequences/a/00000007.jpg", 7}));
   EXPECT_TRUE(std::isnan(labelled.frame.time_s));
 
-  const Neighbour itself = frames.neighbour(labelled, 0);
+  const PairedFrame itself = frames.paired_frame(labelled, 0);
   EXPECT_EQ(itself.state, State::kPresent);
   EXPECT_EQ(itself.frame, labelled.frame);
-  const Neighbour before = frames.neighbour(labelled, -2);
+  const PairedFrame before = frames.paired_frame(labelled, -2);
   EXPECT_EQ(before.state, State::kPresent);
   EXPECT_EQ(before.frame, (FrameRef{"m/sequences/a/00000005.jpg", 5}));
-  const Neighbour hole = frames.neighbour(labelled, 1);
-  EXPECT_EQ(hole.state, State::kHole);
-  EXPECT_EQ(hole.frame.path, "m/sequences/a/00000008.jpg");
-  EXPECT_EQ(frames.neighbour(labelled, 2).state, State::kPresent);
-  EXPECT_EQ(frames.neighbour(labelled, 3).state, State::kBeyond);
-  EXPECT_EQ(frames.neighbour(labelled, -3).state, State::kBeyond);
+  const PairedFrame missing = frames.paired_frame(labelled, 1);
+  EXPECT_EQ(missing.state, State::kMissing);
+  EXPECT_EQ(missing.frame.path, "m/sequences/a/00000008.jpg");
+  EXPECT_EQ(frames.paired_frame(labelled, 2).state, State::kPresent);
+  EXPECT_EQ(frames.paired_frame(labelled, 3).state, State::kBeyond);
+  EXPECT_EQ(frames.paired_frame(labelled, -3).state, State::kBeyond);
 }
 
-TEST_F(MpiiFramesTest, LostFramesAreHolesHoweverManyAreLost) {
+TEST_F(MpiiFramesTest, LostFramesAreMissingHoweverManyAreLost) {
   testing::write_file(folder_ / "m/sequences/a/00000040.jpg", "");
   for (const char* name : {"00000005.jpg", "00000006.jpg", "00000009.jpg"}) {
     std::filesystem::remove(folder_ / "m/sequences/a" / name);
   }
   const MpiiFrames frames = open();
-  const Neighbour next = frames.neighbour(frames.labelled("a.jpg", "a/00000007.jpg"), 1);
-  EXPECT_EQ(next.state, State::kHole);
+  const PairedFrame next = frames.paired_frame(frames.labelled("a.jpg", "a/00000007.jpg"), 1);
+  EXPECT_EQ(next.state, State::kMissing);
   EXPECT_EQ(next.frame.path, "m/sequences/a/00000008.jpg");
 }
 
-TEST_F(MpiiFramesTest, AnAbsentKeyframeIsAHole) {
+TEST_F(MpiiFramesTest, AnAbsentKeyframeIsAMissingFrame) {
   const MpiiFrames frames = open();
   const LabelledFrame labelled = frames.labelled("a.jpg", "a/00000008.jpg");
-  const Neighbour itself = frames.neighbour(labelled, 0);
-  EXPECT_EQ(itself.state, State::kHole);
+  const PairedFrame itself = frames.paired_frame(labelled, 0);
+  EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame, labelled.frame);
-  EXPECT_EQ(frames.neighbour(labelled, -1).state, State::kPresent);
+  EXPECT_EQ(frames.paired_frame(labelled, -1).state, State::kPresent);
 }
 
 TEST_F(MpiiFramesTest, FindsSequencesInBatchFolders) {
@@ -156,7 +156,7 @@ TEST_F(MpiiFramesTest, FindsSequencesInBatchFolders) {
             "m/sequences/mpii_human_pose_v1_sequences_batch3/c/00000001.jpg");
 }
 
-TEST_F(MpiiFramesTest, AnImageWithoutSequenceHasNoNeighbours) {
+TEST_F(MpiiFramesTest, AnImageWithoutSequenceHasNoPairedFrames) {
   const MpiiFrames frames = open();
   for (const char* keyframe :
        {"b/00000020.jpg", "", "00000020.jpg", "/1.jpg", "a/x.jpg", "a/-1.jpg"}) {
@@ -164,16 +164,16 @@ TEST_F(MpiiFramesTest, AnImageWithoutSequenceHasNoNeighbours) {
     EXPECT_EQ(labelled.sequence, "");
     EXPECT_EQ(labelled.frame.path, "m/images/b.jpg");
     EXPECT_EQ(labelled.frame.index, keyframe[0] == 'b' ? 20 : -1) << keyframe;
-    EXPECT_EQ(frames.neighbour(labelled, 0).state, State::kPresent);
-    EXPECT_EQ(frames.neighbour(labelled, 1).state, State::kBeyond);
-    EXPECT_EQ(frames.neighbour(labelled, -1).state, State::kBeyond);
+    EXPECT_EQ(frames.paired_frame(labelled, 0).state, State::kPresent);
+    EXPECT_EQ(frames.paired_frame(labelled, 1).state, State::kBeyond);
+    EXPECT_EQ(frames.paired_frame(labelled, -1).state, State::kBeyond);
   }
 }
 
-TEST_F(MpiiFramesTest, AnAbsentImageIsAHole) {
+TEST_F(MpiiFramesTest, AnAbsentImageIsAMissingFrame) {
   const MpiiFrames frames = open();
-  const Neighbour itself = frames.neighbour(frames.labelled("z.jpg", ""), 0);
-  EXPECT_EQ(itself.state, State::kHole);
+  const PairedFrame itself = frames.paired_frame(frames.labelled("z.jpg", ""), 0);
+  EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame.path, "m/images/z.jpg");
 }
 

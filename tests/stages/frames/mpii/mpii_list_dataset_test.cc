@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/stages/frames/mpii/mpii_fixture.h"
-#include "tests/testing/picture_file.h"
+#include "tests/testing/image_file.h"
 #include "tests/testing/shared_data.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -21,7 +21,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::ThrowsMessage;
 
-using State = Neighbour::State;
+using State = PairedFrame::State;
 
 class MpiiListDatasetTest : public ::testing::Test {
  protected:
@@ -57,13 +57,13 @@ TEST_F(MpiiListDatasetTest, RowsOfOneImageAreOneSample) {
   EXPECT_THAT(dataset->annotation_files(), ElementsAre("labels/list.json"));
 }
 
-TEST_F(MpiiListDatasetTest, WithoutSequencesThereAreNoNeighbours) {
+TEST_F(MpiiListDatasetTest, WithoutSequencesThereAreNoPairedFrames) {
   const auto dataset = open();
   const auto& frames = dataset->labelled_frames();
-  EXPECT_EQ(dataset->neighbour(frames[0], 0).state, State::kHole);  // a.jpg is absent
-  EXPECT_EQ(dataset->neighbour(frames[1], 0).state, State::kPresent);
-  EXPECT_EQ(dataset->neighbour(frames[1], 0).frame.path, "m/images/b.jpg");
-  EXPECT_EQ(dataset->neighbour(frames[1], -1).state, State::kBeyond);
+  EXPECT_EQ(dataset->paired_frame(frames[0], 0).state, State::kMissing);  // a.jpg is absent
+  EXPECT_EQ(dataset->paired_frame(frames[1], 0).state, State::kPresent);
+  EXPECT_EQ(dataset->paired_frame(frames[1], 0).frame.path, "m/images/b.jpg");
+  EXPECT_EQ(dataset->paired_frame(frames[1], -1).state, State::kBeyond);
   EXPECT_THAT(dataset->notes(), IsEmpty());
 }
 
@@ -74,7 +74,7 @@ TEST_F(MpiiListDatasetTest, TheKeyframesFileTellsTheFrame) {
   const auto dataset = open();
   const LabelledFrame& frame = dataset->labelled_frames()[1];
   EXPECT_EQ(frame.frame, (FrameRef{"v/b/00000004.jpg", 4}));
-  EXPECT_EQ(dataset->neighbour(frame, -1).frame, (FrameRef{"v/b/00000003.jpg", 3}));
+  EXPECT_EQ(dataset->paired_frame(frame, -1).frame, (FrameRef{"v/b/00000003.jpg", 3}));
   EXPECT_THAT(dataset->annotation_files(),
               ElementsAre("labels/list.json", "mpii_human_pose_v1_sequences_keyframes.mat"));
   EXPECT_THAT(dataset->notes(),
@@ -91,15 +91,15 @@ TEST_F(MpiiListDatasetTest, LabelsAreInPixelsOfTheFrame) {
   spec_.sequences = "v";
   mat::write_mat(folder_ / "mpii_human_pose_v1_sequences_keyframes.mat", "annolist_keyframes",
                  mat::structs({{{"image", mat::image("b/00000004.jpg")}}}));
-  testing::write_flat_picture(folder_ / "m/images/b.jpg", {48, 64}, 100);
-  testing::write_flat_picture(folder_ / "v/b/00000004.jpg", {24, 32}, 100);
+  testing::write_flat_image(folder_ / "m/images/b.jpg", {48, 64}, 100);
+  testing::write_flat_image(folder_ / "v/b/00000004.jpg", {24, 32}, 100);
   const auto half = std::get<Annotation>(open()->annotation("b.jpg"));
   // 11, 21 counted from 1 are 10, 20; half as large: (10 + 0.5) / 2 - 0.5.
   EXPECT_EQ(half.persons.at(1).center, (Point{4.75, 9.75}));
   EXPECT_DOUBLE_EQ(half.persons.at(1).scale, 1.5);
   EXPECT_THAT(half.original, HasSubstr(R"("scale":3,"center":[11,21])"));
 
-  testing::write_flat_picture(folder_ / "v/b/00000004.jpg", {32, 32}, 100);
+  testing::write_flat_image(folder_ / "v/b/00000004.jpg", {32, 32}, 100);
   const auto square = open()->annotation("b.jpg");
   ASSERT_TRUE(is_fault(square));
   EXPECT_THAT(std::get<SampleFault>(square).reason, HasSubstr("got 32x32, in v/b/00000004.jpg"));
@@ -145,7 +145,7 @@ TEST(MpiiListDatasetOnSharedData, ListAndTableAgree) {
 
   int hidden_in_table = 0;
   for (const LabelledFrame& frame : list->labelled_frames()) {
-    EXPECT_EQ(list->neighbour(frame, 0).state, State::kPresent);
+    EXPECT_EQ(list->paired_frame(frame, 0).state, State::kPresent);
     const auto listed = std::get<Annotation>(list->annotation(frame.label_key)).persons.at(0);
     const auto tabled = std::get<Annotation>(table->annotation(frame.label_key)).persons.at(0);
     for (int i = 0; i < 16; ++i) {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/mpii/mpii_list_dataset_internal.h"
+#include "stages/frames/mpii/detail/mpii_list_dataset.h"
 #include "tests/testing/hdf5_file.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"

@@ -28,11 +28,11 @@ using ::testing::ThrowsMessage;
 ViewShard shard(const std::string& split, const std::string& name, std::vector<std::int32_t> boxes,
                 std::vector<std::int32_t> persons) {
   ViewShard result{split, {}};
-  result.marker.shard = name;
-  result.marker.samples = static_cast<int>(boxes.size());
-  result.marker.valid = result.marker.samples;
-  result.marker.contents.boxes = std::move(boxes);
-  result.marker.contents.persons = std::move(persons);
+  result.record.shard = name;
+  result.record.samples = static_cast<int>(boxes.size());
+  result.record.valid = result.record.samples;
+  result.record.contents.boxes = std::move(boxes);
+  result.record.contents.persons = std::move(persons);
   return result;
 }
 
@@ -50,9 +50,9 @@ TEST(ViewLayout, SplitsAreWholeRangesInTheOrderOfTheirFirstShard) {
                     shard("val", "v1", {1, 0, 0}, {0, 0, 4})});
   EXPECT_THAT(layout.splits, ElementsAre(SplitRange{"val", {0, 5}}, SplitRange{"train", {5, 1}}));
   ASSERT_EQ(layout.shards.size(), 3u);
-  EXPECT_EQ(layout.shards[0].shard.marker.shard, "v0");
-  EXPECT_EQ(layout.shards[1].shard.marker.shard, "v1");
-  EXPECT_EQ(layout.shards[2].shard.marker.shard, "t0");
+  EXPECT_EQ(layout.shards[0].shard.record.shard, "v0");
+  EXPECT_EQ(layout.shards[1].shard.record.shard, "v1");
+  EXPECT_EQ(layout.shards[2].shard.record.shard, "t0");
   EXPECT_EQ(layout.shards[1].samples, (RowRange{2, 3}));
   EXPECT_EQ(layout.shards[2].samples, (RowRange{5, 1}));
 }
@@ -78,11 +78,11 @@ TEST(ViewLayout, RowsBeyond32Bits) {
 
 TEST(ViewLayout, QuarantinedSamplesAreNotValid) {
   ViewShard second = shard("a", "1", {0, 0, 0}, {0, 0, 0});
-  second.marker.quarantined = {{0, "x", ""}, {2, "y", ""}};
+  second.record.quarantined = {{0, "x", ""}, {2, "y", ""}};
   EXPECT_THAT(lay_out_view({shard("a", "0", {0}, {0}), second}).valid, ElementsAre(1, 0, 1, 0));
 }
 
-TEST(ViewLayout, MarkersThatContradictThemselvesAreRefused) {
+TEST(ViewLayout, CommitRecordsThatContradictThemselvesAreRefused) {
   const auto message_of = [](const ViewShard& bad) {
     return [bad] { lay_out_view({shard("a", "good", {1}, {1}), bad}); };
   };
@@ -93,11 +93,11 @@ TEST(ViewLayout, MarkersThatContradictThemselvesAreRefused) {
   EXPECT_THAT(message_of(shard("a", "bad", {-1}, {0})),
               ThrowsMessage<std::runtime_error>(HasSubstr("0 or more boxes of a sample, got -1")));
   ViewShard slot = shard("a", "bad", {1}, {0});
-  slot.marker.quarantined = {{1, "x", ""}};
+  slot.record.quarantined = {{1, "x", ""}};
   EXPECT_THAT(message_of(slot),
               ThrowsMessage<std::runtime_error>(HasSubstr("expected a slot below 1, got 1")));
   ViewShard huge = shard("a", "bad", {}, {});
-  huge.marker.samples = 3;
+  huge.record.samples = 3;
   EXPECT_THAT(message_of(huge), ThrowsMessage<std::runtime_error>(HasSubstr("3 samples, got 0")));
 }
 
@@ -107,10 +107,10 @@ DatasetView view_of_nothing(int shards) {
   std::vector<ViewShard> list;
   for (int i = 0; i < shards; ++i) {
     ViewShard shard{i % 2 == 0 ? "train" : "val", {}};
-    shard.marker.shard = "demo-" + std::to_string(i) + ".h5";
-    shard.marker.samples = 2;
-    shard.marker.contents.boxes = {1, 2};
-    shard.marker.contents.persons = {0, 0};
+    shard.record.shard = "demo-" + std::to_string(i) + ".h5";
+    shard.record.samples = 2;
+    shard.record.contents.boxes = {1, 2};
+    shard.record.contents.persons = {0, 0};
     list.push_back(shard);
   }
   view.layout = lay_out_view(std::move(list));

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "manifests/documents/marker.h"
+#include "manifests/documents/commit_record.h"
 #include "stages/base/files/atomic_file.h"
 #include "tests/stages/shards/example_shard.h"
 
@@ -25,9 +25,9 @@ ExampleShard part_of(const ExampleShard& whole, const std::vector<std::size_t>& 
 }
 
 ViewShard write(const std::filesystem::path& folder, const ExampleShard& shard) {
-  ShardMarker marker = write_shard(folder, shard);
-  write_file_atomically(folder / marker_name(marker.shard), to_json(marker));
-  return {shard.header.split, std::move(marker)};
+  CommitRecord record = write_shard(folder, shard);
+  write_file_atomically(folder / commit_record_name(record.shard), to_json(record));
+  return {shard.header.split, std::move(record)};
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // write_example_views FOLDER: writes datasets for the tests that look at them from Python, each a
-// folder with shards, their markers and dataset.h5:
+// folder with shards, their commit records and dataset.h5:
 //
 //   FOLDER/TYPE   the three shards of example_view.h in every stored type, as one view at the root
 //   FOLDER/two    the same in float16, in group "demo", and a shard without labels in group "other"

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <vector>
+
+#include "manifests/documents/detail/strict_json.h"
+#include "manifests/values/events.h"
+#include "manifests/values/job.h"
+
+namespace eventgan {
+
+/// Reads one of the manifest's sources.
+SourceSpec read_source(const StrictValue& value);
+
+/// Reads a source's `pairs`.
+PairSpec read_pairs(const StrictValue& value);
+
+/// Reads gaps, 1..6, each once, even with kAround; ascending, whatever order they are written in.
+std::vector<int> read_gaps(const StrictValue& value, PairSide side);
+
+/// Reads the manifest's `image`. The preset, named or else that of the sources' datasets, fills in
+/// `grey` and `blur`, unless these are given.
+ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& sources);
+
+/// Reads a manifest's `sensor`, whose keys are SensorSpec's.
+SensorSpec read_sensor(const StrictValue& value);
+
+}  // namespace eventgan

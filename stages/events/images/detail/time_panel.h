@@ -1,0 +1,18 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <span>
+
+#include "manifests/values/events.h"
+
+namespace eventgan {
+
+/// Colour of a mean time (0.1 first bin .. 1 last bin, clamped) at full brightness: blue, cyan,
+/// green, yellow, red.
+cv::Vec3b time_colour(float time);
+
+/// The average-timestamp image of a volume [2 bins, y, x] as CV_8UC3 of the volume's size,
+/// coloured as write_preview_png says. Pixels with a value that is not finite are white.
+cv::Mat time_panel(std::span<const float> volume, const VolumeShape& shape);
+
+}  // namespace eventgan

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+#include "stages/base/images/image_file.h"
+
+namespace eventgan {
+
+/// How volume pixels map to a panel's pixels: a pixel becomes a square of `factor` x `factor`.
+struct PanelScale {
+  double factor = 1;
+
+  /// A point (pixel centres are integers) in panel pixels, whose centres are integers too.
+  Point point(Point in_volume) const {
+    return {(in_volume.x + 0.5) * factor - 0.5, (in_volume.y + 0.5) * factor - 0.5};
+  }
+  /// The corner of an edge rectangle: edges lie between pixels, and are drawn on the pixel after.
+  Point corner(double x, double y) const { return {x * factor - 0.5, y * factor - 0.5}; }
+};
+
+/// How a preview's three panels lie: side by side, one below the other, or the frames side by side
+/// above the events.
+struct PreviewLayout {
+  PanelScale scale;
+  int columns = 3;
+};
+
+/// The layout whose panels are largest, enlarged by a whole factor of at most 8, as long as the
+/// image is about as wide as a page, 1420 pixels each way, so that it can be read at 1200; of
+/// equals the one with more columns. Volumes too large for that are stacked in one column in their
+/// own size.
+PreviewLayout preview_layout(ImageSize volume);
+
+/// What a preview shows: three panels, each of the volume's shape.
+struct PreviewContent {
+  VolumeShape shape;
+  /// [y, x, 3] uint8 blue green red, laid into the volume's frame; empty: the frame was not found.
+  std::vector<std::uint8_t> previous_bgr;
+  std::vector<std::uint8_t> next_bgr;
+  /// [2 bins, y, x] as the shard holds it, decoded to float32; empty: there is none (quarantined).
+  std::vector<float> volume;
+  std::string title;          ///< one line above the panels
+  double label_position = 1;  ///< FramePair::label_position
+  Annotation annotation;
+  VolumeLabels labels;  ///< as many entries as `annotation`
+  LabelSchema schema;
+};
+
+/// Draws previous frame, next frame and average-timestamp image. The events and the labelled
+/// frame, whose panel has a bright border, have the boxes (with their class; ignored regions dashed
+/// grey) and poses (hidden joints hollow; limbs where the joint names are MPII's or Human3.6M's);
+/// on another frame, where things have moved, thin dashes hint at them. A box's name is where
+/// it covers boxes least. Small volumes are enlarged by whole factors, so that text and lines stay
+/// readable.
+///
+/// Time is colour, early blue to late red, the mean over both polarities. Brightness says how many
+/// events, on an absolute scale, so that noise looks faint: 1 - exp(-m) of full brightness where
+/// the pixel's values sum to m; black is no event.
+///
+/// Throws std::invalid_argument if the sizes do not fit each other, std::runtime_error if OpenCV
+/// cannot draw them. Thread safe.
+ColourFrame draw_preview(const PreviewContent& content);
+
+/// The same in small, `width` pixels wide: the labelled frame (of a label between the two the next
+/// one, with dashes) and the events, side by side, or below each other where volumes are wide, with
+/// the title above.
+ColourFrame draw_tile(const PreviewContent& content, int width);
+
+/// Tiles in rows of `columns` in their order: a contact sheet. At least one tile.
+ColourFrame draw_sheet(std::span<const ColourFrame> tiles, int columns);
+
+/// The average-timestamp image of a volume [2 bins, y, x] alone, coloured as above and of the
+/// volume's size, as the bytes of a PNG. Throws std::runtime_error if it cannot be encoded. Thread
+/// safe.
+std::string time_image_png(std::span<const float> volume, const VolumeShape& shape);
+
+}  // namespace eventgan

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <array>
+#include <dnnl.hpp>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "manifests/values/job.h"
+#include "stages/generator/onednn/layer_numbers.h"
+#include "stages/generator/weights.h"
+
+namespace eventgan {
+
+/// One layer's weights, laid out once for each layout that oneDNN's kernels ask for: a few, shared
+/// by all image sizes, and kept. Thread safe.
+class LayerWeights {
+ public:
+  /// `type`: what the weights are converted to (f32, bf16, s8).
+  LayerWeights(LayerNumbers numbers, dnnl::memory::data_type type, const dnnl::engine& engine);
+
+  const LayerNumbers& numbers() const { return numbers_; }
+  dnnl::memory::data_type type() const { return type_; }
+
+  /// The weights laid out as `layout`, which may be read as long as this or the result lives.
+  /// Throws dnnl::error; then nothing is kept.
+  dnnl::memory packed(const dnnl::memory::desc& layout);
+  const dnnl::memory& bias() const { return bias_; }
+
+ private:
+  LayerNumbers numbers_;
+  dnnl::memory::data_type type_;
+  dnnl::engine engine_;
+  dnnl::memory bias_;
+  std::mutex mutex_;
+  std::vector<dnnl::memory> packed_;
+};
+
+/// The network's layers (layer_numbers.h) for one precision, ready for convolutions of any size.
+class NetworkLayers {
+ public:
+  /// kInt8 throws as int8_numbers.
+  NetworkLayers(const Weights& weights, Precision precision, const dnnl::engine& engine);
+
+  LayerWeights& at(const std::string& name) { return layers_.at(name); }
+  const dnnl::engine& engine() const { return engine_; }
+  int base_channels() const { return base_channels_; }
+  int bins() const { return bins_; }
+  Precision precision() const { return precision_; }
+
+  /// What activations between layers are stored as.
+  dnnl::memory::data_type stored_type() const { return stored_type_; }
+  float residual_factor(int block) const { return residual_factors_[block]; }
+
+ private:
+  dnnl::engine engine_;
+  int base_channels_;
+  int bins_;
+  Precision precision_;
+  dnnl::memory::data_type stored_type_;
+  std::array<float, kResidualBlocks> residual_factors_;
+  std::map<std::string, LayerWeights> layers_;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "stages/recordings/detail/event_check.h"
+
+namespace eventgan {
+
+/// A file of which parts are read, too large to be held whole. Thread safe.
+///
+/// Why not mapped into memory: a read error or a file that shrinks would end the process.
+class RandomAccessFile {
+ public:
+  /// Throws InputError if it is no readable file.
+  explicit RandomAccessFile(const std::filesystem::path& path);
+  ~RandomAccessFile();
+  RandomAccessFile(const RandomAccessFile&) = delete;
+  RandomAccessFile& operator=(const RandomAccessFile&) = delete;
+
+  const std::string& name() const { return name_; }
+  std::int64_t size_bytes() const { return size_bytes_; }
+
+  /// The bytes begin..end, which must lie in the file. Throws InputError if they cannot be read.
+  std::string read(std::int64_t begin, std::int64_t end) const;
+
+ private:
+  std::string name_;
+  int descriptor_;
+  std::int64_t size_bytes_ = 0;
+};
+
+/// Parses a line "t x y p" of an ECD `events.txt`: t in seconds, the others whole numbers,
+/// between blanks or tabs; without its line end, but for a CR. Throws EventFault.
+StoredEvent parse_ecd_event(std::string_view line);
+
+/// Its time alone, which must be finite here, since it is searched by.
+double parse_ecd_event_time(std::string_view line);
+
+/// `events.txt` of an ECD recording: a line "t x y p" for each event, in time order. Only what is
+/// asked for is read: a time is found by halving the file. Thread safe.
+class EcdEventFile {
+ public:
+  /// Throws InputError if it is no readable file.
+  explicit EcdEventFile(const std::filesystem::path& path) : file_(path) {}
+
+  /// Where the first line begins whose time is after `time_s`; the end of the file if there is
+  /// none. Throws InputError "expected X, got Y, in FILE (line 3)", the line counted from 1.
+  std::int64_t first_byte_after(double time_s) const;
+
+  /// Where the line begins that is `lines` lines before (negative) or after the one that begins at
+  /// `byte`; the file's start or end if there are fewer.
+  std::int64_t skip_lines(std::int64_t byte, std::int64_t lines) const;
+
+  /// Times of the first and last line; none of an empty file.
+  std::optional<std::array<double, 2>> span() const;
+
+  /// The events of the lines in begin..end, both line starts. Throws likewise.
+  std::vector<Event> events(std::int64_t begin, std::int64_t end, EventCheck check) const;
+
+ private:
+  struct Line {
+    std::int64_t begin;
+    std::int64_t end;  ///< behind its line end
+    double time_s;
+  };
+
+  /// The first line that begins at or after `byte`, which is inside the file and not in its last
+  /// line.
+  Line line_from(std::int64_t byte) const;
+  [[noreturn]] void refuse(const EventFault& fault, std::int64_t line_begin) const;
+
+  RandomAccessFile file_;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <limits>
+#include <stdexcept>
+
+#include "manifests/values/events.h"
+#include "manifests/values/frames.h"
+
+namespace eventgan {
+
+/// An event as a file has it, with nothing known about its values.
+struct StoredEvent {
+  double x = 0;
+  double y = 0;
+  double t_s = 0;
+  double polarity = 0;
+};
+
+/// "expected X, got Y"; the place is added by who knows it.
+class EventFault : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Throws EventFault unless `time_s` is finite and not before `previous_s`.
+void check_event_time(double previous_s, double time_s);
+
+/// What holds for the events of one stretch of a recording: whole coordinates inside the image,
+/// finite times that never fall, in (after_s, until_s], polarities of {-1, +1} or of {0, 1}.
+class EventCheck {
+ public:
+  EventCheck(ImageSize size, double after_s, double until_s)
+      : size_(size), last_s_(after_s), until_s_(until_s) {}
+
+  /// The same without bounds of the times.
+  static EventCheck of_any_time(ImageSize size) {
+    using Limits = std::numeric_limits<double>;
+    return {size, -Limits::infinity(), Limits::max()};
+  }
+
+  /// The next event of the stretch. Throws EventFault.
+  Event take(const StoredEvent& stored);
+
+ private:
+  [[noreturn]] void refuse(const StoredEvent& stored) const;
+
+  ImageSize size_;
+  double last_s_;
+  double until_s_;
+  bool first_ = true;
+  double off_ = std::numeric_limits<double>::quiet_NaN();  ///< -1 or 0, once one was seen
+};
+
+}  // namespace eventgan

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+
+#include "stages/base/hdf5/detail/hdf5.h"
+
+namespace eventgan {
+
+/// An open dataset of numbers, of which parts are read.
+class Hdf5Table {
+ public:
+  /// Throws InputError if there is no such dataset, if it does not hold numbers, or if its shape
+  /// claims more values than the bytes it stores can give. `file_name` is for messages.
+  Hdf5Table(hid_t file, const std::string& path, const std::string& file_name);
+
+  const Dims& dims() const { return dims_; }
+  bool is_float() const { return is_float_; }  ///< float32 or float64
+  bool is_uint8() const { return type_ == "uint8"; }
+
+  /// "PATH (dataset davis/left/events)".
+  const std::string& place() const { return place_; }
+
+  /// Throws InputError "expected EXPECTED, got uint8 [3, 4], in PATH (dataset D)".
+  [[noreturn]] void refuse(const std::string& expected) const;
+
+  /// Reads the block that starts at `start` and has the shape `count`, in C order and as `Number`.
+  /// Throws Hdf5Error.
+  template <class Number>
+  void read(const Dims& start, const Dims& count, Number* values) const {
+    read_block(dataset_, place_, start, count, element_type<Number>(), values);
+  }
+
+ private:
+  std::string place_;
+  Hdf5Handle dataset_;
+  Dims dims_;
+  std::string type_;  ///< numpy's name of it
+  bool is_float_ = false;
+};
+
+}  // namespace eventgan

@@ -1,0 +1,343 @@
+#include <gtest/gtest.h>
+#include <libdeflate.h>
+#include <png.h>
+
+#include <array>
+#include <filesystem>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "stages/base/images/image_codecs.h"
+#include "tests/stages/base/images/test_images.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using testing::gradient_image;
+using testing::opencv_read;
+using testing::read_file;
+using testing::same_pixels;
+using testing::TemporaryFolder;
+using testing::with_open;
+using testing::write_file;
+
+std::string why_png_refused(const std::filesystem::path& file) {
+  return testing::why_refused(file, decode_png);
+}
+
+/// Writes what OpenCV cannot: any kind of PNG with pixels of `bits` bits, all rows counting up.
+void write_png(const std::filesystem::path& path, ImageSize size, int kind, int bits, int interlace,
+               bool pixels = true) {
+  std::FILE* file = std::fopen(path.c_str(), "wb");
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png_create_info_struct(png);
+  png_init_io(png, file);
+  png_set_IHDR(png, info, size.width, size.height, bits, kind, interlace,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  const std::array<png_color, 4> palette{{{1, 2, 3}, {40, 50, 60}, {200, 100, 0}, {255, 254, 253}}};
+  const std::array<png_byte, 2> transparent{0, 128};
+  if (kind == PNG_COLOR_TYPE_PALETTE) {
+    png_set_PLTE(png, info, palette.data(), palette.size());
+    png_set_tRNS(png, info, transparent.data(), transparent.size(), nullptr);
+  }
+  png_set_check_for_invalid_index(png, -1);  // let pixels be colours that the palette lacks
+  png_write_info(png, info);
+  if (pixels) {
+    std::vector<std::vector<png_byte>> rows(size.height);
+    std::vector<png_bytep> pointers;
+    png_byte value = 0;
+    for (auto& row : rows) {
+      row.resize(png_get_rowbytes(png, info));
+      for (png_byte& byte : row) byte = value += 37;
+      pointers.push_back(row.data());
+    }
+    png_write_image(png, pointers.data());
+    png_write_end(png, nullptr);
+  }
+  png_destroy_write_struct(&png, &info);
+  std::fclose(file);
+}
+
+struct PngKind {
+  const char* name;
+  int kind;
+  int bits;
+  int interlace;
+};
+
+class PngKinds : public ::testing::TestWithParam<PngKind> {};
+
+TEST_P(PngKinds, DecodesToTheSamePixelsAsOpenCv) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  for (const ImageSize size : {ImageSize{11, 13}, ImageSize{1, 1}}) {
+    write_png(file, size, GetParam().kind, GetParam().bits, GetParam().interlace);
+    EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
+    EXPECT_EQ(with_open(file, png_size), size);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(, PngKinds,
+                         ::testing::Values(PngKind{"colour", PNG_COLOR_TYPE_RGB, 8, 0},
+                                           PngKind{"colour_16_bit", PNG_COLOR_TYPE_RGB, 16, 0},
+                                           PngKind{"transparent", PNG_COLOR_TYPE_RGBA, 8, 0},
+                                           PngKind{"transparent_16", PNG_COLOR_TYPE_RGBA, 16, 0},
+                                           PngKind{"grey", PNG_COLOR_TYPE_GRAY, 8, 0},
+                                           PngKind{"grey_1_bit", PNG_COLOR_TYPE_GRAY, 1, 0},
+                                           PngKind{"grey_16_bit", PNG_COLOR_TYPE_GRAY, 16, 0},
+                                           PngKind{"grey_alpha", PNG_COLOR_TYPE_GRAY_ALPHA, 8, 0},
+                                           PngKind{"palette", PNG_COLOR_TYPE_PALETTE, 2, 0},
+                                           PngKind{"interlaced", PNG_COLOR_TYPE_RGB, 8, 1}),
+                         [](const auto& param) { return param.param.name; });
+
+TEST(PngImage, EveryTruncationIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  cv::imwrite(file.string(), gradient_image({64, 96}));
+  const std::string bytes = read_file(file);
+  // The last 12 bytes are the chunk IEND: without it all pixels are there, the file is not whole.
+  for (std::size_t length = bytes.size() - 1; length > 8; length = length * 9 / 10) {
+    write_file(file, bytes.substr(0, length));
+    EXPECT_NE(why_png_refused(file), "") << length << " of " << bytes.size() << " bytes";
+  }
+}
+
+TEST(PngImage, AnyChangedByteOfThePixelDataIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  cv::imwrite(file.string(), gradient_image({16, 24}));
+  const std::string bytes = read_file(file);
+  const std::size_t data = bytes.find("IDAT") + 4;
+  for (std::size_t at = data; at < bytes.size() - 16; at += 7) {
+    std::string changed = bytes;
+    changed[at] = static_cast<char>(changed[at] ^ 0x10);
+    write_file(file, changed);
+    EXPECT_NE(why_png_refused(file), "") << "byte " << at;
+  }
+}
+
+TEST(PngImage, AnIndexBeyondThePaletteIsRefused) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  // Pixels count up by 37, so that they reach any number; the palette has four colours.
+  for (const int interlace : {0, 1}) {
+    for (const int bits : {4, 8}) {
+      write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, bits, interlace);
+      EXPECT_NE(why_png_refused(file), "") << bits << " bits";
+    }
+    write_png(file, {11, 13}, PNG_COLOR_TYPE_PALETTE, 2, interlace);
+    EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
+  }
+}
+
+TEST(PngImage, DamageBesideThePixelsIsForgiven) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  cv::imwrite(file.string(), gradient_image({16, 24}));
+  const cv::Mat whole = opencv_read(file);
+  std::string bytes = read_file(file);
+  // A chunk tEXt of 4 bytes whose checksum is wrong, after the signature (8) and IHDR (25).
+  using namespace std::string_literals;
+  bytes.insert(33, "\0\0\0\x04tEXta\0b!\0\0\0\0"s);
+  write_file(file, bytes);
+  EXPECT_TRUE(same_pixels(with_open(file, decode_png), whole));
+}
+
+TEST(PngImage, HugeAnnouncedSizeIsRefusedByName) {
+  const TemporaryFolder folder;
+  const auto file = folder / "picture.png";
+  write_png(file, {90000, 100000}, PNG_COLOR_TYPE_RGB, 8, 0, /*pixels=*/false);
+  // Room for the start of the pixel data, so that the header counts as read.
+  write_file(file, read_file(file) + std::string("\0\0\1\0IDAT", 8));
+  EXPECT_NE(why_png_refused(file).find("100000x90000"), std::string::npos) << why_png_refused(file);
+}
+
+TEST(PngImage, RealFramesEqualOpenCv) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto kitti = data / "kitti_object/training";
+  for (const auto& file : {kitti / "image_2/000000.png", kitti / "prev_2/001497_02.png",
+                           data / "davis/slider_depth/images/frame_00000000.png"}) {
+    EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file))) << file;
+  }
+}
+
+class StoredPngTest : public ::testing::Test {
+ protected:
+  std::string write(const cv::Mat& image) {
+    cv::imwrite(file_.string(), image);
+    return read_file(file_);
+  }
+  std::string stored() const {
+    const auto bytes = testing::with_open(file_, stored_png);
+    return {bytes.begin(), bytes.end()};
+  }
+  std::string stored(const std::string& bytes) const {
+    write_file(file_, bytes);
+    return stored();
+  }
+
+  const TemporaryFolder folder_;
+  const std::filesystem::path file_ = folder_ / "picture.png";
+};
+
+std::uint32_t number_at(const std::string& bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (int i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes.at(at + i));
+  return value;
+}
+
+/// A chunk with its checksum.
+std::string chunk(const std::string& type, const std::string& data) {
+  const auto text = [](std::size_t value) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift);
+    return bytes;
+  };
+  const std::string body = type + data;
+  return text(data.size()) + body + text(libdeflate_crc32(0, body.data(), body.size()));
+}
+
+TEST_F(StoredPngTest, IsAPngOfTheSamePixelsWhoseDataIsStored) {
+  // 75 rows of 1 + 3 * 400 bytes fill one stored block of 65535 bytes and a part of a second.
+  const cv::Mat image = gradient_image({75, 400});
+  write(image);
+  const std::string bytes = stored();
+  const std::size_t raw = 75 * (1 + 3 * 400);
+  const std::size_t data = bytes.find("IDAT");
+  ASSERT_NE(data, std::string::npos);
+  EXPECT_EQ(number_at(bytes, data - 4), 2 + 2 * 5 + raw + 4);
+  write_file(file_, bytes);
+  EXPECT_EQ(cv::norm(opencv_read(file_), image, cv::NORM_INF), 0);
+}
+
+TEST_F(StoredPngTest, FillsStoredBlocksToTheLastByte) {
+  // Rows of 255 bytes: 257 of them are one block of 65535 bytes exactly.
+  for (const int rows : {256, 257, 258}) {
+    const cv::Mat image(rows, 254, CV_8UC1, cv::Scalar(rows - 100));
+    write(image);
+    const std::string bytes = stored();
+    const std::size_t blocks = rows <= 257 ? 1 : 2;
+    EXPECT_EQ(number_at(bytes, bytes.find("IDAT") - 4), 2 + 5 * blocks + 255u * rows + 4);
+    write_file(file_, bytes);
+    EXPECT_EQ(cv::imread(file_.string(), cv::IMREAD_UNCHANGED).at<std::uint8_t>(rows - 1, 253),
+              rows - 100);
+  }
+}
+
+TEST_F(StoredPngTest, LibpngTakesItBeyondItsLimitForOtherChunks) {
+  // 9 MB of pixels; libpng refuses chunks of more than 8 MB, except of pixel data that fills them.
+  const cv::Mat image(1000, 3000, CV_8UC3, cv::Scalar(1, 2, 3));
+  write(image);
+  write_file(file_, stored());
+  EXPECT_GT(std::filesystem::file_size(file_), 9'000'000u);
+  const ColourFrame frame = testing::with_open(file_, decode_png);
+  EXPECT_TRUE(testing::same_pixels(frame, image));
+}
+
+TEST_F(StoredPngTest, OtherChunksStayAsTheyAre) {
+  std::string bytes = write(gradient_image({16, 24}));
+  const std::string early = chunk("tEXt", std::string("a\0b", 3));
+  const std::string late = chunk("tIME", std::string("\7\xd0\1\1\0\0\0", 7));
+  bytes.insert(33, early);  // after the signature (8) and IHDR (25)
+  bytes.insert(bytes.size() - 12, late);
+  const std::string result = stored(bytes);
+  EXPECT_EQ(result.find(early), 33u);
+  EXPECT_EQ(result.substr(result.size() - 12 - late.size()),
+            bytes.substr(bytes.size() - 12 - late.size()));
+}
+
+TEST_F(StoredPngTest, DataInManyChunksIsJoined) {
+  const std::string bytes = write(gradient_image({16, 24}));
+  const std::string whole = stored();
+  const std::size_t at = bytes.find("IDAT");
+  const std::string data = bytes.substr(at + 4, number_at(bytes, at - 4));
+  std::string pieces;
+  for (std::size_t i = 0; i < data.size(); i += 10) pieces += chunk("IDAT", data.substr(i, 10));
+  const std::string cut = bytes.substr(0, at - 4) + pieces + chunk("IEND", "");
+  EXPECT_EQ(stored(cut), whole);
+  EXPECT_FALSE(whole.empty());
+
+  // In two runs it is against the standard: left to libpng.
+  const std::string apart = bytes.substr(0, at - 4) + chunk("IDAT", data.substr(0, 10)) +
+                            chunk("tEXt", std::string("a\0b", 3)) + chunk("IDAT", data.substr(10)) +
+                            chunk("IEND", "");
+  EXPECT_EQ(stored(apart), "");
+}
+
+TEST_F(StoredPngTest, AnyDoubtLeavesTheFileToLibpng) {
+  const std::string bytes = write(gradient_image({16, 24}));
+  const std::size_t at = bytes.find("IDAT");
+  const std::string before = bytes.substr(0, at - 4);
+  const std::string data = bytes.substr(at + 4, number_at(bytes, at - 4));
+  const std::string end = chunk("IEND", "");
+  ASSERT_NE(stored(before + chunk("IDAT", data) + end), "");
+
+  EXPECT_EQ(stored(before + chunk("IDAT", data + "x") + end), "") << "more data than pixels";
+  EXPECT_EQ(stored(before + chunk("IDAT", data.substr(0, data.size() - 1)) + end), "") << "less";
+  EXPECT_EQ(stored(before + chunk("IDAT", "") + end), "") << "none";
+  EXPECT_EQ(stored(before + end), "") << "no chunk of it";
+  EXPECT_EQ(stored(""), "");
+  std::string narrow = data;  // a window of 256 bytes announced, and a header check that fits
+  narrow[0] = 0x08;
+  narrow[1] = 0x1d;
+  EXPECT_EQ(stored(before + chunk("IDAT", narrow) + end), "") << "distances may be too far";
+  std::string changed = data;
+  changed.back() = static_cast<char>(changed.back() ^ 1);
+  EXPECT_EQ(stored(before + chunk("IDAT", changed) + end), "") << "Adler-32 wrong, CRC-32 right";
+  for (const std::size_t header_byte : {16, 20, 24, 25, 28, 29}) {  // sizes, bits, kind, checksum
+    std::string damaged = bytes;
+    damaged[header_byte] = static_cast<char>(damaged[header_byte] ^ 4);
+    EXPECT_EQ(stored(damaged), "") << header_byte;
+  }
+  for (std::size_t length = 0; length < bytes.size(); length += 5) {
+    EXPECT_EQ(stored(bytes.substr(0, length)), "") << length;
+  }
+}
+
+TEST_F(StoredPngTest, EveryKindOfPixelsIsTakenUnlessInterlaced) {
+  const cv::Mat colour = gradient_image({5, 11});
+  std::vector<cv::Mat> channels;
+  cv::split(colour, channels);
+  cv::Mat wide, transparent;
+  colour.convertTo(wide, CV_16U, 257);
+  cv::merge(std::vector<cv::Mat>{channels[0], channels[1], channels[2], channels[0]}, transparent);
+  for (const cv::Mat& image : {colour, channels[0], wide, transparent}) {
+    const std::string bytes = write(image);
+    const std::string result = stored();
+    ASSERT_NE(result, "") << image.type();
+    write_file(file_, result);
+    EXPECT_EQ(cv::norm(cv::imread(file_.string(), cv::IMREAD_UNCHANGED), image, cv::NORM_INF), 0);
+
+    std::string header = bytes.substr(16, 13);
+    EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), result);
+    header.back() = 1;
+    EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), "");
+  }
+  cv::imwrite(file_.string(), channels[0], {cv::IMWRITE_PNG_BILEVEL, 1});
+  EXPECT_EQ(number_at(stored(), stored().find("IDAT") - 4), 2 + 5 + 5 * (1 + 2) + 4u);  // 11 bits
+}
+
+TEST_F(StoredPngTest, LibpngJudgesASecondHeaderAsItDoesInTheFile) {
+  const std::string bytes = write(gradient_image({16, 24}));
+  const std::string header = bytes.substr(8, 25);
+  std::string twice = bytes;
+  twice.insert(33, header);
+  ASSERT_NE(stored(twice), "");
+  EXPECT_NE(testing::why_refused(file_, decode_png), "");
+  write_file(file_, bytes.substr(0, bytes.size() - 12) + header + chunk("IEND", ""));
+  EXPECT_NE(testing::why_refused(file_, decode_png), "");
+}
+
+TEST_F(StoredPngTest, AnAnnouncedSizeThatTheDataCannotFillTakesNoMemory) {
+  const std::string bytes = write(gradient_image({16, 24}));
+  // 8000x8000 is within the limit, but a few hundred bytes cannot hold it.
+  const std::string header("\0\0\x1f\x40\0\0\x1f\x40\x08\2\0\0\0", 13);
+  EXPECT_EQ(stored(bytes.substr(0, 8) + chunk("IHDR", header) + bytes.substr(33)), "");
+}
+
+}  // namespace
+}  // namespace eventgan

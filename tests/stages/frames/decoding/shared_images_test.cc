@@ -1,0 +1,274 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <atomic>
+#include <latch>
+#include <new>
+#include <random>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "stages/frames/decoding/pair_reader.h"
+#include "tests/stages/base/images/test_images.h"
+#include "tests/stages/frames/decoding/test_video.h"
+#include "tests/testing/temporary_folder.h"
+
+// What pairs of one PairReader share.
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::TemporaryFolder;
+
+/// An image of one pixel.
+SharedFrame image(int level) {
+  return std::make_shared<Outcome<PreparedFrame>>(
+      PreparedFrame{{static_cast<std::uint8_t>(level)}, {}});
+}
+
+int level_of(const SharedFrame& frame) { return std::get<PreparedFrame>(*frame).grey.at(0); }
+
+/// Whether getting an image made it, rather than found it.
+bool was_made(SharedImages& images, const std::string& name) {
+  bool made = false;
+  images.get(name, [&] {
+    made = true;
+    return image(0);
+  });
+  return made;
+}
+
+TEST(SharedImages, MakesEachOnceWhileItIsKept) {
+  SharedImages images(2);
+  int made = 0;
+  for (int round = 0; round < 3; ++round) {
+    for (int level : {10, 20}) {
+      const auto make = [&] { return ++made, image(level); };
+      EXPECT_EQ(level_of(images.get(std::to_string(level), make)), level);
+    }
+  }
+  EXPECT_EQ(made, 2);
+}
+
+TEST(SharedImages, TheOneUnusedForLongestGoes) {
+  SharedImages images(3);
+  for (const char* name : {"a", "b", "c"}) EXPECT_TRUE(was_made(images, name));
+  EXPECT_FALSE(was_made(images, "a"));  // so b is the one unused for longest
+  EXPECT_TRUE(was_made(images, "d"));
+  for (const char* name : {"a", "c", "d"}) EXPECT_FALSE(was_made(images, name)) << name;
+  EXPECT_TRUE(was_made(images, "b"));
+}
+
+TEST(SharedImages, KeepsAtLeastOne) {
+  SharedImages images(0);
+  EXPECT_TRUE(was_made(images, "a"));
+  EXPECT_FALSE(was_made(images, "a"));
+  EXPECT_TRUE(was_made(images, "b"));
+  EXPECT_TRUE(was_made(images, "a"));
+}
+
+TEST(SharedImages, WhoHoldsAnImageKeepsItBeyondItsTime) {
+  SharedImages images(1);
+  const SharedFrame held = images.get("a", [] { return image(7); });
+  EXPECT_TRUE(was_made(images, "b"));
+  EXPECT_EQ(level_of(held), 7);
+}
+
+TEST(SharedImages, AFaultIsKeptLikeAnImage) {
+  SharedImages images(2);
+  int made = 0;
+  for (int round = 0; round < 3; ++round) {
+    const SharedFrame frame = images.get("a", [&] {
+      ++made;
+      return std::make_shared<Outcome<PreparedFrame>>(SampleFault{"bad"});
+    });
+    EXPECT_EQ(std::get<SampleFault>(*frame).reason, "bad");
+  }
+  EXPECT_EQ(made, 1);
+}
+
+TEST(SharedImages, WhatMakeThrowsReachesEveryoneWhoAsks) {
+  SharedImages images(2);
+  EXPECT_THROW(images.get("a", []() -> SharedFrame { throw std::bad_alloc(); }), std::bad_alloc);
+  EXPECT_THROW(images.get("a", [] { return image(1); }), std::bad_alloc);
+  EXPECT_TRUE(was_made(images, "b"));
+}
+
+TEST(SharedImages, WhoComesWhileOneIsMadeWaitsForIt) {
+  SharedImages images(1);
+  std::latch started(1);
+  std::latch evicted(1);
+  std::atomic<int> made = 0;
+  std::thread maker([&] {
+    images.get("a", [&] {
+      started.count_down();
+      evicted.wait();
+      return ++made, image(5);
+    });
+  });
+  started.wait();
+  int waited_for = 0;
+  std::thread waiter(
+      [&] { waited_for = level_of(images.get("a", [&] { return ++made, image(6); })); });
+  // Another image is made meanwhile: no lock is held. It may push "a" out before the waiter
+  // comes, which then makes it itself.
+  EXPECT_TRUE(was_made(images, "b"));
+  evicted.count_down();
+  maker.join();
+  waiter.join();
+  EXPECT_EQ(waited_for, made == 1 ? 5 : 6);
+}
+
+TEST(SharedImages, ManyThreadsOnFewImagesMakeEachOnce) {
+  constexpr int kThreads = 8;
+  constexpr int kImages = 12;
+  SharedImages images(kImages);
+  std::vector<std::atomic<int>> made(kImages);
+  std::atomic<int> wrong = 0;
+  std::latch together(kThreads);
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < kThreads; ++thread) {
+    threads.emplace_back([&, thread] {
+      std::mt19937 random(static_cast<unsigned>(thread));
+      together.arrive_and_wait();
+      for (int turn = 0; turn < 500; ++turn) {
+        const int wanted = static_cast<int>(random() % kImages);
+        const SharedFrame frame = images.get(std::to_string(wanted), [&] {
+          ++made[wanted];
+          std::this_thread::yield();
+          return image(wanted);
+        });
+        wrong += level_of(frame) != wanted;
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+  for (const auto& count : made) EXPECT_EQ(count, 1);
+}
+
+TEST(SharedImages, ManyThreadsAndTooLittleRoomStillGetTheRightImages) {
+  SharedImages images(2);
+  std::atomic<int> wrong = 0;
+  std::vector<std::thread> threads;
+  for (int thread = 0; thread < 8; ++thread) {
+    threads.emplace_back([&, thread] {
+      std::mt19937 random(static_cast<unsigned>(thread));
+      for (int turn = 0; turn < 500; ++turn) {
+        const int wanted = static_cast<int>(random() % 6);
+        wrong +=
+            level_of(images.get(std::to_string(wanted), [&] { return image(wanted); })) != wanted;
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+FramePair shared_pair(const std::string& previous, const std::string& next) {
+  FramePair pair;
+  pair.previous.path = previous;
+  pair.next.path = next;
+  return pair;
+}
+
+std::string why_none(const Outcome<PreparedPair>& outcome) {
+  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+}
+
+TEST(PairSharing, PairsThatShareAFrameDecodeItOnce) {
+  const TemporaryFolder folder;
+  for (const std::string name : {"a.png", "b.png", "c.png"}) {
+    cv::imwrite((folder / name).string(), testing::gradient_image({5, 7}) + name[0]);
+  }
+  const PairReader reader(folder.path(), {});
+  const auto first = reader.read(shared_pair("a.png", "b.png"));
+  std::filesystem::remove(folder / "a.png");  // a second decoding would fail
+  std::filesystem::remove(folder / "b.png");
+  for (const auto& pair : {shared_pair("b.png", "c.png"), shared_pair("a.png", "c.png")}) {
+    EXPECT_EQ(why_none(reader.read(pair)), "no fault");
+  }
+  EXPECT_EQ(std::get<PreparedPair>(reader.read(shared_pair("a.png", "b.png"))).input,
+            std::get<PreparedPair>(first).input);
+  EXPECT_THAT(why_none(PairReader(folder.path(), {}).read(shared_pair("a.png", "c.png"))),
+              HasSubstr("got none, in a.png"));
+}
+
+TEST(PairSharing, SharedFramesMakeTheSameInputsAsUnsharedOnes) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 6; ++i) {
+    cv::imwrite((folder / std::to_string(i)).string() + ".png",
+                testing::gradient_image({40, 50}) + cv::Scalar::all(20 * i));
+  }
+  ImageSpec spec;
+  spec.size = ImageSize{20, 30};
+  spec.blur = 3;
+  const PairReader sharing(folder.path(), spec);
+  for (int next = 1; next < 6; ++next) {
+    for (int previous = 0; previous < next; ++previous) {
+      const auto pair =
+          shared_pair(std::to_string(previous) + ".png", std::to_string(next) + ".png");
+      EXPECT_EQ(std::get<PreparedPair>(sharing.read(pair)).input,
+                std::get<PreparedPair>(PairReader(folder.path(), spec).read(pair)).input);
+    }
+  }
+}
+
+TEST(PairSharing, ABadFrameIsTheSameFaultForEachOfItsPairs) {
+  const TemporaryFolder folder;
+  cv::imwrite((folder / "a.png").string(), testing::gradient_image({5, 7}));
+  cv::imwrite((folder / "c.png").string(), testing::gradient_image({5, 7}));
+  cv::imwrite((folder / "b.png").string(), testing::gradient_image({5, 7}));
+  std::filesystem::resize_file(folder / "b.png", 60);
+  const PairReader reader(folder.path(), {});
+  const std::string first = why_none(reader.read(shared_pair("a.png", "b.png")));
+  EXPECT_THAT(first, HasSubstr("expected a whole PNG, got "));
+  EXPECT_THAT(first, HasSubstr(", in b.png"));
+  EXPECT_EQ(why_none(reader.read(shared_pair("b.png", "c.png"))), first);
+  EXPECT_EQ(why_none(reader.read(shared_pair("a.png", "c.png"))), "no fault");
+}
+
+TEST(PairSharing, ManyThreadsGetTheInputsThatOneThreadGets) {
+  const TemporaryFolder folder;
+  constexpr int kFrames = 10;
+  testing::write_counting_video(folder / "clip.avi", kFrames);
+  std::vector<FramePair> pairs;
+  for (int i = 0; i < kFrames; ++i) {
+    const std::string name = std::to_string(i) + ".png";
+    cv::imwrite((folder / name).string(),
+                testing::gradient_image({30, 40}) + cv::Scalar::all(10 * i));
+    for (int gap = 1; gap <= std::min(i, 6); ++gap) {
+      pairs.push_back(shared_pair(std::to_string(i - gap) + ".png", name));
+      pairs.emplace_back();
+      pairs.back().previous = testing::video_ref("clip.avi", i - gap);
+      pairs.back().next = testing::video_ref("clip.avi", i);
+    }
+  }
+  std::vector<std::vector<float>> expected;
+  const PairReader one(folder.path(), {});
+  for (const auto& pair : pairs) {
+    expected.push_back(std::get<PreparedPair>(one.read(pair)).input);
+  }
+
+  const PairReader reader(folder.path(), {}, 1);  // little room, so frames are made again as well
+  std::atomic<int> wrong = 0;
+  std::atomic<std::size_t> taken = 0;
+  std::vector<std::thread> threads;
+  for (int worker = 0; worker < 8; ++worker) {
+    threads.emplace_back([&] {
+      for (std::size_t i = taken++; i < pairs.size(); i = taken++) {
+        const auto outcome = reader.read(pairs[i]);
+        wrong += is_fault(outcome) || std::get<PreparedPair>(outcome).input != expected[i];
+      }
+    });
+  }
+  for (auto& thread : threads) thread.join();
+  EXPECT_EQ(wrong, 0);
+}
+
+}  // namespace
+}  // namespace eventgan
