@@ -185,7 +185,7 @@ def camera(args: argparse.Namespace, scenes: pathlib.Path, labelled: pathlib.Pat
 
 def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
     """The scores of each seed, by what the detectors were trained on; with `trade` the error of that, too."""
-    generators = TRADE if args.what == "trade" else GENERATORS
+    generators = computable(args, TRADE) if args.what == "trade" else GENERATORS
     scenes, seen = make_scenes(args, "scenes", args.scenes), make_scenes(args, "camera", max(args.scenes // 4, 8), *OTHERS)
     sources = pairs_of("kitti_object", {"train": [1, 2, 3], "val": [1]})
     data = {name: convert(args, scenes, name.replace(",", "").replace(" ", "-"), sources, generator) for name, generator in generators.items()}
@@ -207,6 +207,15 @@ def detection(args: argparse.Namespace) -> dict[str, list[dict[str, float]]]:
             result, _, _ = evaluate_detections(out / "predictions.json", samples_of(test), ["Car"])
             scores.setdefault(row, []).append(result["classes"]["Car"] | errors.get(row.removesuffix(", as bright"), {}))
     return scores
+
+
+def computable(args: argparse.Namespace, generators: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Those of a precision that this processor can compute: bfloat16 needs AVX-512."""
+    version = subprocess.run([args.program, "--version"], capture_output=True, text=True, check=True).stdout
+    left_out = [] if "avx512" in version else [name for name, generator in generators.items() if generator.get("precision") == "bfloat16"]
+    for name in left_out:
+        print(f"{name} is left out: this processor has no AVX-512")
+    return {name: generator for name, generator in generators.items() if name not in left_out}
 
 
 def error_of(folder: pathlib.Path, reference: pathlib.Path) -> float:

