@@ -1,8 +1,10 @@
 #include "pipeline/runtime/threads.h"
 
+#include <oneapi/tbb/blocked_range.h>
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/info.h>
 #include <oneapi/tbb/parallel_for.h>
+#include <oneapi/tbb/partitioner.h>
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
@@ -24,7 +26,15 @@ void for_each_index(std::size_t count, int threads, const std::function<void(std
   const oneapi::tbb::global_control budget(oneapi::tbb::global_control::max_allowed_parallelism,
                                            static_cast<std::size_t>(threads));
   oneapi::tbb::task_arena arena(threads);
-  arena.execute([&] { oneapi::tbb::parallel_for(std::size_t{0}, count, work); });
+  // A task an index: each is long, and what waited behind one in its task could not be taken over.
+  arena.execute([&] {
+    oneapi::tbb::parallel_for(
+        oneapi::tbb::blocked_range<std::size_t>(0, count),
+        [&](const auto& range) {
+          for (std::size_t i = range.begin(); i != range.end(); ++i) work(i);
+        },
+        oneapi::tbb::simple_partitioner());
+  });
 }
 
 namespace {

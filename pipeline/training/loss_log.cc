@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 #include <ranges>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -102,7 +103,7 @@ std::map<std::string, double> mean_losses(std::span<const LossRow> rows, Trainin
 
 namespace {
 
-std::vector<double> running_mean(const std::vector<double>& values) {
+std::vector<double> running_mean(std::span<const double> values) {
   const std::size_t window = std::max<std::size_t>(1, values.size() / 50);
   std::vector<double> means;
   double sum = 0;
@@ -125,17 +126,34 @@ std::string loss_curves(std::span<const LossRow> rows) {
   }
   std::vector<Chart> charts;
   for (std::size_t loss = 0; loss < kLossNames.size(); ++loss) {
-    std::vector<double> steps, values;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      if (!std::isfinite(rows[i].losses[loss])) continue;
+    std::vector<double> steps, values, means;
+    double low = std::numeric_limits<double>::infinity(), high = -low;
+    std::size_t begin = 0;  // of the phase's values: each phase has a line and a mean of its own
+    const auto end_phase = [&] {
+      const std::vector<double> of_phase = running_mean(std::span(values).subspan(begin));
+      means.insert(means.end(), of_phase.begin(), of_phase.end());
+    };
+    for (std::size_t i = 0, last = 0; i < rows.size(); ++i) {
+      const double value = rows[i].losses[loss];
+      if (!std::isfinite(value)) continue;
+      if (!values.empty() && rows[i].position.phase != rows[last].position.phase) {
+        end_phase();
+        for (auto* line : {&steps, &values, &means}) {
+          line->push_back(std::numeric_limits<double>::quiet_NaN());
+        }
+        begin = values.size();
+      }
+      last = i;
       steps.push_back(static_cast<double>(i));
-      values.push_back(rows[i].losses[loss]);
+      values.push_back(value);
+      low = std::min(low, value);
+      high = std::max(high, value);
     }
     if (values.empty()) continue;
-    const auto [low, high] = std::ranges::minmax(values);
+    end_phase();
     Chart chart{std::string(kLossNames[loss]), "steps of all phases", ""};
     chart.series = {{"each step", values, ChartMark::kFaintLine, steps},
-                    {"running mean", running_mean(values), ChartMark::kLine, steps}};
+                    {"running mean", means, ChartMark::kLine, steps}};
     chart.log_y = low > 0 && high > 100 * low;
     if (chart.log_y) chart.y_axis = "logarithmic";
     chart.rules = borders;

@@ -63,7 +63,7 @@ class Tradeoff(program.InFolder):
             self.assertGreater(configuration["pairs_per_s"]["median"], 0)
             self.assertGreater(configuration["stored_bytes"], 0)
         self.assertGreater(by_name["shipped:8 float32 x0.75 float32"]["relative_l2"], 0)
-        self.assertIn("mean, by area", " ".join(report["notes"]))
+        self.assertIn("by area: each pixel is the mean", " ".join(report["notes"]))
         self.assertEqual(ElementTree.parse(self.out / "tradeoff.svg").getroot().tag, "{http://www.w3.org/2000/svg}svg")
         self.assertIn("| configuration |", (self.out / "tradeoff.md").read_text())
 

@@ -197,7 +197,7 @@ def labelled_frame(sample: Sample) -> np.ndarray:
     """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel. It must be an image at the pair's end."""
     pair, volume = sample["pair"], np.zeros_like(sample["volume"])
     image = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
-    if canvas is None:
+    if image is None:
         raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
     left, top, width, height = place_of(sample)
     volume[0, top:top + height, left:left + width] = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA) / 255

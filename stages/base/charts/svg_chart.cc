@@ -230,23 +230,29 @@ std::string line(const ChartSeries& series, const std::string& colour, const Plo
   };
   std::string way;
   std::vector<Place> column;
+  bool begins = true;
   const auto finish = [&] {
+    if (column.empty()) return;
     const auto [up, down] = std::ranges::minmax_element(column, {}, &Place::y);
     for (const auto& at : {std::min(up, down), std::max(up, down)}) {
-      way += fmt::format("{}{:.1f} {:.1f}", way.empty() ? "M" : "L", at->x, at->y);
+      way += fmt::format("{}{:.1f} {:.1f}", std::exchange(begins, false) ? "M" : "L", at->x, at->y);
     }
     column.clear();
   };
   for (std::size_t i = 0; i < series.y.size(); ++i) {
     const double x = placeable(series.x[i], plot.x.logarithmic);
     const double y = placeable(series.y[i], plot.y.logarithmic);
-    if (std::isnan(x) || std::isnan(y)) continue;
+    if (std::isnan(x) || std::isnan(y)) {
+      finish();
+      begins = true;
+      continue;
+    }
     const Place place{plot.x_of(x), plot.y_of(y)};
     if (!column.empty() && std::floor(column.front().x) != std::floor(place.x)) finish();
     column.push_back(place);
   }
-  if (column.empty()) return "";
   finish();
+  if (way.empty()) return "";
   return path(colour + (series.mark == ChartMark::kLine ? " line" : " faint line"), way);
 }
 

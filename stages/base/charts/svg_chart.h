@@ -23,7 +23,7 @@ struct ChartSeries {
 };
 
 /// Bars, or lines and points, on axes that fit their values. Not drawn: values that are not finite,
-/// bars below zero, and on a logarithmic axis what is not above zero.
+/// bars below zero, and on a logarithmic axis what is not above zero. A line has a gap there.
 struct Chart {
   std::string title, x_axis, y_axis;
   std::vector<ChartSeries> series = {};

@@ -154,7 +154,7 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     if what == "detection":
         train_shards = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
         factor = np.mean([s["volume"].mean() for s in train_shards]) / np.mean([s["volume"].mean() for s in events])
-        assert f"{camera / 'events'} times {factor:.2f}, as bright as those of {tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout
+        assert f"{camera / 'events'} are scaled by {factor:.2f}, to the brightness of those of {tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout
         for i in range(len(labelled)):
             seen, drawn = events.labels(i), labelled.labels(i)
             assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")

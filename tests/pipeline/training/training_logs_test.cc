@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <regex>
+#include <set>
 #include <stdexcept>
 #include <string>
 
@@ -153,6 +155,26 @@ TEST(LossCurves, HaveAPanelForEachLossThatIsThere) {
   EXPECT_EQ(count_of(">logarithmic</text>", svg), 3u) << "exp(-9) is less than a hundredth";
   EXPECT_EQ(count_of("\"s0 faint line\"", svg), 3u);
   EXPECT_EQ(count_of("\"axis rule\"", svg), 2u) << "two losses have values around the border";
+}
+
+TEST(LossCurves, EachPhaseHasALineAndAMeanOfItsOwn) {
+  std::vector<LossRow> rows;
+  for (int i = 0; i < 300; ++i) {  // a window of the mean is more than one step
+    rows.push_back(row_of(i, i / 100 == 1 ? 1 : 0, i < 100 ? 100 : 1));
+    if (i < 100) rows.back().position.phase = TrainingPhase::kFlow;
+  }
+  const std::string svg = loss_curves(rows);
+  const std::size_t mean = svg.find("\"s1 line\"");
+  ASSERT_NE(mean, svg.npos);
+  const std::string way = svg.substr(mean, svg.find("</path>", mean) - mean);
+  EXPECT_EQ(count_of("M", way), 2u) << way;
+  // 100 and 1 are two heights, and nothing lies between.
+  const std::regex place("[ML][0-9.]+ ([0-9.]+)");
+  std::set<std::string> heights;
+  for (std::sregex_iterator at(way.begin(), way.end(), place), none; at != none; ++at) {
+    heights.insert((*at)[1]);
+  }
+  EXPECT_EQ(heights.size(), 2u) << way;
 }
 
 TEST(LossCurves, AreDrawnOfExtremes) {

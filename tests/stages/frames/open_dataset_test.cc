@@ -111,7 +111,7 @@ TEST(OpenDataset, OpensTheKindTheManifestNames) {
       {DatasetKind::kMpii, "mpii_human_pose_v1_u12_1.mat"},
       {DatasetKind::kMpiiList, "the key annotations"},
       {DatasetKind::kHuman36m, "layout"},
-      {DatasetKind::kFrames, "folders of pictures"},
+      {DatasetKind::kFrames, "folders of images"},
   };
   for (const auto& [kind, what] : missing) {
     SourceSpec spec;

@@ -133,12 +133,20 @@ void expect_sound(const std::string& svg) {
 /// which takes the leftmost 18.
 void expect_texts_inside(const std::string& svg) {
   const std::regex text("<text x=\"([0-9.]+)\"[^>]* text-anchor=\"(middle|end)\">([^<]*)<");
-  for (std::sregex_iterator at(svg.begin(), svg.end(), text), none; at != none; ++at) {
+  std::size_t count = 0;
+  for (std::sregex_iterator at(svg.begin(), svg.end(), text), none; at != none; ++at, ++count) {
     const double width = 7.7 * static_cast<double>((*at)[3].length());
     const double right = std::stod((*at)[1]) + ((*at)[2] == "middle" ? width / 2 : 0);
     EXPECT_GE(right - width, (*at)[2] == "middle" ? 0 : 18) << at->str();
     EXPECT_LE(right, 460) << at->str();
   }
+  EXPECT_TRUE(count > 4 || svg.find("nothing to show") != svg.npos) << svg;
+}
+
+TEST(ChartSvg, LabelsOfEdgesAreNotCutOff) {
+  Chart chart = bars({1, 2, 3, 4, 5, 6, 7, 8, 9, 1.4e-4});
+  chart.labels.assign(11, "1.2e-05");
+  expect_texts_inside(chart_svg(chart));
 }
 
 TEST(ChartSvg, IsSoundForAnyValues) {
