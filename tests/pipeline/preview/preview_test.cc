@@ -128,7 +128,8 @@ TEST_F(Preview, RanksByKind) {
 
 TEST_F(Preview, AClassThatNoBoxHasIsRefused) {
   options_.class_name = "Car";
-  EXPECT_THAT([&] { draw("out"); }, ThrowsMessage<UsageError>(HasSubstr("none of the samples has boxes")));
+  EXPECT_THAT([&] { draw("out"); },
+              ThrowsMessage<UsageError>(HasSubstr("none of the samples has boxes")));
 }
 
 TEST_F(Preview, ASheetIsOneImage) {
