@@ -112,7 +112,7 @@ def measure(bench):
         table.add(f"each read waits {delay} ms", str(reads_of[delay]), number(delay / 1000 * reads_of[delay]), spread(times).median_and_quartiles(),
                   number(ratio))
     text = (f"{settings.frames} frames ({kind}), {settings.size[0]}x{settings.size[1]}, {settings.weights}, {settings.precision}, {THREADS} threads; "
-            f"{settings.rounds} rounds, each from a disk mounted again. A read is at most 128 KiB.")
+            f"{settings.rounds} rounds, each from a freshly mounted disk. A read is at most 128 KiB.")
     return Section(title, text, [table])
 
 

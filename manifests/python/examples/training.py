@@ -75,8 +75,8 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
         args.minutes = 30.0
     if args.device == "cuda" and not torch.cuda.is_available():
         sys.exit("expected a CUDA device, got none, in --device cuda")
-    if args.threads:
-        torch.set_num_threads(args.threads)
+    # Debian's PyTorch begins with one thread.
+    torch.set_num_threads(args.threads or int(os.environ.get("OMP_NUM_THREADS") or len(os.sched_getaffinity(0))))
     torch.manual_seed(args.seed)
     pathlib.Path(args.out).mkdir(parents=True, exist_ok=True)
     return args
@@ -263,7 +263,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             found = check()
         row = {"epoch": state["epoch"], "step": state["step"], "minutes": round(state["seconds"] / 60, 2), "loss": loss, **found}
         state["history"].append({name: None if value is None or math.isnan(value) else value for name, value in row.items()})
-        numbers = " ".join(f"{name} {value:.4g}" for name, value in row.items() if value is not None and name not in ("epoch", "step"))
+        numbers = " ".join(f"{name} {value:.4g}" for name, value in state["history"][-1].items() if value is not None and name not in ("epoch", "step"))
         print(f"epoch {row['epoch']:3} step {row['step']:5} {numbers}" + ("" if row["step"] else "  (untrained)"), flush=True)
 
     if not state["history"]:
@@ -303,7 +303,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
                "history": state["history"]}
     _replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
     _replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
-    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, pictures/")
+    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, pictures/, predictions.json")
 
 
 def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
