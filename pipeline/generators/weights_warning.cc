@@ -18,7 +18,7 @@ std::string weights_warning(const JobManifest& manifest) {
   if (name->origin == WeightsOrigin::kUntrained) return untrained_warning(weights);
   if (name->origin == WeightsOrigin::kFile) return "";
   return shipped_weights_name(weights) +
-         " are stand-in weights: import or train your own to publish";
+         " are stand-in weights; import or train your own to publish";
 }
 
 }  // namespace eventgan
