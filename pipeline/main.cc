@@ -1,5 +1,10 @@
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
+#include <cerrno>
 #include <csignal>
+#include <cstring>
+#include <filesystem>
 #include <opencv2/core/utility.hpp>
 #include <string_view>
 
@@ -10,6 +15,27 @@
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
 #include "stages/base/images/image_file.h"
+
+namespace {
+
+/// Becomes `eventgan-torch`: beside this program where it is built, in libexec where it is
+/// installed. Returns, and tells why, only if it cannot.
+void become_program_with_torch(char** argv) {
+  namespace fs = std::filesystem;
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
+  const fs::path installed = (folder / EVENTGAN_TORCH_FROM_PROGRAM).lexically_normal();
+  for (const fs::path& program : {folder / "eventgan-torch", installed}) {
+    execv(program.c_str(), argv);
+    if (errno == ENOENT) continue;
+    eventgan::tell_error("expected to run " + program.string() + ", got '" + std::strerror(errno) +
+                         "'");
+    return;
+  }
+  eventgan::tell_error("expected eventgan-torch, the program with LibTorch, got none in " +
+                       installed.string() + ": install the package eventgan-torch");
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);
@@ -65,6 +91,8 @@ int main(int argc, char** argv) {
     // faults in a line each.
     const bool is_list = std::string_view(error.what()).find('\n') != std::string_view::npos;
     eventgan::tell_error(is_list ? eventgan::error_text(error) : eventgan::error_line(error));
+  } catch (const eventgan::NeedsTorch&) {
+    become_program_with_torch(argv);
   }
   return streams.finish(exit_code);
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <compare>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -91,6 +92,14 @@ enum class TrainingPrecision { kFloat32, kBfloat16 };
 
 /// The paper's three phases, in this order; each phase's networks are frozen in those after it.
 enum class TrainingPhase { kFlow, kReconstruction, kGenerator };
+
+/// The next step of a training: phase and step within it. A phase that is complete has `step` equal
+/// to its number of steps.
+struct TrainingPosition {
+  TrainingPhase phase = TrainingPhase::kFlow;
+  std::int64_t step = 0;
+  auto operator<=>(const TrainingPosition&) const = default;
+};
 
 /// Steps of each phase; a step is one update of one network. In the generator phase
 /// `discriminator_steps` updates of the discriminator go before each update of the generator

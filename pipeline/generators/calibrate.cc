@@ -16,9 +16,8 @@
 #include "pipeline/generators/choose_engine.h"
 #include "stages/base/files/sha256.h"
 #include "stages/generator/calibration.h"
+#include "stages/generator/onednn/calibrator.h"
 #include "stages/generator/onednn/onednn_generator.h"
-#include "stages/generator/torch/calibrator.h"
-#include "stages/generator/torch/torch_generator.h"
 
 namespace eventgan {
 namespace {
@@ -160,7 +159,7 @@ CalibrationOutcome calibrate(const JobManifest& manifest, const PlannedJob& job,
   const std::vector<CalibrationSample> samples =
       choose_calibration_samples(job.plan, options.pairs, options.held_out);
   const Watch watch(options, std::ssize(samples));
-  const std::unique_ptr<Generator> reference = make_torch_generator(weights);
+  const std::unique_ptr<Generator> reference = make_onednn_generator(weights, Precision::kFloat32);
   const SampleStages stages(manifest, job.datasets, *reference, /*in_flight=*/1);
   Calibrator calibrator(weights);
   CalibrationOutcome outcome;

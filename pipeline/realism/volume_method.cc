@@ -14,6 +14,7 @@
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/shipped_weights.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"
@@ -60,7 +61,10 @@ std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> gen
 }
 
 std::unique_ptr<Generator> open_realism_generator(const std::string& weights) {
-  return make_torch_generator(named_weights(weights));
+  const Weights named = named_weights(weights);
+  return onednn_support(Precision::kFloat32).able
+             ? make_onednn_generator(named, Precision::kFloat32)
+             : make_torch_generator(named);
 }
 
 namespace {

@@ -15,6 +15,10 @@ enum ExitCode : int {
   kStopped = 75  ///< stopped by a signal: run again
 };
 
+/// Thrown where only the program with LibTorch goes on: main() then runs that with the same
+/// arguments. No std::exception, so that nobody on the way takes it for a failure.
+struct NeedsTorch {};
+
 /// The message of an exception and of those nested in it, outermost first, one per line and
 /// indented.
 std::string error_text(const std::exception& error);

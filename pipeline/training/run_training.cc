@@ -1,19 +1,15 @@
 #include "pipeline/training/run_training.h"
 
 #include <ATen/Parallel.h>
-#include <fmt/core.h>
 #include <omp.h>
 
 #include <algorithm>
-#include <array>
 #include <chrono>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/fingerprint.h"
@@ -287,90 +283,6 @@ double TrainingRun::total_seconds() const {
 
 TrainingReport run_training(const TrainingManifest& manifest, const TrainingOptions& options) {
   return TrainingRun(manifest, options).run();
-}
-
-namespace {
-
-/// The losses of a line in words: more would not fit it.
-constexpr std::array<const char*, 4> kShown{"flow", "reconstruction", "generator.total",
-                                            "discriminator"};
-
-}  // namespace
-
-TrainingProgress::TrainingProgress(std::ostream& stream, ProgressStyle style,
-                                   ProgressDisplay::Columns columns, Clock clock)
-    : display_(stream, style, std::move(columns), std::move(clock),
-               [this](std::chrono::steady_clock::time_point now) { return describe(now); }) {}
-
-void TrainingProgress::advance(TrainingPhase phase, std::int64_t done, std::int64_t total,
-                               const std::map<std::string, double>& losses) {
-  display_.update(
-      [&](std::chrono::steady_clock::time_point now) {
-        if (first_ < 0 || phase != phase_) {
-          // The step that was just made belongs to the phase; its time does not: it ran before.
-          start_ = now;
-          first_ = done;
-          losses_.clear();
-        }
-        phase_ = phase;
-        done_ = done;
-        total_ = total;
-        for (const auto& [name, value] : losses) losses_[name] = value;
-      },
-      /*at_once=*/done == total);
-  if (std::exchange(keeps_up_, false)) display_.keep_up();
-}
-
-ProgressText TrainingProgress::describe(std::chrono::steady_clock::time_point now) const {
-  const double seconds = std::chrono::duration<double>(now - start_).count();
-  const double rate = seconds > 0 ? static_cast<double>(done_ - first_) / seconds : 0;
-  std::string line = fmt::format(
-      "{} {}/{}, {} left, {:.2f} steps/s", to_string(phase_), done_, total_,
-      rate > 0 ? duration_text(static_cast<double>(total_ - done_) / rate, "h", 3) : "?", rate);
-  for (const char* name : kShown) {
-    const auto found = losses_.find(name);
-    if (found != losses_.end()) line += fmt::format(", {} {:.4g}", name, found->second);
-  }
-  return {done_, total_, line,
-          dump_json(nlohmann::json{{"event", "progress"},
-                                   {"phase", to_string(phase_)},
-                                   {"done", done_},
-                                   {"total", total_},
-                                   {"steps_per_s", rate},
-                                   {"losses", losses_}})};
-}
-
-std::string to_text(const TrainingReport& report) {
-  std::string text = fmt::format(
-      "{}: {}\n"
-      "  next step   {} {}\n"
-      "  this run    {} steps in {:.0f} s, {:.0f} s with earlier runs\n",
-      report.complete ? "complete" : "stopped, run again to resume", report.folder,
-      to_string(report.position.phase), report.position.step, report.steps_made, report.run_seconds,
-      report.total_seconds);
-  for (const auto& [name, value] : report.losses) {
-    text += fmt::format("  {} {:.6g} (mean of the last steps)\n", name, value);
-  }
-  if (!report.weights.empty()) {
-    text +=
-        fmt::format("  weights     {}\n  SHA-256     {}\n", report.weights, report.weights_sha256);
-  }
-  return text;
-}
-
-std::string to_json(const TrainingReport& report) {
-  const nlohmann::json json = {{"event", "report"},
-                               {"folder", report.folder},
-                               {"complete", report.complete},
-                               {"phase", to_string(report.position.phase)},
-                               {"next_step", report.position.step},
-                               {"steps_made", report.steps_made},
-                               {"run_seconds", report.run_seconds},
-                               {"total_seconds", report.total_seconds},
-                               {"losses", report.losses},
-                               {"weights", report.weights},
-                               {"weights_sha256", report.weights_sha256}};
-  return dump_json(json) + "\n";
 }
 
 }  // namespace eventgan

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -14,14 +13,6 @@
 #include "pipeline/training/training_recording.h"
 
 namespace eventgan {
-
-/// The next step of a training: phase and step within it. A phase that is complete has `step` equal
-/// to its number of steps.
-struct TrainingPosition {
-  TrainingPhase phase = TrainingPhase::kFlow;
-  std::int64_t step = 0;
-  auto operator<=>(const TrainingPosition&) const = default;
-};
 
 /// Number of steps of a phase.
 inline std::int64_t steps_of(const PhaseSteps& steps, TrainingPhase phase) {

@@ -1,5 +1,7 @@
 #include "stages/generator/onednn/detail/network_plan.h"
 
+#include <omp.h>
+
 #include <algorithm>
 #include <stdexcept>
 #include <type_traits>
@@ -17,6 +19,14 @@ std::string numbered(const char* name, int number) {
 }
 
 }  // namespace
+
+void use_one_openmp_thread() {
+  thread_local const bool done = [] {
+    omp_set_num_threads(1);
+    return true;
+  }();
+  static_cast<void>(done);
+}
 
 NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
     : engine_(layers.engine()),
@@ -240,31 +250,44 @@ void NetworkPlan::with_stored_type(Compute&& compute) const {
   }
 }
 
-SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* block) const {
+SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* block,
+                                 const TensorObserver& observe) const {
   dnnl::stream stream(engine_);
   SaturationCount saturation;
   const EngineRun run{stream, block, block + scratch_, saturation};
   const auto at = [&](const Buffer& buffer) { return block + buffer.offset; };
   with_stored_type([&]<class Stored>(Stored) {
-    const auto count = [&](const Buffer& buffer) {
-      saturation.add(reinterpret_cast<const Stored*>(at(buffer)),
-                     buffer.size_bytes / sizeof(Stored));
+    const auto values_of = [&](const Buffer& buffer) {
+      return std::span(reinterpret_cast<const Stored*>(at(buffer)),
+                       buffer.size_bytes / sizeof(Stored));
+    };
+    const auto show = [&](const std::string& name, const Buffer& buffer) {
+      if constexpr (std::is_same_v<Stored, float>) {
+        if (observe) observe(name, values_of(buffer));
+      }
+    };
+    const auto count_and_show = [&](const std::string& name, const Buffer& buffer) {
+      saturation.add(values_of(buffer).data(), values_of(buffer).size());
+      show(name, buffer);
     };
     run_head<Stored>(run, frames);
+    show("head", skips_[0]);
     for (int level = 0; level < kNetworkLevels; ++level) {
       const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
       encoders_[level].run(stream, at(skips_[level]), at(target), run.scratch);
-      count(target);
+      count_and_show(numbered("encoders", level), target);
     }
-    for (std::size_t i = 0; i < residuals_.size(); i += 2) {
-      residuals_[i].run(stream, at(bottleneck_), at(between_), run.scratch);
-      count(between_);
-      residuals_[i + 1].run(stream, at(between_), at(bottleneck_), run.scratch);
-      count(bottleneck_);
+    for (int i = 0; i < kResidualBlocks; ++i) {
+      const std::string name = numbered("resblocks", i);
+      residuals_[2 * i].run(stream, at(bottleneck_), at(between_), run.scratch);
+      count_and_show(name + ".conv1", between_);
+      residuals_[2 * i + 1].run(stream, at(between_), at(bottleneck_), run.scratch);
+      count_and_show(name, bottleneck_);
     }
     const std::byte* small = at(bottleneck_);
     for (int level = 0; level < kNetworkLevels - 1; ++level) {
       run_decoder<Stored>(run, level, small);
+      show(numbered("decoders", level), decoded_[level]);
       small = at(decoded_[level]);
     }
     run_last_decoder<Stored>(run, small, volume);

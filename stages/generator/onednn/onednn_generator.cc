@@ -1,7 +1,5 @@
 #include "stages/generator/onednn/onednn_generator.h"
 
-#include <omp.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -78,16 +76,6 @@ OnednnSupport onednn_support(Precision precision) {
 }
 
 namespace {
-
-/// oneDNN takes as many threads as OpenMP gives the calling thread; how it splits the work must not
-/// depend on the machine.
-void use_one_thread() {
-  thread_local const bool done = [] {
-    omp_set_num_threads(1);
-    return true;
-  }();
-  static_cast<void>(done);
-}
 
 bool all_finite(std::span<const float> values) {
   return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
@@ -180,7 +168,7 @@ class OnednnGenerator final : public Generator {
  private:
   template <class Work>
   GenerationNotes compute(ImageSize size, Work&& work) const {
-    use_one_thread();
+    use_one_openmp_thread();
     const FlushSubnormals flush;
     try {
       return {.saturated_share = work().share()};
@@ -213,7 +201,7 @@ class OnednnGenerator final : public Generator {
 
 }  // namespace
 
-std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {
+void require_onednn(const Weights& weights, Precision precision) {
   check_weights(weights, "the weights");
   const OnednnSupport support = onednn_support(precision);
   if (!support.able) {
@@ -221,6 +209,10 @@ std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precisi
                              std::string(to_string(precision)) + ", got " +
                              support.instruction_set);
   }
+}
+
+std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {
+  require_onednn(weights, precision);
   try {
     return std::make_unique<OnednnGenerator>(weights, precision);
   } catch (const dnnl::error&) {

@@ -21,6 +21,9 @@ struct OnednnSupport {
 /// Thread safe; the same during the whole life of a process.
 OnednnSupport onednn_support(Precision precision);
 
+/// Throws as check_weights, and std::runtime_error if `onednn_support(precision)` is not able.
+void require_onednn(const Weights& weights, Precision precision);
+
 /// The fast engine: oneDNN's convolutions with bias and activation fused, weights laid out once for
 /// all image sizes, and for each size a plan that is built on its first use and then runs in
 /// buffers that are there already. The nearest doubling before a decoder's convolution is not
@@ -34,9 +37,9 @@ OnednnSupport onednn_support(Precision precision);
 ///
 /// kInt8: frames that are not finite give a volume of NaN, since 8 bits would hide them.
 ///
-/// Throws as check_weights; as int8_numbers (std::invalid_argument for kInt8 without
-/// weights.calibration, or for numbers that 8 bits cannot serve); std::runtime_error if
-/// `onednn_support(precision)` is not able or oneDNN fails.
+/// Throws as require_onednn; as int8_numbers (std::invalid_argument for kInt8 without
+/// weights.calibration, or for numbers that 8 bits cannot serve); std::runtime_error if oneDNN
+/// fails.
 std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision);
 
 }  // namespace eventgan

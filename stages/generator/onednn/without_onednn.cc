@@ -1,13 +1,27 @@
 #include <stdexcept>
 
+#include "stages/generator/onednn/calibrator.h"
 #include "stages/generator/onednn/onednn_generator.h"
 
 namespace eventgan {
 
 OnednnSupport onednn_support(Precision) { return {.instruction_set = "a build without oneDNN"}; }
 
-std::unique_ptr<Generator> make_onednn_generator(const Weights&, Precision) {
+void require_onednn(const Weights&, Precision) {
   throw std::runtime_error("expected a build with oneDNN, got one without");
 }
+
+std::unique_ptr<Generator> make_onednn_generator(const Weights& weights, Precision precision) {
+  require_onednn(weights, precision);
+  return nullptr;
+}
+
+struct Calibrator::Network {};
+Calibrator::Calibrator(const Weights& weights) : base_channels_(weights.base_channels) {
+  require_onednn(weights, Precision::kFloat32);
+}
+Calibrator::~Calibrator() = default;
+void Calibrator::add(std::span<const float>, ImageSize) {}
+Calibration Calibrator::calibration(std::string) const { return {}; }
 
 }  // namespace eventgan

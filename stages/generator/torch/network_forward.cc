@@ -125,15 +125,6 @@ void use_one_thread() {
   static_cast<void>(done);
 }
 
-namespace {
-
-at::Tensor observed(const std::string& name, at::Tensor x, const TensorObserver& observe) {
-  if (observe) observe(name, x);
-  return x;
-}
-
-}  // namespace
-
 NetworkForward::NetworkForward(const Weights& weights, const at::TensorOptions& kind) try
     : kind_(kind) {
   check_weights(weights, "the weights");
@@ -156,49 +147,43 @@ at::Tensor NetworkForward::convolve(const std::string& name, const at::Tensor& x
   return convolution(x, layer.weight, layer.bias, layer.stride, layer.padding);
 }
 
-at::Tensor NetworkForward::leaky(const std::string& name, const at::Tensor& x,
-                                 const TensorObserver& observe) const {
+at::Tensor NetworkForward::leaky(const std::string& name, const at::Tensor& x) const {
   at::Tensor y = convolve(name, x);
-  return observed(name, at::leaky_relu_(y, kLeakySlope), observe);
+  return at::leaky_relu_(y, kLeakySlope);
 }
 
-at::Tensor NetworkForward::residual(const std::string& block, const at::Tensor& x,
-                                    const TensorObserver& observe) const {
+at::Tensor NetworkForward::residual(const std::string& block, const at::Tensor& x) const {
   at::Tensor y = convolve(block + ".conv1", x);
-  y = observed(block + ".conv1", at::relu_(y), observe);
-  y = convolve(block + ".conv2", y);
-  return observed(block, at::relu_(y.add_(x)), observe);
+  y = convolve(block + ".conv2", at::relu_(y));
+  return at::relu_(y.add_(x));
 }
 
-at::Tensor NetworkForward::operator()(std::span<const float> frames, ImageSize size,
-                                      const TensorObserver& observe) const {
-  return (*this)(at::from_blob(const_cast<float*>(frames.data()), {1, 2, size.height, size.width}),
-                 observe);
+at::Tensor NetworkForward::operator()(std::span<const float> frames, ImageSize size) const {
+  return (*this)(at::from_blob(const_cast<float*>(frames.data()), {1, 2, size.height, size.width}));
 }
 
-at::Tensor NetworkForward::operator()(const at::Tensor& frames,
-                                      const TensorObserver& observe) const {
+at::Tensor NetworkForward::operator()(const at::Tensor& frames) const {
   use_one_thread();
   // First to the device, there into its type: the other way round the CPU would convert.
   at::Tensor x = frames.to(kind_.device(), frames.scalar_type(), /*non_blocking=*/true)
                      .to(kind_)
                      .contiguous(at::MemoryFormat::ChannelsLast);
-  x = leaky("head", x, observe);
+  x = leaky("head", x);
   std::vector<at::Tensor> skips;
   for (int level = 0; level < kNetworkLevels; ++level) {
     skips.push_back(x);
-    x = leaky("encoders." + std::to_string(level), x, observe);
+    x = leaky("encoders." + std::to_string(level), x);
   }
-  x = residual("resblocks.0", x, observe);
-  x = residual("resblocks.1", x, observe);
+  x = residual("resblocks.0", x);
+  x = residual("resblocks.1", x);
   for (int level = 0; level < kNetworkLevels; ++level) {
     const at::Tensor skip = std::move(skips.back());
     skips.pop_back();
     x = decoders_[level](x, skip);
-    x = observed("decoders." + std::to_string(level), at::leaky_relu_(x, kLeakySlope), observe);
+    at::leaky_relu_(x, kLeakySlope);
   }
   x = convolve("pred", x);
-  return observed("pred", at::relu_(x), observe);
+  return at::relu_(x);
 }
 
 }  // namespace eventgan

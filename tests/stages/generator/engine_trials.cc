@@ -7,7 +7,7 @@
 
 #include "manifests/values/counter_random.h"
 #include "stages/generator/calibration.h"
-#include "stages/generator/torch/calibrator.h"
+#include "stages/generator/onednn/calibrator.h"
 
 namespace eventgan::testing {
 

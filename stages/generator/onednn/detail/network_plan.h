@@ -3,11 +3,13 @@
 #include <array>
 #include <cstddef>
 #include <dnnl.hpp>
+#include <functional>
 #include <future>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,14 @@
 
 namespace eventgan {
 
+/// Lets the calling thread compute with one intra-operation thread from then on: oneDNN takes as
+/// many as OpenMP gives it, and how it splits the work must not depend on the machine.
+void use_one_openmp_thread();
+
+/// Sees a tensor of quantized_tensors() (calibration.h), [y, x, channel] float32, behind its
+/// activation. Valid during the call.
+using TensorObserver = std::function<void(const std::string& name, std::span<const float> values)>;
+
 /// The network for one image size: which convolutions run in which order, and where in one block
 /// of memory their buffers lie. Holds no buffers itself; thread safe.
 class NetworkPlan {
@@ -31,8 +41,9 @@ class NetworkPlan {
   std::size_t block_bytes() const { return layout_.total_bytes(); }
 
   /// frames [2, y, x], volume [2 bins, y, x] as Generator::generate has them. `block`:
-  /// block_bytes(), whatever is in it.
-  SaturationCount run(const float* frames, float* volume, std::byte* block) const;
+  /// block_bytes(), whatever is in it. `observe` is called in float32 only, and may throw.
+  SaturationCount run(const float* frames, float* volume, std::byte* block,
+                      const TensorObserver& observe = {}) const;
 
   /// The same for the tiles that are wanted, by what tiled_work says of them; nothing else of the
   /// volume is written. `tiles`: a block for layers.layout.

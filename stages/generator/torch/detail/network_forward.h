@@ -2,7 +2,6 @@
 
 #include <ATen/core/Tensor.h>
 
-#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -47,11 +46,6 @@ at::Tensor bias_tensor(const std::vector<float>& bias, const at::TensorOptions& 
 /// takes every core. The last bits of a convolution depend on the count, so it is one, always.
 void use_one_thread();
 
-/// Sees a tensor [B, C, H, W], channels-last, behind its activation: by the name of the
-/// convolution that makes it, "resblocks.N" behind the addition. Valid during the call; must not be
-/// changed.
-using TensorObserver = std::function<void(const std::string& name, const at::Tensor& tensor)>;
-
 /// The generator's network (weights.h) in LibTorch. Thread safe.
 class NetworkForward {
  public:
@@ -61,13 +55,12 @@ class NetworkForward {
 
   /// frames: [frame, y, x] float32, C order. Returns [1, 2 bins, H, W] of the type, channels-last.
   /// The calling thread computes with one intra-operation thread from then on. Call under
-  /// c10::InferenceMode. Throws c10::Error and whatever the observer throws.
-  at::Tensor operator()(std::span<const float> frames, ImageSize size,
-                        const TensorObserver& observe = {}) const;
+  /// c10::InferenceMode. Throws c10::Error.
+  at::Tensor operator()(std::span<const float> frames, ImageSize size) const;
 
   /// The same of several pairs [B, 2, H, W] float32, in ordinary memory or on the device: returns
   /// [B, 2 bins, H, W] on the device, where it may still be computed.
-  at::Tensor operator()(const at::Tensor& frames, const TensorObserver& observe = {}) const;
+  at::Tensor operator()(const at::Tensor& frames) const;
 
  private:
   struct Layer {
@@ -78,10 +71,8 @@ class NetworkForward {
   };
 
   at::Tensor convolve(const std::string& name, const at::Tensor& x) const;
-  at::Tensor leaky(const std::string& name, const at::Tensor& x,
-                   const TensorObserver& observe) const;
-  at::Tensor residual(const std::string& block, const at::Tensor& x,
-                      const TensorObserver& observe) const;
+  at::Tensor leaky(const std::string& name, const at::Tensor& x) const;
+  at::Tensor residual(const std::string& block, const at::Tensor& x) const;
 
   at::TensorOptions kind_;
   std::map<std::string, Layer> layers_;

@@ -16,23 +16,21 @@ namespace eventgan {
 ///   D = diag(0.1 var(r_c) + 0.001 mean variance):
 /// the first part keeps it calm with few pairs, the second for channels that hardly ever move. A
 /// tensor that does not vary has no mixing.
-/// Throws std::invalid_argument if no pair was summed, std::runtime_error if LibTorch fails or a
-/// number leaves float32. Deterministic.
+/// Throws std::invalid_argument if no pair was summed, std::runtime_error if the regression fails
+/// or a number leaves float32. Deterministic.
 Calibration fit_calibration(const CalibrationSums& sums, std::string origin);
 
-class NetworkForward;
-
-/// Finds a calibration: runs the float32 reference on real pairs and sums up what its tensors hold.
-/// The same pairs in the same order give the same calibration, on one kind of processor. Memory
-/// does not grow with the number of pairs. Not thread safe.
+/// Finds a calibration: runs the network in float32 on real pairs and sums up what its tensors
+/// hold. The same pairs in the same order give the same calibration, on one kind of processor.
+/// Memory does not grow with the number of pairs. Not thread safe.
 class Calibrator {
  public:
-  /// Throws as check_weights; std::runtime_error if LibTorch fails.
+  /// Throws as make_onednn_generator in float32.
   explicit Calibrator(const Weights& weights);
   ~Calibrator();
 
   /// Adds a pair; frames as Generator::generate takes them. Throws std::invalid_argument if the
-  /// span does not have this size, std::runtime_error if a tensor is not finite or LibTorch fails;
+  /// span does not have this size, std::runtime_error if a value is not finite or oneDNN fails;
   /// then nothing was added.
   void add(std::span<const float> frames, ImageSize size);
 
@@ -42,7 +40,8 @@ class Calibrator {
   Calibration calibration(std::string origin) const;
 
  private:
-  std::unique_ptr<const NetworkForward> forward_;
+  struct Network;
+  std::unique_ptr<Network> network_;
   CalibrationSums sums_;
   int base_channels_;
 };
