@@ -4,6 +4,7 @@ import collections
 import json
 import pathlib
 import shlex
+import shutil
 import struct
 import subprocess
 import sys
@@ -54,8 +55,42 @@ class CommandLine(program.InFolder):
         self.assertRegex(version, r"^eventgan \d+\.\d+\.\d+$")
         for name in ["HDF5", "OpenCV", "libavcodec"]:
             self.assertRegex(libraries, rf"\b{name}\S* \S+")
-        self.assertRegex(engines, r"libtorch_cpu\.so\.\d+\.\d+.*libtbb\.so\.\d+\.\d+")
+        self.assertRegex(engines, r"libtbb\.so\.\d+\.\d+")
         self.assertIn("processor: ", processor)
+
+    def test_libtorch_is_in_a_program_of_its_own(self):
+        """It takes ten times as long to load as everything else."""
+        libraries = subprocess.run(["ldd", program.PROGRAM], check=True, capture_output=True, text=True).stdout
+        self.assertEqual([line for line in libraries.splitlines() if "libtorch" in line], [])
+        version = subprocess.run([program.PROGRAM + "-torch", "--version"], check=True, capture_output=True, text=True).stdout
+        self.assertRegex(version, r"libtorch_cpu\.so\.\d+\.\d+")
+
+    def test_what_needs_libtorch_is_handed_over(self):
+        """Where a package has it, with the same arguments and messages; without the package one line says which it is."""
+        installed = self.folder / "bin" / "eventgan"
+        installed.parent.mkdir()
+        shutil.copy(program.PROGRAM, installed)
+        jobs = [["convert", small_job(self.folder, generator={"weights": "untrained:2", "engine": "torch"}), "--progress", "none"],
+                ["train", program.SOURCE / "manifests" / "examples" / "train.json"]]
+        for arguments in jobs:
+            done = subprocess.run([installed, *arguments], capture_output=True, text=True)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertEqual(done.stderr, "error: expected eventgan-torch, the program with LibTorch, got none in "
+                                          f"{self.folder}/libexec/eventgan/eventgan-torch: install the package eventgan-torch\n")
+            self.assertEqual(done.stdout, "")
+        self.assertFalse((self.folder / "out").exists())
+        with_torch = self.folder / "libexec" / "eventgan" / "eventgan-torch"
+        with_torch.parent.mkdir(parents=True)
+        with_torch.symlink_to(program.PROGRAM + "-torch")
+        linked = self.folder / "eventgan"
+        linked.symlink_to(installed)
+        done = subprocess.run([linked, *jobs[0]], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"\Agenerator: torch float32 on .*\n")
+        with_torch.unlink()
+        with_torch.write_text("no program")
+        done = subprocess.run([linked, *jobs[0]], capture_output=True, text=True)
+        self.assertEqual((done.returncode, done.stderr), (1, f"error: expected to run {with_torch}, got 'Permission denied'\n"))
 
     def test_mistyped_words_get_the_nearest(self):
         for arguments, got, meant in [
