@@ -309,7 +309,9 @@ class PngFile {
       png_init_io(png_, file);
       if (!stored_.empty()) {
         png_set_read_fn(png_, &left_, read_from_memory);
-        png_set_option(png_, PNG_IGNORE_ADLER32, PNG_OPTION_ON);  // compared when inflated
+#ifdef PNG_IGNORE_ADLER32  // not in every libpng: then it compares again what inflating compared
+        png_set_option(png_, PNG_IGNORE_ADLER32, PNG_OPTION_ON);
+#endif
       }
       // What is said beside the pixels (colour profiles, text) may be damaged, the pixels may not.
       png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
