@@ -3,6 +3,7 @@
 #include <ATen/autocast_mode.h>
 #include <c10/core/Device.h>
 #include <torch/cuda.h>
+#include <torch/version.h>
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
@@ -26,6 +27,37 @@ c10::Device training_device(const std::string& name) {
 
 namespace {
 
+// Autocast of this thread: LibTorch 2.4 has one function for all devices in place of one for each.
+#if TORCH_VERSION_MAJOR > 2 || (TORCH_VERSION_MAJOR == 2 && TORCH_VERSION_MINOR >= 4)
+
+bool autocast_enabled(c10::DeviceType device) { return at::autocast::is_autocast_enabled(device); }
+
+void set_autocast_enabled(c10::DeviceType device, bool enabled) {
+  at::autocast::set_autocast_enabled(device, enabled);
+}
+
+void set_autocast_dtype(c10::DeviceType device, at::ScalarType dtype) {
+  at::autocast::set_autocast_dtype(device, dtype);
+}
+
+#else
+
+bool autocast_enabled(c10::DeviceType device) {
+  return device == c10::kCUDA ? at::autocast::is_enabled() : at::autocast::is_cpu_enabled();
+}
+
+void set_autocast_enabled(c10::DeviceType device, bool enabled) {
+  device == c10::kCUDA ? at::autocast::set_enabled(enabled)
+                       : at::autocast::set_cpu_enabled(enabled);
+}
+
+void set_autocast_dtype(c10::DeviceType device, at::ScalarType dtype) {
+  device == c10::kCUDA ? at::autocast::set_autocast_gpu_dtype(dtype)
+                       : at::autocast::set_autocast_cpu_dtype(dtype);
+}
+
+#endif
+
 /// While it lives, this thread's convolutions on the device run in bfloat16 (LibTorch's autocast),
 /// if `enabled`. Parameters stay float32; their casts are forgotten at the end. For forward passes
 /// alone: losses and backward passes stay outside.
@@ -37,9 +69,7 @@ class AutocastScope {
   AutocastScope& operator=(const AutocastScope&) = delete;
 
  private:
-  void switch_to(bool on) const;
-
-  bool cuda_;
+  c10::DeviceType device_;
   bool enabled_;
   bool enabled_before_ = false;
 };
@@ -47,31 +77,19 @@ class AutocastScope {
 }  // namespace
 
 AutocastScope::AutocastScope(c10::Device device, bool enabled)
-    : cuda_(device.is_cuda()), enabled_(enabled) {
+    : device_(device.type()), enabled_(enabled) {
   if (!enabled_) return;
-  enabled_before_ = cuda_ ? at::autocast::is_enabled() : at::autocast::is_cpu_enabled();
-  if (cuda_) {
-    at::autocast::set_autocast_gpu_dtype(at::kBFloat16);
-  } else {
-    at::autocast::set_autocast_cpu_dtype(at::kBFloat16);
-  }
+  enabled_before_ = autocast_enabled(device_);
+  set_autocast_dtype(device_, at::kBFloat16);
   at::autocast::increment_nesting();
-  switch_to(true);
+  set_autocast_enabled(device_, true);
 }
 
 AutocastScope::~AutocastScope() {
   if (!enabled_) return;
   // The cache holds casts of parameters, which the next optimiser step makes stale.
   if (at::autocast::decrement_nesting() == 0) at::autocast::clear_cache();
-  switch_to(enabled_before_);
-}
-
-void AutocastScope::switch_to(bool on) const {
-  if (cuda_) {
-    at::autocast::set_enabled(on);
-  } else {
-    at::autocast::set_cpu_enabled(on);
-  }
+  set_autocast_enabled(device_, enabled_before_);
 }
 
 namespace {

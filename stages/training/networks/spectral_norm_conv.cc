@@ -47,7 +47,8 @@ at::Tensor SpectralNormConvImpl::normalized_weight() {
 }
 
 at::Tensor SpectralNormConvImpl::forward(const at::Tensor& input) {
-  const auto& padding = c10::get<torch::ExpandingArray<2>>(options_.padding());
+  // LibTorch 1's own variant, or later the standard library's: each brings its `get`.
+  const auto& padding = get<torch::ExpandingArray<2>>(options_.padding());
   return at::conv2d(input, normalized_weight(), {}, options_.stride(), *padding);
 }
 
