@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "stages/generator/onednn/detail/onednn_versions.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {
@@ -20,8 +21,7 @@ dnnl::post_ops post_operations(const ConvolutionSetup& setup) {
   if (setup.add_target != 0) operations.append_sum(setup.add_target);
   if (setup.activation != Activation::kNone) {
     const bool leaky = setup.activation == Activation::kLeakyRelu;
-    operations.append_eltwise(1.0f, dnnl::algorithm::eltwise_relu, leaky ? kLeakySlope : kNoSlope,
-                              0.0f);
+    append_relu(operations, leaky ? kLeakySlope : kNoSlope);
   }
   return operations;
 }
@@ -41,33 +41,20 @@ dnnl::convolution_forward::primitive_desc describe(const ConvolutionSetup& setup
       1, numbers.out_channels,
       output_side(setup.input.height, padding.top + padding.bottom, side, setup.stride),
       output_side(setup.input.width, padding.left + padding.right, side, setup.stride)};
-  const dnnl::memory::desc source_layout(source, setup.source_type, Tag::nhwc);
-  const dnnl::memory::desc target_layout(target, setup.target_type, Tag::nhwc);
-  const dnnl::memory::desc weights_layout(
-      Dimensions{numbers.out_channels, numbers.in_channels, side, side}, weights.type(), Tag::any);
-  const Dimensions strides = {setup.stride, setup.stride};
-  const Dimensions before = {padding.top, padding.left};
-  const Dimensions after = {padding.bottom, padding.right};
+  ConvolutionLayouts layouts;
+  layouts.source = {source, setup.source_type, Tag::nhwc};
+  layouts.target = {target, setup.target_type, Tag::nhwc};
+  layouts.weights = {Dimensions{numbers.out_channels, numbers.in_channels, side, side},
+                     weights.type(), Tag::any};
+  if (!numbers.bias.empty()) layouts.bias = weights.bias().get_desc();
+  layouts.strides = {setup.stride, setup.stride};
+  layouts.before = {padding.top, padding.left};
+  layouts.after = {padding.bottom, padding.right};
 
   dnnl::primitive_attr attributes;
   attributes.set_scratchpad_mode(dnnl::scratchpad_mode::user);
   attributes.set_post_ops(post_operations(setup));
-  if (!numbers.output_scales.empty()) {
-    constexpr int kPerOutputChannel = 1 << 1;
-    attributes.set_output_scales(kPerOutputChannel, numbers.output_scales);
-  }
-  const auto forward = dnnl::prop_kind::forward_inference;
-  const auto direct = dnnl::algorithm::convolution_direct;
-  if (numbers.bias.empty()) {
-    return {{forward, direct, source_layout, weights_layout, target_layout, strides, before, after},
-            attributes,
-            engine};
-  }
-  const dnnl::memory::desc& bias_layout = weights.bias().get_desc();
-  return {{forward, direct, source_layout, weights_layout, bias_layout, target_layout, strides,
-           before, after},
-          attributes,
-          engine};
+  return describe_convolution(layouts, numbers, attributes, engine);
 }
 
 }  // namespace
@@ -78,12 +65,8 @@ FusedConvolution::FusedConvolution(const ConvolutionSetup& setup, LayerWeights& 
       description_(describe(setup, weights, engine)),
       primitive_(description_),
       weights_(weights.packed(description_.weights_desc())),
-      bias_(weights.bias()) {}
-
-ImageSize FusedConvolution::output() const {
-  const Dimensions sides = description_.dst_desc().dims();
-  return {static_cast<int>(sides[2]), static_cast<int>(sides[3])};
-}
+      bias_(weights.bias()),
+      scales_(weights.scales()) {}
 
 void FusedConvolution::run(dnnl::stream& stream, const void* source, void* target,
                            void* scratch) const {
@@ -91,12 +74,13 @@ void FusedConvolution::run(dnnl::stream& stream, const void* source, void* targe
   const dnnl::memory from(description_.src_desc(), engine_, const_cast<void*>(source));
   const dnnl::memory to(description_.dst_desc(), engine_, target);
   const dnnl::memory scratchpad(description_.scratchpad_desc(), engine_, scratch);
-  const dnnl_exec_arg_t arguments[] = {{DNNL_ARG_SRC, from.get()},
-                                       {DNNL_ARG_WEIGHTS, weights_.get()},
-                                       {DNNL_ARG_DST, to.get()},
-                                       {DNNL_ARG_SCRATCHPAD, scratchpad.get()},
-                                       {DNNL_ARG_BIAS, bias_.get(true)}};
-  const int count = bias_.get(true) ? 5 : 4;
+  dnnl_exec_arg_t arguments[6] = {{DNNL_ARG_SRC, from.get()},
+                                  {DNNL_ARG_WEIGHTS, weights_.get()},
+                                  {DNNL_ARG_DST, to.get()},
+                                  {DNNL_ARG_SCRATCHPAD, scratchpad.get()}};
+  int count = 4;
+  if (bias_.get(true)) arguments[count++] = {DNNL_ARG_BIAS, bias_.get()};
+  if (scales_.get(true)) arguments[count++] = {kScalesArgument, scales_.get()};
   dnnl::error::wrap_c_api(dnnl_primitive_execute(primitive_.get(), stream.get(), count, arguments),
                           "expected a convolution to run, got an error");
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <limits>
 #include <map>
 #include <stdexcept>
@@ -15,6 +16,13 @@
 #include "stages/generator/quantized_network.h"
 
 namespace eventgan {
+
+std::vector<float> bias_behind_scales(const LayerNumbers& layer) {
+  std::vector<float> bias = layer.bias;
+  if (layer.output_scales.empty()) return bias;
+  std::ranges::transform(bias, layer.output_scales, bias.begin(), std::multiplies());
+  return bias;
+}
 
 bool is_float32_layer(const std::string& name) { return name == "head" || name == "pred"; }
 

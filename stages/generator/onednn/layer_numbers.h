@@ -15,10 +15,13 @@ struct LayerNumbers {
   int kernel = 0;             ///< side in pixels
   std::vector<float> weight;  ///< [out, in, y, x]; for int8 whole numbers -127..127
   std::vector<float> bias;    ///< [out]; empty: none
-  /// int8: [out], what the sum of products and bias is multiplied with: oneDNN adds the bias
-  /// before, so it has been divided by this. Empty: 1.
+  /// int8: [out], what the sum of products and bias is multiplied with: the bias has been divided
+  /// by this. Empty: 1.
   std::vector<float> output_scales;
 };
+
+/// The bias for who adds it to what the scales have made: times output_scales. [out], or empty.
+std::vector<float> bias_behind_scales(const LayerNumbers& layer);
 
 /// The network's layers. Names are those of network_layout(), but each decoder has
 ///   decoders.N.skip         3x3 over the skip connection, with the layer's bias

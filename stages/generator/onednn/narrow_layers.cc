@@ -266,10 +266,10 @@ std::vector<float> scales_of(const LayerNumbers& layer) {
   return scales;
 }
 
-std::vector<float> scaled_bias(const LayerNumbers& layer) {
-  std::vector<float> bias = layer.bias;
+/// 0 where there is none.
+std::vector<float> bias_of(const LayerNumbers& layer) {
+  std::vector<float> bias = bias_behind_scales(layer);
   bias.resize(layer.out_channels);
-  for (std::size_t o = 0; o < layer.output_scales.size(); ++o) bias[o] *= layer.output_scales[o];
   return bias;
 }
 
@@ -292,9 +292,9 @@ NarrowLayers::NarrowLayers(const LayerNumbers& head, const LayerNumbers& skip,
       phases_(packed(phases, 2, sizeof(Word) / stored_bytes)),
       prediction_(pred.weight),
       head_bias_(head.bias),
-      skip_bias_(scaled_bias(skip)),
+      skip_bias_(bias_of(skip)),
       skip_scales_(scales_of(skip)),
-      phases_bias_(scaled_bias(phases)),
+      phases_bias_(bias_of(phases)),
       phases_scales_(scales_of(phases)),
       prediction_bias_(pred.bias) {
   std::size_t bytes = buffer_values() * sizeof(float);

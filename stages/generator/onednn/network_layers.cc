@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "stages/generator/onednn/detail/onednn_versions.h"
 #include "stages/generator/onednn/layer_numbers.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/quantized_network.h"
@@ -13,11 +14,11 @@ namespace {
 
 using Tag = dnnl::memory::format_tag;
 
-dnnl::memory bias_memory(std::vector<float>& bias, const dnnl::engine& engine) {
-  if (bias.empty()) return {};
-  const dnnl::memory::desc layout({static_cast<dnnl::memory::dim>(bias.size())},
+dnnl::memory memory_of(std::vector<float>& values, const dnnl::engine& engine) {
+  if (values.empty()) return {};
+  const dnnl::memory::desc layout({static_cast<dnnl::memory::dim>(values.size())},
                                   dnnl::memory::data_type::f32, Tag::x);
-  return {layout, engine, bias.data()};
+  return {layout, engine, values.data()};
 }
 
 }  // namespace
@@ -27,7 +28,10 @@ LayerWeights::LayerWeights(LayerNumbers numbers, dnnl::memory::data_type type,
     : numbers_(std::move(numbers)),
       type_(type),
       engine_(engine),
-      bias_(bias_memory(numbers_.bias, engine)) {}
+      bias_values_(bias_argument(numbers_)),
+      scale_values_(scales_argument(numbers_)),
+      bias_(memory_of(bias_values_, engine)),
+      scales_(memory_of(scale_values_, engine)) {}
 
 dnnl::memory LayerWeights::packed(const dnnl::memory::desc& layout) {
   const std::lock_guard lock(mutex_);

@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "stages/generator/onednn/detail/onednn_versions.h"
+
 namespace eventgan {
 namespace {
 
@@ -70,8 +72,7 @@ void NetworkPlan::plan_narrow(NetworkLayers& layers) {
   const std::size_t pixels = size_.width + NarrowLayers::kPixels;
   head_rows_buffer_ = layout_.add(pixels * NarrowLayers::kChannels * sizeof(float));
   const auto numbers = [&](const std::string& name) { return layers.at(name).numbers(); };
-  const bool tiles =
-      stored_type_ == Type::bf16 && dnnl::get_effective_cpu_isa() == dnnl::cpu_isa::avx512_core_amx;
+  const bool tiles = stored_type_ == Type::bf16 && processor_has(dnnl::cpu_isa::avx512_core_amx);
   const auto stored_bytes = static_cast<int>(dnnl::memory::data_type_size(stored_type_));
   narrow_.emplace(numbers("head"), numbers("decoders.3.skip"), numbers("decoders.3.phases"),
                   numbers("pred"), size_, stored_bytes, tiles, layout_);

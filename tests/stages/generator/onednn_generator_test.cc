@@ -7,9 +7,13 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "stages/generator/onednn/detail/fused_convolution.h"
 #include "stages/generator/onednn/detail/network_plan.h"
+#include "stages/generator/onednn/detail/onednn_versions.h"
+#include "stages/generator/quantized_network.h"
 #include "stages/generator/weights.h"
 #include "tests/stages/generator/engine_trials.h"
 
@@ -34,6 +38,19 @@ TEST(OnednnSupport, ObeysTheLimitOfTheEnvironment) {
   EXPECT_FALSE(onednn_support(Precision::kBfloat16).native) << limit;
   EXPECT_FALSE(onednn_support(Precision::kInt8).native) << limit;
   EXPECT_TRUE(limit != "AVX2" || !onednn_support(Precision::kBfloat16).able);
+}
+
+TEST(OnednnSupport, IsOfEveryProcessorThatHasTheInstructions) {
+  using Isa = dnnl::cpu_isa;
+  EXPECT_EQ(processor_has(Isa::sse41), onednn_support(Precision::kFloat32).able);
+  EXPECT_TRUE(processor_has(Isa::avx2, Isa::avx2_vnni));
+  EXPECT_TRUE(processor_has(Isa::avx512_core_bf16, Isa::avx512_core_amx));
+  EXPECT_FALSE(processor_has(Isa::avx2_vnni, Isa::avx512_core));
+  EXPECT_FALSE(processor_has(Isa::avx512_core, Isa::avx2_vnni));
+  EXPECT_FALSE(processor_has(Isa::avx512_core_amx, Isa::avx512_core_bf16));
+  // One that came after all that are known here.
+  const Isa later{static_cast<int>(Isa::avx512_core_amx) | 1 << 20};
+  EXPECT_TRUE(processor_has(Isa::avx512_core_amx, later));
 }
 
 TEST(OnednnSupport, APrecisionThatIsNotAbleIsRefusedByName) {
@@ -69,6 +86,56 @@ TEST(OnednnGenerator, RefusesInt8WithoutCalibration) {
   if (!onednn_support(Precision::kInt8).able) GTEST_SKIP() << "no int8 here";
   EXPECT_THROW(make_onednn_generator(untrained_weights(2, 9, 1), Precision::kInt8),
                std::invalid_argument);
+}
+
+/// One pixel of an image, so that all weights meet all activations.
+std::vector<std::uint8_t> int8_pixel(LayerNumbers numbers, Activation activation, float add_target,
+                                     const std::vector<std::uint8_t>& source,
+                                     std::vector<std::uint8_t> target) {
+  const dnnl::engine engine(dnnl::engine::kind::cpu, 0);
+  LayerWeights weights(std::move(numbers), dnnl::memory::data_type::s8, engine);
+  ConvolutionSetup setup;
+  setup.input = {1, 1};
+  setup.source_type = setup.target_type = dnnl::memory::data_type::u8;
+  setup.activation = activation;
+  setup.add_target = add_target;
+  const FusedConvolution convolution(setup, weights, engine);
+  std::vector<std::byte> scratch(convolution.scratch_bytes() + 1);
+  dnnl::stream stream(engine);
+  convolution.run(stream, source.data(), target.data(), scratch.data());
+  return target;
+}
+
+TEST(FusedConvolution, ScalesEachChannelsSumAndBiasBeforeWhatFollows) {
+  if (!onednn_support(Precision::kInt8).able) GTEST_SKIP() << "no int8 here";
+  // Sums 1 * 3 + 2 * 4 = 11 and -5 * 4 = -20 and 10 * 3 = 30, with biases 5, 4 and -10: 16, -16
+  // and 20, times 2, 1 and 0.25: 32, -16 and 5; plus half of what is there: 42, -6 and 20.
+  const LayerNumbers numbers{"layer", 3, 2, 1, {1, 2, 0, -5, 10, 0}, {5, 4, -10}, {2, 1, 0.25f}};
+  EXPECT_EQ(int8_pixel(numbers, Activation::kRelu, 0.5f, {3, 4}, {20, 20, 30}),
+            (std::vector<std::uint8_t>{42, 0, 20}));
+  EXPECT_EQ(int8_pixel(numbers, Activation::kNone, 0, {3, 4}, {20, 20, 30}),
+            (std::vector<std::uint8_t>{32, 0, 5}));
+}
+
+TEST(FusedConvolution, AddsTheLargestProductsExactly) {
+  if (!onednn_support(Precision::kInt8).able) GTEST_SKIP() << "no int8 here";
+  // Without VNNI two products are added in 16 bits.
+  const bool native = onednn_support(Precision::kInt8).native;
+  const auto largest = float(native ? kLargestWeight : kLargestWeightWithoutVnni);
+  constexpr int kIn = 64, kOut = 32;
+  LayerNumbers numbers{"layer", kOut, kIn, 1, {}, {}, {}};
+  std::vector<std::uint8_t> expected;
+  for (int out = 0; out < kOut; ++out) {
+    for (int in = 0; in < kIn; ++in) numbers.weight.push_back(out % 2 ? -largest : largest);
+    // Of the sum of all products n remains 100 + n, where n is the channel.
+    const float sum = 255 * largest * kIn;
+    numbers.bias.push_back(out % 2 ? sum + 100 + float(out) : -sum + 100 + float(out));
+    numbers.output_scales.push_back(1);
+    expected.push_back(static_cast<std::uint8_t>(100 + out));
+  }
+  EXPECT_EQ(int8_pixel(numbers, Activation::kNone, 0, std::vector<std::uint8_t>(kIn, 255),
+                       std::vector<std::uint8_t>(kOut)),
+            expected);
 }
 
 class NetworkPlans : public ::testing::TestWithParam<Precision> {

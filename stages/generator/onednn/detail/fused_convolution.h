@@ -46,7 +46,6 @@ class FusedConvolution {
   /// The caller's thread computes. `scratch`: scratch_bytes().
   void run(dnnl::stream& stream, const void* source, void* target, void* scratch) const;
 
-  ImageSize output() const;
   std::size_t scratch_bytes() const { return description_.scratchpad_desc().get_size(); }
 
   /// oneDNN's name of the kernel: "brgconv:avx512_core".
@@ -58,6 +57,7 @@ class FusedConvolution {
   dnnl::convolution_forward primitive_;
   dnnl::memory weights_;
   dnnl::memory bias_;
+  dnnl::memory scales_;
 };
 
 struct RowConvolutionSetup {

@@ -26,13 +26,16 @@ class LayerWeights {
   /// The weights laid out as `layout`, which may be read as long as this or the result lives.
   /// Throws dnnl::error; then nothing is kept.
   dnnl::memory packed(const dnnl::memory::desc& layout);
+  /// What a convolution gets beside them (onednn_versions.h); nothing where it gets none.
   const dnnl::memory& bias() const { return bias_; }
+  const dnnl::memory& scales() const { return scales_; }
 
  private:
   LayerNumbers numbers_;
   dnnl::memory::data_type type_;
   dnnl::engine engine_;
-  dnnl::memory bias_;
+  std::vector<float> bias_values_, scale_values_;
+  dnnl::memory bias_, scales_;
   std::mutex mutex_;
   std::vector<dnnl::memory> packed_;
 };
