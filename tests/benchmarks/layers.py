@@ -35,8 +35,10 @@ SETTINGS = {
 }
 KINDS = ["head", "encoders", "residual blocks", "decoders: doubled part", "decoders: skip part", "prediction"]
 OWN = "the engine's own code"
-# oneDNN's line of a convolution that was run ends in its shape and milliseconds: [ic, oc, ih, oh, kernel h, stride h, iw, ow].
-LINE = re.compile(r"^onednn_verbose,exec,cpu,convolution,.*_?ic(\d+)oc(\d+)_ih(\d+)oh(\d+)kh(\d+)sh(\d+).*_iw(\d+)ow(\d+)kw\d+.*,([\d.e-]+)$")
+# oneDNN's line of a convolution that was run (since version 3 with the kind of line) ends in its shape and milliseconds:
+# [ic, oc, ih, oh, kernel h, stride h, iw, ow].
+LINE = re.compile(r"^onednn_verbose,(?:v1,primitive,)?exec,cpu,convolution,"
+                  r".*_?ic(\d+)oc(\d+)_ih(\d+)oh(\d+)kh(\d+)sh(\d+).*_iw(\d+)ow(\d+)kw\d+.*,([\d.e-]+)$")
 
 
 def kind_of(inputs, outputs, kernel, stride, widest):
