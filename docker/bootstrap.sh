@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
-# Sets up a Debian 12 machine, builds eventgan and runs it:
+# Sets up a Debian 12 or 13 machine, builds eventgan and runs it:
 #   docker/bootstrap.sh demo [DIR]   a small demo dataset in DIR (default: ./demo), converted, checked and drawn
 #   docker/bootstrap.sh test         the whole test suite
 #   docker/bootstrap.sh build        only the program, build/release/eventgan
-#   docker/bootstrap.sh package      a Debian package of it, build/release/eventgan_VERSION_amd64.deb
+#   docker/bootstrap.sh package      Debian packages, build/release/eventgan_*.deb; eventgan-torch_*.deb adds training and LibTorch
 #   docker/bootstrap.sh packages [LIST...]   only installs what is missing of docker/packages/LIST.txt (default: build test)
 # Run again, it does only what is left to do. JOBS sets the number of compilers at a time (default: all cores).
 set -euo pipefail
@@ -16,13 +16,28 @@ listed() { sed -e 's/#.*//' -e '/^[[:space:]]*$/d' "$@"; }
 
 installed() { dpkg-query -W -f='${Status}' "$1" 2>/dev/null | grep -q 'ok installed'; }
 
-# Installs the packages of the given lists that are missing; asks for rights only if there are any.
+# Whether this is a Debian that has the packages under the names of docker/packages; says what helps where it is not.
+is_supported() (
+  ID='' VERSION_ID='' PRETTY_NAME=$(uname)
+  [ ! -r /etc/os-release ] || . /etc/os-release
+  [[ "$ID $VERSION_ID" == "debian 12" || "$ID $VERSION_ID" == "debian 13" ]] && return
+  echo "expected Debian 12 or 13, got $PRETTY_NAME: install yourself what Debian calls $*," \
+    "or build the image: docker build --file docker/Dockerfile --tag eventgan ." >&2
+  return 1
+)
+
+# Installs the packages of the given lists that are missing; asks for rights only if there are any. On another system all
+# but `packages` goes on: what is there under another name does, and CMake names what is not there.
 install_packages() {
   local missing=() package
   while read -r package; do
     installed "$package" || missing+=("$package")
   done < <(listed "$@")
   [ ${#missing[@]} -eq 0 ] && return
+  if ! is_supported "${missing[@]}"; then
+    [ "$task" != packages ] || exit 1
+    return 0
+  fi
   say "installing ${missing[*]}"
   local root=()
   if [ "$(id -u)" -ne 0 ]; then
@@ -45,7 +60,7 @@ build() {
 build_program() {
   install_packages docker/packages/build.txt
   options=(-DEVENTGAN_TESTS=OFF)
-  build release eventgan
+  build release eventgan eventgan-torch
 }
 
 package() {
@@ -92,7 +107,8 @@ packages() {
   install_packages "${lists[@]}"
 }
 
-case "${1:-}" in
+task=${1:-}
+case "$task" in
   demo) demo "${@:2}" ;;
   test) run_tests ;;
   build) build_program ;;

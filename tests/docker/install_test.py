@@ -1,4 +1,5 @@
-"""`cmake --install`: the program, its man pages and completion, pages that find each other, examples, schemas, the Python package."""
+"""What is installed, by `cmake --install` and as Debian packages: the program, its man pages and completion, pages that find each
+other, examples, schemas, the Python package; apart from these what needs LibTorch."""
 
 import gzip
 import os
@@ -26,9 +27,11 @@ def run(*command, **how):
 class Install(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
-        cls.prefix = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
-        cls.addClassCleanup(shutil.rmtree, cls.prefix)
-        run("cmake", "--install", BUILD, "--prefix", cls.prefix)
+        cls.root = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
+        cls.addClassCleanup(shutil.rmtree, cls.root)
+        # As packagers do: into a folder that stands for the system's root.
+        cls.prefix = cls.root / "opt" / "eventgan"
+        run("cmake", "--install", BUILD, "--prefix", "/opt/eventgan", env={**os.environ, "DESTDIR": str(cls.root)})
         cls.program = cls.prefix / "bin" / "eventgan"
         cls.help = run(cls.program, "--help")
         cls.commands = re.findall(r"(?m)^  ([a-z-]+) {2,}", cls.help.split("Subcommands:")[1])
@@ -90,9 +93,76 @@ class Install(unittest.TestCase):
         self.assertTrue(where.startswith(str(self.prefix)))
 
     def test_nothing_else_is_installed(self):
-        self.assertEqual({path.name for path in self.prefix.iterdir()} - {"files"}, {"bin", "share", "lib"})
-        self.assertEqual([path.name for path in self.program.parent.iterdir()], ["eventgan"])
+        self.assertEqual([path.relative_to(self.root).as_posix() for path in self.root.glob("*/*")], ["opt/eventgan"])
+        self.assertEqual({path.name for path in self.prefix.iterdir()} - {"files"}, {"bin", "libexec", "share", "lib"})
+        executables = [path for path in self.prefix.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
+        self.assertEqual({path.relative_to(self.prefix).as_posix() for path in executables},
+                         {"bin/eventgan", "libexec/eventgan/eventgan-torch"})
+        self.assertTrue(all(os.access(path, os.X_OK) for path in executables))
         self.assertFalse([path for path in self.prefix.rglob("*") if "__pycache__" in path.parts])
+
+
+def loaded_packages(executable):
+    """Those whose libraries an executable names itself."""
+    names = re.findall(r"NEEDED.*\[(.+)\]", run("readelf", "--dynamic", executable))
+    paths = dict(re.findall(r"(?m)^\s*(\S+) => (/\S+)", run("ldd", executable)))
+    assert len(paths) > 10
+    packages = set()
+    for path in (paths[name] for name in names if name in paths):  # the loader has no arrow
+        # Where /lib is a link to /usr/lib, dpkg may know either name; an alternative (libblas.so.3) is a link that it does not know.
+        found = subprocess.run(["dpkg-query", "--search", path, "/usr" + path, os.path.realpath(path)], capture_output=True, text=True)
+        packages.update(re.findall(r"(?m)^([^:\n]+)(?::\w+)?: /", found.stdout)[:1] or [f"the package of {path}"])
+    return packages
+
+
+@unittest.skipUnless(shutil.which("dpkg-shlibdeps"), "no dpkg-dev")
+class Packages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder)
+        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=BUILD)
+        cls.files = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
+
+    def field(self, package, name):
+        return run("dpkg-deb", "--field", self.files[package], name).strip()
+
+    def names(self, package, name):
+        return {entry.split()[0] for entry in self.field(package, name).split(",")}
+
+    def test_two_packages_share_the_files(self):
+        contents = {name: set(re.findall(r"(?m) \./(\S*[^/\s])$", run("dpkg-deb", "--contents", path))) for name, path in self.files.items()}
+        self.assertEqual(set(contents), {"eventgan", "eventgan-torch"})
+        self.assertEqual(contents["eventgan-torch"], {"usr/libexec/eventgan/eventgan-torch"})
+        self.assertIn("usr/bin/eventgan", contents["eventgan"])
+        self.assertIn("usr/share/man/man1/eventgan.1.gz", contents["eventgan"])
+        self.assertIn("usr/lib/python3/dist-packages/eventgan_shards/__init__.py", contents["eventgan"])
+        self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])
+
+    def test_dependencies_are_the_libraries_packages(self):
+        for package, executable in [("eventgan", "eventgan"), ("eventgan-torch", "eventgan-torch")]:
+            self.assertLessEqual(loaded_packages(BUILD / executable), self.names(package, "Depends"))
+        version = run(BUILD / "eventgan", "--version").split()[1]
+        self.assertIn(f"eventgan (= {version})", self.field("eventgan-torch", "Depends"))
+        self.assertLessEqual({"python3-h5py", "python3-numpy"}, self.names("eventgan", "Recommends"))
+
+    @unittest.expectedFailure  # until the program is split
+    def test_only_one_needs_libtorch(self):
+        self.assertTrue([name for name in self.names("eventgan-torch", "Depends") if name.startswith("libtorch")])
+        self.assertEqual([name for name in self.names("eventgan", "Depends") if name.startswith("libtorch")], [])
+
+    def test_descriptions_are_well_formed(self):
+        for package in self.files:
+            first, *rest = self.field(package, "Description").splitlines()
+            self.assertLess(len(first), 80)
+            self.assertTrue(rest)
+            self.assertFalse([line for line in rest if not re.match(r" \S", line)])
+
+    @unittest.skipUnless(shutil.which("apt-get"), "no apt-get")
+    def test_apt_would_install_them(self):
+        said = run("apt-get", "install", "--simulate", *self.files.values())
+        for package in self.files:
+            self.assertRegex(said, rf"(?m)^Inst {package} ")
 
 
 if __name__ == "__main__":
