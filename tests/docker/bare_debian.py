@@ -2,11 +2,11 @@
 """What a stranger's machine does, tried in a bare Debian that debootstrap makes from the mirror of this machine's apt:
 
     bare_debian.py suite [RELEASE]             the README's two commands (default: in the other Debian, of 12 and 13)
-    bare_debian.py image [RELEASE] [TARGET]    docker/Dockerfile, instruction by instruction; then its program makes a dataset
-                                               (default: trixie, without LibTorch). Prints the image's size and packages.
+    bare_debian.py image [RELEASE] [TARGET]    docker/Dockerfile, instruction by instruction (default: trixie, without
+                                               LibTorch); then its program makes a dataset. Prints the image's size.
 
-Needs root, debootstrap, about 6 GB in $TMPDIR (default: /var/tmp), and the time of a build from nothing. It is no container:
-processes and network are the machine's.
+Needs root, debootstrap, about 6 GB in $TMPDIR (default: /var/tmp), and the time of a build from nothing. It is no
+container: processes and network are the machine's.
 """
 
 import copy
@@ -22,8 +22,12 @@ import tempfile
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
 SKIPPED = 77  # what ctest knows as skipped
-# As in Docker's images called slim.
-SLIM = "".join(f"path-exclude /usr/share/{name}/*\n" for name in ("doc", "info", "locale", "man")) + "path-include /usr/share/doc/*/copyright\n"
+# What makes Docker's images slim, as the two files in them have it.
+LEFT_OUT = ["usr/share/doc", "usr/share/info", "usr/share/locale", "usr/share/man"]
+SLIM = {"etc/dpkg/dpkg.cfg.d/docker": "".join(f"path-exclude /{folder}/*\n" for folder in LEFT_OUT) +
+                                      "path-include /usr/share/doc/*/copyright\n",
+        "etc/apt/apt.conf.d/docker-clean": 'DPkg::Post-Invoke { "rm -f /var/cache/apt/archives/*.deb || true"; };\n'
+                                           'Dir::Cache::pkgcache "";\nDir::Cache::srcpkgcache "";\n'}
 PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
 PASSED_ON = ["JOBS", "http_proxy", "https_proxy", "no_proxy"]
 
@@ -43,8 +47,8 @@ def this_release():
 
 def mirror():
     """Where this machine gets its Debian from."""
-    form = ["--format", "$(REPO_URI) $(CODENAME)", "Created-By: Packages", "Component: main"]
-    return next(uri for uri, name in map(str.split, said("apt-get", "indextargets", *form).splitlines()) if name == this_release())
+    lines = said("apt-get", "indextargets", "--format", "$(CODENAME) $(REPO_URI)", "Created-By: Packages").splitlines()
+    return dict(reversed([line.split() for line in lines]))[this_release()]  # the first of several
 
 
 class Tree:
@@ -58,12 +62,14 @@ class Tree:
         return self.root.joinpath(*(str(part).lstrip("/") for part in parts))
 
     def debootstrap(self, release, slim):
-        call("debootstrap", "--variant=minbase", release, self.root, mirror(), stdout=subprocess.DEVNULL)
+        call("debootstrap", "--variant=minbase", release, self.root, mirror())
         if slim:
-            call("sh", "-c", "cd $0/usr/share && rm -rf doc info locale man", self.root)
-            self.at("etc/dpkg/dpkg.cfg.d/docker").write_text(SLIM)
-            call("sh", "-c", "rm -rf $0/var/lib/apt/lists/* $0/var/cache/apt/archives/*.deb", self.root)
-        shutil.copy("/etc/resolv.conf", self.at("etc/resolv.conf"))
+            for name, text in SLIM.items():
+                self.at(name).write_text(text)
+            call("sh", "-ec", f"cd $0; rm -rf {' '.join(LEFT_OUT)} var/lib/apt/lists/* var/cache/apt/*.bin "
+                              "var/cache/apt/archives/*.deb", self.root)
+        for name in ("hosts", "resolv.conf"):
+            shutil.copy(f"/etc/{name}", self.at("etc", name))
         return self
 
     def run(self, command, mounts=(), read_only=False):
@@ -78,7 +84,8 @@ class Tree:
             call("mount", "-o", "remount,bind,ro", self.root)
         settings = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         try:
-            call("chroot", f"--userspec={self.user}", self.root, "env", "-i", f"PATH={PATH}", "HOME=/root", "TERM=xterm", *settings,
+            call("chroot", f"--userspec={self.user}", self.root,
+                 "env", "-i", f"PATH={PATH}", "HOME=/root", "TERM=xterm", *settings,
                  "sh", "-ec", f"cd {shlex.quote(self.folder)}\n{command}", stdin=subprocess.DEVNULL)
         finally:
             call("umount", "--recursive", self.root)
@@ -100,7 +107,8 @@ def copy_sources(folder):
 def suite(top, release=None):
     commands = re.findall(r"(?m)^    (docker/bootstrap\.sh (?:demo|test))\b", (SOURCE / "README.md").read_text())
     assert len(commands) == 2, commands
-    tree = Tree(top / "tree").debootstrap(release or {"bookworm": "trixie", "trixie": "bookworm"}[this_release()], slim=False)
+    release = release or {"bookworm": "trixie", "trixie": "bookworm"}[this_release()]
+    tree = Tree(top / "tree").debootstrap(release, slim=False)
     tree.folder = "/src"
     copy_sources(tree.at(tree.folder))
     for command in commands:
@@ -139,7 +147,8 @@ def image(top, release="trixie", target=None):
                 shutil.copy(SOURCE / source, there)
         elif instruction == "RUN":
             mount = re.match(r"--mount=type=bind,from=(\w+),source=(\S+),target=(\S+) ", rest)
-            tree.run(rest[mount.end():] if mount else rest, [(stages[mount[1]].at(mount[2]), mount[3])] if mount else [])
+            command = rest[mount.end():] if mount else rest
+            tree.run(command, [(stages[mount[1]].at(mount[2]), mount[3])] if mount else [])
         elif instruction == "USER":
             tree.user = rest
         elif instruction == "ENTRYPOINT":
@@ -151,14 +160,15 @@ def image(top, release="trixie", target=None):
     data = top / "data"
     data.mkdir()
     os.chown(data, *map(int, tree.user.split(":")))
-    for arguments in (["--version"], ["make-demo", "demo", "--scenes", "10"], ["convert", "demo/manifest.json", "--output", "events"],
-                      ["finalize", "events"]):
-        tree.run(shlex.join(tree.entrypoint + arguments), [(data, tree.folder)], read_only=True)
-    print(f"{release}, {target or 'default target'}: {size[0]} MB and {size[1]} packages; Debian alone: {debian[0]} MB, {debian[1]}")
+    for arguments in ("--version", "make-demo demo --scenes 10", "convert demo/manifest.json --output events",
+                      "finalize events"):
+        tree.run(f"{shlex.join(tree.entrypoint)} {arguments}", [(data, tree.folder)], read_only=True)
+    print(f"{release}, {target or 'default target'}: {size[0]} MB, {size[1]} packages; "
+          f"of these Debian's own are {debian[0]} MB, {debian[1]} packages")
 
 
 def main():
-    missing = [name for name in ("debootstrap", "git", "unshare") if not shutil.which(name)]
+    missing = [name for name in ("apt-get", "debootstrap", "git", "unshare") if not shutil.which(name)]
     if missing or os.geteuid() != 0:
         print(f"skipped: no {', '.join(missing) or 'root'}")
         sys.exit(SKIPPED)

@@ -1,5 +1,5 @@
-"""What is installed, by `cmake --install` and as Debian packages: the program, its man pages and completion, pages that find each
-other, examples, schemas, the Python package; apart from these what needs LibTorch."""
+"""What is installed, by `cmake --install` and as Debian packages: the program, its man pages and completion, pages that
+find each other, examples, schemas, the Python package; apart from these what needs LibTorch."""
 
 import gzip
 import os
@@ -109,8 +109,9 @@ def loaded_packages(executable):
     assert len(paths) > 10
     packages = set()
     for path in (paths[name] for name in names if name in paths):  # the loader has no arrow
-        # Where /lib is a link to /usr/lib, dpkg may know either name; an alternative (libblas.so.3) is a link that it does not know.
-        found = subprocess.run(["dpkg-query", "--search", path, "/usr" + path, os.path.realpath(path)], capture_output=True, text=True)
+        # Where /lib is a link to /usr/lib, dpkg may know either name; links of alternatives it does not know at all.
+        found = subprocess.run(["dpkg-query", "--search", path, "/usr" + path, os.path.realpath(path)],
+                               capture_output=True, text=True)
         packages.update(re.findall(r"(?m)^([^:\n]+)(?::\w+)?: /", found.stdout)[:1] or [f"the package of {path}"])
     return packages
 
@@ -131,7 +132,8 @@ class Packages(unittest.TestCase):
         return {entry.split()[0] for entry in self.field(package, name).split(",")}
 
     def test_two_packages_share_the_files(self):
-        contents = {name: set(re.findall(r"(?m) \./(\S*[^/\s])$", run("dpkg-deb", "--contents", path))) for name, path in self.files.items()}
+        contents = {name: set(re.findall(r"(?m) \./(\S*[^/\s])$", run("dpkg-deb", "--contents", path)))
+                    for name, path in self.files.items()}
         self.assertEqual(set(contents), {"eventgan", "eventgan-torch"})
         self.assertEqual(contents["eventgan-torch"], {"usr/libexec/eventgan/eventgan-torch"})
         self.assertIn("usr/bin/eventgan", contents["eventgan"])

@@ -57,10 +57,12 @@ class Script(unittest.TestCase):
             self.assertTrue(called[1].endswith(" ".join(["--no-install-recommends", *listed("slurm"), *listed("package")])))
 
     def test_elsewhere_packages_says_what_to_do(self):
-        for system, name in [("ubuntu", "Ubuntu 24.04.2 LTS"), ("unstable", "Debian GNU/Linux forky/sid"), (None, os.uname().sysname)]:
+        names = {"ubuntu": "Ubuntu 24.04.2 LTS", "unstable": "Debian GNU/Linux forky/sid", None: os.uname().sysname}
+        for system, name in names.items():
             code, called, errors = self.run_on(system, "packages", "slurm")
             self.assertEqual((code, called), (1, []))
-            self.assertRegex(errors, rf"\Aexpected Debian 12 or 13, got {re.escape(name)}: .* munge slurm-wlm, .*docker build .*\n\Z")
+            self.assertRegex(errors, rf"\Aexpected Debian 12 or 13, got {re.escape(name)}: .* munge slurm-wlm, "
+                                     r".*docker build .*\n\Z")
 
     def test_elsewhere_what_is_there_is_built(self):
         code, called, errors = self.run_on("ubuntu", "package")
@@ -107,8 +109,9 @@ class Image(unittest.TestCase):
         self.stages = stages()
 
     def test_two_images_without_and_with_libtorch(self):
+        debian = "debian:${DEBIAN}-slim"
         self.assertEqual({name: values(stage, "FROM") for name, stage in self.stages.items()},
-                         {"build": ["debian:${DEBIAN}-slim"], "plain": ["debian:${DEBIAN}-slim"], "torch": ["plain"], None: ["plain"]})
+                         {"build": [debian], "plain": [debian], "torch": ["plain"], None: ["plain"]})
         self.assertEqual(len(self.stages[None]), 1)
         self.assertRegex((DOCKER / "Dockerfile").read_text(), r"(?m)^ARG DEBIAN=trixie$")
 
