@@ -79,16 +79,16 @@ class Tree:
                    *(("--bind", outside, inside) for outside, inside in mounts)]
         for *how, inside in mounted:
             self.at(inside).mkdir(parents=True, exist_ok=True)
-            call("mount", *how, self.at(inside))
+            said("mount", *how, self.at(inside))
         if read_only:
-            call("mount", "-o", "remount,bind,ro", self.root)
+            said("mount", "-o", "remount,bind,ro", self.root)
         settings = [f"{name}={os.environ[name]}" for name in PASSED_ON if name in os.environ]
         try:
             call("chroot", f"--userspec={self.user}", self.root,
                  "env", "-i", f"PATH={PATH}", "HOME=/root", "TERM=xterm", *settings,
                  "sh", "-ec", f"cd {shlex.quote(self.folder)}\n{command}", stdin=subprocess.DEVNULL)
         finally:
-            call("umount", "--recursive", self.root)
+            said("umount", "--recursive", self.root)
 
     def size(self):
         """(MB on disk, number of packages)"""

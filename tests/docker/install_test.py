@@ -109,7 +109,7 @@ def loaded_packages(executable):
     assert len(paths) > 10
     packages = set()
     for path in (paths[name] for name in names if name in paths):  # the loader has no arrow
-        # Where /lib is a link to /usr/lib, dpkg may know either name; links of alternatives it does not know at all.
+        # Where /lib is a link to /usr/lib, dpkg may know either name. It does not know links of alternatives.
         found = subprocess.run(["dpkg-query", "--search", path, "/usr" + path, os.path.realpath(path)],
                                capture_output=True, text=True)
         packages.update(re.findall(r"(?m)^([^:\n]+)(?::\w+)?: /", found.stdout)[:1] or [f"the package of {path}"])
