@@ -91,10 +91,10 @@ demo() {
 
 run_tests() {
   install_packages docker/packages/build.txt docker/packages/test.txt
-  options=()
-  build dev
+  options=(-DEVENTGAN_TESTS=ON)
+  build release
   say "testing"
-  ctest --preset dev -j "$jobs"
+  ctest --preset release -j "$jobs"
 }
 
 packages() {
