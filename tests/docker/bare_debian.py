@@ -115,24 +115,42 @@ def suite(top, release=None):
         tree.run(command)
 
 
-def image(top, release="trixie", target=None):
-    text = re.sub(r"\\\n\s*", "", (SOURCE / "docker" / "Dockerfile").read_text())
-    stages, debian = {}, {}
-    for instruction, rest in (line.split(maxsplit=1) for line in text.splitlines() if line and not line.startswith("#")):
-        if instruction == "FROM":
-            if target and target in stages:
-                break
-            base, _, name = rest.replace("${DEBIAN}", release).partition(" AS ")
-            if base in stages:
-                tree = copy.copy(stages[base])
-                tree.root = top / f"stage-{len(stages)}"
-                call("cp", "--archive", stages[base].root, tree.root)
-            else:
-                assert base == f"debian:{release}-slim", base
-                tree = Tree(top / f"stage-{len(stages)}").debootstrap(release, slim=True)
-                debian = tree.size()
-            stages[name] = tree
-        elif instruction == "WORKDIR":
+class Dockerfile:
+    """docker/Dockerfile's stages, each made when it is needed. The instructions that are here are all that it may use."""
+
+    def __init__(self, top, release):
+        self.top, self.release, self.stages, self.made = top, release, {}, {}
+        self.debian = None  # the base image's size
+        text = re.sub(r"\\\n\s*", "", (SOURCE / "docker" / "Dockerfile").read_text())
+        for instruction, rest in (line.split(maxsplit=1) for line in text.splitlines() if line and line[0] != "#"):
+            if instruction == "FROM":
+                base, _, name = rest.replace("${DEBIAN}", release).partition(" AS ")
+                self.stages[name] = (base, [])
+            elif instruction != "ARG":
+                self.stages[name][1].append((instruction, rest))
+
+    def stage(self, name):
+        """Its tree. The last stage, which has no name, is "" here."""
+        if name not in self.made:
+            base, instructions = self.stages[name]
+            self.made[name] = self.begun(base)
+            for instruction, rest in instructions:
+                self.do(self.made[name], instruction, rest)
+        return self.made[name]
+
+    def begun(self, base):
+        if base in self.stages:
+            tree = copy.copy(self.stage(base))
+            tree.root = self.top / f"stage-{len(self.made)}"
+            call("cp", "--archive", self.made[base].root, tree.root)
+        else:
+            assert base == f"debian:{self.release}-slim", base
+            tree = Tree(self.top / f"stage-{len(self.made)}").debootstrap(self.release, slim=True)
+            self.debian = tree.size()
+        return tree
+
+    def do(self, tree, instruction, rest):
+        if instruction == "WORKDIR":
             tree.folder = rest
             tree.at(rest).mkdir(parents=True, exist_ok=True)
         elif instruction == "COPY":
@@ -148,13 +166,18 @@ def image(top, release="trixie", target=None):
         elif instruction == "RUN":
             mount = re.match(r"--mount=type=bind,from=(\w+),source=(\S+),target=(\S+) ", rest)
             command = rest[mount.end():] if mount else rest
-            tree.run(command, [(stages[mount[1]].at(mount[2]), mount[3])] if mount else [])
+            tree.run(command, [(self.stage(mount[1]).at(mount[2]), mount[3])] if mount else [])
         elif instruction == "USER":
             tree.user = rest
-        elif instruction == "ENTRYPOINT":
-            tree.entrypoint = json.loads(rest)
         else:
-            assert instruction == "ARG", instruction
+            assert instruction == "ENTRYPOINT", instruction
+            tree.entrypoint = json.loads(rest)
+
+
+def image(top, release="trixie", target=""):
+    dockerfile = Dockerfile(top, release)
+    tree = dockerfile.stage(target)
+    debian = dockerfile.debian
     size = tree.size()
     # As `docker run --read-only --volume DATA:/data`.
     data = top / "data"
