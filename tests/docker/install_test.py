@@ -148,7 +148,6 @@ class Packages(unittest.TestCase):
         self.assertIn(f"eventgan (= {version})", self.field("eventgan-torch", "Depends"))
         self.assertLessEqual({"python3-h5py", "python3-numpy"}, self.names("eventgan", "Recommends"))
 
-    @unittest.expectedFailure  # until the program is split
     def test_only_one_needs_libtorch(self):
         self.assertTrue([name for name in self.names("eventgan-torch", "Depends") if name.startswith("libtorch")])
         self.assertEqual([name for name in self.names("eventgan", "Depends") if name.startswith("libtorch")], [])
