@@ -157,6 +157,8 @@ class Builder : public nlohmann::json_sax<Json> {
       const std::size_t at = reason.find(introduction);
       if (at != std::string::npos) reason.erase(0, at + introduction.size());
     }
+    // Of an empty text newer versions of the library say something else, and more than helps.
+    if (text_.empty()) reason = "while parsing value - unexpected end of input";
     constexpr std::size_t kLongest = 200;  // it quotes what it read last, which may be a whole line
     if (reason.size() > kLongest) {
       std::size_t end = kLongest;
