@@ -14,7 +14,6 @@
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
-#include "stages/base/images/image_file.h"
 
 namespace {
 
@@ -41,7 +40,6 @@ int main(int argc, char** argv) {
   const eventgan::StandardStreams streams(argc, argv);
   std::signal(SIGXFSZ, SIG_IGN);  // a write beyond ulimit -f fails then, as any other may
   eventgan::keep_big_buffers();
-  eventgan::silence_decoders();
   cv::setNumThreads(1);  // the flow graph is the only source of parallelism
 
   CLI::App app(

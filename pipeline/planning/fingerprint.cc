@@ -142,9 +142,12 @@ std::string libraries(bool with_videos) {
                      loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
                      loaded_library("libisal") + ", " + loaded_library("libwebp") + ", " +
                      loaded_library("libtiff");
-  // Those of FFmpeg's libraries that decode, and make colours of it.
-  if (with_videos)
-    text += ", " + loaded_library("libavcodec") + ", " + loaded_library("libswscale");
+  // Those of FFmpeg's libraries that take videos apart, decode, and make colours of it.
+  if (with_videos) {
+    for (const char* name : {"libavformat", "libavcodec", "libswscale"}) {
+      text += ", " + loaded_library(name);
+    }
+  }
   return text;
 }
 

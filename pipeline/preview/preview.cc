@@ -15,6 +15,7 @@
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/planning/spread.h"
 #include "pipeline/preview/preview_reader.h"
+#include "stages/base/videos/video_file.h"
 #include "stages/events/images/image_output.h"
 #include "stages/events/images/preview_image.h"
 

@@ -3,10 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
-#include <vector>
 
+#include "stages/base/images/image_file.h"
 #include "stages/synthetic/layouts/output_files.h"
 
 namespace eventgan {
@@ -14,20 +12,6 @@ namespace {
 
 std::uint8_t rounded(float value) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0f, 255.0f)));
-}
-
-void write(const Image& image, const std::filesystem::path& path,
-           const std::vector<int>& parameters) {
-  const cv::Mat view(image.size.height, image.size.width, CV_8UC3,
-                     const_cast<std::uint8_t*>(image.bgr.data()));
-  // cv::imwrite tells of no write that fails.
-  std::vector<std::uint8_t> bytes;
-  try {
-    cv::imencode(path.extension().string(), view, bytes, parameters);
-  } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot write " + path.string() + ": " + exception.err);
-  }
-  write_text(path, {reinterpret_cast<const char*>(bytes.data()), bytes.size()});
 }
 
 }  // namespace
@@ -44,11 +28,11 @@ void set_pixel(Image& image, int x, int y, const Colour& colour) {
 }
 
 void write_png(const Image& image, const std::filesystem::path& path) {
-  write(image, path, {cv::IMWRITE_PNG_COMPRESSION, 6});
+  write_text(path, encode_png({image.size, image.bgr.data()}));
 }
 
 void write_jpeg(const Image& image, const std::filesystem::path& path) {
-  write(image, path, {cv::IMWRITE_JPEG_QUALITY, 90});
+  write_text(path, encode_jpeg({image.size, image.bgr.data()}, 90));
 }
 
 namespace {

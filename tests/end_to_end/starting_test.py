@@ -274,7 +274,7 @@ class Init(program.InFolder):
         self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))
         (self.folder / "v").mkdir()
         (self.folder / "v" / "broken.mp4").write_text("no video")
-        self.assertIn("expected a video, got no frames, in ", self.init(self.folder / "v", expect=66))
+        self.assertIn("expected a video, got a file that cannot be read as one, in ", self.init(self.folder / "v", expect=66))
 
     def test_of_several_datasets_one_must_be_named(self):
         for name in "ab":

@@ -13,7 +13,7 @@ FLOORS = [
     ["manifests/documents"],
     ["stages/base/charts", "stages/base/files", "stages/base/processor", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/images"],
-    ["stages/base/archives"],
+    ["stages/base/archives", "stages/base/videos"],
     ["stages/recordings"],
     ["stages/frames", "stages/labels", "stages/events", "stages/generator", "stages/training",
      "stages/shards", "stages/synthetic", "stages/exports"],

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <cstdio>
 #include <vector>
@@ -9,36 +10,58 @@
 
 namespace eventgan {
 
-/// Decodes a JPEG file, open at its start, to the same pixels as OpenCV's imread, which however
-/// returns an image with a grey rest where data is missing. An orientation tag (EXIF) is not
-/// applied: labels are given in stored pixels.
-/// Throws std::runtime_error saying what is wrong if any pixel is missing or in doubt, if the
-/// image is too large, or if its colours are neither grey nor YCbCr nor RGB. Thread safe.
-ColourFrame decode_jpeg(std::FILE* file);
+// One decoder for each format of image files. Each takes a file that is open at its start and gives
+// the same pixels as OpenCV's imread: grey and palettes become colour, 16 bits become 8,
+// transparency is dropped, and an orientation tag is not applied, since labels are given in stored
+// pixels. But where OpenCV returns an image with a grey or invented rest, these throw
+// std::runtime_error saying what is wrong if any pixel is missing or in doubt, as they do if the
+// image is too large (check_image_size, before memory is taken) or of a kind that is not read. All
+// are thread safe and write nothing to the standard streams.
+// The sizes are from the header alone.
 
-/// Size from the header alone. Throws std::runtime_error. Thread safe.
+/// Grey, YCbCr and RGB.
+ColourFrame decode_jpeg(std::FILE* file);
 ImageSize jpeg_size(std::FILE* file);
 
-/// Decodes a PNG file, open at its start, to the same pixels as OpenCV's imread: 16 bits are cut to
-/// the upper 8, transparency is dropped, palettes and grey become colour. Throws std::runtime_error
-/// saying what is wrong if the file is not whole, a checksum of its image data does not match, a
-/// pixel is a colour that its palette does not have, or the image is too large. Thread safe.
+/// Every PNG; 16 bits are cut to the upper 8. Throws also if a checksum of what decides the pixels
+/// does not match, or a pixel is a colour that its palette does not have.
 ColourFrame decode_png(std::FILE* file);
-
-/// Size from the header alone. Throws std::runtime_error. Thread safe.
 ImageSize png_size(std::FILE* file);
 
-/// The same PNG with its pixel data no longer compressed ("stored" deflate blocks, RFC 1951 section
-/// 3.2.4; every other chunk byte for byte), so that libpng has nothing left to inflate: libdeflate
-/// does that much faster than the zlib that libpng uses, but only for data that lies in memory as a
-/// whole.
+/// One image, no animation. WebP has no checksum: changed bytes may be other pixels.
+ColourFrame decode_webp(std::FILE* file);
+ImageSize webp_size(std::FILE* file);
+
+/// The first page, if libtiff makes 8-bit colour of it: 16 bits are rounded, and a colour is
+/// multiplied by its transparency unless it is so in the file. No floating point.
+ColourFrame decode_tiff(std::FILE* file);
+ImageSize tiff_size(std::FILE* file);
+
+/// 1, 4, 8, 24 and 32 bits a pixel, not compressed.
+ColourFrame decode_bmp(std::FILE* file);
+ImageSize bmp_size(std::FILE* file);
+
+/// PBM, PGM and PPM, plain and binary; 16 bits are cut to the upper 8.
+ColourFrame decode_pnm(std::FILE* file);
+ImageSize pnm_size(std::FILE* file);
+
+using Buffer = std::vector<std::uint8_t>;
+
+/// The whole file, from its start, wherever it is open at; empty if it cannot be read, or has more
+/// than `most` bytes. Thread safe.
+Buffer whole_file(std::FILE* file, std::size_t most);
+
+/// The same PNG with its pixel data no longer compressed (one chunk of "stored" deflate blocks, RFC
+/// 1951 section 3.2.4; other chunks that decide the pixels byte for byte, the rest gone), so that
+/// libpng has nothing left to inflate: libdeflate does that much faster than the zlib that libpng
+/// uses, but only for data that lies in memory as a whole.
 ///
 /// Empty if there is any doubt about the file, or if it or its pixel data takes more than 256 MiB:
-/// then libpng should read the file itself and judge it. Without doubt means: eight bytes where the
-/// signature should be, a header of an image within kMaxImagePixels that is not interlaced,
-/// whole chunks up to the end chunk, all pixel data in one run, its checksums (CRC-32 of each
-/// chunk, Adler-32 of the whole) right, and exactly as much of it as the header says. Reads `file`
-/// from its start; where it is after that is undefined. Thread safe.
-std::vector<std::uint8_t> stored_png(std::FILE* file);
+/// then libpng should read the file itself and judge it. Without doubt means: a header of an image
+/// within kMaxImagePixels that is not interlaced, whole chunks up to the end chunk, all pixel data
+/// in one run, every checksum (CRC-32 of each chunk that decides the pixels, Adler-32 of the pixel
+/// data) right, and exactly as much data as the header says. Where the file is open at afterwards
+/// is undefined. Thread safe.
+Buffer stored_png(std::FILE* file);
 
 }  // namespace eventgan

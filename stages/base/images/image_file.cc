@@ -1,15 +1,11 @@
 #include "stages/base/images/image_file.h"
 
-#include <stdlib.h>
-
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstdio>
-#include <iostream>
 #include <memory>
-#include <opencv2/core/utils/logger.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
-#include <streambuf>
 #include <string>
 #include <string_view>
 #include <system_error>
@@ -25,8 +21,6 @@ void check_image_size(ImageSize size) {
 }
 
 namespace {
-
-enum class Format { kJpeg, kPng, kOther, kNone };
 
 struct FileCloser {
   void operator()(std::FILE* file) const { std::fclose(file); }
@@ -45,109 +39,88 @@ OpenFile open_file(const std::filesystem::path& path) {
   return file;
 }
 
-thread_local bool in_opencv = false;
-
-/// OpenCV tells std::cerr itself, past its own log, what it could not decode. Stands before
-/// std::cerr's buffer and drops what a thread writes while it is in OpenCV.
-class WithoutOpencv final : public std::streambuf {
- public:
-  explicit WithoutOpencv(std::streambuf* target) : target_(target) {}
-
- protected:
-  int_type overflow(int_type character) override {
-    if (in_opencv || character == traits_type::eof()) return traits_type::not_eof(character);
-    return target_->sputc(traits_type::to_char_type(character));
-  }
-  std::streamsize xsputn(const char* text, std::streamsize length) override {
-    return in_opencv ? length : target_->sputn(text, length);
-  }
-  int sync() override { return in_opencv ? 0 : target_->pubsync(); }
-
- private:
-  std::streambuf* target_;
+struct Format {
+  const char* name;
+  bool (*starts)(std::string_view bytes);  ///< a file of it, by the first 12
+  ColourFrame (*decode)(std::FILE*);
+  ImageSize (*size)(std::FILE*);
 };
 
-/// In its scope the calling thread is in OpenCV.
-struct OpencvScope {
-  OpencvScope() { in_opencv = true; }
-  ~OpencvScope() { in_opencv = false; }
-};
+constexpr std::array<Format, 6> kFormats = {{
+    {"JPEG", [](std::string_view bytes) { return bytes.starts_with("\xff\xd8\xff"); }, decode_jpeg,
+     jpeg_size},
+    {"PNG", [](std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); },
+     decode_png, png_size},
+    {"WebP",
+     [](std::string_view bytes) { return bytes.starts_with("RIFF") && bytes.ends_with("WEBP"); },
+     decode_webp, webp_size},
+    {"TIFF",
+     [](std::string_view bytes) {
+       using namespace std::string_view_literals;
+       return bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) ||
+              bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv);
+     },
+     decode_tiff, tiff_size},
+    {"BMP", [](std::string_view bytes) { return bytes.starts_with("BM"); }, decode_bmp, bmp_size},
+    {"PNM",
+     [](std::string_view bytes) {
+       return bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
+              std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
+     },
+     decode_pnm, pnm_size},
+}};
 
-bool opencv_knows(const std::filesystem::path& file) {
-  try {
-    return cv::haveImageReader(file.string());
-  } catch (const cv::Exception&) {
-    return false;
-  }
-}
-
-/// Leaves `file` at its start.
-Format format_of(std::FILE* file, const std::filesystem::path& path) {
-  std::array<char, 8> start{};
+/// None: the file is no image. Leaves `file` at its start.
+const Format* format_of(std::FILE* file) {
+  std::array<char, 12> start{};
   const std::size_t length = std::fread(start.data(), 1, start.size(), file);
   if (length == 0) throw std::runtime_error("expected an image, got an empty file");
   std::rewind(file);
-  const std::string_view bytes(start.data(), length);
-  if (bytes.starts_with("\xff\xd8\xff")) return Format::kJpeg;
-  if (bytes == "\x89PNG\r\n\x1a\n") return Format::kPng;
-  return opencv_knows(path) ? Format::kOther : Format::kNone;
+  const auto* const format = std::ranges::find_if(kFormats, [&](const Format& one) {
+    return one.starts(std::string_view(start.data(), length));
+  });
+  return format == kFormats.end() ? nullptr : format;
 }
 
-ColourFrame decode_with_opencv(const std::filesystem::path& file) {
-  cv::Mat image;
-  const OpencvScope scope;
-  try {
-    image = cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  } catch (const cv::Exception& exception) {
-    throw std::runtime_error(exception.err);
-  }
-  if (image.empty()) throw std::runtime_error("a damaged one");
-  const ImageSize size{image.rows, image.cols};
-  check_image_size(size);
-  return {size, {image.data, image.data + image.total() * image.elemSize()}};
-}
-
-/// Calls the one of three readers that fits the file, and completes their errors.
-template <class Jpeg, class Png, class Other>
-auto read_by_format(const std::filesystem::path& path, Jpeg jpeg, Png png, Other other) {
+/// What one of a format's functions makes of the file, with its errors completed.
+template <class Result>
+Result read_by_format(const std::filesystem::path& path, Result (*Format::*read)(std::FILE*)) {
   const OpenFile file = open_file(path);
-  const Format format = format_of(file.get(), path);
-  if (format == Format::kNone) {
-    throw std::runtime_error("expected an image, got a file of another kind");
+  const Format* const format = format_of(file.get());
+  if (format == nullptr) {
+    throw std::runtime_error(
+        "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind");
   }
   try {
-    if (format == Format::kJpeg) return jpeg(file.get());
-    if (format == Format::kPng) return png(file.get());
-    return other(path);
+    return (format->*read)(file.get());
   } catch (const std::runtime_error& error) {
-    const char* name = format == Format::kJpeg ? "JPEG" : format == Format::kPng ? "PNG" : "image";
-    throw std::runtime_error(std::string("expected a whole ") + name + ", got " + error.what());
+    throw std::runtime_error(std::string("expected a whole ") + format->name + ", got " +
+                             error.what());
   }
 }
 
 }  // namespace
 
-void silence_decoders() {
-  setenv("OPENCV_FFMPEG_LOGLEVEL", "-8", /*overwrite=*/0);  // quiet
-  cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
-  cv::redirectError([](int, const char*, const char*, const char*, int, void*) { return 0; });
-  // Never deleted, since std::cerr is in use to the program's end.
-  static auto* const without_opencv = new WithoutOpencv(std::cerr.rdbuf());
-  std::cerr.rdbuf(without_opencv);
+Buffer whole_file(std::FILE* file, std::size_t most) {
+  if (std::fseek(file, 0, SEEK_END) != 0) return {};
+  const long end = std::ftell(file);
+  std::rewind(file);
+  if (end < 0 || static_cast<std::size_t>(end) > most) return {};
+  Buffer bytes(static_cast<std::size_t>(end));
+  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
+  return bytes;
 }
 
 bool is_image_file(const std::filesystem::path& file) {
-  return format_of(open_file(file).get(), file) != Format::kNone;
+  return format_of(open_file(file).get()) != nullptr;
 }
 
 ColourFrame decode_image_file(const std::filesystem::path& file) {
-  return read_by_format(file, decode_jpeg, decode_png, decode_with_opencv);
+  return read_by_format(file, &Format::decode);
 }
 
 ImageSize image_file_size(const std::filesystem::path& file) {
-  return read_by_format(file, jpeg_size, png_size, [](const std::filesystem::path& path) {
-    return decode_with_opencv(path).size;
-  });
+  return read_by_format(file, &Format::size);
 }
 
 }  // namespace eventgan

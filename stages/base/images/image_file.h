@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "manifests/values/frames.h"
@@ -28,22 +29,22 @@ inline constexpr std::size_t kMaxImagePixels = std::size_t{1} << 26;
 /// the limit.
 void check_image_size(ImageSize size);
 
-/// What OpenCV and FFmpeg would write to the standard error stream about a damaged file, which
-/// the functions here and VideoFile report as exceptions, is dropped from now on. (FFmpeg's is not
-/// if OPENCV_FFMPEG_LOGLEVEL is set.) To be called before there are other threads.
-void silence_decoders();
-
 /// True if the file is an image by its first bytes, whatever its name. Throws std::runtime_error
 /// saying what is wrong ("expected an image, got an empty file") if it is missing, empty or a
 /// folder.
 bool is_image_file(const std::filesystem::path& file);
 
-/// Decodes an image file: JPEG and PNG strictly (image_codecs.h), other
-/// formats as OpenCV does. Throws std::runtime_error saying what is wrong ("expected a whole PNG,
-/// got ..."), without the file's name. Thread safe.
+/// Decodes a JPEG, PNG, WebP, TIFF, BMP or PNM file, told by its first bytes, strictly
+/// (image_codecs.h). Throws std::runtime_error saying what is wrong ("expected a whole PNG, got
+/// ..."), without the file's name. Thread safe.
 ColourFrame decode_image_file(const std::filesystem::path& file);
 
-/// The size alone: of a JPEG or PNG from its header, of other formats by decoding. Throws as above.
+/// The size alone, from the header. Throws as above. Thread safe.
 ImageSize image_file_size(const std::filesystem::path& file);
+
+/// The bytes of a PNG, or of a JPEG of a quality of 1 to 100. Throw std::runtime_error if the image
+/// is empty or too large for the format. Thread safe.
+std::string encode_png(const ColourView& image);
+std::string encode_jpeg(const ColourView& image, int quality);
 
 }  // namespace eventgan

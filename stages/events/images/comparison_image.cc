@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <vector>
 
 #include "stages/base/files/atomic_file.h"
+#include "stages/base/images/image_file.h"
 #include "stages/events/images/detail/time_panel.h"
 
 namespace eventgan {
@@ -128,15 +128,9 @@ void write_comparison_png(std::span<const ComparedPair> pairs, const std::filesy
   for (cv::Mat& row : rows) {  // pairs may differ in size
     cv::copyMakeBorder(row, row, 0, 0, 0, width - row.cols, cv::BORDER_CONSTANT, kPaper);
   }
-  std::vector<unsigned char> png;
-  try {
-    cv::Mat image;
-    cv::vconcat(rows, image);
-    cv::imencode(".png", image, png);
-  } catch (const cv::Exception& exception) {
-    throw std::runtime_error("cannot draw " + path.string() + ": " + exception.err);
-  }
-  write_file_atomically(path, {reinterpret_cast<const char*>(png.data()), png.size()});
+  cv::Mat image;
+  cv::vconcat(rows, image);
+  write_file_atomically(path, encode_png({{image.rows, image.cols}, image.data}));
 }
 
 }  // namespace eventgan

@@ -2,8 +2,6 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <functional>
-#include <optional>
 #include <string>
 
 #include "stages/base/images/image_file.h"
@@ -18,11 +16,5 @@ void write_png(const ColourFrame& image, const std::filesystem::path& path);
 /// The bytes of a JPEG of at most `most_bytes`, in the best of a few qualities that fits; where
 /// none does, of the image in half its size, and so on.
 std::string jpeg_of(const ColourFrame& image, std::size_t most_bytes);
-
-/// Writes an MP4 (H.264, which browsers play) of the images that `next` gives, until it gives
-/// none, each shown 1/frames_per_second seconds; all of the size of the first, whose odd sides get
-/// a row or column of black. Returns how many. Throws also for none, and what `next` throws.
-int write_video(const std::filesystem::path& path, double frames_per_second,
-                const std::function<std::optional<ColourFrame>()>& next);
 
 }  // namespace eventgan

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstddef>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 #include <stdexcept>
@@ -464,9 +463,8 @@ ColourFrame draw_sheet(std::span<const ColourFrame> tiles, int columns) {
 
 std::string time_image_png(std::span<const float> volume, const VolumeShape& shape) {
   try {
-    std::vector<unsigned char> png;
-    cv::imencode(".png", time_panel(volume, shape), png);
-    return {png.begin(), png.end()};
+    const cv::Mat panel = time_panel(volume, shape);
+    return encode_png({{panel.rows, panel.cols}, panel.data});
   } catch (const cv::Exception& exception) {
     throw std::runtime_error("cannot draw an image of times: " + exception.err);
   }

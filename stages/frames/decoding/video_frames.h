@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <functional>
 #include <list>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <stdexcept>
@@ -16,33 +15,9 @@
 #include <utility>
 
 #include "stages/base/images/image_file.h"
+#include "stages/base/videos/video_file.h"
 
 namespace eventgan {
-
-/// One video, decoded from its start to its end: seeking in compressed video is not exact, so a
-/// frame is found by counting. All throw std::runtime_error saying what is wrong, without the
-/// file's name. Not thread safe.
-class VideoFile {
- public:
-  explicit VideoFile(const std::filesystem::path& path);
-  ~VideoFile();
-  VideoFile(VideoFile&&) noexcept;
-  VideoFile& operator=(VideoFile&&) noexcept;
-
-  /// Passes the next frame over, which is cheaper than `next`; false at the video's end.
-  bool skip();
-
-  /// The next frame, valid until the next call; none at the video's end.
-  std::optional<ColourView> next();
-
-  /// Frames behind, skipped ones and those that `next` threw for included.
-  std::int64_t position() const { return position_; }
-
- private:
-  struct Capture;
-  std::unique_ptr<Capture> capture_;
-  std::int64_t position_ = 0;
-};
 
 /// A window on one video: its latest frames, since pairs of close frames are asked for by turns.
 /// Asking for an earlier one opens the video again, which costs all the frames before it. Of a

@@ -3,10 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fstream>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
-#include <opencv2/videoio.hpp>
 #include <stdexcept>
 #include <vector>
 
@@ -49,12 +46,6 @@ TEST(ImageOutput, ErrorsNameThePath) {
         write_png(plain({4, 4}, 1), folder / "none/p.png");
       },
       ThrowsMessage<std::runtime_error>(HasSubstr((folder / "none").string())));
-  EXPECT_THAT([&] { write_video(folder / "none/v.mp4", 10, [] {
-                      return plain({4, 4}, 1);
-                    }); },
-              ThrowsMessage<std::runtime_error>(HasSubstr((folder / "none/v.mp4").string())));
-  EXPECT_THAT([&] { write_video(folder / "v.mp4", 10, [] { return std::nullopt; }); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("no images")));
 }
 
 TEST(ImageOutput, AJpegIsNoLargerThanAsked) {
@@ -68,28 +59,6 @@ TEST(ImageOutput, AJpegIsNoLargerThanAsked) {
     ASSERT_FALSE(read.empty());
     EXPECT_EQ(read.cols < 300, most < 20'000) << "smaller only if no quality does";
   }
-}
-
-TEST(ImageOutput, AVideoHasEveryFrameAndItsSpeed) {
-  const testing::TemporaryFolder folder;
-  int given = 0;
-  const int written = write_video(folder / "v.mp4", 12.5, [&]() -> std::optional<ColourFrame> {
-    if (given == 9) return std::nullopt;
-    return plain({33, 47}, static_cast<std::uint8_t>(20 * given++));
-  });
-  EXPECT_EQ(written, 9);
-  cv::VideoCapture video((folder / "v.mp4").string(), cv::CAP_FFMPEG);
-  ASSERT_TRUE(video.isOpened());
-  EXPECT_NEAR(video.get(cv::CAP_PROP_FPS), 12.5, 0.01);
-  cv::Mat frame;
-  for (int i = 0; i < 9; ++i) {
-    ASSERT_TRUE(video.read(frame)) << i;
-    EXPECT_EQ(frame.size(), cv::Size(48, 34)) << "H.264 has even sides only";
-    EXPECT_NEAR(frame.at<cv::Vec3b>(16, 16)[1], 20 * i, 4);
-  }
-  EXPECT_FALSE(video.read(frame));
-  const auto files = std::filesystem::directory_iterator(folder / ".");
-  EXPECT_EQ(std::distance(begin(files), end(files)), 1) << "no temporary is left";
 }
 
 }  // namespace

@@ -355,9 +355,11 @@ TEST_F(VideoFolderTest, NotesWhatItLeavesOut) {
 TEST_F(VideoFolderTest, AVideoThatCannotBeReadIsLeftOutWithItsReason) {
   testing::write_file(folder_ / "v/a.mp4", "no video");
   EXPECT_EQ(open()->labelled_frames().size(), 7u);
-  EXPECT_THAT(open()->notes(), ElementsAre(AllOf(HasSubstr("1 videos left out: "),
-                                                 HasSubstr("expected a video, got no frames"),
-                                                 HasSubstr("v/a.mp4"))));
+  EXPECT_THAT(open()->notes(),
+              ElementsAre(AllOf(HasSubstr("1 videos left out: "),
+                                HasSubstr("expected a video, got a file that cannot "
+                                          "be read as one"),
+                                HasSubstr("v/a.mp4"))));
   std::filesystem::remove(folder_ / "v/clip.avi");
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("v/a.mp4")));
 }

@@ -238,16 +238,15 @@ TEST_F(StoredPngTest, LibpngTakesItBeyondItsLimitForOtherChunks) {
   EXPECT_TRUE(testing::same_pixels(frame, image));
 }
 
-TEST_F(StoredPngTest, OtherChunksStayAsTheyAre) {
+TEST_F(StoredPngTest, OnlyWhatDecidesThePixelsStays) {
   std::string bytes = write(gradient_image({16, 24}));
+  const std::string whole = stored();
   const std::string early = chunk("tEXt", std::string("a\0b", 3));
   const std::string late = chunk("tIME", std::string("\7\xd0\1\1\0\0\0", 7));
-  bytes.insert(33, early);  // after the signature (8) and IHDR (25)
+  const std::string palette = chunk("PLTE", "rgbRGB");  // which colour pictures may suggest
+  bytes.insert(33, early + palette);                    // after the signature (8) and IHDR (25)
   bytes.insert(bytes.size() - 12, late);
-  const std::string result = stored(bytes);
-  EXPECT_EQ(result.find(early), 33u);
-  EXPECT_EQ(result.substr(result.size() - 12 - late.size()),
-            bytes.substr(bytes.size() - 12 - late.size()));
+  EXPECT_EQ(stored(bytes), whole.substr(0, 33) + palette + whole.substr(33));
 }
 
 TEST_F(StoredPngTest, DataInManyChunksIsJoined) {
@@ -281,10 +280,6 @@ TEST_F(StoredPngTest, AnyDoubtLeavesTheFileToLibpng) {
   EXPECT_EQ(stored(before + chunk("IDAT", "") + end), "") << "none";
   EXPECT_EQ(stored(before + end), "") << "no chunk of it";
   EXPECT_EQ(stored(""), "");
-  std::string narrow = data;  // a window of 256 bytes announced, and a header check that fits
-  narrow[0] = 0x08;
-  narrow[1] = 0x1d;
-  EXPECT_EQ(stored(before + chunk("IDAT", narrow) + end), "") << "distances may be too far";
   std::string changed = data;
   changed.back() = static_cast<char>(changed.back() ^ 1);
   EXPECT_EQ(stored(before + chunk("IDAT", changed) + end), "") << "Adler-32 wrong, CRC-32 right";
@@ -326,7 +321,7 @@ TEST_F(StoredPngTest, LibpngJudgesASecondHeaderAsItDoesInTheFile) {
   const std::string header = bytes.substr(8, 25);
   std::string twice = bytes;
   twice.insert(33, header);
-  ASSERT_NE(stored(twice), "");
+  write_file(file_, twice);
   EXPECT_NE(testing::why_refused(file_, decode_png), "");
   write_file(file_, bytes.substr(0, bytes.size() - 12) + header + chunk("IEND", ""));
   EXPECT_NE(testing::why_refused(file_, decode_png), "");

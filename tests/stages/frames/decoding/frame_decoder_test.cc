@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <iostream>
 #include <opencv2/imgproc.hpp>
 #include <set>
 #include <stdexcept>
@@ -86,21 +85,6 @@ TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
   }
 }
 
-TEST(FrameDecoder, ATruncatedWebpIsAFault) {
-  const TemporaryFolder folder;
-  const FrameDecoder decoder(folder.path());
-  for (const int quality : {80, 101}) {  // beyond 100: without loss
-    ASSERT_TRUE(cv::imwrite((folder / "a.webp").string(), gradient_image({120, 160}),
-                            {cv::IMWRITE_WEBP_QUALITY, quality}));
-    const std::string whole = testing::read_file(folder / "a.webp");
-    for (std::size_t length = whole.size() - 1; length > 0; length = length * 9 / 10) {
-      write_file(folder / "a.webp", whole.substr(0, length));
-      EXPECT_NE(fault(decoder.decode(image_ref("a.webp"))), "no fault")
-          << length << " of " << whole.size() << " bytes, quality " << quality;
-    }
-  }
-}
-
 TEST(FrameDecoder, FormatIsToldByContentNotByName) {
   const TemporaryFolder folder;
   cv::imwrite((folder / "a.png").string(), gradient_image({12, 20}));
@@ -122,25 +106,14 @@ TEST(FrameDecoder, FaultsSayWhatIsWrongAndNameTheFile) {
             "expected an image, got an empty file, in sub/empty.png");
   EXPECT_EQ(fault(decoder.decode(image_ref("none.png"))), "expected a file, got none, in none.png");
   EXPECT_EQ(fault(decoder.decode(image_ref("text.png"))),
-            "expected an image, got a file of another kind, in text.png");
+            "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind, in "
+            "text.png");
   EXPECT_EQ(fault(decoder.decode(image_ref("folder.png"))),
             "expected a file, got a folder or device, in folder.png");
   EXPECT_THAT(fault(decoder.decode(image_ref("short.jpg"))),
               AllOf(HasSubstr("expected a whole JPEG, got "), HasSubstr(", in short.jpg")));
   EXPECT_EQ(fault(decoder.decode(image_ref("cut.bmp"))),
-            "expected a whole image, got a damaged one, in cut.bmp");
-}
-
-TEST(FrameDecoder, OpencvTellsNobodyElseWhatIsWrong) {
-  const TemporaryFolder folder;
-  cv::imwrite((folder / "cut.bmp").string(), gradient_image({12, 20}));
-  std::filesystem::resize_file(folder / "cut.bmp", 300);
-  silence_decoders();
-  ::testing::internal::CaptureStderr();
-  const std::string reason = fault(FrameDecoder(folder.path()).decode(image_ref("cut.bmp")));
-  std::cerr << "from us\n";
-  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "from us\n");
-  EXPECT_THAT(reason, HasSubstr("got a damaged one"));
+            "expected a whole BMP, got one that ends early, in cut.bmp");
 }
 
 TEST(FrameDecoder, VideoFramesAreFoundByCountingInAnyOrder) {

@@ -1,5 +1,3 @@
-#include "stages/base/images/image_codecs.h"
-
 #include <libdeflate.h>
 #include <png.h>
 
@@ -9,15 +7,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
-#include <optional>
+#include <new>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "stages/base/images/image_codecs.h"
 // jpeglib.h needs <cstddef> and <cstdio> above it.
 #include <jerror.h>
 #include <jpeglib.h>
@@ -118,10 +119,45 @@ ColourFrame decode_jpeg(std::FILE* file) { return JpegFile(file).read(); }
 
 ImageSize jpeg_size(std::FILE* file) { return JpegFile(file).read_header(); }
 
-namespace {
+std::string encode_jpeg(const ColourView& image, int quality) {
+  jpeg_compress_struct codec{};
+  jpeg_error_mgr errors{};
+  Escape escape;
+  codec.err = jpeg_std_error(&errors);
+  errors.error_exit = leave_with_message;
+  codec.client_data = &escape;
+  unsigned char* bytes = nullptr;  // libjpeg's
+  unsigned long size = 0;
+  const auto encode = [&] {
+    jpeg_create_compress(&codec);
+    jpeg_mem_dest(&codec, &bytes, &size);
+    codec.image_width = static_cast<JDIMENSION>(image.size.width);
+    codec.image_height = static_cast<JDIMENSION>(image.size.height);
+    codec.input_components = 3;
+    codec.in_color_space = JCS_EXT_BGR;
+    jpeg_set_defaults(&codec);
+    jpeg_set_quality(&codec, quality, TRUE);
+    jpeg_start_compress(&codec, TRUE);
+    while (codec.next_scanline < codec.image_height) {
+      auto row = const_cast<JSAMPROW>(image.bgr + 3ul * codec.next_scanline * codec.image_width);
+      jpeg_write_scanlines(&codec, &row, 1);
+    }
+    jpeg_finish_compress(&codec);
+  };
+  std::string error;
+  try {
+    run_guarded(escape, encode);
+  } catch (const std::runtime_error& exception) {
+    error = exception.what();
+  }
+  std::string jpeg(reinterpret_cast<const char*>(bytes), error.empty() ? size : 0);
+  jpeg_destroy_compress(&codec);
+  std::free(bytes);
+  if (!error.empty()) throw std::runtime_error("cannot encode an image: " + error);
+  return jpeg;
+}
 
-using Bytes = std::span<const std::uint8_t>;
-using Buffer = std::vector<std::uint8_t>;
+namespace {
 
 constexpr std::size_t kSignatureBytes = 8;
 constexpr std::size_t kAroundData = 12;         // of a chunk: length, type, checksum
@@ -134,150 +170,114 @@ std::uint32_t big_endian(const std::uint8_t* bytes) {
          std::uint32_t{bytes[2]} << 8 | std::uint32_t{bytes[3]};
 }
 
-void put_big_endian(std::uint32_t value, std::uint8_t* bytes) {
-  for (int i = 0; i < 4; ++i) bytes[i] = static_cast<std::uint8_t>(value >> (24 - 8 * i));
-}
-
-/// Empty if it cannot be read, or is too large.
-Buffer whole_file(std::FILE* file) {
-  if (std::fseek(file, 0, SEEK_END) != 0) return {};
-  const long end = std::ftell(file);
-  std::rewind(file);
-  if (end < 0 || static_cast<std::size_t>(end) > kMostInMemory) return {};
-  Buffer bytes(static_cast<std::size_t>(end));
-  bytes.resize(std::fread(bytes.data(), 1, bytes.size(), file));
-  return bytes;
-}
-
-struct Chunk {
-  std::string_view type;
-  Bytes data;
-  Bytes whole;  ///< with length, type and checksum
-
-  bool checksum_fits() const {
-    return libdeflate_crc32(0, whole.data() + 4, data.size() + 4) ==
-           big_endian(data.data() + data.size());
+void append_big_endian(std::uint32_t value, Buffer& bytes) {
+  for (int shift = 24; shift >= 0; shift -= 8) {
+    bytes.push_back(static_cast<std::uint8_t>(value >> shift));
   }
-};
-
-/// The chunk at the start of `rest`, if it is all there.
-std::optional<Chunk> first_chunk(Bytes rest) {
-  if (rest.size() < kAroundData) return std::nullopt;
-  const std::size_t length = big_endian(rest.data());
-  if (length > rest.size() - kAroundData) return std::nullopt;
-  return Chunk{{reinterpret_cast<const char*>(rest.data()) + 4, 4},
-               rest.subspan(8, length),
-               rest.first(length + kAroundData)};
 }
 
-/// What a sound header says of the size of the pixel data: each row has a byte in front that names
-/// its filter.
-std::optional<std::size_t> pixel_data_bytes(const Chunk& header) {
-  if (header.type != "IHDR" || header.data.size() != 13 || !header.checksum_fits()) return {};
-  const std::size_t width = big_endian(header.data.data());
-  const std::size_t height = big_endian(header.data.data() + 4);
-  const std::uint8_t bits = header.data[8];
-  const std::uint8_t kind = header.data[9];
+/// What the header's 13 bytes say of the size of the pixel data: each row has a byte in front that
+/// names its filter. 0 if they are not sound, or the rows are interlaced.
+std::size_t pixel_data_bytes(const std::uint8_t* header) {
+  const std::size_t width = big_endian(header);
+  const std::size_t height = big_endian(header + 4);
+  const std::uint8_t bits = header[8];
+  const std::uint8_t kind = header[9];
   constexpr std::array<std::uint8_t, 7> kChannels{1, 0, 3, 1, 2, 0, 4};
-  const bool interlaced = header.data[12] != 0;
-  if (width == 0 || height == 0 || width > kMaxImagePixels || height > kMaxImagePixels ||
-      width * height > kMaxImagePixels || bits > 16 || kind >= kChannels.size() || interlaced) {
-    return {};
+  const bool interlaced = header[12] != 0;
+  if (width > kMaxImagePixels || height > kMaxImagePixels || width * height > kMaxImagePixels ||
+      bits > 16 || kind >= kChannels.size() || interlaced) {
+    return 0;
   }
   return height * (1 + (width * kChannels[kind] * bits + 7) / 8);
 }
 
-/// A PNG taken apart. Empty if the chunks are not whole and in order.
-struct Parts {
-  Bytes before;  ///< up to the pixel data
-  Buffer compressed;
-  Bytes after;  ///< from the pixel data to the end
-};
-
-std::optional<Parts> take_apart(Bytes file) {
-  Parts parts;
-  std::size_t at = kSignatureBytes;
-  std::size_t data_end = 0;
-  while (const auto chunk = first_chunk(file.subspan(at))) {
-    if (chunk->type == "IDAT") {
-      if (data_end == 0) parts.before = file.first(at);
-      if ((data_end != 0 && data_end != at) || !chunk->checksum_fits()) return {};
-      parts.compressed.insert(parts.compressed.end(), chunk->data.begin(), chunk->data.end());
-      data_end = at + chunk->whole.size();
-    }
-    at += chunk->whole.size();
-    if (chunk->type != "IEND") continue;
-    if (data_end == 0) return {};
-    parts.after = file.subspan(data_end, at - data_end);
-    return parts;
+/// Appends a chunk IDAT whose zlib stream has the same data in stored blocks. False if `compressed`
+/// is not sound, or not `raw_bytes` when inflated.
+bool append_stored(const Buffer& compressed, std::size_t raw_bytes, Buffer& png) {
+  if (raw_bytes == 0 || raw_bytes > std::min(kMostPerByte * compressed.size(), kMostInMemory)) {
+    return false;
   }
-  return {};
-}
-
-/// Whether no distance can reach beyond the window that the zlib header announces: zlib refuses
-/// what does, libdeflate does not look at it.
-bool window_reaches_all(Bytes compressed, std::size_t raw_bytes) {
-  if (compressed.empty()) return false;
-  constexpr std::size_t kFullWindow = 1 << 15;
-  return std::size_t{1} << (8 + (compressed[0] >> 4)) >= std::min(raw_bytes, kFullWindow);
-}
-
-bool inflate(Bytes compressed, std::span<std::uint8_t> raw) {
-  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)>
-      decompressor(libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
-  std::size_t used = 0;
-  return decompressor != nullptr &&
-         libdeflate_zlib_decompress_ex(decompressor.get(), compressed.data(), compressed.size(),
-                                       raw.data(), raw.size(), &used,
-                                       nullptr) == LIBDEFLATE_SUCCESS &&
-         used == compressed.size();
-}
-
-/// The file put together again with one chunk of stored data, its zlib header announcing the full
-/// window. Empty if the data is not sound, or not `raw_bytes` when inflated.
-Buffer with_stored_data(const Parts& parts, std::size_t raw_bytes) {
   // chunk length, type | zlib header | blocks: header of 5 bytes, data | Adler-32 | CRC-32
   const std::size_t blocks = (raw_bytes + kLargestStored - 1) / kLargestStored;
   const std::size_t data_bytes = 2 + 5 * blocks + raw_bytes + 4;
-  Buffer stored(parts.before.size() + data_bytes + kAroundData + parts.after.size());
-  std::ranges::copy(parts.before, stored.begin());
-  std::uint8_t* const chunk = stored.data() + parts.before.size();
-  put_big_endian(static_cast<std::uint32_t>(data_bytes), chunk);
-  std::ranges::copy(std::string_view("IDAT\x78\x01"), chunk + 4);
+  append_big_endian(static_cast<std::uint32_t>(data_bytes), png);
+  for (const char byte : std::string_view("IDAT\x78\x01")) {
+    png.push_back(static_cast<std::uint8_t>(byte));
+  }
+  const std::size_t start = png.size();
+  png.resize(start + data_bytes - 2);
 
   // Inflated behind the room for the blocks' headers, then moved forward block by block.
-  std::uint8_t* to = chunk + 10;
-  const std::span<std::uint8_t> raw(to + 5 * blocks, raw_bytes);
-  if (!inflate(parts.compressed, raw)) return {};
-  const std::uint32_t adler = libdeflate_adler32(1, raw.data(), raw.size());
-  for (std::size_t at = 0; at < raw_bytes; at += kLargestStored) {
-    const std::size_t size = std::min(raw_bytes - at, kLargestStored);
-    *to++ = at + size == raw_bytes ? 1 : 0;  // the last block
+  std::uint8_t* to = png.data() + start;
+  const std::uint8_t* raw = to + 5 * blocks;
+  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)>
+      decompressor(libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
+  std::size_t used = 0;
+  if (decompressor == nullptr ||
+      libdeflate_zlib_decompress_ex(decompressor.get(), compressed.data(), compressed.size(),
+                                    to + 5 * blocks, raw_bytes, &used,
+                                    nullptr) != LIBDEFLATE_SUCCESS ||
+      used != compressed.size()) {
+    return false;
+  }
+  for (std::size_t left = raw_bytes; left > 0;) {
+    const std::size_t size = std::min(left, kLargestStored);
+    left -= size;
+    *to++ = left == 0 ? 1 : 0;  // the last block
     for (const std::size_t length : {size, ~size}) {
       *to++ = static_cast<std::uint8_t>(length);
       *to++ = static_cast<std::uint8_t>(length >> 8);
     }
-    std::memmove(to, raw.data() + at, size);
+    std::memmove(to, raw, size);
     to += size;
+    raw += size;
   }
-  put_big_endian(adler, to);
-  put_big_endian(libdeflate_crc32(0, chunk + 4, 4 + data_bytes), to + 4);
-  std::ranges::copy(parts.after, to + 8);
-  return stored;
+  std::copy(compressed.end() - 4, compressed.end(), to);  // the same Adler-32
+  append_big_endian(libdeflate_crc32(0, png.data() + start - 6, 4 + data_bytes), png);
+  return true;
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> stored_png(std::FILE* stream) {
-  const Buffer file = whole_file(stream);
-  if (file.size() < kSignatureBytes) return {};
-  const auto header = first_chunk(Bytes(file).subspan(kSignatureBytes));
-  if (!header) return {};
-  const auto raw_bytes = pixel_data_bytes(*header);
-  if (!raw_bytes || *raw_bytes > std::min(kMostPerByte * file.size(), kMostInMemory)) return {};
-  const auto parts = take_apart(file);
-  if (!parts || !window_reaches_all(parts->compressed, *raw_bytes)) return {};
-  return with_stored_data(*parts, *raw_bytes);
+Buffer stored_png(std::FILE* stream) {
+  const Buffer file = whole_file(stream, kMostInMemory);
+  Buffer before;  // up to the pixel data
+  Buffer compressed;
+  compressed.reserve(file.size());
+  Buffer after;  // from the pixel data on
+  bool data_ended = false;
+  std::size_t raw_bytes = 0;
+  for (std::size_t at = kSignatureBytes; file.size() >= at + kAroundData;) {
+    const std::uint8_t* const chunk = file.data() + at;
+    const std::size_t length = big_endian(chunk);
+    if (length > file.size() - at - kAroundData) return {};
+    const std::string_view type(reinterpret_cast<const char*>(chunk) + 4, 4);
+    const std::uint8_t* const data = chunk + 8;
+    const bool is_first = at == kSignatureBytes;
+    at += length + kAroundData;
+    if (type == "IDAT" && data_ended) return {};  // in two runs
+    data_ended = type != "IDAT" && !compressed.empty();
+    if ((type[0] & 0x20) != 0) continue;  // says nothing of the pixels
+    if (libdeflate_crc32(0, chunk + 4, length + 4) != big_endian(data + length)) return {};
+    if (is_first != (type == "IHDR") || (is_first && length != 13)) return {};
+    if (is_first) raw_bytes = pixel_data_bytes(data);
+    if (type == "IDAT") {
+      compressed.insert(compressed.end(), data, data + length);
+      continue;
+    }
+    Buffer& part = compressed.empty() ? before : after;
+    part.insert(part.end(), chunk, data + length + 4);
+    if (type != "IEND") continue;
+    Buffer png;
+    png.reserve(file.size() - compressed.size() + raw_bytes + raw_bytes / 1024);
+    png.insert(png.end(), file.begin(), file.begin() + kSignatureBytes);
+    png.insert(png.end(), before.begin(), before.end());
+    if (!append_stored(compressed, raw_bytes, png)) return {};
+    png.insert(png.end(), after.begin(), after.end());
+    return png;
+  }
+  return {};
 }
 
 namespace {
@@ -298,7 +298,7 @@ void read_from_memory(png_structp png, png_bytep to, std::size_t count) {
 class PngFile {
  public:
   /// Reads `file`, or `stored` unless that is empty: the same file with its pixel data inflated.
-  explicit PngFile(std::FILE* file, std::vector<std::uint8_t> stored = {})
+  explicit PngFile(std::FILE* file, Buffer stored = {})
       : stored_(std::move(stored)), left_(stored_) {
     run_guarded(escape_, [&] {
       png_ = png_create_read_struct(PNG_LIBPNG_VER_STRING, &escape_, leave_with_message,
@@ -309,9 +309,7 @@ class PngFile {
       png_init_io(png_, file);
       if (!stored_.empty()) {
         png_set_read_fn(png_, &left_, read_from_memory);
-#ifdef PNG_IGNORE_ADLER32  // not in every libpng: then it compares again what inflating compared
-        png_set_option(png_, PNG_IGNORE_ADLER32, PNG_OPTION_ON);
-#endif
+        png_set_crc_action(png_, PNG_CRC_QUIET_USE, PNG_CRC_DEFAULT);  // compared already
       }
       // What is said beside the pixels (colour profiles, text) may be damaged, the pixels may not.
       png_set_keep_unknown_chunks(png_, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
@@ -392,7 +390,7 @@ class PngFile {
     png_set_interlace_handling(png_);
   }
 
-  std::vector<std::uint8_t> stored_;
+  Buffer stored_;
   std::span<const std::uint8_t> left_;  ///< of it
   Escape escape_;
   png_structp png_ = nullptr;
@@ -402,11 +400,62 @@ class PngFile {
 }  // namespace
 
 ColourFrame decode_png(std::FILE* file) {
-  std::vector<std::uint8_t> stored = stored_png(file);
+  Buffer stored = stored_png(file);
   std::rewind(file);
   return PngFile(file, std::move(stored)).read();
 }
 
 ImageSize png_size(std::FILE* file) { return PngFile(file).read_header(); }
+
+namespace {
+
+void append_bytes(png_structp png, png_bytep bytes, std::size_t count) {
+  try {
+    static_cast<std::string*>(png_get_io_ptr(png))
+        ->append(reinterpret_cast<const char*>(bytes), count);
+    return;
+  } catch (const std::bad_alloc&) {
+  }
+  png_error(png, "no memory");  // which jumps
+}
+
+void nothing_to_flush(png_structp) {}
+
+}  // namespace
+
+std::string encode_png(const ColourView& image) try {
+  std::string bytes;
+  Escape escape;
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+  struct Destroyer {
+    png_structp& png;
+    png_infop& info;
+    ~Destroyer() { png_destroy_write_struct(&png, &info); }
+  } const destroyer{png, info};
+  run_guarded(escape, [&] {
+    png =
+        png_create_write_struct(PNG_LIBPNG_VER_STRING, &escape, leave_with_message, ignore_warning);
+    if (png == nullptr) escape.leave("cannot start libpng");
+    info = png_create_info_struct(png);
+    if (info == nullptr) escape.leave("cannot start libpng");
+    png_set_write_fn(png, &bytes, append_bytes, nothing_to_flush);
+    png_set_IHDR(png, info, static_cast<png_uint_32>(image.size.width),
+                 static_cast<png_uint_32>(image.size.height), 8, PNG_COLOR_TYPE_RGB,
+                 PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+    // Many times faster than the best compression, and hardly larger for what is drawn.
+    png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
+    png_set_compression_level(png, 1);
+    png_set_compression_strategy(png, 3);  // Z_RLE
+    png_write_info(png, info);
+    png_set_bgr(png);
+    const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.size.width);
+    for (int y = 0; y < image.size.height; ++y) png_write_row(png, image.bgr + y * row_bytes);
+    png_write_end(png, info);
+  });
+  return bytes;
+} catch (const std::runtime_error& error) {
+  throw std::runtime_error(std::string("cannot encode an image: ") + error.what());
+}
 
 }  // namespace eventgan
