@@ -1,5 +1,9 @@
 #include "pipeline/planning/fingerprint.h"
 
+extern "C" {
+#include <libavutil/avutil.h>
+}
+
 #include <fmt/format.h>
 #include <link.h>
 #include <png.h>
@@ -142,12 +146,7 @@ std::string libraries(bool with_videos) {
                      loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
                      loaded_library("libisal") + ", " + loaded_library("libwebp") + ", " +
                      loaded_library("libtiff");
-  // Those of FFmpeg's libraries that take videos apart, decode, and make colours of it.
-  if (with_videos) {
-    for (const char* name : {"libavformat", "libavcodec", "libswscale"}) {
-      text += ", " + loaded_library(name);
-    }
-  }
+  if (with_videos) text += std::string(", FFmpeg ") + av_version_info();  // with Debian's revision
   return text;
 }
 
