@@ -20,7 +20,9 @@ namespace {
 }
 
 [[gnu::always_inline]] inline void store(float value, std::uint8_t& stored) {
-  const float clipped = value > 0 ? std::min(value, 255.0f) : 0.0f;
+  // One step a line: nested, GCC 14 makes a masked loop of it that takes three times as long.
+  const float positive = value > 0 ? value : 0.0f;
+  const float clipped = std::min(positive, 255.0f);
   stored = static_cast<std::uint8_t>(static_cast<std::int32_t>(clipped + 0.5f));
 }
 
