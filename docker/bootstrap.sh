@@ -60,7 +60,7 @@ build() {
 build_program() {
   install_packages docker/packages/build.txt
   options=(-DEVENTGAN_TESTS=OFF)
-  build release eventgan eventgan-torch
+  build release
 }
 
 package() {

@@ -6,6 +6,7 @@
 #include <cstring>
 #include <filesystem>
 #include <opencv2/core/utility.hpp>
+#include <string>
 #include <string_view>
 
 #include "pipeline/commands/commands.h"
@@ -17,21 +18,21 @@
 
 namespace {
 
-/// Becomes `eventgan-torch`: beside this program where it is built, in libexec where it is
-/// installed. Returns, and tells why, only if it cannot.
-void become_program_with_torch(char** argv) {
+/// Becomes the other program: beside this one where it is built, in libexec where it is installed.
+/// Returns, and tells why, only if it cannot.
+void become(const eventgan::HandOver& other, char** argv) {
   namespace fs = std::filesystem;
   const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path();
-  const fs::path installed = (folder / EVENTGAN_TORCH_FROM_PROGRAM).lexically_normal();
-  for (const fs::path& program : {folder / "eventgan-torch", installed}) {
+  const fs::path installed = (folder / EVENTGAN_LIBEXEC_FROM_PROGRAM).lexically_normal();
+  for (const fs::path& program : {folder / other.program, installed / other.program}) {
     execv(program.c_str(), argv);
     if (errno == ENOENT) continue;
     eventgan::tell_error("expected to run " + program.string() + ", got '" + std::strerror(errno) +
                          "'");
     return;
   }
-  eventgan::tell_error("expected eventgan-torch, the program with LibTorch, got none in " +
-                       installed.string() + ": install the package eventgan-torch");
+  eventgan::tell_error(std::string("expected ") + other.program + ", got none in " +
+                       installed.string() + ": " + other.advice);
 }
 
 }  // namespace
@@ -89,8 +90,8 @@ int main(int argc, char** argv) {
     // faults in a line each.
     const bool is_list = std::string_view(error.what()).find('\n') != std::string_view::npos;
     eventgan::tell_error(is_list ? eventgan::error_text(error) : eventgan::error_line(error));
-  } catch (const eventgan::NeedsTorch&) {
-    become_program_with_torch(argv);
+  } catch (const eventgan::HandOver& other) {
+    become(other, argv);
   }
   return streams.finish(exit_code);
 }

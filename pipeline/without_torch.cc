@@ -6,15 +6,22 @@
 #include "stages/generator/torch/torch_generator.h"
 
 namespace eventgan {
+namespace {
 
-std::unique_ptr<Generator> make_torch_generator(const Weights&, Precision) { throw NeedsTorch(); }
-
-std::unique_ptr<Generator> make_batched_generator(const Weights&, Precision, Device) {
-  throw NeedsTorch();
+[[noreturn]] void hand_over() {
+  throw HandOver{"eventgan-torch", "install the package eventgan-torch"};
 }
 
-CudaSupport cuda_support(Precision) { throw NeedsTorch(); }
+}  // namespace
 
-TrainingReport run_training(const TrainingManifest&, const TrainingOptions&) { throw NeedsTorch(); }
+std::unique_ptr<Generator> make_torch_generator(const Weights&, Precision) { hand_over(); }
+
+std::unique_ptr<Generator> make_batched_generator(const Weights&, Precision, Device) {
+  hand_over();
+}
+
+CudaSupport cuda_support(Precision) { hand_over(); }
+
+TrainingReport run_training(const TrainingManifest&, const TrainingOptions&) { hand_over(); }
 
 }  // namespace eventgan

@@ -49,14 +49,17 @@ std::string trial_text(const JobOptions& job, const ConversionReport& report) {
 }
 
 int convert_and_report(const JobOptions& job, const JobManifest& manifest,
-                       const ConversionOptions& options) {
+                       ConversionOptions options) {
   const LoadedGenerator loaded = [&] {
     const TraceSpan span(options.trace, "load generator", "job");
     return load_generator(manifest);
   }();
-  // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on.
-  if (!loaded.choice.empty()) tell(loaded.choice);
-  for (const std::string& warning : loaded.warnings) tell_warning(warning);
+  // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on. Not
+  // before the plan, which may be another program's to make (HandOver).
+  options.on_planned = [&] {
+    if (!loaded.choice.empty()) tell(loaded.choice);
+    for (const std::string& warning : loaded.warnings) tell_warning(warning);
+  };
   const ConversionReport report =
       convert(manifest, *loaded.generator, loaded.weights_hash, options);
   std::cout << (job.as_json() ? to_json(report) : to_text(report));

@@ -157,6 +157,7 @@ ConversionReport convert(const JobManifest& manifest, const Generator& generator
                                   .trace = options.trace,
                                   .show_phase = options.show_phase,
                                   .limit = options.limit});
+  if (options.on_planned) options.on_planned();
   for (const std::string& warning : planned.warnings) tell(options.warn, warning);
   std::vector<std::string> notes = notes_of(planned.plan.sources);  // as the inputs are today
   const auto fingerprint = planned.plan.fingerprint;

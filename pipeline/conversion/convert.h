@@ -20,6 +20,8 @@ struct ConversionOptions : RunOptions {
   std::optional<std::int64_t> limit;            ///< a trial of so many pairs (PlanningOptions)
   /// Told what goes on: which part this is, where the manifest is now. None: silent.
   std::function<void(const std::string&)> note;
+  /// Called once the job is planned, when nothing is written yet. None: nothing.
+  std::function<void()> on_planned;
 };
 
 /// The job: plans, freezes the plan, converts every shard of this worker's part that is not done,

@@ -1,9 +1,5 @@
 #include "pipeline/planning/fingerprint.h"
 
-extern "C" {
-#include <libavutil/avutil.h>
-}
-
 #include <fmt/format.h>
 #include <link.h>
 #include <png.h>
@@ -20,6 +16,7 @@ extern "C" {
 #include "stages/base/files/sha256.h"
 #include "stages/base/hdf5/detail/hdf5.h"
 #include "stages/base/processor/processor.h"
+#include "stages/base/videos/video_file.h"
 
 namespace eventgan {
 namespace {
@@ -146,7 +143,7 @@ std::string libraries(bool with_videos) {
                      loaded_library("libjpeg") + ", " + loaded_library("libdeflate") + ", " +
                      loaded_library("libisal") + ", " + loaded_library("libwebp") + ", " +
                      loaded_library("libtiff");
-  if (with_videos) text += std::string(", FFmpeg ") + av_version_info();  // with Debian's revision
+  if (with_videos) text += ", " + video_libraries();
   return text;
 }
 
@@ -172,7 +169,8 @@ std::string version_text() {
     engines.push_back(file.filename().string());
   }
   return fmt::format("{}\nlibraries: {}\nengines: {}\nprocessor: {}", program_version(),
-                     libraries(/*with_videos=*/true), fmt::join(engines, ", "), instruction_sets());
+                     libraries(/*with_videos=*/false), fmt::join(engines, ", "),
+                     instruction_sets());
 }
 
 std::map<std::string, std::string> make_fingerprint(

@@ -1,5 +1,6 @@
-"""Folders of images of one texture that moves by whole pixels, so that its true motion is known."""
+"""Folders of images, and videos, of one texture that moves by whole pixels, so that its true motion is known."""
 
+import cv2
 import numpy as np
 import PIL.Image
 
@@ -30,3 +31,12 @@ def write_images(folder, shifts_px, height, width, seed):
     for index, image in enumerate(images):
         PIL.Image.fromarray(image).save(folder / f"frame_{index:02d}.png")
     return np.stack(images)
+
+
+def write_video(path, frames, height=48, width=64, frames_per_second=25):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), frames_per_second, (width, height))
+    image = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
+    for shift in range(frames):
+        video.write(image[:, shift:shift + width])
+    video.release()

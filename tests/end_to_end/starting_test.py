@@ -15,7 +15,7 @@ import numpy as np
 
 import program
 from camera_files import random_events, write_dhp19, write_mvsec
-from moving_texture import texture
+from moving_texture import texture, write_video
 from program import SHARED, SOURCE, run, shard_bytes, text
 from small_job import save_image, small_job, write_cars, write_people
 
@@ -23,15 +23,6 @@ sys.path.insert(0, str(SOURCE / "tests" / "fuzz"))
 from make_corpus import Cdf
 
 EXAMPLES = SOURCE / "manifests" / "examples"
-
-
-def write_video(path, frames, height=48, width=64, frames_per_second=25):
-    path.parent.mkdir(parents=True, exist_ok=True)
-    video = cv2.VideoWriter(str(path), cv2.VideoWriter_fourcc(*"mp4v"), frames_per_second, (width, height))
-    image = cv2.cvtColor(texture(height, width + frames, 7), cv2.COLOR_GRAY2BGR)
-    for shift in range(frames):
-        video.write(image[:, shift:shift + width])
-    video.release()
 
 
 def read_commented(path):

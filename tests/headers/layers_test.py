@@ -26,7 +26,7 @@ FLOORS = [
      "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],
     ["pipeline/commands"],
-    ["pipeline/main.cc", "pipeline/without_torch.cc"],
+    ["pipeline/main.cc", "pipeline/without_torch.cc", "pipeline/without_videos.cc"],
 ]
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 

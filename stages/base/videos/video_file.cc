@@ -188,6 +188,8 @@ std::optional<ColourView> VideoFile::next() {
   return ColourView{{image.rows, image.cols}, image.data};
 }
 
+std::string video_libraries() { return std::string("FFmpeg ") + av_version_info(); }
+
 double VideoFile::time_s() const {
   const std::int64_t ticks = decoder_->frame->best_effort_timestamp;
   return ticks == AV_NOPTS_VALUE ? std::numeric_limits<double>::quiet_NaN()

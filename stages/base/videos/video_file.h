@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <string>
 
 #include "stages/base/images/image_file.h"
 
@@ -45,6 +46,9 @@ class VideoFile {
   std::unique_ptr<Decoder> decoder_;
   std::int64_t position_ = 0;
 };
+
+/// "FFmpeg 5.1.6-0+deb12u1", as it runs.
+std::string video_libraries();
 
 /// Writes an MP4 (H.264, which browsers play) of the images that `next` gives, until it gives
 /// none, each shown 1/frames_per_second seconds; all of the size of the first, whose odd sides get
