@@ -46,8 +46,10 @@ void fit_lost_part(const TensorSums& sums, TensorStatistics& statistics) {
   cv::Mat mixing = cv::Mat::zeros(channels, channels, CV_64F);
   if (mean_variance > kNoVariance * cv::mean(squares.diag())[0]) {
     const cv::Mat ridge = cv::Mat::diag(variance * kRidge + mean_variance * kRidgeOfMean);
+    const double unit = 1 / mean_variance;  // OpenCV takes small numbers for a singular matrix
     cv::Mat transposed;
-    if (!cv::solve(covariance + ridge, cross.t(), transposed, cv::DECOMP_CHOLESKY)) {
+    if (!cv::solve((covariance + ridge) * unit, cross.t() * unit, transposed,
+                   cv::DECOMP_CHOLESKY)) {
       throw std::runtime_error("expected a regression of " + sums.name + ", got none");
     }
     mixing = transposed.t();
