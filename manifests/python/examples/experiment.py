@@ -62,11 +62,11 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--steps", type=int, help=f"training steps of each network (default: {STEPS})")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, instead of the simulated camera")
-    parser.add_argument("--small", action="store_true", help="16 sequences, one seed, 5 steps: tests that it runs; the scores mean nothing")
+    parser.add_argument("--small", action="store_true", help="8 sequences, one seed, 2 steps: tests that it runs; the scores mean nothing")
     args = parser.parse_args()
     args.steps = args.steps or STEPS[args.what]
     if args.small:
-        args.scenes, args.seeds, args.steps = 16, 1, 5
+        args.scenes, args.seeds, args.steps = 8, 1, 2
     args.out = args.out.resolve()
     return args
 
