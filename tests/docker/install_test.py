@@ -97,7 +97,7 @@ class Install(unittest.TestCase):
         self.assertEqual({path.name for path in self.prefix.iterdir()} - {"files"}, {"bin", "libexec", "share", "lib"})
         executables = [path for path in self.prefix.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
         self.assertEqual({path.relative_to(self.prefix).as_posix() for path in executables},
-                         {"bin/eventgan", "libexec/eventgan/eventgan-torch"})
+                         {"bin/eventgan", "libexec/eventgan/eventgan-torch", "libexec/eventgan/eventgan-video"})
         self.assertTrue(all(os.access(path, os.X_OK) for path in executables))
         self.assertFalse([path for path in self.prefix.rglob("*") if "__pycache__" in path.parts])
 
@@ -136,13 +136,14 @@ class Packages(unittest.TestCase):
                     for name, path in self.files.items()}
         self.assertEqual(set(contents), {"eventgan", "eventgan-torch"})
         self.assertEqual(contents["eventgan-torch"], {"usr/libexec/eventgan/eventgan-torch"})
-        self.assertIn("usr/bin/eventgan", contents["eventgan"])
+        self.assertLessEqual({"usr/bin/eventgan", "usr/libexec/eventgan/eventgan-video"}, contents["eventgan"])
         self.assertIn("usr/share/man/man1/eventgan.1.gz", contents["eventgan"])
         self.assertIn("usr/lib/python3/dist-packages/eventgan_shards/__init__.py", contents["eventgan"])
         self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])
 
     def test_dependencies_are_the_libraries_packages(self):
-        for package, executable in [("eventgan", "eventgan"), ("eventgan-torch", "eventgan-torch")]:
+        for package, executable in [("eventgan", "eventgan"), ("eventgan", "eventgan-video"),
+                                    ("eventgan-torch", "eventgan-torch")]:
             self.assertLessEqual(loaded_packages(BUILD / executable), self.names(package, "Depends"))
         version = run(BUILD / "eventgan", "--version").split()[1]
         self.assertIn(f"eventgan (= {version})", self.field("eventgan-torch", "Depends"))
