@@ -183,7 +183,9 @@ TEST(FlowLoss, MatchesGoldenNumbers) {
   expect_near(loss.photometric, "losses/flow_scaled/photometric");
   expect_near(loss.smoothness, "losses/flow_scaled/smoothness");
   const at::Tensor warped = golden_tensor("losses/flow_scaled/warped_last");
-  EXPECT_LT((loss.warped - warped).abs().max().item<double>(), 1e-5);
+  // Where it is looked up is a float32 in [-1, 1] of 96 pixels, after a few roundings in x and in y
+  // of 96/2 * 2^-24 = 3e-6 pixels each; neighbouring pixels differ by up to 2.
+  EXPECT_LT((loss.warped - warped).abs().max().item<double>(), 5e-5);
 }
 
 // Four pixels in a row, each looked up at its right neighbour's middle, pixel j + 1, which lies at
