@@ -15,8 +15,8 @@ enum ExitCode : int {
   kStopped = 75  ///< stopped by a signal: run again
 };
 
-/// Thrown where only another of the programs goes on: main() then runs that with the same arguments.
-/// No std::exception, so that nobody on the way takes it for a failure.
+/// Thrown where only another of the programs goes on: main() then runs that with the same
+/// arguments. No std::exception, so that nobody on the way takes it for a failure.
 struct HandOver {
   const char* program;  ///< "eventgan-torch"
   const char* advice;   ///< for who does not have it
