@@ -48,19 +48,16 @@ install_packages() {
   "${root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends "${missing[@]}"
 }
 
-# One preset, configured and built; further arguments are targets (default: all).
+# The programs, with their tests (ON) or without (OFF).
 build() {
-  local preset=$1
-  shift
-  say "building ($preset)"
-  cmake --preset "$preset" "${options[@]}"
-  cmake --build --preset "$preset" -j "$jobs" ${1:+--target "$@"}
+  say "building"
+  cmake --preset release "-DEVENTGAN_TESTS=$1"
+  cmake --build --preset release -j "$jobs"
 }
 
 build_program() {
   install_packages docker/packages/build.txt
-  options=(-DEVENTGAN_TESTS=OFF)
-  build release
+  build OFF
 }
 
 package() {
@@ -91,8 +88,7 @@ demo() {
 
 run_tests() {
   install_packages docker/packages/build.txt docker/packages/test.txt
-  options=(-DEVENTGAN_TESTS=ON)
-  build release
+  build ON
   say "testing"
   ctest --preset release -j "$jobs"
 }
