@@ -45,7 +45,7 @@ int main(int argc, char** argv) {
 
   CLI::App app(
       "Turn labelled image datasets into event-camera training data\nReads KITTI, MPII, Human3.6M, "
-      "and folders of images and videos.");
+      "your own images and videos with their labels, and recordings of event cameras.");
   app.name("eventgan");
   eventgan::wrap_help(app);
   app.set_version_flag("--version", eventgan::version_text);

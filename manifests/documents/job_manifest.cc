@@ -33,14 +33,60 @@ std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
   return gaps;
 }
 
+namespace {
+
+StillsSpec read_motion(const StrictValue& value) {
+  constexpr double kFarthest_px = 100, kMost_deg = 45, kMostScale = 0.5;
+  StillsSpec spec;
+  StrictObject object = value.object();
+  if (const auto range = object.find("translation_px")) {
+    const auto ends = range->elements(2);
+    if (ends.size() == 2) {
+      spec.translation_px = {ends[0].number(0, kFarthest_px), ends[1].number(0, kFarthest_px)};
+      if (spec.translation_px[1] < spec.translation_px[0]) {
+        ends[1].fault("a number not below the previous one");
+      }
+    } else if (!ends.empty()) {
+      range->fault("an array of 2");
+    }
+  }
+  if (const auto angle = object.find("rotation_deg")) {
+    spec.rotation_deg = angle->number(0, kMost_deg);
+  }
+  if (const auto scale = object.find("scale")) spec.scale = scale->number(0, kMostScale);
+  if (const auto frames = object.find("frames")) spec.frames = frames->integer(1, 6);
+  object.finish();
+  return spec;
+}
+
+}  // namespace
+
 PairSpec read_pairs(const StrictValue& value) {
   PairSpec spec;
   StrictObject object = value.object();
-  if (const auto side = object.find("side")) spec.side = side->choice(kSideWords);
-  if (const auto choose = object.find("choose")) spec.choose = choose->choice(kChoiceWords);
   if (const auto least = object.find("min_pairs")) {
     spec.min_pairs = least->integer<std::int64_t>(0, 1'000'000'000);
   }
+  const auto side = object.find("side");
+  if (side) spec.side = side->choice(kSideWords);
+  const auto from = object.find("from");
+  if (from && from->choice(kPairOriginWords)) {
+    if (spec.side == PairSide::kAround)
+      side->fault("\"before\" or \"after\", since from is \"stills\"");
+    const auto motion = object.find("motion");
+    spec.stills = motion ? read_motion(*motion) : StillsSpec();
+    spec.gaps = {spec.stills->frames};
+    for (const char* key : {"gaps", "choose", "max_gap_s"}) {
+      if (const auto found = object.find(key))
+        found->fault("no such key, since from is \"stills\"");
+    }
+    object.finish();
+    return spec;
+  }
+  if (const auto motion = object.find("motion")) {
+    motion->fault("no such key, since from is \"sequence\"");
+  }
+  if (const auto choose = object.find("choose")) spec.choose = choose->choice(kChoiceWords);
   if (const auto most = object.find("max_gap_s")) spec.max_gap_s = most->number(1e-6, 1e6);
   spec.gaps = read_gaps(object.at("gaps"), spec.side);
   object.finish();
@@ -132,7 +178,59 @@ WindowSpec read_window(SpecialKeys& keys, std::optional<DatasetKind> dataset) {
   return spec;
 }
 
+LabelSpec read_labels(const StrictValue& value) {
+  LabelSpec spec;
+  StrictObject object = value.object();
+  spec.format = object.at("format").choice(kLabelFormatWords);
+  spec.path = read_path(object.at("path"));
+  object.finish();
+  return spec;
+}
+
+RecordingOptions read_recording_options(SpecialKeys& keys) {
+  constexpr int kLargestSensor = 8192;
+  using enum DatasetKind;
+  RecordingOptions options;
+  if (const auto camera = keys.find("camera", {kRecording})) {
+    options.camera = read_stereo_camera(*camera);
+  }
+  if (const auto rectify = keys.find("rectify", {kRecording})) options.rectify = rectify->boolean();
+  if (const auto sensor = keys.find("sensor", {kRecording}))
+    options.sensor = read_size(*sensor, 1, kLargestSensor);
+  if (const auto columns = keys.find("columns", {kRecording}))
+    options.columns = read_columns(*columns);
+  return options;
+}
+
 }  // namespace
+
+std::string read_stereo_camera(const StrictValue& value) {
+  return value.text("\"left\" or \"right\"",
+                    [](std::string_view text) { return text == "left" || text == "right"; });
+}
+
+ImageSize read_size(const StrictValue& value, int least, int most) {
+  StrictObject object = value.object();
+  const ImageSize size{object.at("height").integer(least, most),
+                       object.at("width").integer(least, most)};
+  object.finish();
+  return size;
+}
+
+EventFields read_columns(const StrictValue& value) {
+  EventFields columns;
+  StrictObject object = value.object();
+  const auto read = [&](const char* key, std::string& name) {
+    if (const auto found = object.find(key)) name = found->text();
+  };
+  read("t", columns.t);
+  read("x", columns.x);
+  read("y", columns.y);
+  read("p", columns.p);
+  if (const auto unit = object.find("unit")) columns.tick_s = unit->choice(kTimeUnitWords);
+  object.finish();
+  return columns;
+}
 
 SourceSpec read_source(const StrictValue& value) {
   using enum DatasetKind;
@@ -164,11 +262,8 @@ SourceSpec read_source(const StrictValue& value) {
     spec.frames_per_second = rate->number(1e-6, 1e6);
   }
 
-  if (const auto camera = keys.find("camera", {kRecording})) {
-    spec.camera = camera->text("\"left\" or \"right\"", [](std::string_view text) {
-      return text == "left" || text == "right";
-    });
-  }
+  if (const auto labels = keys.find("labels", {kFrames})) spec.labels = read_labels(*labels);
+  spec.recording = read_recording_options(keys);
 
   spec.selection = read_selection(object, keys);
   spec.window = read_window(keys, dataset);

@@ -36,6 +36,25 @@ FrameRef read_frame(const StrictValue& value) {
   return frame;
 }
 
+json to_json_value(const ImageMotion& motion) {
+  return {{"x_px", motion.x_px},
+          {"y_px", motion.y_px},
+          {"angle_deg", motion.angle_deg},
+          {"scale", motion.scale}};
+}
+
+ImageMotion read_image_motion(const StrictValue& value) {
+  constexpr double kFarthest_px = 1e6, kMost_deg = 360, kLeastScale = 1e-6, kMostScale = 1e6;
+  ImageMotion motion;
+  StrictObject object = value.object();
+  motion.x_px = object.at("x_px").number(-kFarthest_px, kFarthest_px);
+  motion.y_px = object.at("y_px").number(-kFarthest_px, kFarthest_px);
+  motion.angle_deg = object.at("angle_deg").number(-kMost_deg, kMost_deg);
+  motion.scale = object.at("scale").number(kLeastScale, kMostScale);
+  object.finish();
+  return motion;
+}
+
 std::vector<std::string> read_texts(const StrictValue& value) {
   std::vector<std::string> texts;
   for (const StrictValue& element : value.elements()) texts.push_back(element.text());
@@ -58,6 +77,7 @@ json to_json_value(const PlannedSample& sample) {
                  {"gap", sample.pair.gap_frames},
                  {"label_index", sample.pair.label_index},
                  {"label_position", sample.pair.label_position}};
+  if (const auto& motion = sample.pair.motion) result["motion"] = to_json_value(*motion);
   if (!sample.fault.empty()) result["fault"] = sample.fault;
   return result;
 }
@@ -73,6 +93,7 @@ PlannedSample read_planned_sample(const StrictValue& value) {
   sample.pair.gap_frames = object.at("gap").integer(0, kLargestGap);
   sample.pair.label_index = object.at("label_index").integer<std::int64_t>(-kMost, kMost);
   sample.pair.label_position = object.at("label_position").number(0, 1);
+  if (const auto motion = object.find("motion")) sample.pair.motion = read_image_motion(*motion);
   if (const auto fault = object.find("fault")) sample.fault = fault->text();
   object.finish();
   return sample;

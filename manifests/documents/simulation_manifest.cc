@@ -105,14 +105,6 @@ std::vector<SimulationSource> read_simulation_sources(const StrictValue& value) 
   return sources;
 }
 
-ImageSize read_sensor_size(const StrictValue& value) {
-  StrictObject object = value.object();
-  const ImageSize size{object.at("height").integer(kSmallestSensorSide, kLargestSensorSide),
-                       object.at("width").integer(kSmallestSensorSide, kLargestSensorSide)};
-  object.finish();
-  return size;
-}
-
 SimulationManifest read_simulation_document(const StrictValue& document) {
   SimulationManifest manifest;
   StrictObject object = document.object();
@@ -120,7 +112,8 @@ SimulationManifest read_simulation_document(const StrictValue& document) {
   manifest.name = read_name(object.at("name"));
   if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
   manifest.sources = read_simulation_sources(object.at("sources"));
-  if (const auto size = object.find("size")) manifest.size = read_sensor_size(*size);
+  if (const auto size = object.find("size"))
+    manifest.size = read_size(*size, kSmallestSensorSide, kLargestSensorSide);
   if (const auto sensor = object.find("sensor")) manifest.sensor = read_sensor(*sensor);
   StrictObject output = object.at("output").object();
   manifest.output_directory = read_path(output.at("directory"));

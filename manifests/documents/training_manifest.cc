@@ -1,5 +1,11 @@
 #include "manifests/documents/training_manifest.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <initializer_list>
+#include <ranges>
+
 #include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/values/words.h"
@@ -24,14 +30,27 @@ constexpr double kLeastRate = 1e-9;
 constexpr double kLargestRate = 1;
 constexpr double kLargestFactor = 1e6;
 
-void read_camera(const StrictValue& value, RecordingSpec& spec) {
-  if (spec.format != RecordingFormat::kMvsec) {
-    value.fault("no such key for format \"" + std::string(to_string(spec.format)) +
-                "\" (only for mvsec)");
-    return;
+/// Recordings that may have frames: the first of all formats.
+constexpr std::array kFormatWords{kRecordingFormatWords[0], kRecordingFormatWords[1],
+                                  kRecordingFormatWords[2], kRecordingFormatWords[3],
+                                  kRecordingFormatWords[4]};
+static_assert(kFormatWords.back().value == RecordingFormat::kDsec);
+
+/// Reads the keys that only some formats have.
+void read_options(StrictObject& object, RecordingSpec& spec) {
+  using enum RecordingFormat;
+  const auto find = [&](const char* key, std::initializer_list<RecordingFormat> owners) {
+    std::optional<StrictValue> value = object.find(key);
+    if (!value || std::ranges::find(owners, spec.format) != owners.end()) return value;
+    const auto word = [](RecordingFormat owner) { return to_string(owner); };
+    value->fault(fmt::format("no such key for format \"{}\" (only for {})", to_string(spec.format),
+                             fmt::join(owners | std::views::transform(word), ", ")));
+    return std::optional<StrictValue>();
+  };
+  if (const auto camera = find("camera", {kMvsec})) {
+    spec.options.camera = read_stereo_camera(*camera);
   }
-  spec.camera = value.text("\"left\" or \"right\"",
-                           [](std::string_view text) { return text == "left" || text == "right"; });
+  if (const auto rectify = find("rectify", {kDsec})) spec.options.rectify = rectify->boolean();
 }
 
 /// Two numbers, the second not below the first.
@@ -59,9 +78,9 @@ RecordingSpec read_recording(const StrictValue& value) {
   RecordingSpec spec;
   StrictObject object = value.object();
   spec.path = read_path(object.at("path"));
-  const auto format = object.at("format").sound_choice(kRecordingFormatWords);
+  const auto format = object.at("format").sound_choice(kFormatWords);
   spec.format = format.value_or(spec.format);
-  if (const auto camera = object.find("camera")) read_camera(*camera, spec);
+  read_options(object, spec);
   if (const auto weight = object.find("weight")) spec.weight = weight->number(1e-6, 1e6);
   if (const auto first = object.find("first_frame")) {
     spec.first_frame = first->integer<std::int64_t>(0, kMostFrames);

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,16 @@ struct FrameOrigin {
   bool operator==(const FrameOrigin&) const = default;
 };
 
+/// A motion of a whole image, as a moving camera sees it, about the image's centre c:
+///   x' = c + scale R (x - c) + (x_px, y_px),  R = [cos a, -sin a; sin a, cos a], a = angle_deg.
+struct ImageMotion {
+  double x_px = 0;
+  double y_px = 0;
+  double angle_deg = 0;  ///< from x towards y: clockwise as one sees it
+  double scale = 1;
+  bool operator==(const ImageMotion&) const = default;
+};
+
 /// Two frames of one sequence, `previous` before `next`, and the labelled frame they belong to. Of
 /// events: the begin and the end of a window, as the recording's last frames at or before them.
 struct FramePair {
@@ -66,6 +77,9 @@ struct FramePair {
   std::int64_t label_index = -1;  ///< FrameRef::index of the labelled frame
   /// Where the labelled frame lies: 0 = previous frame, 1 = next frame, 0.5 = in the middle.
   double label_position = 1;
+  /// Of a still: how a point moves from the previous image to the next. Both frames are the
+  /// labelled image then; the one that is not at `label_position` is it under this motion.
+  std::optional<ImageMotion> motion = std::nullopt;
 
   /// NaN if either time is unknown.
   double gap_s() const { return next.time_s - previous.time_s; }

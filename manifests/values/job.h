@@ -64,6 +64,10 @@ constexpr bool has_events(DatasetKind dataset) {
   return dataset == DatasetKind::kRecording || dataset == DatasetKind::kDhp19;
 }
 
+/// Whether images are turned upright as their EXIF orientation says, as tools show those that one
+/// labels oneself. The labels of the known datasets are in pixels as stored.
+constexpr bool is_turned_upright(DatasetKind dataset) { return dataset == DatasetKind::kFrames; }
+
 /// How the Human3.6M source is laid out on disk (manifests/guides/datasets.md).
 enum class Human36mLayout { kFetch, kExtracted, kOfficial };
 
@@ -73,14 +77,54 @@ enum class PairSide { kBefore, kAfter, kAround };
 /// One pair a labelled frame, its gap drawn by the seed; or one pair for each gap.
 enum class PairChoice { kOne, kAll };
 
+/// Pairs of stills: an image, and itself under a small motion about its centre. The seed draws the
+/// motion of each image: a shift in any direction, an angle and a scale factor, each uniformly.
+struct StillsSpec {
+  std::array<double, 2> translation_px{2, 8};  ///< least and most, pixels of the image, 0..100
+  double rotation_deg = 2;                     ///< most, either way, 0..45
+  double scale = 0.03;                         ///< most, larger or smaller: 1 ± scale, 0..0.5
+  int frames = 1;                              ///< the pair's gap_frames, 1..6
+};
+
 struct PairSpec {
-  std::vector<int> gaps;  ///< 1..6, ascending, distinct; even only with kAround
+  std::vector<int> gaps;  ///< 1..6, ascending, distinct; even only with kAround; of stills `frames`
   PairSide side = PairSide::kBefore;
   PairChoice choose = PairChoice::kOne;
   std::int64_t min_pairs = 1;  ///< fewer pairs than this from the source is an error
   /// Frames farther apart in time than this are not paired; > 0. Where times are unknown, and
   /// without it, all are.
   std::optional<double> max_gap_s = std::nullopt;
+  /// Pairs of single images, with kBefore or kAfter and kOne; none: of two frames of a sequence.
+  std::optional<StillsSpec> stills = std::nullopt;
+};
+
+/// How labels of one's own are written (manifests/guides/own_data.md).
+enum class LabelFormat { kCoco, kYolo, kVoc, kMot, kCsv };
+
+/// Labels of one's own for the images or videos of a `frames` source.
+struct LabelSpec {
+  LabelFormat format = LabelFormat::kCoco;
+  std::string path;  ///< file or folder, as written in the manifest
+};
+
+/// Which fields of a table of events are what: names of a header, of a structured array's fields,
+/// or of an archive's arrays.
+struct EventFields {
+  std::string t = "t";
+  std::string x = "x";
+  std::string y = "y";
+  std::string p = "p";
+  double tick_s = 1e-6;  ///< what `t` counts: 1, 1e-3, 1e-6 or 1e-9 s
+  bool operator==(const EventFields&) const = default;
+};
+
+/// What a recording of events does not tell of itself.
+struct RecordingOptions {
+  std::string camera = "left";           ///< mvsec, m3ed: "left" or "right"
+  bool rectify = false;                  ///< dsec: events through its rectify_map.h5
+  std::optional<ImageSize> sensor = {};  ///< table, prophesee: where the file does not tell it
+  EventFields columns = {};              ///< table
+  bool operator==(const RecordingOptions&) const = default;
 };
 
 /// Where in its window of events a label lies.
@@ -117,10 +161,11 @@ struct SourceSpec {
   std::optional<std::string> sequences;     ///< mpii, mpii_list: the folder of video frames
   std::optional<Human36mLayout> layout;     ///< human36m only, and required there
   std::optional<double> frames_per_second;  ///< frames: for gap_s where the files do not tell
+  std::optional<LabelSpec> labels;          ///< frames
   SelectionSpec selection;
   PairSpec pairs;
-  std::string camera = "left";  ///< recording, in MVSEC's layout: "left" or "right"
-  WindowSpec window;            ///< recording, dhp19: in place of `pairs`
+  RecordingOptions recording;  ///< recording
+  WindowSpec window;           ///< recording, dhp19: in place of `pairs`
 };
 
 enum class ImageFit { kStretch, kLetterbox, kCrop };
@@ -223,6 +268,7 @@ struct JobManifest : ManifestOrigin {
 /// The manifest's words for these values, and back into text for shards, plans and reports.
 std::string_view to_string(DatasetKind kind);
 std::string_view to_string(Human36mLayout layout);
+std::string_view to_string(LabelFormat format);
 std::string_view to_string(PairSide side);
 std::string_view to_string(PairChoice choice);
 std::string_view to_string(LabelPlace place);

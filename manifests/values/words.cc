@@ -11,6 +11,7 @@ std::string_view to_string(Device device) { return word_of(kDeviceWords, device)
 
 std::string_view to_string(DatasetKind kind) { return word_of(kDatasetWords, kind); }
 std::string_view to_string(Human36mLayout layout) { return word_of(kLayoutWords, layout); }
+std::string_view to_string(LabelFormat format) { return word_of(kLabelFormatWords, format); }
 std::string_view to_string(PairSide side) { return word_of(kSideWords, side); }
 std::string_view to_string(PairChoice choice) { return word_of(kChoiceWords, choice); }
 std::string_view to_string(LabelPlace place) { return word_of(kLabelPlaceWords, place); }

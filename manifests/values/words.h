@@ -47,6 +47,19 @@ inline constexpr std::array kLayoutWords{
     Word<Human36mLayout>{"extracted", Human36mLayout::kExtracted},
     Word<Human36mLayout>{"official", Human36mLayout::kOfficial}};
 
+inline constexpr std::array kLabelFormatWords{
+    Word<LabelFormat>{"coco", LabelFormat::kCoco}, Word<LabelFormat>{"yolo", LabelFormat::kYolo},
+    Word<LabelFormat>{"voc", LabelFormat::kVoc}, Word<LabelFormat>{"mot", LabelFormat::kMot},
+    Word<LabelFormat>{"csv", LabelFormat::kCsv}};
+
+/// Where pairs come from.
+inline constexpr std::array kPairOriginWords{Word<bool>{"sequence", false},
+                                             Word<bool>{"stills", true}};
+
+/// What EventFields::t counts, in seconds.
+inline constexpr std::array kTimeUnitWords{Word<double>{"s", 1}, Word<double>{"ms", 1e-3},
+                                           Word<double>{"us", 1e-6}, Word<double>{"ns", 1e-9}};
+
 inline constexpr std::array kSideWords{Word<PairSide>{"before", PairSide::kBefore},
                                        Word<PairSide>{"after", PairSide::kAfter},
                                        Word<PairSide>{"around", PairSide::kAround}};
@@ -105,7 +118,12 @@ inline constexpr std::array kSimulationMethodWords{
 inline constexpr std::array kRecordingFormatWords{
     Word<RecordingFormat>{"mvsec", RecordingFormat::kMvsec},
     Word<RecordingFormat>{"eventgan", RecordingFormat::kEventgan},
-    Word<RecordingFormat>{"ecd", RecordingFormat::kEcd}};
+    Word<RecordingFormat>{"ecd", RecordingFormat::kEcd},
+    Word<RecordingFormat>{"aedat4", RecordingFormat::kAedat4},
+    Word<RecordingFormat>{"dsec", RecordingFormat::kDsec},
+    Word<RecordingFormat>{"m3ed", RecordingFormat::kM3ed},
+    Word<RecordingFormat>{"prophesee", RecordingFormat::kProphesee},
+    Word<RecordingFormat>{"table", RecordingFormat::kTable}};
 
 inline constexpr std::array kSpectralNormWords{
     Word<SpectralNormPlace>{"decoders", SpectralNormPlace::kDecoders},

@@ -8,9 +8,9 @@
 #include <limits>
 #include <memory>
 
-#include "manifests/documents/job_manifest.h"
 #include "manifests/values/job.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/given_job.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/convert.h"
@@ -48,8 +48,8 @@ std::string trial_text(const JobOptions& job, const ConversionReport& report) {
                      report.plan_pairs, job.manifest);
 }
 
-int convert_and_report(const JobOptions& job, const JobManifest& manifest,
-                       ConversionOptions options) {
+int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionOptions options) {
+  const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = [&] {
     const TraceSpan span(options.trace, "load generator", "job");
     return load_generator(manifest);
@@ -57,6 +57,8 @@ int convert_and_report(const JobOptions& job, const JobManifest& manifest,
   // Here, and not in every command that loads them: `plan` writes nothing, and `retry` goes on. Not
   // before the plan, which may be another program's to make (HandOver).
   options.on_planned = [&] {
+    for (const std::string& line : given.findings) tell(line);
+    keep_manifest(given);
     if (!loaded.choice.empty()) tell(loaded.choice);
     for (const std::string& warning : loaded.warnings) tell_warning(warning);
   };
@@ -70,20 +72,19 @@ int convert_and_report(const JobOptions& job, const JobManifest& manifest,
 
 /// OUT-trial-20 beside OUT.
 fs::path trial_folder(fs::path output, std::int64_t limit) {
-  if (!output.has_filename()) output = output.parent_path();  // "out/"
   return output += fmt::format("-trial-{}", limit);
 }
 
 int run(const ConvertArguments& arguments) {
   const JobOptions& job = arguments.job;
   const StopSignal signal(shard_stopping_line(arguments.grace_s));
-  const JobManifest manifest = read_job_manifest(job.manifest);
+  const GivenJob given = read_given_job(job.manifest, job.output_folder());
   ConversionOptions options;
   options.part = choose_part(arguments.shards, [](const char* name) { return std::getenv(name); });
   options.grace_s = arguments.grace_s;
   options.since_stop_request = [&] { return signal.seconds_since_request(); };
   options.limit = arguments.limit;
-  fs::path folder = job.output_folder().value_or(resolve(manifest, manifest.output.directory));
+  fs::path folder = given.output;
   if (options.limit && !job.output) folder = trial_folder(folder, *options.limit);
   options.output = folder;
   options.threads = job.threads;
@@ -94,7 +95,7 @@ int run(const ConvertArguments& arguments) {
   options.note = [](const std::string& text) { tell(text); };
   return run_profiled({arguments.profile, "convert", folder}, [&](TraceRecorder* trace) {
     options.trace = trace;
-    return convert_and_report(job, manifest, options);
+    return convert_and_report(job, given, options);
   });
 }
 
@@ -108,8 +109,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
       "to resume. Several workers can share the output folder. On SIGTERM, SIGINT or SIGUSR1 the "
       "current shard is finished or dropped, and the exit code is 75.");
   const auto arguments = std::make_shared<ConvertArguments>();
-  add_job_options(*command, arguments->job,
-                  "The manifest of the job (examples: manifests/examples)",
+  add_job_options(*command, arguments->job, kGivenJob, kGivenJobText,
                   "Discard the results of earlier runs of the same job");
   command
       ->add_option("--shards", arguments->shards,

@@ -23,7 +23,8 @@ namespace {
 const std::map<std::string, ExportFormat> kFormats = {
     {"yolo", ExportFormat::kYolo},     {"coco", ExportFormat::kCoco},
     {"mpii", ExportFormat::kMpii},     {"davis", ExportFormat::kDavis},
-    {"events", ExportFormat::kEvents}, {"webdataset", ExportFormat::kWebdataset}};
+    {"events", ExportFormat::kEvents}, {"webdataset", ExportFormat::kWebdataset},
+    {"dsec", ExportFormat::kDsec},     {"rvt", ExportFormat::kRvt}};
 const std::map<std::string, bool> kIgnored = {{"keep", true}, {"drop", false}};
 const std::map<std::string, bool> kIsFloat32 = {{"float16", false}, {"float32", true}};
 const std::map<std::string, EventCounts> kCounts = {{"poisson", EventCounts::kPoisson},
@@ -37,14 +38,18 @@ struct OwnOption {
   const char* formats;
   std::vector<ExportFormat> of;
 };
+const std::vector<ExportFormat> kOfDrawnEvents = {ExportFormat::kEvents, ExportFormat::kDsec,
+                                                  ExportFormat::kRvt};
 const std::vector<OwnOption> kOwnOptions = {
-    {"--classes", "yolo or coco", {ExportFormat::kYolo, ExportFormat::kCoco}},
+    {"--classes",
+     "yolo, coco, dsec or rvt",
+     {ExportFormat::kYolo, ExportFormat::kCoco, ExportFormat::kDsec, ExportFormat::kRvt}},
     {"--ignored", "yolo or coco", {ExportFormat::kYolo, ExportFormat::kCoco}},
     {"--full-scale", "yolo or mpii", {ExportFormat::kYolo, ExportFormat::kMpii}},
     {"--dtype", "davis", {ExportFormat::kDavis}},
-    {"--counts", "events", {ExportFormat::kEvents}},
+    {"--counts", "events, dsec or rvt", kOfDrawnEvents},
     {"--layout", "events", {ExportFormat::kEvents}},
-    {"--seed", "events", {ExportFormat::kEvents}}};
+    {"--seed", "events, dsec or rvt", kOfDrawnEvents}};
 
 struct ExportArguments {
   std::string folder;
@@ -102,8 +107,8 @@ void add_export_command(CLI::App& app, int& exit_code) {
       ->allow_extra_args(false);
   command
       ->add_option("--classes", arguments->classes,
-                   "yolo, coco: JSON file that maps each class name to a number, or to null to "
-                   "leave the class out")
+                   "yolo, coco, dsec, rvt: JSON file that maps each class name to a number, or to "
+                   "null to leave the class out")
       ->option_text("FILE");
   take_one_of(
       command->add_option("--ignored", arguments->keep_ignored,
@@ -121,13 +126,14 @@ void add_export_command(CLI::App& app, int& exit_code) {
   take_one_of(
       command->add_option(
           "--counts", options.counts,
-          "events: draw the number of events from a Poisson distribution (default) or round it"),
+          "events, dsec, rvt: draw the number of events from a Poisson distribution (default) or "
+          "round it"),
       kCounts);
   take_one_of(
       command->add_option("--layout", options.event_file,
                           "events: lines of text, t x y p (default), or HDF5 as MVSEC has it"),
       kEventFiles);
-  command->add_option("--seed", options.seed, "events: random seed; default: 0")
+  command->add_option("--seed", options.seed, "events, dsec, rvt: random seed; default: 0")
       ->option_text("NUMBER");
   command->add_option("--threads", options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));

@@ -1,11 +1,13 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
@@ -23,24 +25,38 @@ namespace {
 namespace fs = std::filesystem;
 
 struct InitArguments {
-  std::vector<std::string> where;  ///< PATH, or DATASET PATH
+  std::vector<std::string> where;  ///< PATH..., or DATASET PATH...
   std::string out = "manifest.json";
   bool has_out = false;  ///< --out was given
 };
 
-/// Of those that find_source knows: a camera's recordings are not looked for.
-DatasetKind read_dataset(const std::string& word) {
-  std::string words;
-  for (const Word<DatasetKind>& known : kDatasetWords) {
-    if (known.value == DatasetKind::kRecording || known.value == DatasetKind::kDhp19) {
-      if (known.word != word) continue;
-      throw UsageError("DATASET: expected labelled frames, got recorded events, " + word +
-                       " (manifests/guides/real_events.md has a manifest for them)");
+/// The first of several arguments, if it is the word of a dataset that find_source knows.
+std::optional<DatasetKind> dataset_word(const std::vector<std::string>& where) {
+  if (where.size() < 2) return std::nullopt;
+  const auto known = std::ranges::find(kDatasetWords, where.front(), &Word<DatasetKind>::word);
+  if (known == kDatasetWords.end()) return std::nullopt;
+  if (known->value != DatasetKind::kDhp19) return known->value;
+  throw UsageError(
+      "DATASET: expected one that init recognises, got dhp19 (manifests/guides/real_events.md has "
+      "a manifest for it)");
+}
+
+std::vector<FoundSource> find_sources(const std::vector<std::string>& where) {
+  const auto dataset = dataset_word(where);
+  std::vector<FoundSource> found;
+  for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
+    if (where[i].empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
+    if (i == 0 && where.size() > 1 && !fs::exists(where[i])) {  // it may have been meant as a word
+      std::vector<std::string_view> words;
+      for (const Word<DatasetKind>& known : kDatasetWords) {
+        if (known.value != DatasetKind::kDhp19) words.push_back(known.word);
+      }
+      throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
+                                   fmt::join(words, ", "), where[i]));
     }
-    if (known.word == word) return known.value;
-    words.append(words.empty() ? "" : ", ").append(known.word);
+    found.push_back(find_source(where[i], dataset));
   }
-  throw UsageError("DATASET: expected one of " + words + ", got " + word);
+  return found;
 }
 
 void refuse_to_overwrite(const InitArguments& arguments) {
@@ -50,21 +66,15 @@ void refuse_to_overwrite(const InitArguments& arguments) {
 }
 
 int run(const InitArguments& arguments) {
-  if (arguments.where.size() > 2) {
-    throw UsageError("expected PATH or DATASET PATH, got " +
-                     std::to_string(arguments.where.size()) + " arguments");
-  }
-  const fs::path path = arguments.where.back();
   const fs::path out = arguments.out;
-  if (path.empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
   if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
-  const auto dataset = arguments.where.size() == 2
-                           ? std::optional(read_dataset(arguments.where.front()))
-                           : std::nullopt;
-  const FoundSource found = find_source(path, dataset);
-  const fs::path folder = fs::absolute(out).lexically_normal().parent_path();
-  const ManifestDraft draft = draft_manifest(found, folder, path.is_relative());
+  const std::vector<FoundSource> found = find_sources(arguments.where);
+  const ManifestDraft draft = draft_manifest(
+      found, {fs::absolute(out).lexically_normal().parent_path(),
+              std::ranges::none_of(arguments.where,
+                                   [](const fs::path& path) { return path.is_absolute(); }),
+              "out/" + draft_name(found)});
   const bool is_new = create_file_atomically(out, [&](const TextSink& sink) { sink(draft.text); });
   if (!is_new) refuse_to_overwrite(arguments);
 
@@ -72,7 +82,7 @@ int run(const InitArguments& arguments) {
   for (const std::string& note : draft.notes)
     std::cout << "note: " << escape_controls(note) << "\n";
   std::cout << "manifest written to " << out.string() << "\n"
-            << (draft.has_pairs ? "next:  " : "no pairs can be made yet; once that is fixed:  ")
+            << (draft.has_samples ? "next:  " : "no samples can be made yet; once that is fixed:  ")
             << "eventgan plan " << out.string() << std::endl;
   return kComplete;
 }
@@ -80,15 +90,17 @@ int run(const InitArguments& arguments) {
 }  // namespace
 
 void add_init_command(CLI::App& app, int& exit_code) {
-  auto* command = app.add_subcommand("init", "Detect a dataset and write a manifest for it");
+  auto* command = app.add_subcommand("init", "Detect datasets and write one manifest for them");
   const auto arguments = std::make_shared<InitArguments>();
   command
       ->add_option("PATH", arguments->where,
-                   "The folder or video, optionally after the dataset that it should be: "
-                   "kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, human36m or frames")
+                   "Folders, videos and recordings, each a source of the one manifest; before them "
+                   "the dataset "
+                   "that they should be: kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, "
+                   "human36m, frames or recording (a folder of such a name is ./frames)")
       ->required()
       ->expected(-1)
-      ->option_text("[DATASET] PATH");
+      ->option_text("[DATASET] PATH...");
   auto* out = command->add_option("--out", arguments->out,
                                   "The manifest to write, a new file; default: manifest.json");
   out->option_text("FILE");

@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 
+#include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/runtime/errors.h"

@@ -54,9 +54,9 @@ std::optional<std::filesystem::path> JobOptions::output_folder() const {
   return *output;
 }
 
-void add_job_options(CLI::App& command, JobOptions& options, const std::string& manifest_text,
-                     const std::string& overwrite_text) {
-  command.add_option("MANIFEST", options.manifest, manifest_text)->required();
+void add_job_options(CLI::App& command, JobOptions& options, const std::string& what,
+                     const std::string& what_text, const std::string& overwrite_text) {
+  command.add_option(what, options.manifest, what_text)->required();
   command.add_option("--output", options.output, "Output folder; default: the manifest's");
   command.add_option("--threads", options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));

@@ -41,10 +41,10 @@ struct JobOptions {
   std::optional<std::filesystem::path> output_folder() const;
 };
 
-/// Adds MANIFEST, --output, --threads, --overwrite and --progress. `options` must outlive the
-/// parsing; the texts are the help of MANIFEST and --overwrite.
-void add_job_options(CLI::App& command, JobOptions& options, const std::string& manifest_text,
-                     const std::string& overwrite_text);
+/// Adds the manifest under the name `what`, --output, --threads, --overwrite and --progress.
+/// `options` must outlive the parsing; the texts are the help of the manifest and --overwrite.
+void add_job_options(CLI::App& command, JobOptions& options, const std::string& what,
+                     const std::string& what_text, const std::string& overwrite_text);
 
 /// Adds `--profile FILE` to a command; `file` must outlive its parsing.
 void add_profile_option(CLI::App& command, std::optional<std::string>& file);

@@ -6,9 +6,9 @@
 #include <optional>
 
 #include "manifests/documents/detail/json_text.h"
-#include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "pipeline/commands/commands.h"
+#include "pipeline/commands/given_job.h"
 #include "pipeline/commands/options.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/plan_summary.h"
@@ -44,28 +44,29 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
             << " samples in " << frozen.plan.shards.size() << " shards" << std::endl;
 }
 
-int freeze(const PlanArguments& arguments, const JobManifest& manifest, Plan plan) {
-  if (arguments.output && arguments.output->empty()) {  // a script's unset variable
-    throw UsageError("--output: expected a folder, got nothing");
-  }
-  const std::filesystem::path folder = arguments.output
-                                           ? std::filesystem::path(*arguments.output)
-                                           : resolve(manifest, manifest.output.directory);
+int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {
+  const std::filesystem::path& folder = given.output;
   std::filesystem::create_directories(folder);
-  const FrozenPlan frozen =
-      freeze_plan(folder, std::move(plan), show_phases(arguments.progress), manifest.directory);
-  record_manifest_folder(folder, manifest);
+  keep_manifest(given);
+  const FrozenPlan frozen = freeze_plan(folder, std::move(plan), show_phases(arguments.progress),
+                                        given.manifest.directory);
+  record_manifest_folder(folder, given.manifest);
   print_frozen(folder, frozen, arguments.json);
   return kComplete;
 }
 
 int run(const PlanArguments& arguments) {
-  const JobManifest manifest = read_job_manifest(arguments.manifest);
+  if (arguments.output && arguments.output->empty()) {  // a script's unset variable
+    throw UsageError("--output: expected a folder, got nothing");
+  }
+  const GivenJob given = read_given_job(arguments.manifest, arguments.output);
+  const JobManifest& manifest = given.manifest;
   const LoadedGenerator loaded = load_generator(manifest);
   PlannedJob job = make_plan(manifest, loaded.weights_hash, loaded.generator->description(),
                              {.show_phase = show_phases(arguments.progress)});
+  for (const std::string& line : given.findings) tell(line);
   for (const std::string& warning : job.warnings) tell_warning(warning);
-  if (arguments.freeze) return freeze(arguments, manifest, std::move(job.plan));
+  if (arguments.freeze) return freeze(arguments, given, std::move(job.plan));
   const int threads = thread_count(arguments.threads);
   const bool as_json = arguments.json || arguments.progress == ProgressStyle::kJson;
   const TrialEstimate estimate = measure_trial(manifest, job, *loaded.generator, threads);
@@ -82,7 +83,7 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "Show what convert would do\nPrints pairs, missing frames, shards, size "
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
-  command->add_option("MANIFEST", arguments->manifest, "The manifest of the job")->required();
+  command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
   command
       ->add_option("--threads", arguments->threads,
                    "Number of threads to estimate for; default: all cores")

@@ -11,6 +11,7 @@
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/options.h"
@@ -40,12 +41,13 @@ const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::k
 
 /// As told, else by what is there.
 RecordingFormat format_of(const RealismArguments& arguments, const std::string& recording) {
-  for (const RecordingFormat format :
-       {RecordingFormat::kMvsec, RecordingFormat::kEventgan, RecordingFormat::kEcd}) {
-    if (arguments.format == to_string(format)) return format;
+  for (const auto& [word, format] : kRecordingFormatWords) {
+    if (arguments.format == word) return format;
   }
   const bool is_folder = std::filesystem::is_directory(recording);
-  return find_recording_format(recording, arguments.camera)
+  RecordingOptions options;
+  options.camera = arguments.camera;
+  return find_recording_format(recording, options)
       .value_or(is_folder ? RecordingFormat::kEcd : RecordingFormat::kMvsec);
 }
 
@@ -89,7 +91,7 @@ std::vector<RecordingSpec> wanted_parts(const RealismArguments& arguments) {
     RecordingSpec& part = parts.emplace_back();
     part.path = argument;
     part.format = format_of(arguments, argument);
-    part.camera = arguments.camera;
+    part.options.camera = arguments.camera;
     if (!arguments.frames.empty()) read_frame_range(arguments.frames, part);
   }
   return parts;
@@ -118,7 +120,7 @@ int run_realism(const RealismArguments& arguments) {
     if (parts.size() > 1 && !arguments.out.empty()) {
       options.images /= std::filesystem::path(part.path).stem();
     }
-    const auto recording = open_recording(part.path, part.format, part.camera);
+    const auto recording = open_recording(part.path, part.format, part.options);
     if (parts.size() > 1 && is_too_short(part, *recording, options.gaps)) {
       tell_note("skipped, since it has too few frames for --gaps: " + recording->name());
       continue;
@@ -141,8 +143,10 @@ void add_choices(CLI::App& command, RealismArguments& arguments) {
                   "Recordings of events and frames; a training manifest (*.json) stands for its "
                   "validation recordings")
       ->required();
-  command.add_option("--format", arguments.format, "mvsec, eventgan or ecd; default: detected")
-      ->check(CLI::IsMember({"mvsec", "eventgan", "ecd"}));
+  command
+      .add_option("--format", arguments.format,
+                  "mvsec, eventgan, ecd, aedat4 or dsec; default: detected")
+      ->check(CLI::IsMember({"mvsec", "eventgan", "ecd", "aedat4", "dsec"}));
   command.add_option("--camera", arguments.camera, "For mvsec: left (default) or right")
       ->check(CLI::IsMember({"left", "right"}));
   command.add_option("--frames", arguments.frames, "Range of frames, FIRST:LAST; default: all");

@@ -32,7 +32,7 @@ void add_simulate_command(CLI::App& app, int& exit_code) {
                                      "Simulate event recordings of videos and images\nUses a model "
                                      "of the sensor (manifests/guides/simulation.md).");
   const auto arguments = std::make_shared<JobOptions>();
-  add_job_options(*command, *arguments,
+  add_job_options(*command, *arguments, "MANIFEST",
                   "The manifest of the job (example: manifests/examples/simulate.json)",
                   "Make existing recordings again");
   command->callback([arguments, &exit_code] { exit_code = run_simulation(*arguments); });

@@ -135,6 +135,9 @@ int run(TradeoffArguments& arguments) {
     options.real.push_back(open_recording(
         real, find_recording_format(real).value_or(is_folder ? RecordingFormat::kEcd
                                                              : RecordingFormat::kMvsec)));
+    if (options.real.back()->frame_count() == 0) {
+      throw InputError("expected a recording with frames, got one without, in " + real);
+    }
   }
   options.stop_requested = [&] { return signal.requested(); };
   if (arguments.progress != ProgressStyle::kNone) options.tell = tell_note;

@@ -48,7 +48,7 @@ void add_train_command(CLI::App& app, int& exit_code) {
       "Train a generator on recorded events\nSee manifests/guides/training.md. "
       "SIGINT, SIGTERM or SIGUSR1 save the state and stop; run the same command again to resume.");
   const auto arguments = std::make_shared<TrainArguments>();
-  add_job_options(*command, arguments->job,
+  add_job_options(*command, arguments->job, "MANIFEST",
                   "The manifest of the training (example: manifests/examples/train.json)",
                   "Discard the results of earlier runs of the same training");
   command->add_option("--device", arguments->device, "cpu (default) or cuda")

@@ -141,7 +141,10 @@ std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
     text += fmt::format("  labelled frames  {}\n", summary.labelled_frames);
     text += fmt::format("  pairs            {}{}\n", pairs_of(summary),
                         by_gap_text(summary.pairs_by_gap));
-    text += unpaired_text(spec, summary, unpaired);
+    if (spec.pairs.stills) {
+      text += fmt::format("  stills under a drawn motion: {}\n", pairs_of(summary));
+    }
+    if (!spec.pairs.stills || summary.unpaired > 0) text += unpaired_text(spec, summary, unpaired);
   }
   if (summary.faults > 0) {
     text += fmt::format(
@@ -195,6 +198,7 @@ std::string plan_summary_json(const JobManifest& manifest, const PlannedJob& job
                        {"split", manifest.sources[i].split},
                        {"labelled_frames", summary.labelled_frames},
                        {"pairs", pairs_of(summary)},
+                       {"stills", manifest.sources[i].pairs.stills ? pairs_of(summary) : 0},
                        {"pairs_by_gap", by_gap_json(summary.pairs_by_gap)},
                        {"without_partner", summary.unpaired},
                        {"without_partner_by_gap", by_gap_json(job.unpaired_by_gap[i])},

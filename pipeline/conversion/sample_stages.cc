@@ -10,6 +10,7 @@
 #include "pipeline/runtime/threads.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/generator/wanted_tiles.h"
 #include "stages/labels/label_mapping.h"
 
@@ -100,7 +101,10 @@ void SampleStages::read_frames(SampleMessage& message) const {
        i <= slot + in_flight_ && i < samples.size(); ++i) {
     reader_.expect(samples[i].pair);
   }
-  Outcome<PreparedPair> prepared = reader_.read(message.planned().pair);
+  const auto source = static_cast<std::size_t>(message.shard->source);
+  Outcome<PreparedPair> prepared =
+      reader_.read(message.planned().pair, orientation_of(manifest_.sources[source].dataset),
+                   manifest_.sources[source].every);
   if (is_fault(prepared)) {
     message.fail(std::get<SampleFault>(prepared).reason);
   } else {

@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <numeric>
+#include <stdexcept>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -135,6 +136,9 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     return {"expected the frames of the plan, " + pair.previous.path + " and " + pair.next.path +
             ", got " + stored.pair.previous.path + " and " + stored.pair.next.path};
   }
+  if (stored.pair.motion != pair.motion) {
+    return {"expected the motion of the plan, got another"};
+  }
   const std::string place = dataset.label_place(planned.label_key);
   Outcome<Annotation> read = read_annotation(dataset, planned.label_key);
   if (!stored.valid) {
@@ -151,7 +155,7 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   const std::optional<ImageSize> size = has_events(kind)
                                             ? std::optional(dataset.sensor_size(planned.label_key))
-                                            : image_size(stored.pair.next.path);
+                                            : image_size(stored.pair.next.path, kind);
   if (size && *size != stored.source_size) {
     return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
             ", got " + to_string(stored.source_size)};
@@ -159,7 +163,12 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   if (stored.source_size.height <= 0 || stored.source_size.width <= 0) {
     return {"expected a source size, got " + to_string(stored.source_size)};
   }
-  const Placement placement = eventgan::place(stored.source_size, manifest_.image);
+  Placement placement;
+  try {
+    placement = eventgan::place(stored.source_size, manifest_.image, stored.pair);
+  } catch (const std::invalid_argument& error) {  // of a still
+    return {error.what()};
+  }
   const std::array<double, 6> map = placement.source_to_volume();
   if (placement.volume != reader.header().volume.size ||
       !std::ranges::equal(map, stored.source_to_volume,
@@ -196,10 +205,12 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   return row_differences(header, reader.tables(), slot, expected, place);
 }
 
-std::optional<ImageSize> SourceComparison::image_size(const std::string& path) {
-  const auto [entry, is_new] = sizes_.try_emplace(path);
+std::optional<ImageSize> SourceComparison::image_size(const std::string& path,
+                                                      DatasetKind dataset) {
+  const ImageOrientation orientation = orientation_of(dataset);
+  const auto [entry, is_new] = sizes_.try_emplace({path, orientation});
   if (is_new) {
-    const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path));
+    const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path), orientation);
     if (!is_fault(found)) entry->second = std::get<ImageSize>(found);
   }
   return entry->second;

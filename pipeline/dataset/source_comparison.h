@@ -4,12 +4,14 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "manifests/documents/plan.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/shard.h"
+#include "stages/base/images/image_file.h"
 #include "stages/frames/dataset.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
@@ -44,12 +46,13 @@ class SourceComparison {
  private:
   std::vector<std::string> sample_faults(const PlannedShard& shard, int slot,
                                          const ShardSample& stored, const ShardReader& reader);
-  std::optional<ImageSize> image_size(const std::string& path);
+  std::optional<ImageSize> image_size(const std::string& path, DatasetKind dataset);
 
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
   std::vector<std::string> notes_;
-  std::map<std::string, std::optional<ImageSize>> sizes_;  // by path; a video serves many samples
+  /// By path; a video serves many samples.
+  std::map<std::pair<std::string, ImageOrientation>, std::optional<ImageSize>> sizes_;
   long long compared_ = 0;
 };
 

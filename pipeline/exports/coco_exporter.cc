@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <map>
+#include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "pipeline/exports/detail/exporter.h"
@@ -51,37 +54,112 @@ class CocoFile {
   bool is_first_list_ = true;
 };
 
-/// The person's box: as annotated, else around its chosen joints and its head; cut to the volume.
-std::optional<Rectangle> box_of(const VolumePerson& person, const JointChoice& choice,
-                                ImageSize volume) {
-  constexpr double kFar = std::numeric_limits<double>::infinity();
-  Rectangle box{kFar, kFar, -kFar, -kFar};
-  const auto include = [&](const Rectangle& part) {
-    box = {std::min(box.left, part.left), std::min(box.top, part.top),
-           std::max(box.right, part.right), std::max(box.bottom, part.bottom)};
-  };
-  if (person.box) {
-    box = *person.box;
-  } else {
-    constexpr double kHalf = 0.5;  // a joint is a pixel's centre, a box has edges
-    for (const std::size_t i : choice.indices) {
-      const Point joint = person.joints.at(i);
-      if (joint != kMissingPoint) {
-        include({joint.x + kHalf, joint.y + kHalf, joint.x + kHalf, joint.y + kHalf});
+/// What COCO's labels call an image and its annotations, which are a sample's boxes in their order.
+struct OriginalIds {
+  std::int64_t image = 0;
+  std::vector<std::int64_t> annotations, categories;
+  std::vector<std::int64_t> persons;  ///< of the annotations that are persons as well
+};
+
+/// None if the sample's labels are not COCO's, or some have no ids.
+std::optional<OriginalIds> original_ids(const ExportSource& source, const Annotation& annotation) {
+  if (!source.has_coco_labels) return std::nullopt;
+  const nlohmann::json entry = nlohmann::json::parse(annotation.original, nullptr, false);
+  try {
+    OriginalIds ids;
+    ids.image = entry.at("image").at("id").get<std::int64_t>();
+    for (const nlohmann::json& object : entry.at("annotations")) {
+      ids.annotations.push_back(object.at("id").get<std::int64_t>());
+      ids.categories.push_back(object.at("category_id").get<std::int64_t>());
+      const nlohmann::json joints = object.value("keypoints", nlohmann::json::array());
+      bool is_person = false;
+      for (std::size_t i = 2; i < joints.size(); i += 3) is_person = is_person || joints[i] > 0;
+      if (is_person) ids.persons.push_back(ids.annotations.back());
+    }
+    if (ids.annotations.size() != annotation.boxes.size() ||
+        ids.persons.size() != annotation.persons.size()) {
+      return std::nullopt;
+    }
+    return ids;
+  } catch (const nlohmann::json::exception&) {
+    return std::nullopt;
+  }
+}
+
+/// Where the ids of COCO's labels can be kept.
+class KeptIds {
+ public:
+  /// Reads the labels of all sources that have COCO's.
+  explicit KeptIds(const ExportInput& input) {
+    for (const ExportShard& shard : input.shards()) {
+      const ExportSource& source = input.source_of(shard);
+      Split& split = splits_[source.split];
+      if (!source.has_coco_labels) {
+        split.is_kept = false;
+        continue;
+      }
+      const ShardReader reader = input.open(shard);
+      for (int slot = 0; slot < reader.header().sample_count; ++slot) {
+        const ShardSample sample = reader.sample(slot);
+        if (sample.valid) add(source, sample.annotation, split);
       }
     }
-    if (person.head_box) include(*person.head_box);
+    for (auto& [name, split] : splits_) split.images = split.annotations = {};
   }
-  if (box.left > box.right) return std::nullopt;
-  const Rectangle cut = clip(box, volume);
-  return is_empty(cut) ? std::nullopt : std::optional(cut);
-}
+
+  /// Whether a split's samples and annotations keep their ids: all have one, each another.
+  bool in(const std::string& split) const { return splits_.at(split).is_kept; }
+
+  /// The classes' numbers, of those that some annotation is of; empty if two do not agree.
+  std::map<std::string, int> categories() const {
+    std::set<int> numbers;
+    for (const auto& [name, number] : categories_) numbers.insert(number);
+    return agree_ && numbers.size() == categories_.size() ? categories_
+                                                          : std::map<std::string, int>();
+  }
+
+ private:
+  struct Split {
+    bool is_kept = true;
+    std::set<std::int64_t> images, annotations;
+  };
+
+  void add(const ExportSource& source, const Annotation& annotation, Split& split) {
+    const auto ids = original_ids(source, annotation);
+    if (!ids) {
+      agree_ = split.is_kept = false;
+      return;
+    }
+    split.is_kept = split.is_kept && split.images.insert(ids->image).second;
+    for (std::size_t i = 0; i < annotation.boxes.size(); ++i) {
+      split.is_kept = split.is_kept && split.annotations.insert(ids->annotations[i]).second;
+      const std::int64_t category = ids->categories[i];
+      if (category < 0 || category > std::numeric_limits<int>::max()) {
+        agree_ = false;
+        continue;
+      }
+      const auto number = static_cast<int>(category);
+      const std::string& name =
+          source.class_names.at(static_cast<std::size_t>(annotation.boxes[i].class_id));
+      if (name == kDontCare) split.is_kept = false;  // a box of it is one of each category
+      agree_ = agree_ && categories_.emplace(name, number).first->second == number;
+    }
+  }
+
+  std::map<std::string, Split> splits_;
+  std::map<std::string, int> categories_;
+  bool agree_ = true;
+};
 
 /// instances_SPLIT.json, person_keypoints_SPLIT.json, volumes/SPLIT/NAME.npy.
 class CocoExporter : public Exporter {
  public:
   CocoExporter(const ExportInput& input, const ExportOptions& options)
-      : numbers_(input, options, 1), keep_ignored_(options.keep_ignored.value_or(true)) {}
+      : numbers_(input, options, 1), keep_ignored_(options.keep_ignored.value_or(true)) {
+    if (options.classes) return;
+    kept_ids_.emplace(input);
+    numbers_.renumber(kept_ids_->categories(), 1);
+  }
 
   std::string settings() const override {
     return fmt::format("classes {}\nignored {}\n", numbers_.text(),
@@ -125,7 +203,7 @@ class CocoExporter : public Exporter {
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
     for (const VolumePerson& person : sample.labels.labels.persons) {
-      if (!box_of(person, choice, header.volume.size)) {
+      if (!person_box(person, choice, header.volume.size)) {
         ++left_out["persons of whom nothing is left in the volume"];
       }
     }
@@ -141,11 +219,27 @@ class CocoExporter : public Exporter {
     return persons ? source.has_joints() : source.has_boxes();
   }
 
-  void add_boxes(const OutgoingSample& sample, std::int64_t image_id, std::int64_t& id,
+  /// Of a sample, if its split keeps them.
+  std::optional<OriginalIds> ids_of(const OutgoingSample& sample) const {
+    if (!kept_ids_ || !kept_ids_->in(sample.source.split)) return std::nullopt;
+    return original_ids(sample.source, sample.labels.annotation);
+  }
+
+  /// `place`: of the sample in its split.
+  std::int64_t image_id(const OutgoingSample& sample, std::int64_t place) const {
+    const auto ids = ids_of(sample);
+    return ids ? ids->image : place;
+  }
+
+  void add_boxes(const OutgoingSample& sample, std::int64_t place, std::int64_t& id,
                  CocoFile& file) const {
+    const auto ids = ids_of(sample);
+    const std::int64_t image = ids ? ids->image : place;
     const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
       const auto add = [&](int category) {
-        file.add(coco_box({++id, image_id, category}, box.clipped, box.ignore));
+        const auto index = static_cast<std::size_t>(&box - sample.labels.labels.boxes.data());
+        const std::int64_t own = ids ? ids->annotations[index] : ++id;
+        file.add(coco_box({own, image, category}, box.clipped, box.ignore));
       };
       if (entry.fate == ClassNumbers::Fate::kKept) {
         add(entry.number);
@@ -183,25 +277,25 @@ class CocoExporter : public Exporter {
     if (step.is_done()) return;
     const Skeletons skeletons = persons ? skeletons_of(work.input) : Skeletons();
     CocoFile file(step.file(name));
-    // An image's number is its place in the split, in both of the split's files.
-    std::int64_t image_id = 0;
+    // Unless it keeps its own, an image's number is its place in the split, in both of its files.
+    std::int64_t place = 0;
     file.begin_list("images");
     work.walk(shards, [&](const OutgoingSample& sample) {
-      ++image_id;
+      ++place;
       if (!is_for(sample.shard, work, persons)) return;
-      file.add(coco_image(image_id, volume_name(sample), sample.reader.header().volume.size,
-                          sample.labels.sample_id));
+      file.add(coco_image(image_id(sample, place), volume_name(sample),
+                          sample.reader.header().volume.size, sample.labels.sample_id));
     });
     file.begin_list("annotations");
-    image_id = 0;
+    place = 0;
     std::int64_t id = 0;
     work.walk(shards, [&](const OutgoingSample& sample) {
-      ++image_id;
+      ++place;
       if (!is_for(sample.shard, work, persons)) return;
       if (persons) {
-        add_persons(sample, image_id, id, skeletons, file);
+        add_persons(sample, place, id, skeletons, file);
       } else {
-        add_boxes(sample, image_id, id, file);
+        add_boxes(sample, place, id, file);
       }
     });
     file.begin_list("categories");
@@ -222,25 +316,25 @@ class CocoExporter : public Exporter {
     step.finish();
   }
 
-  static void add_persons(const OutgoingSample& sample, std::int64_t image_id, std::int64_t& id,
-                          const Skeletons& skeletons, CocoFile& file) {
+  void add_persons(const OutgoingSample& sample, std::int64_t place, std::int64_t& id,
+                   const Skeletons& skeletons, CocoFile& file) const {
+    const auto ids = ids_of(sample);
     const ShardHeader& header = sample.reader.header();
     const JointChoice choice = choose_joints(header.label_schema);
     const auto known = std::ranges::find(skeletons, choice.names) - skeletons.begin();
     const ShardSample& labels = sample.labels;
     for (std::size_t p = 0; p < labels.labels.persons.size(); ++p) {
       const VolumePerson& person = labels.labels.persons[p];
-      const auto box = box_of(person, choice, header.volume.size);
+      const auto box = person_box(person, choice, header.volume.size);
       if (!box) continue;
-      std::vector<ExportedJoint> joints;
-      for (const std::size_t i : choice.indices) {
-        joints.push_back({person.joints.at(i), labels.annotation.persons[p].joints.at(i).visible});
-      }
-      file.add(coco_person({++id, image_id, static_cast<int>(known) + 1}, *box, joints));
+      const std::int64_t own = ids ? ids->persons[p] : ++id;
+      file.add(coco_person({own, ids ? ids->image : place, static_cast<int>(known) + 1}, *box,
+                           exported_joints(labels, p, choice)));
     }
   }
 
   ClassNumbers numbers_;
+  std::optional<KeptIds> kept_ids_;  ///< none where the user numbers the classes
   bool keep_ignored_;
 };
 

@@ -10,8 +10,8 @@
 #include "pipeline/exports/detail/exporter.h"
 #include "stages/base/archives/numpy_arrays.h"
 #include "stages/exports/array_files.h"
-#include "stages/exports/davis_file.h"
 #include "stages/exports/pose_list.h"
+#include "stages/exports/volume_file.h"
 #include "stages/shards/codec/quantization.h"
 
 namespace eventgan {
@@ -171,7 +171,8 @@ class DavisExporter : public Exporter {
   void write_set(const ExportWork& work, const ExportSet& set, ExportFolder::Step& step) const {
     const Layout layout = lay_out(work, set);
     const VolumeShape shape = work.input.open(*set.shards[0]).header().volume;
-    DavisFile file(step.file(set.name + ".hdf5"), layout.row_count, shape, stored_size(dtype_));
+    VolumeFile file(step.file(set.name + ".hdf5"), VolumeLayout::kDavis, layout.row_count, shape,
+                    stored_size(dtype_));
     work.walk(set.shards, [&](const OutgoingSample& sample) {
       const auto rows = layout.rows_of.find({sample.shard.outline.name, sample.slot});
       if (rows == layout.rows_of.end()) return;

@@ -27,11 +27,21 @@ constexpr char kBegun[] = ".begun";
 
 /// Whether an export has files of this name: the exporters say which.
 bool is_export_name(std::string_view name) {
-  static constexpr std::array<std::string_view, 5> kFolders{"annot", "events", "images", "labels",
-                                                            "volumes"};
-  static constexpr std::array<std::string_view, 9> kEndings{
-      ".hdf5", ".json", ".mat", ".npy", ".npz", ".png", ".tar", ".txt", ".yaml"};
-  constexpr std::size_t kMostParts = 3;
+  struct Folder {
+    std::string_view name;
+    std::size_t most_parts;  ///< of a file's name, the folder counted
+  };
+  static constexpr std::array<Folder, 9> kFolders{{{"annot", 2},
+                                                   {"dsec", 6},
+                                                   {"events", 3},
+                                                   {"images", 3},
+                                                   {"labels", 3},
+                                                   {"pose", 4},
+                                                   {"preprocessed", 6},
+                                                   {"raw", 3},
+                                                   {"volumes", 3}}};
+  static constexpr std::array<std::string_view, 10> kEndings{
+      ".h5", ".hdf5", ".json", ".mat", ".npy", ".npz", ".png", ".tar", ".txt", ".yaml"};
   const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
   if (!std::ranges::all_of(name, is_plain)) return false;
   std::vector<std::string_view> parts;
@@ -40,8 +50,13 @@ bool is_export_name(std::string_view name) {
     parts.push_back(name.substr(begin, end == name.npos ? end : end - begin));
     if (parts.back().empty() || parts.back().starts_with('.')) return false;
   }
-  if (parts.size() > kMostParts) return false;
-  if (parts.size() > 1 && std::ranges::find(kFolders, parts[0]) == kFolders.end()) return false;
+  if (name == kCard) return true;
+  if (parts.size() > 1) {
+    // There may be several of a kind: "pose-2".
+    const std::string_view kind = parts[0].substr(0, parts[0].find('-'));
+    const auto folder = std::ranges::find(kFolders, kind, &Folder::name);
+    if (folder == kFolders.end() || parts.size() > folder->most_parts) return false;
+  }
   return std::ranges::any_of(kEndings,
                              [&](std::string_view ending) { return name.ends_with(ending); });
 }

@@ -94,6 +94,7 @@ void ExportInput::read_description(const std::vector<std::string>& splits) {
     ExportSource& known = sources_.emplace_back();
     known.dataset = to_string(spec.dataset);
     known.split = spec.split;
+    known.has_coco_labels = spec.labels && spec.labels->format == LabelFormat::kCoco;
     const auto& source = json.at("sources").at(sources_.size() - 1);
     if (source.at("dataset") != known.dataset || source.at("split") != known.split) {
       throw InputError(fmt::format(

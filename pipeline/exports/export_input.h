@@ -21,8 +21,9 @@ struct ExportSource {
   /// then DATASET and '+', from the second of one kind on DATASET-2 and '+'.
   std::string name_prefix;
   std::vector<std::string> class_names,
-      joint_names;        ///< empty as long as none of its shards is done
-  std::string any_shard;  ///< file name of one that is done; empty if none is
+      joint_names;               ///< empty as long as none of its shards is done
+  std::string any_shard;         ///< file name of one that is done; empty if none is
+  bool has_coco_labels = false;  ///< so that annotations' originals have COCO's ids
 
   bool has_boxes() const { return !class_names.empty(); }
   bool has_joints() const { return !joint_names.empty(); }

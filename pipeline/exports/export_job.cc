@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <utility>
@@ -86,6 +87,41 @@ void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut
   if (largest > full_scale) ++left_out["samples' values above the full scale (cut to it)"];
 }
 
+std::optional<Rectangle> person_box(const VolumePerson& person, const JointChoice& choice,
+                                    ImageSize volume) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
+  Rectangle box{kFar, kFar, -kFar, -kFar};
+  const auto include = [&](const Rectangle& part) {
+    box = {std::min(box.left, part.left), std::min(box.top, part.top),
+           std::max(box.right, part.right), std::max(box.bottom, part.bottom)};
+  };
+  if (person.box) {
+    box = *person.box;
+  } else {
+    constexpr double kHalf = 0.5;  // a joint is a pixel's centre, a box has edges
+    for (const std::size_t i : choice.indices) {
+      const Point joint = person.joints.at(i);
+      if (joint != kMissingPoint) {
+        include({joint.x + kHalf, joint.y + kHalf, joint.x + kHalf, joint.y + kHalf});
+      }
+    }
+    if (person.head_box) include(*person.head_box);
+  }
+  if (box.left > box.right) return std::nullopt;
+  const Rectangle cut = clip(box, volume);
+  return is_empty(cut) ? std::nullopt : std::optional(cut);
+}
+
+std::vector<ExportedJoint> exported_joints(const ShardSample& sample, std::size_t person,
+                                           const JointChoice& choice) {
+  std::vector<ExportedJoint> joints;
+  for (const std::size_t i : choice.indices) {
+    joints.push_back({sample.labels.persons.at(person).joints.at(i),
+                      sample.annotation.persons.at(person).joints.at(i).visible});
+  }
+  return joints;
+}
+
 ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& options, int first) {
   std::vector<std::string> known;
   for (const ExportSource& source : input.sources()) {
@@ -135,6 +171,20 @@ ClassNumbers::ClassNumbers(const ExportInput& input, const ExportOptions& option
     throw UsageError(file + ": expected a number for at least one class, got none");
 }
 
+void ClassNumbers::renumber(const std::map<std::string, int>& given, int first) {
+  std::map<int, std::string> names;
+  for (const auto& [name, number] : given) {
+    if (entries_.contains(name)) names[number] = name;
+  }
+  for (const auto& [old, name] : names_) {  // in their order
+    if (given.contains(name)) continue;
+    while (names.contains(first)) ++first;
+    names[first] = name;
+  }
+  names_ = std::move(names);
+  for (const auto& [number, name] : names_) entries_[name] = {Fate::kKept, number};
+}
+
 ClassNumbers::Entry ClassNumbers::of(const std::string& name) const {
   const auto entry = entries_.find(name);
   return entry == entries_.end() ? Entry{} : entry->second;
@@ -162,6 +212,10 @@ const char* word_of(ExportFormat format) {
       return "davis";
     case ExportFormat::kWebdataset:
       return "webdataset";
+    case ExportFormat::kDsec:
+      return "dsec";
+    case ExportFormat::kRvt:
+      return "rvt";
     case ExportFormat::kEvents:
       break;
   }
@@ -180,6 +234,10 @@ std::unique_ptr<Exporter> make_exporter(const ExportInput& input, const ExportOp
       return davis_exporter(options);
     case ExportFormat::kWebdataset:
       return webdataset_exporter();
+    case ExportFormat::kDsec:
+      return dsec_exporter(input, options);
+    case ExportFormat::kRvt:
+      return rvt_exporter(input, options);
     case ExportFormat::kEvents:
       break;
   }
@@ -232,6 +290,7 @@ class Description {
                                                   {"reason", sample.reason}});
       }
     }
+    for (const auto& [what, count] : exporter_.whole_samples_left_out()) left_out_[what] += count;
     lines += "],\n\"left_out\": " + dump_json(nlohmann::ordered_json(left_out_)) + "}\n";
     file.write(lines);
     file.publish();

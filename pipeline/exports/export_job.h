@@ -16,7 +16,7 @@
 namespace eventgan {
 
 /// What an export is made for; manifests/guides/exports.md says what each consists of.
-enum class ExportFormat { kYolo, kCoco, kMpii, kDavis, kWebdataset, kEvents };
+enum class ExportFormat { kYolo, kCoco, kMpii, kDavis, kWebdataset, kEvents, kDsec, kRvt };
 
 enum class EventFile { kText, kMvsec };
 
@@ -25,14 +25,14 @@ struct ExportOptions {
   std::filesystem::path out;
   std::vector<std::string> splits;  ///< none: all
   std::optional<std::filesystem::path>
-      classes;  ///< kYolo, kCoco: JSON, class name → number or null
+      classes;  ///< kYolo, kCoco, kDsec, kRvt: JSON, class name → number or null
   /// kYolo, kCoco: whether boxes to ignore are kept; unset: kCoco keeps them, kYolo does not.
   std::optional<bool> keep_ignored;
   double full_scale = 1;                       ///< kYolo, kMpii: the value that becomes 255, > 0
   StoredType dtype = StoredType::kFloat16;     ///< kDavis: or kFloat32
-  EventCounts counts = EventCounts::kPoisson;  ///< kEvents
+  EventCounts counts = EventCounts::kPoisson;  ///< kEvents, kDsec, kRvt
   EventFile event_file = EventFile::kText;     ///< kEvents
-  std::uint64_t seed = 0;                      ///< kEvents
+  std::uint64_t seed = 0;                      ///< kEvents, kDsec, kRvt
   bool overwrite = false;
   int threads = 0;  ///< 0: all cores; changes no byte
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;  ///< none: silent

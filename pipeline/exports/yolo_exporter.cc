@@ -1,4 +1,9 @@
-#include <fmt/core.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <string>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "pipeline/exports/detail/exporter.h"
@@ -7,7 +12,8 @@
 namespace eventgan {
 namespace {
 
-/// images/SPLIT/NAME.{png,npy}, labels/SPLIT/NAME.txt, SPLIT.txt, data.yaml.
+/// images/SPLIT/NAME.{png,npy}, labels/SPLIT/NAME.txt, SPLIT.txt, data.yaml; of persons the same
+/// below pose.
 class YoloExporter : public Exporter {
  public:
   YoloExporter(const ExportInput& input, const ExportOptions& options)
@@ -29,42 +35,49 @@ class YoloExporter : public Exporter {
       names_.push_back(name);
     }
     if (keep_ignored_) names_.push_back("ignored");
+    for (const ExportSource& source : input.sources()) {
+      if (!source.has_joints()) continue;
+      pose_text_ +=
+          fmt::format("{} {}\n", pose_folder(input, source), fmt::join(source.joint_names, ","));
+    }
   }
 
   std::string settings() const override {
-    return fmt::format("classes {}\nignored {}\nfull scale {}\n", numbers_.text(),
-                       keep_ignored_ ? "keep" : "drop", full_scale_);
+    return fmt::format("classes {}\nignored {}\nfull scale {}\n{}", numbers_.text(),
+                       keep_ignored_ ? "keep" : "drop", full_scale_, pose_text_);
   }
 
-  bool takes(const ExportSource& source) const override { return source.has_boxes(); }
+  bool takes(const ExportSource& source) const override {
+    return source.has_boxes() || source.has_joints();
+  }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
+    const ExportSource& source = work.input.source_of(shard);
+    const std::string pose = pose_folder(work.input, source);
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
-      write_image_pair(sample, "images/" + sample.source.split, full_scale_, step);
-      step.write("labels/" + sample.source.split + "/" + sample.name + ".txt", labels_of(sample));
+      const std::string below = source.split + "/" + sample.name + ".txt";
+      if (source.has_boxes()) {
+        write_image_pair(sample, "images/" + source.split, full_scale_, step);
+        step.write("labels/" + below, labels_of(sample));
+      }
+      if (source.has_joints()) {
+        write_image_pair(sample, pose + "images/" + source.split, full_scale_, step);
+        step.write(pose + "labels/" + below, poses_of(sample));
+      }
     });
   }
 
   void finish(const ExportWork& work,
               const std::vector<const ExportShard*>& shards) const override {
-    ExportFolder::Step step(work.folder, "data.yaml", input_hash(shards));
-    if (step.is_done()) return;
-    std::vector<std::string> splits;
-    int channels = 0;
-    for (const std::string& split : work.input.splits()) {
-      const auto of_it = of_split(work.input, shards, split);
-      if (of_it.empty()) continue;
-      splits.push_back(split);
-      std::string list;
-      work.walk(of_it, [&](const OutgoingSample& sample) {
-        list += "./images/" + split + "/" + sample.name + ".png\n";
-        channels = sample.reader.header().volume.channels();
-      });
-      step.write(split + ".txt", list);
+    // By the folder of a data.yaml, those with boxes at the top.
+    std::map<std::string, std::vector<const ExportShard*>> of_folder;
+    for (const ExportShard* shard : shards) {
+      const ExportSource& source = work.input.source_of(*shard);
+      if (source.has_boxes()) of_folder[""].push_back(shard);
+      if (source.has_joints()) of_folder[pose_folder(work.input, source)].push_back(shard);
     }
-    step.write("data.yaml", yolo_data_yaml(names_, channels, splits));
-    step.finish();
+    for (const auto& [folder, of_it] : of_folder) write_lists(work, folder, of_it);
   }
 
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
@@ -72,6 +85,20 @@ class YoloExporter : public Exporter {
     for_each_box(
         sample, numbers_, keep_ignored_, [](const auto&, const auto&) {},
         [&](const std::string& why) { ++left_out[why]; });
+    const ShardHeader& header = sample.reader.header();
+    const JointChoice choice = choose_joints(header.label_schema);
+    const std::vector<VolumePerson>& persons = sample.labels.labels.persons;
+    for (std::size_t i = 0; i < persons.size(); ++i) {
+      if (!person_box(persons[i], choice, header.volume.size)) {
+        ++left_out["persons of whom nothing is left in the volume"];
+        continue;
+      }
+      for (const ExportedJoint& joint : exported_joints(sample.labels, i, choice)) {
+        if (joint.at != kMissingPoint && !is_within(joint, header.volume.size)) {
+          ++left_out["joints outside the volume (as not annotated)"];
+        }
+      }
+    }
   }
 
  private:
@@ -86,9 +113,66 @@ class YoloExporter : public Exporter {
     return text;
   }
 
+  /// Persons are a dataset by themselves, for each list of joints: all lines of one have the same
+  /// length. "pose/", "pose-2/" ..., in the order of the sources.
+  static std::string pose_folder(const ExportInput& input, const ExportSource& source) {
+    std::vector<const std::vector<std::string>*> lists;
+    for (const ExportSource& known : input.sources()) {
+      const auto is_same = [&](const auto* list) { return *list == known.joint_names; };
+      if (known.has_joints() && std::ranges::none_of(lists, is_same)) {
+        lists.push_back(&known.joint_names);
+      }
+      if (known.joint_names == source.joint_names) break;
+    }
+    return lists.size() > 1 ? fmt::format("pose-{}/", lists.size()) : "pose/";
+  }
+
+  std::string poses_of(const OutgoingSample& sample) const {
+    const ShardHeader& header = sample.reader.header();
+    const JointChoice choice = choose_joints(header.label_schema);
+    std::string text;
+    for (std::size_t i = 0; i < sample.labels.labels.persons.size(); ++i) {
+      const auto box = person_box(sample.labels.labels.persons[i], choice, header.volume.size);
+      if (!box) continue;
+      text +=
+          yolo_pose_line(0, *box, exported_joints(sample.labels, i, choice), header.volume.size) +
+          "\n";
+    }
+    return text;
+  }
+
+  /// SPLIT.txt of each split, and data.yaml.
+  void write_lists(const ExportWork& work, const std::string& folder,
+                   const std::vector<const ExportShard*>& shards) const {
+    const std::string name = folder.empty() ? "data.yaml" : folder.substr(0, folder.size() - 1);
+    ExportFolder::Step step(work.folder, name, input_hash(shards));
+    if (step.is_done()) return;
+    std::vector<std::string> splits;
+    int channels = 0;
+    std::vector<std::string> joint_names;
+    for (const std::string& split : work.input.splits()) {
+      const auto of_it = of_split(work.input, shards, split);
+      if (of_it.empty()) continue;
+      splits.push_back(split);
+      std::string list;
+      work.walk(of_it, [&](const OutgoingSample& sample) {
+        list += "./images/" + split + "/" + sample.name + ".png\n";
+        const ShardHeader& header = sample.reader.header();
+        channels = header.volume.channels();
+        if (!folder.empty()) joint_names = choose_joints(header.label_schema).names;
+      });
+      step.write(folder + split + ".txt", list);
+    }
+    step.write(folder + "data.yaml", folder.empty()
+                                         ? yolo_data_yaml(names_, channels, splits)
+                                         : yolo_pose_yaml(joint_names, channels, splits));
+    step.finish();
+  }
+
   ClassNumbers numbers_;
   bool keep_ignored_;
   double full_scale_;
+  std::string pose_text_;  ///< which joints are in which of the folders of persons
   std::vector<std::string> names_;
 };
 

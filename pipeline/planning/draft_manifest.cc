@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
@@ -39,13 +41,15 @@ struct Habits {
   std::string_view size;
 };
 
+constexpr std::string_view kDavisSize = R"("width": 346, "height": 260, "fit": "letterbox")";
+
 Habits habits_of(DatasetKind dataset) {
   constexpr std::string_view kKittiComment =
       "The size that the generator's authors trained with; boxes are scaled with the images.";
-  constexpr std::string_view kKittiSize = R"( "width": 861, "height": 260, "fit": "stretch" )";
+  constexpr std::string_view kKittiSize = R"("width": 861, "height": 260, "fit": "stretch")";
   constexpr std::string_view kMpiiComment =
       "Images come in many shapes; letterboxing keeps each one's shape and adds borders.";
-  constexpr std::string_view kMpiiSize = R"( "width": 640, "height": 480, "fit": "letterbox" )";
+  constexpr std::string_view kMpiiSize = R"("width": 640, "height": 480, "fit": "letterbox")";
   switch (dataset) {
     case DatasetKind::kKittiObject:
       return {"kitti-events", PairSide::kBefore, {1, 2}, kKittiComment, kKittiSize};
@@ -63,7 +67,7 @@ Habits habits_of(DatasetKind dataset) {
           PairSide::kAfter,
           {1, 2},
           "The size of a DAVIS346 camera; letterboxing keeps the images' shape and adds borders.",
-          R"( "width": 346, "height": 260, "fit": "letterbox" )"};
+          kDavisSize};
     case DatasetKind::kFrames:
       return {"frames-events",
               PairSide::kBefore,
@@ -71,11 +75,30 @@ Habits habits_of(DatasetKind dataset) {
               "No width and height: volumes are as large as the images.",
               ""};
     case DatasetKind::kRecording:
+      return {"recording-events",
+              PairSide::kBefore,
+              {},
+              "No width and height: volumes are as large as the sensor.",
+              ""};
     case DatasetKind::kDhp19:
-      break;  // find_source knows neither
+      break;  // find_source does not know it
   }
   throw std::logic_error("habits_of: not a kind of dataset");
 }
+
+/// What is known of a source when its part of the manifest is written.
+struct SourceDraft {
+  const FoundSource& found;
+  Habits habits;
+  std::vector<int> gaps;
+  std::string preset = {};  ///< of its dataset; empty of events
+  std::vector<std::string> findings = {};
+  bool is_stills = false;
+  bool has_sizes = false;     ///< the images that were looked at have several sizes
+  bool has_frames = false;    ///< recording
+  bool needs_sensor = false;  ///< recording whose files do not tell the sensor's size
+  bool has_samples = false;
+};
 
 std::string quoted(const std::string& text) {
   if (!utf8::is_valid(text)) {
@@ -84,34 +107,33 @@ std::string quoted(const std::string& text) {
   return dump_json(nlohmann::json(text));
 }
 
-/// A name for the job, which is part of its files' names and its folder: that of the folder or
-/// video that was shown, so that two of them do not come into each other's way.
-std::string name_of(const FoundSource& found, const Habits& habits) {
+/// A job's name after a folder or a video, so that two of them do not come into each other's way;
+/// empty if the path has no name that serves.
+std::string name_after(fs::path path) {
   constexpr std::size_t kLongest = 50;
   constexpr std::string_view kAllowed =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789._-";
   const auto is_common = [](const fs::path& folder) {  // each dataset of its kind has it
-    return std::ranges::any_of(
-        std::array{"training", "testing", "image_2", "image_02", "images", "frames", "data"},
-        [&](const char* name) { return folder.filename() == name; });
+    return std::ranges::any_of(std::array{"training", "testing", "image_2", "image_02", "images",
+                                          "JPEGImages", "frames", "data"},
+                               [&](const char* name) { return folder.filename() == name; });
   };
-  fs::path path = found.root;
+  const bool is_folder = fs::is_directory(path);
   while (is_common(path)) path = path.parent_path();
   std::string name;
-  const fs::path shown = fs::is_directory(found.root) ? path.filename() : path.stem();
-  for (const char c : shown.string()) {
+  for (const char c : (is_folder ? path.filename() : path.stem()).string()) {
     const bool is_allowed = kAllowed.find(c) != kAllowed.npos;
     if (is_allowed || !name.ends_with('_')) name += is_allowed ? c : '_';
   }
   name.erase(0, name.find_first_not_of("._-"));
-  return name.empty() ? std::string(habits.name) : name.substr(0, kLongest) + "-events";
+  return name.empty() ? "" : name.substr(0, kLongest) + "-events";
 }
 
 /// What is counted before the manifest is written.
 struct Survey {
-  std::size_t labelled_frames = 0;
-  std::size_t sequences = 0;
-  std::size_t annotation_files = 0;
+  std::int64_t labelled_frames = 0;
+  std::int64_t sequences = 0;
+  std::int64_t annotation_files = 0;
   std::map<int, std::int64_t> pairs_by_gap;  ///< every gap that `side` allows
   std::int64_t missing = 0;                  ///< pairs at fault, as far as names tell
 };
@@ -129,9 +151,9 @@ Survey survey(const Dataset& dataset, SourceSpec spec) {
       ++(sample.fault.empty() ? counted.pairs_by_gap[sample.pair.gap_frames] : counted.missing);
     }
   }
-  counted.labelled_frames = dataset.labelled_frames().size();
-  counted.sequences = sequences.size();
-  counted.annotation_files = dataset.annotation_files().size();
+  counted.labelled_frames = std::ssize(dataset.labelled_frames());
+  counted.sequences = std::ssize(sequences);
+  counted.annotation_files = std::ssize(dataset.annotation_files());
   return counted;
 }
 
@@ -155,21 +177,6 @@ std::string where_text(PairSide side) {
       return "around them";
   }
   throw std::logic_error("where_text: not a side");
-}
-
-std::vector<std::string> findings_of(const FoundSource& found, const Survey& survey,
-                                     PairSide side) {
-  std::vector<std::string> lines;
-  lines.push_back(fmt::format("{}: {} labelled frames", found.title, survey.labelled_frames));
-  if (survey.sequences > 0) lines.back() += fmt::format(" of {} sequences", survey.sequences);
-  lines.back() += fmt::format(", {} annotation files", survey.annotation_files);
-  lines.push_back(fmt::format("labelled frames with a pair of frames {}, by gap: {}",
-                              where_text(side), counts_text(survey.pairs_by_gap, "gap ")));
-  if (survey.missing > 0) {
-    lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.missing));
-  }
-  lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
-  return lines;
 }
 
 using Image = cv::Mat_<float>;
@@ -219,31 +226,29 @@ std::optional<double> likeness(const ColourFrame& first, const ColourFrame& seco
   return *middle;
 }
 
-/// A line if images that are taken as one sequence have several sizes, as far as some tell.
-void compare_sizes(const Dataset& dataset, const fs::path& folder,
-                   std::vector<std::string>& warnings) {
+/// Looks at the sizes of some images; a line if a sequence has several.
+void compare_sizes(const Dataset& dataset, const fs::path& folder, SourceDraft& draft) {
   constexpr std::size_t kMost = 200;
   const auto& frames = dataset.labelled_frames();
   std::map<std::string_view, std::pair<ImageSize, std::string_view>> first;  // of a sequence
   for (const std::size_t i : spread(kMost, frames.size())) {
     const std::string& path = frames[i].frame.path;
-    const Outcome<ImageSize> probed = probe_image_size(folder / path);
+    const Outcome<ImageSize> probed = probe_image_size(folder / path, ImageOrientation::kUpright);
     if (is_fault(probed)) continue;
     const auto size = std::get<ImageSize>(probed);
-    const auto [known, is_new] = first.try_emplace(frames[i].sequence, size, path);
-    if (is_new || known->second.first == size) continue;
-    warnings.push_back(fmt::format(
-        "warning: images of several sizes in one folder, {} in {} and {} in {}: is it a "
-        "sequence? Two frames of different sizes make no pair",
-        to_string(known->second.first), known->second.second, to_string(size), path));
-    return;
+    const auto known = first.try_emplace(frames[i].sequence, size, path).first;
+    draft.has_sizes |= first.begin()->second.first != size;
+    if (draft.is_stills || known->second.first == size) continue;
+    draft.is_stills = true;
+    draft.findings.push_back(
+        fmt::format("images of several sizes in one folder, {} in {} and {} in {}",
+                    to_string(known->second.first), known->second.second, to_string(size), path));
   }
 }
 
 /// A line if images that are taken as neighbours have nothing to do with each other, as far as some
 /// tell.
-void compare_neighbours(const Dataset& dataset, const fs::path& folder,
-                        std::vector<std::string>& warnings) {
+void compare_neighbours(const Dataset& dataset, const fs::path& folder, SourceDraft& draft) {
   constexpr std::size_t kPairs = 8, kTries = 64;
   constexpr double kUnrelated = 0.5;  // see likeness
   const FrameDecoder decoder(folder);
@@ -256,7 +261,8 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder,
       const FrameRef& frame = frames[places[i]].frame;
       const PairedFrame next = dataset.paired_frame(frames[places[i]], 1);
       if (next.state != PairedFrame::State::kPresent) continue;
-      const auto a = decoder.decode(frame), b = decoder.decode(next.frame);
+      const auto a = decoder.decode(frame, 1, ImageOrientation::kUpright);
+      const auto b = decoder.decode(next.frame, 1, ImageOrientation::kUpright);
       if (is_fault(a) || is_fault(b)) continue;
       const auto alike = likeness(std::get<ColourFrame>(a), std::get<ColourFrame>(b));
       if (!alike) continue;
@@ -266,106 +272,313 @@ void compare_neighbours(const Dataset& dataset, const fs::path& folder,
     }
   }
   if (2 * unrelated <= pairs) return;
-  warnings.push_back(
-      fmt::format("warning: {} of {} compared pairs of neighbouring images do not show the same "
-                  "scene, first {}: is it a sequence? Events between unrelated images mean nothing",
+  draft.is_stills = true;
+  draft.findings.push_back(
+      fmt::format("{} of {} compared pairs of neighbouring images do not show the same scene, "
+                  "first {}",
                   unrelated, pairs, example));
 }
 
+/// Decides whether each image makes a pair with itself. A video is a sequence, whatever it shows.
+void consider_stills(const Dataset& dataset, const fs::path& folder, SourceDraft& draft) {
+  const auto& frames = dataset.labelled_frames();
+  const auto is_of_video = [](const LabelledFrame& frame) { return frame.frame.video_frame >= 0; };
+  if (frames.empty() || std::ranges::any_of(frames, is_of_video)) return;
+  if (draft.found.dataset == DatasetKind::kFrames) {
+    compare_sizes(dataset, folder, draft);
+    compare_neighbours(dataset, folder, draft);
+  }
+  if (!draft.is_stills && draft.has_samples) return;
+  if (!draft.is_stills) draft.findings.emplace_back("no labelled frame has a paired frame");
+  draft.is_stills = true;
+  draft.findings.emplace_back(
+      "no sequences: each image makes a pair with itself under a small motion (\"from\": "
+      "\"stills\")");
+  draft.has_samples =
+      std::ranges::any_of(frames, [](const LabelledFrame& frame) { return frame.fault.empty(); });
+}
+
+/// What was counted, before what else was found.
+std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& survey) {
+  const FoundSource& found = draft.found;
+  const bool is_events = has_events(found.dataset);
+  std::vector<std::string> lines;
+  lines.push_back(std::string(found.title) + ": " +
+                  count_text(survey.labelled_frames, is_events ? "sample" : "labelled frame"));
+  if (survey.sequences > 0) {
+    lines.back() += " of " + count_text(survey.sequences, is_events ? "recording" : "sequence");
+  }
+  lines.back() += ", " + count_text(survey.annotation_files, "annotation file");
+  if (!is_events && !draft.is_stills) {
+    lines.push_back(fmt::format("labelled frames with a pair of frames {}, by gap: {}",
+                                where_text(draft.habits.side),
+                                counts_text(survey.pairs_by_gap, "gap ")));
+    if (survey.missing > 0) {
+      lines.push_back(fmt::format("pairs with a missing or invalid frame: {}", survey.missing));
+    }
+  }
+  if (found.labels) {
+    lines.push_back(fmt::format("labels: {}, in {}", to_string(found.labels->format),
+                                found.labels->path.string()));
+  }
+  lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());
+  lines.insert(lines.end(), draft.findings.begin(), draft.findings.end());
+  return lines;
+}
+
+/// Says so where no frame has a time, which the manifest can give.
+void note_unknown_times(const Dataset& dataset, SourceDraft& draft) {
+  if (draft.found.dataset != DatasetKind::kFrames) return;
+  const auto has_time = [](const LabelledFrame& frame) { return !std::isnan(frame.frame.time_s); };
+  if (std::ranges::any_of(dataset.labelled_frames(), has_time)) return;
+  draft.findings.emplace_back("no times, since images have none (set \"frames_per_second\")");
+}
+
+/// Opens the source; one that only lacks the size of its sensor with the largest one, so that it
+/// can be looked at.
+std::unique_ptr<Dataset> open_source(SourceSpec spec, const fs::path& folder,
+                                     SourceDraft& draft) try {
+  return open_dataset(spec, folder);
+} catch (const InputError&) {
+  if (!has_events(spec.dataset)) throw;
+  constexpr int kLargest = 8192;
+  spec.recording.sensor = ImageSize{kLargest, kLargest};
+  try {
+    auto dataset = open_dataset(spec, folder);
+    draft.needs_sensor = true;
+    draft.findings.emplace_back("no size of the sensor in the files: set \"sensor\"");
+    return dataset;
+  } catch (const InputError&) {  // it lacks something else
+  }
+  throw;
+}
+
+/// Whether each recording has frames: then an interval between two of them is a window.
+bool all_have_frames(const Dataset& recordings) {
+  std::map<std::string_view, bool> has_frames;
+  for (const LabelledFrame& sample : recordings.labelled_frames()) {
+    has_frames[sample.sequence] |= sample.frame.index >= 0;
+  }
+  return std::ranges::all_of(has_frames, [](const auto& recording) { return recording.second; });
+}
+
+/// Writes manifests.
 class Draft {
  public:
-  Draft(const FoundSource& found, const fs::path& folder, bool relative)
-      : found_(found),
-        habits_(habits_of(found.dataset)),
-        name_(name_of(found, habits_)),
-        folder_(folder),
-        relative_(relative) {}
+  Draft(const DraftPlace& place, std::string name) : place_(place), name_(std::move(name)) {}
 
-  std::string text(const std::vector<std::string>& findings, const std::vector<int>& gaps) const {
-    std::string text;
-    for (const std::string& line : findings) text += "// " + escape_controls(line) + "\n";
-    text +=
-        fmt::format(R"({{
+  std::string text(const std::vector<SourceDraft>& sources) const {
+    const bool is_events = has_events(sources.front().found.dataset);
+    std::vector<std::string> written;
+    for (const SourceDraft& source : sources) written.push_back(source_text(source));
+    return fmt::format(R"({{
   "format": "eventgan-manifest",
   "version": 1,
   "name": "{}",  // shards are named {}-SPLIT-NUMBER-of-COUNT.h5
-  "seed": 7,  // decides which gap each labelled frame gets
+  "seed": 7,  // decides what is drawn, such as each labelled frame's gap
 
   "sources": [
-    {{
-      "dataset": "{}",
-{}      // One pair per labelled frame, its gap drawn from these; "choose": "all" makes one per gap.
-      "pairs": {{ "gaps": [{}], "side": "{}", "choose": "one" }}
-    }}
+{}
   ],
 
-  // {}
-  "image": {{{}}},
-  // Volumes are made by the generator that comes with the program, unless another is named:
-  // "generator": {{ "weights": "my.safetensors" }},
-  "output": {{ "directory": "out/{}" }}
+{}{}  "output": {{ "directory": {} }}
 }}
 )",
-                    name_, name_, to_string(found_.dataset), source_keys(), fmt::join(gaps, ", "),
-                    to_string(habits_.side), habits_.size_comment, habits_.size, name_);
-    return text;
+                       name_, name_, fmt::join(written, ",\n"), image_text(sources),
+                       is_events ? kEvents : kNetwork, quoted(place_.output));
   }
 
-  const Habits& habits() const { return habits_; }
-
  private:
-  std::string source_keys() const {
-    std::string keys = key("root", found_.root);
-    if (!found_.layout.empty()) {
-      keys += fmt::format("      \"layout\": \"{}\",\n", found_.layout);
+  static constexpr std::string_view kNetwork =
+      R"(  // Volumes are made by the generator that comes with the program, unless another is named:
+  // "generator": { "weights": "my.safetensors" },
+)";
+  static constexpr std::string_view kEvents =
+      R"(  // Volumes are made of the camera's own events.
+  "generator": { "kind": "events" },
+  // To go with generated volumes, in both jobs:
+  // "volume": { "normalize": "eta98" },
+)";
+
+  std::string source_text(const SourceDraft& source) const {
+    std::string text;
+    for (const std::string& line : source.findings) {
+      text += "    // " + escape_controls(line) + "\n";
     }
-    if (found_.layout == "official") {
+    text += fmt::format("    {{\n      \"dataset\": \"{}\",\n", to_string(source.found.dataset));
+    text += source_keys(source.found);
+    text += has_events(source.found.dataset) ? window_text(source)
+            : source.is_stills               ? stills_text()
+                                             : pairs_text(source);
+    return text + "    }";
+  }
+
+  std::string source_keys(const FoundSource& found) const {
+    std::string keys = key("root", found.root);
+    if (!found.layout.empty()) {
+      keys += fmt::format("      \"layout\": \"{}\",\n", found.layout);
+    }
+    if (found.layout == "official") {
       keys += "      \"every\": 5,  // of 50 frames a second: a gap of 1 is a tenth of a second\n";
     }
-    if (found_.raw_root) keys += key("raw_root", *found_.raw_root);
-    if (found_.devkit) keys += key("devkit", *found_.devkit);
-    if (found_.annotations) keys += key("annotations", *found_.annotations);
-    if (found_.sequences) keys += key("sequences", *found_.sequences);
+    if (found.raw_root) keys += key("raw_root", *found.raw_root);
+    if (found.devkit) keys += key("devkit", *found.devkit);
+    if (found.annotations) keys += key("annotations", *found.annotations);
+    if (found.sequences) keys += key("sequences", *found.sequences);
+    if (found.labels) {
+      keys += fmt::format("      \"labels\": {{ \"format\": \"{}\", \"path\": {} }},\n",
+                          to_string(found.labels->format), written(found.labels->path));
+    }
+    if (found.columns != EventFields()) {
+      keys += fmt::format("      \"columns\": {{ \"t\": {} }},\n", quoted(found.columns.t));
+    }
     return keys;
   }
 
-  std::string key(std::string_view name, const fs::path& path) const {
-    const fs::path written = relative_ ? path.lexically_proximate(folder_) : path;
-    return fmt::format("      \"{}\": {},\n", name, quoted(written.generic_string()));
+  static std::string pairs_text(const SourceDraft& source) {
+    return fmt::format(
+        R"(      // One pair per labelled frame, its gap drawn from these; "choose": "all" makes one per gap.
+      "pairs": {{ "gaps": [{}], "side": "{}", "choose": "one" }}
+)",
+        fmt::join(source.gaps, ", "), to_string(source.habits.side));
   }
 
-  const FoundSource& found_;
-  Habits habits_;
+  static std::string stills_text() {
+    const StillsSpec spec;
+    return fmt::format(
+        R"(      // The motion of each image is drawn: what moves is everything, as before a moving camera.
+      "pairs": {{
+        "from": "stills",
+        "motion": {{ "translation_px": [{}, {}], "rotation_deg": {}, "scale": {}, "frames": {} }}
+      }}
+)",
+        spec.translation_px[0], spec.translation_px[1], spec.rotation_deg, spec.scale, spec.frames);
+  }
+
+  static std::string window_text(const SourceDraft& source) {
+    std::string text;
+    if (source.needs_sensor) {
+      text += "      // \"sensor\": { \"width\": 346, \"height\": 260 },\n";
+    }
+    text +=
+        source.has_frames
+            ? R"(      // Without it, a window is an interval between two frames:
+      // "window_s": 0.05,
+)"
+            : R"(      "window_s": 0.05,  // there are no frames, between which a window could lie
+)";
+    return text + "      \"label_at\": \"end\"\n";
+  }
+
+  /// One size and one preset serve all sources.
+  static std::string image_text(const std::vector<SourceDraft>& sources) {
+    const SourceDraft& first = sources.front();
+    const bool is_mixed = std::ranges::any_of(sources, [&](const SourceDraft& source) {
+      return (source.is_stills && source.has_sizes) || source.habits.size != first.habits.size;
+    });
+    const bool has_presets = std::ranges::any_of(
+        sources, [&](const SourceDraft& source) { return source.preset != first.preset; });
+    std::vector<std::string> keys;
+    std::string_view comment = first.habits.size_comment;
+    if (is_mixed) {
+      comment =
+          "Images come in many shapes; a DAVIS346 camera's size, with borders, keeps each one's.";
+      keys.emplace_back(kDavisSize);
+    } else if (!first.habits.size.empty()) {
+      keys.emplace_back(first.habits.size);
+    }
+    std::string text = fmt::format("  // {}\n", comment);
+    if (has_presets) {
+      text += fmt::format("  // The sources' own presets differ; this is that of {}.\n",
+                          to_string(first.found.dataset));
+      keys.push_back(fmt::format("\"preset\": \"{}\"", first.preset));
+    }
+    return text + (keys.empty() ? "  \"image\": {},\n"
+                                : fmt::format("  \"image\": {{ {} }},\n", fmt::join(keys, ", ")));
+  }
+
+  std::string key(std::string_view name, const fs::path& path) const {
+    return fmt::format("      \"{}\": {},\n", name, written(path));
+  }
+
+  std::string written(const fs::path& path) const {
+    return quoted(
+        (place_.is_relative ? path.lexically_proximate(place_.folder) : path).generic_string());
+  }
+
+  DraftPlace place_;
   std::string name_;
-  fs::path folder_;
-  bool relative_;
 };
+
+void require_one_job(const std::vector<FoundSource>& sources) {
+  for (std::size_t i = 1; i < sources.size(); ++i) {
+    const FoundSource &first = sources.front(), &now = sources[i];
+    if (has_events(first.dataset) != has_events(now.dataset)) {
+      throw UsageError(fmt::format(
+          "expected frames alone or recordings of events alone, got {} ({}) and {} ({}): a job has "
+          "either generated events or real ones",
+          first.root.string(), to_string(first.dataset), now.root.string(),
+          to_string(now.dataset)));
+    }
+    for (std::size_t before = 0; before < i; ++before) {
+      std::error_code unknown;
+      if (sources[before].root != now.root &&
+          !fs::equivalent(sources[before].root, now.root, unknown))
+        continue;
+      throw UsageError("expected each folder or video once, got it twice: " + now.root.string());
+    }
+  }
+}
 
 }  // namespace
 
-ManifestDraft draft_manifest(const FoundSource& found, const fs::path& folder, bool relative) {
-  const Draft draft(found, folder, relative);
-  const Habits& habits = draft.habits();
-  const auto read = [&](const std::string& text) {
-    return parse_job_manifest(text, folder, "the manifest for " + found.root.string());
-  };
-  const JobManifest first = read(draft.text({}, habits.gaps));
-  const auto dataset = open_dataset(first.sources.front(), folder);
-  const Survey counted = survey(*dataset, first.sources.front());
-
-  ManifestDraft made;
-  made.findings = findings_of(found, counted, habits.side);
-  const auto& frames = dataset->labelled_frames();
-  const bool is_video = !frames.empty() && frames.front().frame.video_frame >= 0;
-  if (found.dataset == DatasetKind::kFrames && !is_video) {
-    compare_sizes(*dataset, folder, made.findings);
-    compare_neighbours(*dataset, folder, made.findings);
+std::string draft_name(const std::vector<FoundSource>& sources) {
+  const fs::path& first = sources.front().root;
+  const fs::path above = first.parent_path();
+  std::string name;
+  if (sources.size() > 1 && std::ranges::all_of(sources, [&](const FoundSource& source) {
+        return source.root.parent_path() == above;
+      })) {
+    name = name_after(above);
   }
-  made.notes = dataset->notes();
-  made.has_pairs =
-      std::ranges::any_of(counted.pairs_by_gap, [](const auto& gap) { return gap.second > 0; });
-  made.text = draft.text(made.findings, gaps_to_take(counted, habits));
-  read(made.text);
+  if (name.empty()) name = name_after(first);
+  return name.empty() ? std::string(habits_of(sources.front().dataset).name) : name;
+}
+
+ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place) {
+  require_one_job(sources);
+  const Draft draft(place, draft_name(sources));
+  std::vector<SourceDraft> drafts;
+  ManifestDraft made;
+  made.has_samples = true;
+  for (const FoundSource& found : sources) {
+    Habits habits = habits_of(found.dataset);
+    SourceDraft source{found, habits, habits.gaps};
+    const JobManifest alone = parse_job_manifest(draft.text({source}), place.folder,
+                                                 "the manifest for " + found.root.string());
+    const SourceSpec& spec = alone.sources.front();
+    source.preset = alone.image.preset;
+    const auto dataset = open_source(spec, place.folder, source);
+    const Survey counted = survey(*dataset, spec);
+    if (has_events(found.dataset)) {
+      source.has_frames = all_have_frames(*dataset);
+      source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
+    } else {
+      source.gaps = gaps_to_take(counted, source.habits);
+      source.has_samples =
+          std::ranges::any_of(counted.pairs_by_gap, [](const auto& gap) { return gap.second > 0; });
+      consider_stills(*dataset, place.folder, source);
+      if (!source.is_stills) note_unknown_times(*dataset, source);
+    }
+    source.findings = findings_of(source, counted);
+    if (sources.size() > 1) source.findings.insert(source.findings.begin(), found.root.string());
+    made.has_samples &= source.has_samples;
+    std::ranges::copy(source.findings, std::back_inserter(made.findings));
+    std::ranges::move(dataset->notes(), std::back_inserter(made.notes));
+    drafts.push_back(std::move(source));
+  }
+  made.text = draft.text(drafts);
+  parse_job_manifest(made.text, place.folder, "the manifest for " + sources.front().root.string());
   return made;
 }
 

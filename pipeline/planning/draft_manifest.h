@@ -8,23 +8,37 @@
 
 namespace eventgan {
 
-/// A manifest for a dataset that was found, and what a person should know of the two.
+/// A manifest for datasets that were found, and what a person should know of them.
 struct ManifestDraft {
   std::string text;  ///< the manifest, with comments
-  /// What was found, what is missing, and what speaks against it ("warning: ..."), a line each.
+  /// What was found, what is missing, what was decided, and what speaks against it
+  /// ("warning: ..."), a line each; of several sources, each one's begin with its root.
   std::vector<std::string> findings;
   std::vector<std::string> notes;  ///< Dataset::notes()
-  bool has_pairs = false;          ///< false: no labelled frame has a paired frame at any gap
+  bool has_samples = false;        ///< each source has labelled frames that make pairs, or windows
 };
 
-/// Opens the dataset, counts its labelled frames and their paired frames, and writes a manifest for
-/// it: gaps, size and preset as manifests/examples have them, gaps without any paired frame left
-/// out; name and output folder after the folder or video that was found. Of folders of images some
-/// are looked at, whether they can be sequences. The manifest will lie in `folder`; its paths start
-/// there if `relative`, else they are absolute. What it reads is what `convert` would read from it.
+/// Where a manifest will lie, and what it says of places.
+struct DraftPlace {
+  std::filesystem::path folder;
+  bool is_relative = false;  ///< sources' paths start at `folder`, else they are absolute
+  std::string output;        ///< output.directory
+};
+
+/// A name for the job of these sources, a part of its files' names and its folder: after the folder
+/// or video that was found or, of several in one folder, after that; "kitti-events".
+std::string draft_name(const std::vector<FoundSource>& sources);
+
+/// Opens the datasets, counts their labelled frames and the paired frames of these, and writes one
+/// manifest for all: gaps, size and preset as manifests/examples have them, gaps without any paired
+/// frame left out. Where images are no sequence, since some that are looked at have several sizes,
+/// or neighbours that do not show the same scene, or where no labelled frame has a paired frame,
+/// each image makes a pair with itself ("from": "stills"). Of sources that want different sizes, it
+/// is one that fits all. What it reads is what `convert` would read by the manifest.
+///
 /// Throws as open_dataset does, and UsageError for a path that is not UTF-8, which no manifest can
-/// name.
-ManifestDraft draft_manifest(const FoundSource& found, const std::filesystem::path& folder,
-                             bool relative);
+/// name, for a source that is given twice, and for recordings of events beside frames, which make
+/// no job together.
+ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place);
 
 }  // namespace eventgan

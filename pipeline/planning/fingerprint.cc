@@ -108,6 +108,17 @@ bool any_video(const std::vector<PlannedShard>& shards) {
   });
 }
 
+/// Whether an image's orientation counts.
+bool turns_images(const JobManifest& manifest, const Plan& plan) {
+  return std::ranges::any_of(plan.shards, [&](const PlannedShard& shard) {
+    const SourceSpec& source = manifest.sources[static_cast<std::size_t>(shard.source)];
+    return is_turned_upright(source.dataset) &&
+           std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
+             return sample.pair.next.video_frame < 0 || sample.pair.previous.video_frame < 0;
+           });
+  });
+}
+
 /// The file of a library that is loaded in this process; empty: it is none, or a part of the
 /// program.
 std::filesystem::path library_file(const std::string& name) {
@@ -194,6 +205,9 @@ std::map<std::string, std::string> make_fingerprint(
   }
   if (generator.scope.scope == Scope::kLabels || generator.scope.scope == Scope::kLabelsOnly) {
     fingerprint["persons' tiles"] = "all that pose trainers cut out";
+  }
+  if (turns_images(manifest, plan)) {
+    fingerprint["orientation"] = "upright, by " + loaded_library("libexif");
   }
   for (const auto& [path, value] : manifest_fields(manifest.text))
     fingerprint["manifest " + path] = value;

@@ -3,10 +3,13 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
+#include <cmath>
 #include <iterator>
 #include <limits>
 #include <map>
+#include <numbers>
 #include <optional>
 #include <string_view>
 #include <unordered_map>
@@ -31,8 +34,9 @@ struct Window {
   double position = 1;  // of the labelled frame within the pair
 };
 
-Window window(PairSide side, int gap) {
-  switch (side) {
+Window window(const PairSpec& spec, int gap) {
+  if (spec.stills) return {0, 0, spec.side == PairSide::kBefore ? 1.0 : 0.0};
+  switch (spec.side) {
     case PairSide::kBefore:
       return {-gap, 0, 1.0};
     case PairSide::kAfter:
@@ -57,7 +61,7 @@ bool too_far_apart(const FramePair& pair, std::optional<double> max_gap_s) {
 Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const PairSpec& spec,
                     int gap) {
   using State = PairedFrame::State;
-  const Window place = window(spec.side, gap);
+  const Window place = window(spec, gap);
   const PairedFrame previous = dataset.paired_frame(frame, place.first);
   const PairedFrame next = dataset.paired_frame(frame, place.last);
 
@@ -83,6 +87,24 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
   return result;
 }
 
+/// The seed draws each number on its own, so that the limits of one do not change the others.
+ImageMotion draw_motion(const StillsSpec& spec, const CounterRandom& random) {
+  const auto between = [&](std::uint64_t counter, double least, double most) {
+    return least + (most - least) * random.uniform(counter);
+  };
+  const double length_px = between(0, spec.translation_px[0], spec.translation_px[1]);
+  const double direction = between(1, 0, 2 * std::numbers::pi);
+  return {length_px * std::cos(direction), length_px * std::sin(direction),
+          between(2, -spec.rotation_deg, spec.rotation_deg),
+          between(3, 1 - spec.scale, 1 + spec.scale)};
+}
+
+/// A still has no time before or after itself.
+void forget_moved_time(FramePair& pair) {
+  FrameRef& moved = pair.label_position == 1 ? pair.previous : pair.next;
+  moved.time_s = std::numeric_limits<double>::quiet_NaN();
+}
+
 PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
                             const SourceSpec& source, std::uint64_t seed) {
   PairChoiceResult result;
@@ -99,6 +121,11 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   const CounterRandom random =
       CounterRandom(seed).keyed(to_string(source.dataset)).keyed(frame.sample_id);
   result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
+  if (source.pairs.stills) {
+    FramePair& pair = result.samples.back().pair;
+    pair.motion = draw_motion(*source.pairs.stills, random.keyed("motion"));
+    forget_moved_time(pair);
+  }
   return result;
 }
 
@@ -139,15 +166,15 @@ PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame
 
 void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const SourceSpec& source,
                   PlannedSample& sample) {
-  const Window place = has_events(source.dataset)
-                           ? Window{-1, 1}
-                           : window(source.pairs.side, sample.pair.gap_frames);
+  const Window place =
+      has_events(source.dataset) ? Window{-1, 1} : window(source.pairs, sample.pair.gap_frames);
   const auto renew = [&](FrameRef& planned, int steps) {
     const FrameRef today = dataset.paired_frame(frame, steps).frame;
     if (today == planned) planned.time_s = today.time_s;
   };
   renew(sample.pair.previous, place.first);
   renew(sample.pair.next, place.last);
+  if (sample.pair.motion) forget_moved_time(sample.pair);
   sample.label_key = frame.label_key;
   if (sample.fault.empty()) sample.fault = frame.fault;
 }
@@ -233,22 +260,23 @@ class SizeProbe {
                         const PlannedSample& sample) {
     if (manifest_.image.size) return *manifest_.image.size;
     if (has_events(source.dataset)) return dataset.sensor_size(sample.label_key);
-    const ImageSize size = probe(sample.pair.next.path);
-    return size == ImageSize{} ? probe(sample.pair.previous.path) : size;
+    const ImageOrientation orientation = orientation_of(source.dataset);
+    const ImageSize size = probe(sample.pair.next.path, orientation);
+    return size == ImageSize{} ? probe(sample.pair.previous.path, orientation) : size;
   }
 
  private:
-  ImageSize probe(const std::string& path) {
-    const auto [entry, is_new] = sizes_.try_emplace(path);
+  ImageSize probe(const std::string& path, ImageOrientation orientation) {
+    const auto [entry, is_new] = sizes_[static_cast<std::size_t>(orientation)].try_emplace(path);
     if (is_new && !path.empty()) {
-      const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path));
+      const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path), orientation);
       if (!is_fault(found)) entry->second = std::get<ImageSize>(found);
     }
     return entry->second;
   }
 
   const JobManifest& manifest_;
-  std::unordered_map<std::string, ImageSize> sizes_;
+  std::array<std::unordered_map<std::string, ImageSize>, 2> sizes_;  ///< by orientation
 };
 
 struct PlannedSource {

@@ -35,6 +35,9 @@ struct PairChoiceResult {
 /// can be had). All pairs of a frame that is itself at fault (LabelledFrame::fault) have that
 /// fault.
 ///
+/// Of stills: the labelled frame twice, with a motion that (seed, dataset, sample id) draws; the
+/// time of the moved frame is not known.
+///
 /// Of a dataset of events: its one window, of gap 0.
 PairChoiceResult choose_pairs(const Dataset& dataset, const LabelledFrame& frame,
                               const SourceSpec& source, std::uint64_t seed);

@@ -2,11 +2,15 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
+#include <exception>
+#include <memory>
 #include <optional>
 #include <utility>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/words.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
 #include "stages/frames/decoding/frame_decoder.h"
@@ -15,24 +19,36 @@
 #include "stages/shards/shard_reader.h"
 
 namespace eventgan {
+
+/// A recording that is open: opening one may read all of it.
+struct OpenRecording {
+  std::filesystem::path path{};
+  RecordingOptions options{};
+  std::unique_ptr<Recording> recording{};
+};
+
 namespace {
 
 namespace fs = std::filesystem;
 
-/// The frame of a recording of events; a fault names its file. `source`: that of the sample, if
-/// known. A path alone does not lead to it: two sources can be the two cameras of one file.
+/// The frame of a recording of events, of `last` if it is that one; a fault names its file.
+/// `source`: that of the sample, if known. A path alone does not lead to it: two sources can be the
+/// two cameras of one file.
 Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* source,
-                                     const FrameRef& frame) try {
-  fs::path path = folder / frame.path;
+                                     const FrameRef& frame, OpenRecording& last) try {
+  const fs::path path = folder / frame.path;
   if (source == nullptr) {
     return SampleFault{
         "expected the shard's plan beside it, since its manifest has several such "
         "sources, got none, for a frame in " +
         path.string()};
   }
-  if (path.filename() == "events.txt") path = path.parent_path();
-  const auto format = find_recording_format(path, source->camera).value_or(RecordingFormat::kMvsec);
-  const GreyImage grey = open_recording(path, format, source->camera)->frame(frame.video_frame);
+  if (!last.recording || last.path != path || last.options != source->recording) {
+    const auto format =
+        find_recording_format(path, source->recording).value_or(RecordingFormat::kMvsec);
+    last = {path, source->recording, open_recording(path, format, source->recording)};
+  }
+  const GreyImage grey = last.recording->frame(frame.video_frame);
   ColourFrame colour{grey.size, {}};
   for (const std::uint8_t pixel : grey.pixels) colour.bgr.insert(colour.bgr.end(), 3, pixel);
   return colour;
@@ -40,7 +56,13 @@ Outcome<ColourFrame> decode_recorded(const fs::path& folder, const SourceSpec* s
   return SampleFault{error.what()};
 }
 
-/// The colour frame laid into the volume; empty, with a warning, if it cannot be had.
+/// Whether `frame` is the one of a still's pair that is moved.
+bool is_moved(const FrameRef& frame, const FramePair& pair) {
+  return pair.motion && &frame == (pair.label_position == 1 ? &pair.previous : &pair.next);
+}
+
+/// The colour frame, one of those of the sample's pair, laid into the volume; empty, with a
+/// warning, if it cannot be had.
 std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const FrameRef& frame,
                                       const ShardSample& sample, const ImageSpec& image,
                                       std::vector<std::string>& warnings) {
@@ -49,14 +71,20 @@ std::vector<std::uint8_t> frame_image(const Outcome<ColourFrame>& decoded, const
     return {};
   }
   const ColourFrame& colour = std::get<ColourFrame>(decoded);
-  const Placement placement = place(sample.source_size, image);
-  if (colour.size != placement.source) {
+  if (colour.size != sample.source_size) {
     warnings.push_back(
         "expected the size that the frame had when it was converted, got another, in " +
         frame.path + " (" + sample.sample_id + ")");
     return {};
   }
-  return place_colour(colour, placement);
+  try {
+    const Placement placement = place(sample.source_size, image, sample.pair);
+    return place_colour(is_moved(frame, sample.pair) ? move_still(colour, sample.pair) : colour,
+                        placement);
+  } catch (const std::exception& error) {  // a still whose motion no plan has drawn
+    warnings.push_back(error.what() + (", in " + frame.path) + " (" + sample.sample_id + ")");
+    return {};
+  }
 }
 
 }  // namespace
@@ -65,6 +93,7 @@ struct PreviewReader::State {
   fs::path frames;
   std::vector<std::string>& warnings;
   FrameDecoder decoder;
+  OpenRecording recording{};
   fs::path shard{};  ///< that `reader` has open
   std::optional<ShardReader> reader{};
   JobManifest manifest{};
@@ -135,22 +164,28 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   content.shape = header.volume;
   if (sample.valid) content.volume = reader.volume(slot);
   lift_time_limit();
+  const auto* const dataset =
+      std::ranges::find(kDatasetWords, header.dataset, &Word<DatasetKind>::word);
+  const ImageOrientation orientation =
+      dataset == kDatasetWords.end() ? ImageOrientation::kStored : orientation_of(dataset->value);
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.
     if (!sample.valid || (state_->has_events && which.video_frame < 0)) {
       return std::vector<std::uint8_t>();
     }
-    return frame_image(state_->has_events
-                           ? decode_recorded(state_->frames, state_->source, which)
-                           : state_->decoder.decode(which, sample.pair.video_stride()),
-                       which, sample, state_->manifest.image, state_->warnings);
+    return frame_image(
+        state_->has_events
+            ? decode_recorded(state_->frames, state_->source, which, state_->recording)
+            : state_->decoder.decode(which, sample.pair.video_stride(), orientation),
+        which, sample, state_->manifest.image, state_->warnings);
   };
   content.previous_bgr = frame(sample.pair.previous);
   content.next_bgr = frame(sample.pair.next);
   const FramePair& pair = sample.pair;
   content.title = header.dataset + " " + sample.sample_id +
                   (state_->has_events ? fmt::format(", {:.4g} s", pair.gap_s())
-                                      : ", gap " + std::to_string(pair.gap_frames)) +
+                                      : (pair.motion ? ", still, gap " : ", gap ") +
+                                            std::to_string(pair.gap_frames)) +
                   (sample.valid ? "" : ", QUARANTINED");
   content.label_position = sample.pair.label_position;
   content.annotation = std::move(sample.annotation);

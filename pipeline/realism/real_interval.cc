@@ -99,7 +99,7 @@ std::vector<FrameInterval> choose_intervals(const Recording& recording, std::int
                                             std::optional<std::int64_t> last,
                                             const std::vector<int>& gaps) {
   if (recording.frame_count() == 0) {
-    throw InputError("expected frames, got none, in " + recording.name());
+    throw InputError("expected a recording with frames, got one without, in " + recording.name());
   }
   const std::int64_t end = last.value_or(recording.frame_count() - 1);
   check_range(recording, first, end);

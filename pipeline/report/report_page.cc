@@ -198,6 +198,17 @@ std::string origin(const Survey& survey, const PageContext& context) {
                                          escaped(source_name(survey, i)), escaped(source.root)));
       continue;
     }
+    if (const auto& stills = source.pairs.stills) {
+      html +=
+          fact("source",
+               fmt::format("stills of {} from <code>{}</code>, moved {} the labelled image: {:g} "
+                           "to {:g} px, up to {:g} degrees, scale 1 &plusmn; {:g}, gap {}",
+                           escaped(source_name(survey, i)), escaped(source.root),
+                           to_string(source.pairs.side), stills->translation_px[0],
+                           stills->translation_px[1], stills->rotation_deg, stills->scale,
+                           stills->frames));
+      continue;
+    }
     html += fact("source",
                  fmt::format("{} from <code>{}</code>, gaps {} {} the labelled frame, {} of them",
                              escaped(source_name(survey, i)), escaped(source.root),

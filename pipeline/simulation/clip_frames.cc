@@ -123,7 +123,7 @@ ClipFrames::ClipFrames(const SimulationSource& source, const SimulationManifest&
 
 GreyImage ClipFrames::frame(std::int64_t position) {
   const FrameRef& ref = frames_[at(position)];
-  const Outcome<ColourFrame> decoded = decoder_.decode(ref);
+  const Outcome<ColourFrame> decoded = decoder_.decode(ref, 1, ImageOrientation::kUpright);
   if (is_fault(decoded)) throw InputError(std::get<SampleFault>(decoded).reason);
   const auto& frame = std::get<ColourFrame>(decoded);
   if (!frame_size_) frame_size_ = frame.size;

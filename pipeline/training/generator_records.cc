@@ -21,6 +21,7 @@
 #include "stages/generator/generator.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"
+#include "stages/recordings/recording.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan {
@@ -28,14 +29,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Of a recording in a folder: of the lists of frames and events, which say what it holds.
-std::string recording_hash(const fs::path& path) {
-  if (!fs::is_directory(path)) return sha256_of_file(path);
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path)) {
-    if (entry.is_regular_file()) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
+/// Of the file with the events and of what is read beside it.
+std::string recording_hash(const fs::path& path, const RecordingOptions& options) {
+  const fs::path events = event_file(fs::absolute(path).lexically_normal(), options);
+  std::vector<fs::path> files = event_companions(events, options);
+  if (files.empty()) return sha256_of_file(events);
+  files.insert(files.begin(), events);
   std::string listing;
   for (const fs::path& file : files) {
     listing += file.filename().string() + '\t' + sha256_of_file(file) + '\n';
@@ -75,7 +74,8 @@ void add_final_origin(Weights& weights, const TrainingManifest& manifest,
                       const std::map<std::string, double>& losses) {
   std::string listing;
   for (std::size_t i = 0; i < recordings.size(); ++i) {
-    listing += manifest.recordings.at(i).path + '\t' + recording_hash(recordings[i].file) + '\n';
+    const RecordingSpec& spec = manifest.recordings.at(i);
+    listing += spec.path + '\t' + recording_hash(recordings[i].file, spec.options) + '\n';
   }
   weights.metadata["training_recordings_sha256"] = listing;
   std::string means;

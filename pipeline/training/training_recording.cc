@@ -20,6 +20,8 @@ std::string fault_of(const RecordingSpec& spec, const TrainingRecording& opened,
   const Recording& recording = *opened.recording;
   const ImageSize size = recording.size();
   const std::string where = ", in " + opened.file.string();
+  if (recording.frame_count() == 0)
+    return "expected a recording with frames, got one without" + where;
   if (size.height < smallest.height || size.width < smallest.width) {
     return "expected images of at least " + to_string(smallest) + " (crop), got " +
            to_string(size) + where;
@@ -47,7 +49,7 @@ std::vector<TrainingRecording> open_training_recordings(std::span<const Recordin
   for (const RecordingSpec& spec : specs) {
     TrainingRecording opened;
     opened.file = directory / spec.path;
-    opened.recording = open_recording(opened.file, spec.format, spec.camera);
+    opened.recording = open_recording(opened.file, spec.format, spec.options);
     opened.weight = spec.weight;
     opened.first_frame = spec.first_frame;
     opened.last_frame = spec.last_frame.value_or(opened.recording->frame_count() - 1);

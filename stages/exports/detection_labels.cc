@@ -3,7 +3,9 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
+#include <string_view>
 
 #include "manifests/documents/detail/json_text.h"
 
@@ -18,6 +20,70 @@ std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume) 
                      share(box.bottom - box.top, volume.height));
 }
 
+namespace {
+
+constexpr double kToCentre = 0.5;  // from a pixel's edge, where the volume begins
+
+/// The name with one side put for the other; empty if it does not begin or end with a side.
+std::string other_side(const std::string& name) {
+  struct Sides {
+    std::string_view left, right;
+  };
+  static constexpr std::array<Sides, 5> kBegin{
+      {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}, {"l_", "r_"}, {"L_", "R_"}}};
+  static constexpr std::array<Sides, 5> kEnd{
+      {{"left", "right"}, {"Left", "Right"}, {"LEFT", "RIGHT"}, {"_l", "_r"}, {"_L", "_R"}}};
+  for (const auto& [left, right] : kBegin) {
+    if (name.starts_with(left)) return std::string(right) + name.substr(left.size());
+    if (name.starts_with(right)) return std::string(left) + name.substr(right.size());
+  }
+  for (const auto& [left, right] : kEnd) {
+    if (name.ends_with(left)) return name.substr(0, name.size() - left.size()) + std::string(right);
+    if (name.ends_with(right))
+      return name.substr(0, name.size() - right.size()) + std::string(left);
+  }
+  const auto is_upper = [](char c) { return c >= 'A' && c <= 'Z'; };
+  std::string mirrored = name;
+  if (name.size() > 1 && (name[0] == 'L' || name[0] == 'R') && is_upper(name[1])) {
+    mirrored[0] = name[0] == 'L' ? 'R' : 'L';
+    return mirrored;
+  }
+  return "";
+}
+
+}  // namespace
+
+bool is_within(const ExportedJoint& joint, ImageSize volume) {
+  const double x = joint.at.x + kToCentre;
+  const double y = joint.at.y + kToCentre;
+  return joint.at != kMissingPoint && x >= 0 && x <= volume.width && y >= 0 && y <= volume.height;
+}
+
+std::string yolo_pose_line(int class_number, const Rectangle& box,
+                           const std::vector<ExportedJoint>& joints, ImageSize volume) {
+  std::string line = yolo_line(class_number, box, volume);
+  for (const ExportedJoint& joint : joints) {
+    line += is_within(joint, volume)
+                ? fmt::format(" {:.9f} {:.9f} {}", (joint.at.x + kToCentre) / volume.width,
+                              (joint.at.y + kToCentre) / volume.height, joint.visible == 0 ? 1 : 2)
+                : " 0 0 0";
+  }
+  return line;
+}
+
+std::optional<std::vector<int>> flip_indices(const std::vector<std::string>& joint_names) {
+  std::vector<int> places(joint_names.size());
+  bool has_sides = false;
+  for (std::size_t i = 0; i < joint_names.size(); ++i) {
+    const std::string other = other_side(joint_names[i]);
+    const std::string& mirrored = other.empty() ? joint_names[i] : other;
+    if (std::ranges::count(joint_names, mirrored) != 1) return std::nullopt;
+    places[i] = static_cast<int>(std::ranges::find(joint_names, mirrored) - joint_names.begin());
+    has_sides |= !other.empty();
+  }
+  return has_sides ? std::optional(places) : std::nullopt;
+}
+
 std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
                            const std::vector<std::string>& splits) {
   std::string text = "path: .\n";
@@ -25,6 +91,17 @@ std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
   // A JSON list is a YAML list.
   return text + fmt::format("nc: {}\nchannels: {}\nnames: {}\n", names.size(), channels,
                             dump_json(nlohmann::json(names)));
+}
+
+std::string yolo_pose_yaml(const std::vector<std::string>& joint_names, int channels,
+                           const std::vector<std::string>& splits) {
+  std::string text = yolo_data_yaml({"person"}, channels, splits) +
+                     fmt::format("kpt_shape: [{}, 3]\nkpt_names: {{0: {}}}\n", joint_names.size(),
+                                 dump_json(nlohmann::json(joint_names)));
+  if (const auto places = flip_indices(joint_names)) {
+    text += fmt::format("flip_idx: {}\n", dump_json(nlohmann::json(*places)));
+  }
+  return text;
 }
 
 namespace {
@@ -60,7 +137,6 @@ std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd
 
 std::string coco_person(const CocoPlace& place, const Rectangle& box,
                         const std::vector<ExportedJoint>& joints) {
-  constexpr double kToCentre = 0.5;
   Json json = annotation(place, box);
   json["iscrowd"] = 0;
   int annotated = 0;

@@ -19,8 +19,33 @@ namespace eventgan {
 /// within 0..1. `box` lies within the volume.
 std::string yolo_line(int class_number, const Rectangle& box, ImageSize volume);
 
+/// A joint of an exported person.
+struct ExportedJoint {
+  Point at = kMissingPoint;  ///< volume pixels; kMissingPoint if not annotated
+  int visible = -1;          ///< as Joint::visible
+};
+
+/// Whether a joint is annotated and lies in the volume, from edge to edge.
+bool is_within(const ExportedJoint& joint, ImageSize volume);
+
+/// yolo_line and then "x y v" of each joint: shares of width and height, 9 decimals, counted from
+/// the volume's left and top edge, within 0..1; v 0 not annotated or outside the volume (then
+/// x = y = 0), 1 hidden, 2 visible or not known.
+std::string yolo_pose_line(int class_number, const Rectangle& box,
+                           const std::vector<ExportedJoint>& joints, ImageSize volume);
+
+/// Where each joint is in a mirrored image, by the joints' names: those of one side ("r_knee",
+/// "RightKnee", "RKnee", "knee_right") change places with the other side's. None if a name of one
+/// side has no counterpart, or no name tells a side: then the names do not say how to mirror.
+std::optional<std::vector<int>> flip_indices(const std::vector<std::string>& joint_names);
+
 /// data.yaml of `names` (number i is names[i]) and of the splits' lists, SPLIT.txt each.
 std::string yolo_data_yaml(const std::vector<std::string>& names, int channels,
+                           const std::vector<std::string>& splits);
+
+/// The same of persons, "person" the only class: with kpt_shape, kpt_names, and flip_idx if the
+/// names tell it.
+std::string yolo_pose_yaml(const std::vector<std::string>& joint_names, int channels,
                            const std::vector<std::string>& splits);
 
 /// An entry of COCO's `images`.
@@ -36,12 +61,6 @@ struct CocoPlace {
 
 /// An entry for a box: `bbox` is left, top, width, height; `area` that of the box.
 std::string coco_box(const CocoPlace& place, const Rectangle& box, bool is_crowd);
-
-/// A joint of an exported person.
-struct ExportedJoint {
-  Point at = kMissingPoint;  ///< volume pixels; kMissingPoint if not annotated
-  int visible = -1;          ///< as Joint::visible
-};
 
 /// An entry for a person: COCO counts an image from its left edge, so each joint is moved by half
 /// a pixel; visibility 0 not annotated (then x = y = 0), 1 hidden, 2 visible or not known.

@@ -82,7 +82,7 @@ class Dataset {
 
   /// Where a person finds that annotation: the file's path as FrameRef::path is written, and the
   /// place in it (`kitti/training/label_2/001497.txt`, `h36m/S1/Directions-1/annot.h5#5`,
-  /// `mpii/mpii_human_pose_v1_u12_1.mat:annolist[0]`); for messages.
+  /// `mpii/mpii_human_pose_v1_u12_1.mat:annolist[0]`, `instances.json#images/17`); for messages.
   virtual std::string label_place(const std::string& label_key) const = 0;
 
   /// Every file the annotations come from, those with one frame each as well, written as

@@ -6,12 +6,15 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/words.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/mpii/mpii_frames.h"
 #include "stages/frames/mpii/mpii_list_dataset.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/source_folders.h"
+#include "stages/recordings/recording.h"
 
 namespace eventgan {
 namespace {
@@ -36,6 +39,16 @@ FolderListing look_into(const fs::path& folder) {
     return {};
   }
 }
+
+constexpr std::array kRecordingTitles{
+    Word<RecordingFormat>{"recording of an event camera (MVSEC)", RecordingFormat::kMvsec},
+    Word<RecordingFormat>{"recording of an event camera (EventGAN)", RecordingFormat::kEventgan},
+    Word<RecordingFormat>{"recording of an event camera (ECD)", RecordingFormat::kEcd},
+    Word<RecordingFormat>{"recording of an event camera (AEDAT4)", RecordingFormat::kAedat4},
+    Word<RecordingFormat>{"recording of an event camera (DSEC)", RecordingFormat::kDsec},
+    Word<RecordingFormat>{"recording of an event camera (M3ED)", RecordingFormat::kM3ed},
+    Word<RecordingFormat>{"recording of an event camera (Prophesee)", RecordingFormat::kProphesee},
+    Word<RecordingFormat>{"recording of an event camera (table)", RecordingFormat::kTable}};
 
 template <class Fits>
 bool any_folder(const fs::path& folder, Fits fits) {
@@ -87,15 +100,78 @@ bool is_human36m_official(const fs::path& root) {
       root, [](const fs::path& folder) { return folder.filename() == "MyPoseFeatures"; });
 }
 
+bool has_images(const fs::path& folder) {
+  return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
+}
+
+bool is_mot_sequence(const fs::path& folder) {
+  return has_file(folder / "gt/gt.txt") && has_images(folder / "img1");
+}
+
 bool is_frames(const fs::path& root) {
   if (has_file(root)) return is_video_name(root);
   if (has_folder(root / "image_2")) return false;  // KITTI's test images: no sequence at all
   const ImageFolder top = has_folder(root) ? list_image_folder(root) : ImageFolder();
   return !top.frames.empty() || std::ranges::any_of(top.left_out, is_video_name) ||
+         (has_folder(root / "images") && is_frames(root / "images")) ||
+         std::ranges::any_of(top.folders,
+                             [&](const std::string& name) { return has_images(root / name); }) ||
          std::ranges::any_of(top.folders, [&](const std::string& name) {
-           return !look_into(root / name).files.empty() &&
-                  !list_image_folder(root / name).frames.empty();
+           return is_mot_sequence(root / name) ||
+                  (has_folder(root / name / "labels") && has_images(root / name / "images"));
          });
+}
+
+bool may_be_recording(const fs::path& file) {
+  constexpr std::array kExtensions = {".aedat4", ".csv", ".dat", ".h5",
+                                      ".hdf5",   ".npy", ".npz", ".raw"};
+  return std::ranges::find(kExtensions, lower_extension(file)) != kExtensions.end();
+}
+
+struct FoundRecording {
+  RecordingFormat format;
+  EventFields columns;
+};
+
+std::optional<FoundRecording> recording_at(const fs::path& path) {
+  // Of other names of the time it would be a guess what they count.
+  for (const char* time : {"t", "t_us"}) {
+    const EventFields columns{.t = time};
+    if (const auto format = find_recording_format(path, {.columns = columns})) {
+      return FoundRecording{*format, columns};
+    }
+  }
+  return std::nullopt;
+}
+
+/// The recording, or the first one in a folder of them.
+std::optional<FoundRecording> first_recording(const fs::path& root) {
+  if (has_folder(root) || may_be_recording(root)) {
+    if (const auto found = recording_at(root)) return found;
+  }
+  const FolderListing listing = look_into(root);
+  for (const std::string& name : listing.folders) {
+    if (const auto found = recording_at(root / name)) return found;
+  }
+  for (const std::string& name : listing.files) {
+    if (!may_be_recording(name) || lower_extension(name) == ".npy") continue;  // any numbers [N, 4]
+    if (const auto found = recording_at(root / name)) return found;
+  }
+  return std::nullopt;
+}
+
+/// Tables of numbers lie beside images, too.
+bool is_recording(const fs::path& root) {
+  const auto found = first_recording(root);
+  return found && (found->format != RecordingFormat::kTable || !is_frames(root));
+}
+
+void complete_recording(FoundSource& found) {
+  const FoundRecording recording = *first_recording(found.root);
+  const auto title =
+      std::ranges::find(kRecordingTitles, recording.format, &Word<RecordingFormat>::value);
+  found.title = title->word;
+  found.columns = recording.columns;
 }
 
 /// The first that fits of the two folders above `root`, and of the folders in these.
@@ -165,13 +241,6 @@ void complete_mpii_list(FoundSource& found) {
   }
 }
 
-void complete_frames(FoundSource& found) {
-  if (has_file(found.root)) return;
-  const ImageFolder top = list_image_folder(found.root);
-  if (top.frames.empty() && std::ranges::any_of(top.left_out, is_video_name)) return;
-  found.remarks.push_back("no times, since images have none (set \"frames_per_second\")");
-}
-
 /// A dataset in one of the ways in which it lies on disk.
 struct DatasetLayout {
   DatasetKind dataset;
@@ -197,7 +266,9 @@ constexpr std::array kLayouts{
                   is_human36m_extracted},
     DatasetLayout{DatasetKind::kMpiiList, "", "MPII as a list of people", is_mpii_list,
                   complete_mpii_list},
-    DatasetLayout{DatasetKind::kFrames, "", "images or videos", is_frames, complete_frames}};
+    DatasetLayout{DatasetKind::kRecording, "", "recording of an event camera", is_recording,
+                  complete_recording},
+    DatasetLayout{DatasetKind::kFrames, "", "images or videos", is_frames, find_own_labels}};
 
 struct Place {
   const DatasetLayout* layout;
@@ -271,9 +342,10 @@ FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset
   const std::optional<Place> place = look_around(root, dataset);
   if (!place) {
     const auto other = dataset ? look_around(root, std::nullopt) : std::nullopt;
-    const std::string expected =
-        dataset ? std::string(to_string(*dataset))
-                : "KITTI object, tracking or raw, MPII, Human3.6M, images or videos";
+    const std::string expected = dataset ? std::string(to_string(*dataset))
+                                         : "KITTI object, tracking or raw, MPII, Human3.6M, "
+                                           "recordings of an event camera, images "
+                                           "or videos";
     throw InputError("expected " + expected + ", got " +
                      (other ? std::string(to_string(other->layout->dataset)) : "none of these") +
                      ", in " + path.string());
@@ -286,6 +358,10 @@ FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset
   place->layout->complete(found);
   if (found.dataset == DatasetKind::kFrames) note_dataset_above(found);
   return found;
+}
+
+bool may_be_source(const fs::path& path) {
+  return has_folder(path) || is_video_name(path) || may_be_recording(path);
 }
 
 }  // namespace eventgan

@@ -10,13 +10,22 @@
 
 namespace eventgan {
 
+/// Labels of one's own that lie beside images or videos.
+struct FoundLabels {
+  LabelFormat format = LabelFormat::kCoco;
+  std::filesystem::path path;
+};
+
 /// A dataset that was found by looking at a folder. Paths are absolute and normal.
 struct FoundSource {
   DatasetKind dataset = DatasetKind::kFrames;
   std::string_view layout;  ///< the manifest's word; empty where the dataset has only one
-  std::string_view title;   ///< for a person: "KITTI object"
+  /// For a person: "KITTI object", "recording of an event camera (AEDAT4)".
+  std::string_view title;
   std::filesystem::path root;
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;
+  std::optional<FoundLabels> labels;  ///< frames
+  EventFields columns;                ///< recording: a table's, by what its columns are called
   /// What is not there and what that costs, or is left out; a line each.
   std::vector<std::string> remarks;
 };
@@ -24,11 +33,19 @@ struct FoundSource {
 /// Finds out which dataset lies at `path` or, if it is none, in a folder of it; `dataset`, if it is
 /// given, must be that one. What belongs to it is looked for beside it, too: KITTI raw and the
 /// development kit in the two folders above the root and in their folders. Only names are looked
-/// at, and the beginnings of lists of people: opening the dataset tells whether it is sound.
+/// at, the beginnings of lists of people, and what tells the format of a recording: opening the
+/// dataset tells whether it is sound.
 ///
-/// Any folder of images or videos is `frames`, so that this is asked last. Throws InputError if
-/// there is nothing at `path`, no such dataset, or more than one.
+/// Any folder of images or videos is `frames`, so that this is asked last. Of one with labels of
+/// one's own the root becomes the folder of images that they are of (FOLDER/images,
+/// FOLDER/JPEGImages, FOLDER/train2017), and `labels` is set; those that were found and do not
+/// count are remarks. Throws InputError if there is nothing at `path`, no such dataset, or more
+/// than one.
 FoundSource find_source(const std::filesystem::path& path,
                         std::optional<DatasetKind> dataset = std::nullopt);
+
+/// Whether find_source may find something at `path`: a folder, or a file that is a dataset by its
+/// name, such as a video; also a video's name where nothing is.
+bool may_be_source(const std::filesystem::path& path);
 
 }  // namespace eventgan

@@ -10,24 +10,27 @@
 namespace eventgan {
 namespace {
 
-/// One axis of the map: an edge at 0 lies at `offset` in the volume.
+/// One axis of the map: an edge at `border` lies at `offset` in the volume.
 struct Axis {
   double scale;
+  double border;
   double offset;
 
-  double edge_to_volume(double x) const { return x * scale + offset; }
-  double edge_to_source(double x) const { return (x - offset) / scale; }
+  double edge_to_volume(double x) const { return (x - border) * scale + offset; }
+  double edge_to_source(double x) const { return (x - offset) / scale + border; }
   // A pixel's centre lies half a pixel after its left edge.
   double point_to_volume(double x) const { return edge_to_volume(x + 0.5) - 0.5; }
   double point_to_source(double x) const { return edge_to_source(x + 0.5) - 0.5; }
 };
 
 Axis horizontal(const Placement& placement) {
-  return {placement.scale_x(), static_cast<double>(placement.offset_x)};
+  return {placement.scale_x(), static_cast<double>(placement.border_x),
+          static_cast<double>(placement.offset_x)};
 }
 
 Axis vertical(const Placement& placement) {
-  return {placement.scale_y(), static_cast<double>(placement.offset_y)};
+  return {placement.scale_y(), static_cast<double>(placement.border_y),
+          static_cast<double>(placement.offset_y)};
 }
 
 }  // namespace
@@ -74,13 +77,30 @@ std::array<double, 12> to_volume(const Placement& placement,
   return mapped;
 }
 
-Rectangle clip(const Rectangle& box, ImageSize size) {
-  const auto into = [](double x, int extent) {
-    return std::clamp(x, 0.0, static_cast<double>(extent));
-  };
-  return {into(box.left, size.width), into(box.top, size.height), into(box.right, size.width),
-          into(box.bottom, size.height)};
+namespace {
+
+Rectangle clip(const Rectangle& box, const Rectangle& area) {
+  return {std::clamp(box.left, area.left, area.right), std::clamp(box.top, area.top, area.bottom),
+          std::clamp(box.right, area.left, area.right),
+          std::clamp(box.bottom, area.top, area.bottom)};
 }
+
+Rectangle whole(ImageSize size) {
+  return {0, 0, static_cast<double>(size.width), static_cast<double>(size.height)};
+}
+
+/// What labels are clipped to. A border that was cut away would lie in the border of a letterbox.
+Rectangle area_of(const Placement& placement) {
+  const Rectangle volume = whole(placement.volume);
+  if (!placement.has_borders()) return volume;
+  const double left = placement.offset_x;
+  const double top = placement.offset_y;
+  return clip({left, top, left + placement.scaled.width, top + placement.scaled.height}, volume);
+}
+
+}  // namespace
+
+Rectangle clip(const Rectangle& box, ImageSize size) { return clip(box, whole(size)); }
 
 bool is_empty(const Rectangle& box) { return !(box.left < box.right && box.top < box.bottom); }
 
@@ -208,7 +228,7 @@ Complaint check(const Person& person, ImageSize image) {
 
 VolumeBox map(const Box& box, const Placement& placement) {
   const Rectangle unclipped = to_volume(placement, box.xyxy);
-  const Rectangle clipped = clip(unclipped, placement.volume);
+  const Rectangle clipped = clip(unclipped, area_of(placement));
   return {clipped, unclipped, box.ignore || is_empty(clipped)};
 }
 

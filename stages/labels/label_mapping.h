@@ -31,7 +31,8 @@ Rectangle clip(const Rectangle& box, ImageSize size);
 /// True if the rectangle has no area.
 bool is_empty(const Rectangle& box);
 
-/// Maps every label into the volume. A fault if a label cannot belong to the image: a place, a
+/// Maps every label into the volume; boxes are clipped to it, those of a still without its borders
+/// to what is seen of the image. A fault if a label cannot belong to the image: a place, a
 /// camera or a scale beyond 1e6 (px), another number that is not finite (a joint in 3-D may be
 /// unknown), a projection that is not in the volume, a box with right < left or bottom < top or
 /// without any overlap with the source image (a box to ignore may lie anywhere within those 1e6

@@ -10,7 +10,6 @@
 
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
-#include "stages/base/images/image_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 
 namespace eventgan {
@@ -92,59 +91,31 @@ EcdImageList list_of_present_images(const std::filesystem::path& folder) {
   return images;
 }
 
-/// Decoding gives colour; of a grey image all three channels are one, and stay what they are.
-GreyImage grey_of(const ColourFrame& colour, bool& has_colour) {
-  GreyImage grey{colour.size, std::vector<std::uint8_t>(colour.size.pixel_count())};
-  for (std::size_t i = 0; i < grey.pixels.size(); ++i) {
-    const std::uint8_t* const bgr = &colour.bgr[3 * i];
-    has_colour |= bgr[0] != bgr[1] || bgr[1] != bgr[2];
-    const int thousandths = 114 * bgr[0] + 587 * bgr[1] + 299 * bgr[2];
-    grey.pixels[i] = static_cast<std::uint8_t>((thousandths + 500) / 1000);
-  }
-  return grey;
+std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder,
+                                            const EcdImageList& images) {
+  std::vector<std::filesystem::path> files;
+  for (const std::string& path : images.paths) files.push_back(folder / path);
+  return files;
 }
 
 }  // namespace
 
 EcdRecording::EcdRecording(const std::filesystem::path& folder)
-    : folder_(folder),
-      name_(folder.string()),
-      images_(list_of_present_images(folder)),
+    : EcdRecording(folder, list_of_present_images(folder)) {}
+
+EcdRecording::EcdRecording(const std::filesystem::path& folder, EcdImageList images)
+    : name_(folder.string()),
       events_(folder / "events.txt"),
-      size_(read_frame(0).size),
-      boundaries_(images_.times_s.size()) {}
+      frames_(files_of(folder, images), images.times_s),
+      boundaries_(images.times_s.size()) {}
 
 double EcdRecording::frame_time_s(std::int64_t index) const {
-  return images_.times_s[frame_position(index, frame_count(), name_)];
+  return frames_.times_s()[frame_position(index, frame_count(), name_)];
 }
 
 GreyImage EcdRecording::frame(std::int64_t index) const {
-  const std::size_t position = frame_position(index, frame_count(), name_);
-  GreyImage image = read_frame(position);
-  if (image.size == size_) return image;
-  throw InputError("expected frames of one size, " + to_string(size_) + ", got " +
-                   to_string(image.size) + ", in " + (folder_ / images_.paths[position]).string());
-}
-
-GreyImage EcdRecording::read_frame(std::size_t position) const {
-  const std::filesystem::path file = folder_ / images_.paths[position];
-  try {
-    bool has_colour = false;
-    GreyImage image = grey_of(decode_image_file(file), has_colour);
-    std::ptrdiff_t none_yet = -1;
-    if (has_colour)
-      colour_frame_.compare_exchange_strong(none_yet, static_cast<std::ptrdiff_t>(position));
-    return image;
-  } catch (const std::runtime_error& error) {
-    std::throw_with_nested(InputError(std::string(error.what()) + ", in " + file.string()));
-  }
-}
-
-std::vector<std::string> EcdRecording::notes() const {
-  const std::ptrdiff_t frame = colour_frame_;
-  if (frame < 0) return {};
-  return {"frames in colour are made grey, in " +
-          (folder_ / images_.paths[static_cast<std::size_t>(frame)]).string()};
+  frame_position(index, frame_count(), name_);
+  return frames_.read(index);
 }
 
 std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,
@@ -153,19 +124,20 @@ std::vector<Event> EcdRecording::events_between(std::int64_t first_frame,
   const std::int64_t begin = first_byte_after(range.first);
   const std::int64_t end = first_byte_after(range.last);
   return events_.events(
-      begin, end, EventCheck(size_, images_.times_s[range.first], images_.times_s[range.last]));
+      begin, end,
+      EventCheck(size(), frames_.times_s()[range.first], frames_.times_s()[range.last]));
 }
 
 std::vector<Event> EcdRecording::events_in(double after_s, double until_s) const {
   return events_.events(events_.first_byte_after(after_s), events_.first_byte_after(until_s),
-                        EventCheck(size_, after_s, until_s));
+                        EventCheck(size(), after_s, until_s));
 }
 
 std::vector<Event> EcdRecording::events_around(double time_s, std::int64_t before,
                                                std::int64_t after) const {
   const std::int64_t middle = events_.first_byte_after(time_s);
   return events_.events(events_.skip_lines(middle, -before), events_.skip_lines(middle, after),
-                        EventCheck::of_any_time(size_));
+                        EventCheck::of_any_time(size()));
 }
 
 std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
@@ -174,7 +146,7 @@ std::optional<FlowField> EcdRecording::flow(std::int64_t index) const {
 }
 
 std::int64_t EcdRecording::first_byte_after(std::size_t frame) const {
-  return boundaries_.at(frame, [&] { return events_.first_byte_after(images_.times_s[frame]); });
+  return boundaries_.at(frame, [&] { return events_.first_byte_after(frames_.times_s()[frame]); });
 }
 
 }  // namespace eventgan

@@ -66,6 +66,10 @@ void GrowingDataset<Number>::close() {
 }
 
 template class GrowingDataset<std::uint8_t>;
+template class GrowingDataset<std::uint16_t>;
+template class GrowingDataset<std::uint32_t>;
+template class GrowingDataset<std::uint64_t>;
+template class GrowingDataset<std::int64_t>;
 template class GrowingDataset<float>;
 template class GrowingDataset<double>;
 

@@ -4,33 +4,31 @@
 
 #include <algorithm>
 #include <cmath>
-#include <system_error>
+#include <optional>
 #include <utility>
+#include <vector>
 
 #include "manifests/values/faults.h"
 #include "stages/base/images/image_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/hdf5_table.h"
+#include "stages/recordings/detail/stored_recording.h"
 
 namespace eventgan {
 namespace {
 
-constexpr std::int64_t kEventsPerRead = std::int64_t{1} << 17;
 constexpr hsize_t kTimeColumn = 2;
 
-Hdf5Handle open_file(const std::filesystem::path& path) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(path, ignored)) {
-    throw InputError("expected an HDF5 file, got " +
-                     std::string(std::filesystem::exists(path, ignored) ? "a folder" : "none") +
-                     ", in " + path.string());
-  }
-  try {
-    return open_hdf5_file(path);
-  } catch (const Hdf5Error&) {
-    std::throw_with_nested(
-        InputError("expected a whole HDF5 file, got one that does not open, in " + path.string()));
-  }
-}
+/// The datasets of a recording, of which it is known that they fit together.
+struct Hdf5RecordingTables {
+  Hdf5Handle file;  ///< first, so that it closes last
+  Hdf5Table events;
+  Hdf5Table frames;
+  std::optional<Hdf5Table> flow;
+  ImageSize size;
+  std::vector<double> frame_times_s;
+  std::vector<std::int64_t> event_index;  ///< as the file says, or empty
+};
 
 Hdf5Table open_events(hid_t file, const Hdf5Layout& layout, const std::string& name) {
   Hdf5Table events(file, layout.events, name);
@@ -105,7 +103,7 @@ std::optional<Hdf5Table> open_flow(hid_t file, const Hdf5Layout& layout, const s
 Hdf5RecordingTables open_tables(const std::filesystem::path& path, const Hdf5Layout& layout) {
   const Hdf5Lock lock;
   const std::string name = path.string();
-  Hdf5Handle file = open_file(path);
+  Hdf5Handle file = open_recording_file(path);
   Hdf5Table events = open_events(file, layout, name);
   Hdf5Table frames = open_frames(file, layout, name);
   const Dims dims = frames.dims();
@@ -121,6 +119,84 @@ Hdf5RecordingTables open_tables(const std::filesystem::path& path, const Hdf5Lay
           std::move(event_index)};
 }
 
+class Hdf5Events final : public EventStore {
+ public:
+  Hdf5Events(std::shared_ptr<const Hdf5RecordingTables> tables, std::string name)
+      : tables_(std::move(tables)), name_(std::move(name)) {}
+
+  std::int64_t count() const override {
+    return static_cast<std::int64_t>(tables_->events.dims()[0]);
+  }
+
+  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
+    static_assert(sizeof(StoredEvent) == 4 * sizeof(double), "a row of the dataset");
+    std::vector<StoredEvent> rows(static_cast<std::size_t>(count));
+    read_block(first, rows.size(), 0, 4, rows.empty() ? nullptr : &rows.data()->x);
+    return rows;
+  }
+
+  std::vector<double> times_s(std::int64_t first, std::int64_t count) const override {
+    std::vector<double> times(static_cast<std::size_t>(count));
+    read_block(first, times.size(), kTimeColumn, 1, times.data());
+    return times;
+  }
+
+ private:
+  void read_block(std::int64_t first, hsize_t rows, hsize_t column, hsize_t columns,
+                  double* values) const {
+    read_hdf5(
+        fmt::format("{} (events {}..{})", name_, first,
+                    first + static_cast<std::int64_t>(rows) - 1),
+        [&] {
+          tables_->events.read({static_cast<hsize_t>(first), column}, {rows, columns}, values);
+        });
+  }
+
+  std::shared_ptr<const Hdf5RecordingTables> tables_;
+  std::string name_;
+};
+
+class Frames final : public FrameStore {
+ public:
+  Frames(std::shared_ptr<const Hdf5RecordingTables> tables, std::string name)
+      : tables_(std::move(tables)), name_(std::move(name)) {}
+
+  const std::vector<double>& times_s() const override { return tables_->frame_times_s; }
+
+  GreyImage read(std::int64_t index) const override {
+    const ImageSize size = tables_->size;
+    GreyImage image{size, std::vector<std::uint8_t>(size.pixel_count())};
+    const Dims& dims = tables_->frames.dims();
+    read_hdf5(fmt::format("{} (frame {})", name_, index), [&] {
+      tables_->frames.read({static_cast<hsize_t>(index), 0, 0}, {1, dims[1], dims[2]},
+                           image.pixels.data());
+    });
+    return image;
+  }
+
+  std::optional<FlowField> flow(std::int64_t index) const override {
+    if (!tables_->flow) return std::nullopt;
+    const std::size_t count = tables_->size.pixel_count();
+    FlowField field{tables_->size, std::vector<float>(count), std::vector<float>(count)};
+    const Dims& dims = tables_->flow->dims();
+    const auto row = static_cast<hsize_t>(index);
+    const std::string place = fmt::format("{} (flow of frame {})", name_, index);
+    read_hdf5(place, [&] {
+      tables_->flow->read({row, 0, 0, 0}, {1, 1, dims[2], dims[3]}, field.x_px.data());
+      tables_->flow->read({row, 1, 0, 0}, {1, 1, dims[2], dims[3]}, field.y_px.data());
+    });
+    const auto finite = [](float value) { return std::isfinite(value); };
+    if (!std::ranges::all_of(field.x_px, finite) || !std::ranges::all_of(field.y_px, finite)) {
+      throw InputError("expected finite values, got others, in " + place);
+    }
+    return field;
+  }
+
+ private:
+  std::shared_ptr<const Hdf5RecordingTables> tables_;
+  std::string name_;
+};
+
 }  // namespace
 
 Hdf5Layout mvsec_layout(const std::string& camera) {
@@ -134,156 +210,14 @@ Hdf5Layout eventgan_layout() {
           "davis/image_raw/event_index", ""};
 }
 
-Hdf5Recording::Hdf5Recording(const std::filesystem::path& path, const Hdf5Layout& layout)
-    : name_(path.string()),
-      tables_(open_tables(path, layout)),
-      boundaries_(tables_.frame_times_s.size()) {}
-
-template <class Read>
-auto Hdf5Recording::read_locked(const std::string& what, Read read) const {
-  const Hdf5Lock lock;
-  try {
-    return read();
-  } catch (const Hdf5Error&) {
-    std::throw_with_nested(
-        InputError("expected readable values, got damage, in " + name_ + " (" + what + ")"));
-  }
-}
-
-double Hdf5Recording::frame_time_s(std::int64_t index) const {
-  return tables_.frame_times_s[frame_position(index, frame_count(), name_)];
-}
-
-GreyImage Hdf5Recording::frame(std::int64_t index) const {
-  const hsize_t row = frame_position(index, frame_count(), name_);
-  GreyImage image{size(), std::vector<std::uint8_t>(size().pixel_count())};
-  const Dims& dims = tables_.frames.dims();
-  read_locked("frame " + std::to_string(index), [&] {
-    tables_.frames.read({row, 0, 0}, {1, dims[1], dims[2]}, image.pixels.data());
-  });
-  return image;
-}
-
-std::optional<FlowField> Hdf5Recording::flow(std::int64_t index) const {
-  const hsize_t row = frame_position(index, frame_count() - 1, name_);
-  if (!tables_.flow) return std::nullopt;
-  const std::size_t count = size().pixel_count();
-  FlowField field{size(), std::vector<float>(count), std::vector<float>(count)};
-  const Dims& dims = tables_.flow->dims();
-  const std::string what = "flow of frame " + std::to_string(index);
-  read_locked(what, [&] {
-    tables_.flow->read({row, 0, 0, 0}, {1, 1, dims[2], dims[3]}, field.x_px.data());
-    tables_.flow->read({row, 1, 0, 0}, {1, 1, dims[2], dims[3]}, field.y_px.data());
-  });
-  const auto finite = [](float value) { return std::isfinite(value); };
-  if (!std::ranges::all_of(field.x_px, finite) || !std::ranges::all_of(field.y_px, finite)) {
-    throw InputError("expected finite values, got others, in " + name_ + " (" + what + ")");
-  }
-  return field;
-}
-
-std::vector<Event> Hdf5Recording::events_between(std::int64_t first_frame,
-                                                 std::int64_t last_frame) const {
-  const auto [first, last] = frame_range(first_frame, last_frame, frame_count(), name_);
-  const std::string what =
-      "events of frames " + std::to_string(first_frame) + ".." + std::to_string(last_frame);
-  const double after_s = frame_time_s(first_frame);
-  const double until_s = frame_time_s(last_frame);
-  return read_locked(what, [&, first = first, last = last] {
-    return read_events(events_until(first), events_until(last),
-                       EventCheck(size(), after_s, until_s));
-  });
-}
-
-std::vector<Event> Hdf5Recording::events_in(double after_s, double until_s) const {
-  return read_locked(fmt::format("events of {} s to {} s", after_s, until_s), [&] {
-    return read_events(events_until_time(after_s), events_until_time(until_s),
-                       EventCheck(size(), after_s, until_s));
-  });
-}
-
-std::vector<Event> Hdf5Recording::events_around(double time_s, std::int64_t before,
-                                                std::int64_t after) const {
-  return read_locked(fmt::format("events around {} s", time_s), [&] {
-    const std::int64_t middle = events_until_time(time_s);
-    return read_events(std::max<std::int64_t>(middle - before, 0),
-                       middle + std::min(after, event_count() - middle),
-                       EventCheck::of_any_time(size()));
-  });
-}
-
-std::optional<std::array<double, 2>> Hdf5Recording::event_span() const {
-  if (event_count() == 0) return std::nullopt;
-  return read_locked("first and last event", [&] {
-    return std::array{event_times(0, 1)[0], event_times(event_count() - 1, 1)[0]};
-  });
-}
-
-/// The frame before tells where to look first.
-std::int64_t Hdf5Recording::events_until_time(double time_s) const {
-  const std::vector<double>& frames = tables_.frame_times_s;
-  const auto next = std::ranges::upper_bound(frames, time_s);
-  const std::int64_t guess =
-      next == frames.begin() ? 0
-                             : events_until(static_cast<std::size_t>(next - frames.begin()) - 1);
-  return count_events_until(
-      time_s, guess, event_count(),
-      [&](std::int64_t begin, std::int64_t count) { return event_times(begin, count); });
-}
-
-std::int64_t Hdf5Recording::events_until(std::size_t frame) const {
-  return boundaries_.at(frame, [&] {
-    const std::vector<std::int64_t>& index = tables_.event_index;
-    const std::int64_t guess = index.empty() ? event_count() / 2 : index[frame];
-    return count_events_until(
-        tables_.frame_times_s[frame], guess, event_count(),
-        [&](std::int64_t begin, std::int64_t count) { return event_times(begin, count); });
-  });
-}
-
-std::vector<double> Hdf5Recording::event_times(std::int64_t first, std::int64_t count) const {
-  const auto rows = static_cast<hsize_t>(count);
-  std::vector<double> times(rows);
-  tables_.events.read({static_cast<hsize_t>(first), kTimeColumn}, {rows, 1}, times.data());
-  // Among times out of order a search would find a wrong place and nobody would know.
-  std::size_t at = 0;
-  try {
-    for (; at < times.size(); ++at) check_event_time(times[at == 0 ? 0 : at - 1], times[at]);
-  } catch (const EventFault& fault) {
-    refuse(fault, first + static_cast<std::int64_t>(at));
-  }
-  return times;
-}
-
-void Hdf5Recording::refuse(const EventFault& fault, std::int64_t event) const {
-  throw InputError(std::string(fault.what()) + ", in " + name_ + " (event " +
-                   std::to_string(event) + ")");
-}
-
-std::vector<Event> Hdf5Recording::read_events(std::int64_t begin, std::int64_t end,
-                                              EventCheck check) const {
-  if (end < begin) {
-    throw InputError("expected times that never fall, got others, in " + name_ + " (events " +
-                     std::to_string(end) + ".." + std::to_string(begin) + ")");
-  }
-  std::vector<Event> events;
-  events.reserve(static_cast<std::size_t>(end - begin));
-  std::vector<StoredEvent> rows;
-  std::int64_t next = begin;
-  try {
-    while (next < end) {
-      rows.resize(static_cast<std::size_t>(std::min(kEventsPerRead, end - next)));
-      static_assert(sizeof(StoredEvent) == 4 * sizeof(double), "a row of the dataset");
-      tables_.events.read({static_cast<hsize_t>(next), 0}, {rows.size(), 4}, &rows.data()->x);
-      for (const StoredEvent& row : rows) {
-        events.push_back(check.take(row));
-        ++next;
-      }
-    }
-  } catch (const EventFault& fault) {
-    refuse(fault, next);
-  }
-  return events;
+std::unique_ptr<Recording> open_hdf5_recording(const std::filesystem::path& path,
+                                               const Hdf5Layout& layout) {
+  const auto tables = std::make_shared<const Hdf5RecordingTables>(open_tables(path, layout));
+  return make_stored_recording({.name = path.string(),
+                                .size = tables->size,
+                                .events = std::make_unique<Hdf5Events>(tables, path.string()),
+                                .frames = std::make_unique<Frames>(tables, path.string()),
+                                .event_index = tables->event_index});
 }
 
 }  // namespace eventgan

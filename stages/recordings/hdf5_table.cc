@@ -1,10 +1,12 @@
 #include "stages/recordings/detail/hdf5_table.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
-
-#include "manifests/values/faults.h"
+#include <system_error>
 
 namespace eventgan {
 namespace {
@@ -71,7 +73,53 @@ hsize_t most_values(hid_t dataset, std::size_t width) {
   return stored > kMost / growth ? kMost : stored * growth / width;
 }
 
+/// Filters of recordings that libhdf5 does not have itself, and Debian's packages of them.
+struct Plugin {
+  H5Z_filter_t filter;
+  const char* name;
+  const char* package;
+};
+constexpr std::array kPlugins{Plugin{32000, "LZF", "hdf5-plugin-lzf"},
+                              Plugin{32001, "Blosc", "hdf5-filter-plugin-blosc-serial"}};
+
+/// HDF5 finds a filter that is installed as a plugin by itself.
+void require_filters(hid_t dataset, const std::string& place) {
+  const Hdf5Handle creation(H5Dget_create_plist(dataset), H5Pclose, "read", "the filters");
+  const int count = checked(H5Pget_nfilters(creation), "count", "the filters");
+  for (int i = 0; i < count; ++i) {
+    unsigned flags = 0;
+    std::size_t values = 0;
+    const H5Z_filter_t filter = checked(H5Pget_filter2(creation, static_cast<unsigned>(i), &flags,
+                                                       &values, nullptr, 0, nullptr, nullptr),
+                                        "read", "a filter");
+    if (checked(H5Zfilter_avail(filter), "look for", "a filter") > 0) continue;
+    const auto known = std::ranges::find(kPlugins, filter, &Plugin::filter);
+    throw InputError(
+        known == kPlugins.end()
+            ? fmt::format("expected HDF5's filter {} to be installed, got none, in {}", filter,
+                          place)
+            : fmt::format(
+                  "expected HDF5's filter {} to be installed, got none (apt-get install {}), in {}",
+                  known->name, known->package, place));
+  }
+}
+
 }  // namespace
+
+Hdf5Handle open_recording_file(const std::filesystem::path& path) {
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(path, ignored)) {
+    throw InputError("expected an HDF5 file, got " +
+                     std::string(std::filesystem::exists(path, ignored) ? "a folder" : "none") +
+                     ", in " + path.string());
+  }
+  try {
+    return open_hdf5_file(path);
+  } catch (const Hdf5Error&) {
+    std::throw_with_nested(
+        InputError("expected a whole HDF5 file, got one that does not open, in " + path.string()));
+  }
+}
 
 Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& file_name)
     : place_(file_name + " (dataset " + path + ")") {
@@ -83,6 +131,7 @@ Hdf5Table::Hdf5Table(hid_t file, const std::string& path, const std::string& fil
     is_float_ = type_ == "float32" || type_ == "float64";
     dims_ = dims_of(dataset_, path);
     if (type_ == "text" || type_ == "no numbers") refuse("numbers");
+    require_filters(dataset_, place_);
     if (side_beyond(dims_, most_values(dataset_, H5Tget_size(type)))) {
       refuse("what its " + std::to_string(H5Dget_storage_size(dataset_)) +
              " stored bytes can hold");

@@ -21,8 +21,9 @@ struct FlowField {
   std::vector<float> y_px;  ///< [y, x] float32, displacement down
 };
 
-/// A recording of an event camera with frames: frames, their times, and the events, all on one
-/// clock and one pixel grid. Nothing but the index is held in memory.
+/// A recording of an event camera: the events, and frames with their times if it has any, all on
+/// one clock and one pixel grid. Of a table (.npy, .npz, .csv) all events are read at once, those
+/// of the tables used last are kept; of the others nothing but the index is held in memory.
 ///
 /// A frame that is not there is std::out_of_range. Thread safety: all may be called from several
 /// threads (calls into HDF5 take turns).
@@ -53,7 +54,7 @@ class Recording {
   virtual std::vector<Event> events_in(double after_s, double until_s) const = 0;
 
   /// The last `before` events with t ≤ time_s and the first `after` ones behind them, fewer where
-  /// the recording ends; throws likewise.
+  /// the recording ends, or where rectifying moves some out of the image; throws likewise.
   virtual std::vector<Event> events_around(double time_s, std::int64_t before,
                                            std::int64_t after) const = 0;
 
@@ -69,15 +70,27 @@ class Recording {
   virtual std::vector<std::string> notes() const { return {}; }
 };
 
-/// What lies at `path`: a folder with events.txt is ECD's, an HDF5 file tells by its datasets; none
-/// if it is neither, or holds other data.
+/// What lies at `path`, told by what is in it: a folder with events.txt (or this file) is ECD's,
+/// one with events/left/events.h5 DSEC's, an HDF5 file or an array tells by its fields' names, a
+/// CSV by its header, a file of AEDAT4 or Prophesee's by how it begins; none if it is nothing of
+/// that.
 std::optional<RecordingFormat> find_recording_format(const std::filesystem::path& path,
-                                                     const std::string& camera = "left");
+                                                     const RecordingOptions& options = {});
+
+/// The file with the events of the recording at `path`, which stands for it: of ECD's folder the
+/// events.txt, of DSEC's the events.h5; of others it is `path`.
+std::filesystem::path event_file(const std::filesystem::path& path,
+                                 const RecordingOptions& options = {});
+
+/// What decides, beside this file, the times of frames and the places of events: images.txt of ECD;
+/// timestamps.txt and, with `rectify`, rectify_map.h5 of DSEC.
+std::vector<std::filesystem::path> event_companions(const std::filesystem::path& event_file,
+                                                    const RecordingOptions& options = {});
 
 /// Opens a recording: reads the frames' times and checks that everything is there and fits
 /// together; where a frame's events end is looked up when first asked for. Throws InputError
-/// "expected X, got Y, in PATH" if it is absent or not of this format. `camera` is for kMvsec.
+/// "expected X, got Y, in PATH" if it is absent or not of this format.
 std::unique_ptr<Recording> open_recording(const std::filesystem::path& path, RecordingFormat format,
-                                          const std::string& camera = "left");
+                                          const RecordingOptions& options = {});
 
 }  // namespace eventgan

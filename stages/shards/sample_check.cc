@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "manifests/values/placement.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_tables.h"
 
@@ -27,6 +28,9 @@ std::array<double, 4> numbers(const Intrinsics& camera) {
 }
 std::array<double, 5> numbers(const LensDistortion& lens) {
   return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2};
+}
+std::array<double, 4> numbers(const ImageMotion& motion) {
+  return {motion.x_px, motion.y_px, motion.angle_deg, motion.scale};
 }
 std::array<double, 1> numbers(double x) { return {x}; }
 template <class Number, std::size_t kCount>
@@ -84,11 +88,23 @@ class SourceToVolume {
   const std::array<double, 6>& m_;
 };
 
-Rectangle cut(const Rectangle& box, const ImageSize& size) {
-  const double width = size.width;
-  const double height = size.height;
-  return {std::clamp(box.left, 0.0, width), std::clamp(box.top, 0.0, height),
-          std::clamp(box.right, 0.0, width), std::clamp(box.bottom, 0.0, height)};
+Rectangle cut(const Rectangle& box, const Rectangle& area) {
+  return {std::clamp(box.left, area.left, area.right), std::clamp(box.top, area.top, area.bottom),
+          std::clamp(box.right, area.left, area.right),
+          std::clamp(box.bottom, area.top, area.bottom)};
+}
+
+/// What boxes are cut to: the volume, or what it shows of a still's image.
+Rectangle area_of(const ShardSample& sample, const SourceToVolume& map, const Rectangle& volume) {
+  const auto [height, width] = sample.source_size;
+  const auto border = sample.pair.motion ? still_border(sample.source_size, sample.pair)
+                                         : std::optional<ImageSize>();
+  if (!border || *border == ImageSize{}) return volume;
+  const auto [rows, columns] = *border;
+  return cut(
+      map(Rectangle{static_cast<double>(columns), static_cast<double>(rows),
+                    static_cast<double>(width - columns), static_cast<double>(height - rows)}),
+      volume);
 }
 
 /// Columns in which a number is not finite.
@@ -106,6 +122,7 @@ std::vector<std::string> not_finite(const ShardSample& sample) {
   const auto expect_finite_if_any = [&](const char* column, const auto& value) {
     if (value) expect_finite(column, *value);
   };
+  expect_finite_if_any("motion", sample.pair.motion);
   if (sample.valid) {  // of a quarantined one the source's alone may be there, as it is
     expect_finite_if_any("projection_source", sample.annotation.projection);
     expect_finite_if_any("projection", sample.labels.projection);
@@ -150,6 +167,13 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
   const auto expect = [&](bool holds, const std::string& what) {
     if (!holds) faults.push_back("expected " + what + ", got another place");
   };
+  const FramePair& pair = sample.pair;
+  if (pair.motion && (pair.previous != pair.next || pair.motion->scale <= 0 ||
+                      (pair.label_position != 0 && pair.label_position != 1))) {
+    faults.emplace_back(
+        "expected a motion of scale > 0, label_position 0 or 1, and one image as prev_path, "
+        "prev_index, prev_video_frame and next_path, next_index, next_video_frame, got others");
+  }
   const SourceToVolume map(sample.source_to_volume);
   const auto expect_mapped = [&](const std::string& name, const std::string& of, const auto& mapped,
                                  const auto& source) {
@@ -158,6 +182,9 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
     expect(near(*mapped, map(*source)), name + " where source_to_volume puts " + of);
   };
 
+  const Rectangle volume{0, 0, static_cast<double>(header.volume.size.width),
+                         static_cast<double>(header.volume.size.height)};
+  const Rectangle area = area_of(sample, map, volume);
   for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
     const VolumeBox& box = sample.labels.boxes[i];
     const std::string name = " of box " + std::to_string(i);
@@ -168,8 +195,7 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
     }
     expect(near(box.unclipped, map(sample.annotation.boxes[i].xyxy)),
            "xyxy_unclipped" + name + " where source_to_volume puts xyxy_source");
-    expect(near(box.clipped, cut(box.unclipped, header.volume.size)) &&
-               box.clipped == cut(box.clipped, header.volume.size),
+    expect(near(box.clipped, cut(box.unclipped, area)) && box.clipped == cut(box.clipped, volume),
            "xyxy" + name + " to be xyxy_unclipped cut to the volume");
   }
   for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {

@@ -12,7 +12,8 @@ namespace eventgan {
 /// What is wrong with the labels of one sample as a shard holds them: a number that is not finite,
 /// in any column; a box, joint, centre, scale, head box, person's box, camera or projection that is
 /// not what source_to_volume makes of its annotation (more than 0.01 px off); a clipped box that is
-/// not the unclipped one cut to the volume. Texts without the file's name; empty if sound.
+/// not the unclipped one cut to the volume; a motion of a pair that is no still's. Texts without
+/// the file's name; empty if sound.
 std::vector<std::string> label_faults(const ShardHeader& header, const ShardSample& sample);
 
 /// What is wrong with a volume as read back from a shard: values that are not finite or below zero,

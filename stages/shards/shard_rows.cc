@@ -75,6 +75,14 @@ void put(std::vector<double>& column, const std::optional<Intrinsics>& camera, s
       row);
 }
 
+void put(std::vector<double>& column, const std::optional<ImageMotion>& motion, std::size_t row) {
+  using Numbers = std::array<double, 4>;
+  put(column,
+      motion ? std::optional(Numbers{motion->x_px, motion->y_px, motion->angle_deg, motion->scale})
+             : std::nullopt,
+      row);
+}
+
 void append_pair(const ShardHeader& header, const ShardSample& sample, PairColumns& to) {
   const FramePair& pair = sample.pair;
   const FrameOrigin& origin = sample.origin;
@@ -102,6 +110,7 @@ void append_pair(const ShardHeader& header, const ShardSample& sample, PairColum
   put(to.action, origin.action, row);
   put(to.camera, origin.camera, row);
   put(to.drive, origin.drive, row);
+  put(to.motion, pair.motion, row);
 }
 
 void append_events(const ShardSample& sample, EventColumns& to) {
@@ -286,6 +295,9 @@ FramePair pair_at(const PairColumns& from, std::size_t row) {
   pair.gap_frames = from.gap_frames[row];
   pair.label_index = from.label_index[row];
   pair.label_position = from.label_position[row];
+  if (const double* motion = row_if_any(from.motion, 4, row)) {
+    pair.motion = {motion[0], motion[1], motion[2], motion[3]};
+  }
   return pair;
 }
 

@@ -159,6 +159,10 @@ std::string describe_sample(const ShardReader& reader, int slot) {
        is_window || seconds.empty() ? "" : ", ", seconds);
   line("label", "frame {}, at {:g} of the way from previous to next", pair.label_index,
        pair.label_position);
+  if (const auto& motion = pair.motion) {
+    line("motion", "of a still: ({:.4g} {:.4g}) px, {:.4g} degrees, scale {:.6g}", motion->x_px,
+         motion->y_px, motion->angle_deg, motion->scale);
+  }
   line("source size", "{} pixels", to_string(sample.source_size));
   if (sample.valid) {
     const VolumeStatistics& statistics = sample.statistics;
@@ -192,6 +196,13 @@ Json json(const Intrinsics& camera) {
 
 Json json(const LensDistortion& lens) {
   return {{"k1", lens.k1}, {"k2", lens.k2}, {"k3", lens.k3}, {"p1", lens.p1}, {"p2", lens.p2}};
+}
+
+Json json(const ImageMotion& motion) {
+  return {{"x_px", motion.x_px},
+          {"y_px", motion.y_px},
+          {"angle_deg", motion.angle_deg},
+          {"scale", motion.scale}};
 }
 
 Json json(const std::array<double, 3>& place) { return place; }
@@ -315,6 +326,7 @@ std::string sample_json(const ShardReader& reader, int slot) {
                {"gap_s", sample.pair.gap_s()},
                {"label_index", sample.pair.label_index},
                {"label_position", sample.pair.label_position},
+               {"motion", json(sample.pair.motion)},
                {"source_size", json(sample.source_size)},
                {"source_to_volume", sample.source_to_volume},
                {"scale", sample.scale},

@@ -1,8 +1,11 @@
 """A camera's own events as a source of `convert`: their volumes, labels and times as numpy has them, and what goes wrong with them."""
 
 import json
+import os
 import pathlib
+import pickle
 import shutil
+import subprocess
 import sys
 
 import cv2
@@ -10,7 +13,8 @@ import h5py
 import numpy as np
 
 import program
-from camera_files import DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of, write_dhp19, write_mvsec
+from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of, whole_microseconds, write_columns,
+                          write_dhp19, write_mvsec)
 from program import SHARED, SOURCE, run, shard_bytes, text
 
 sys.path.insert(0, str(SOURCE / "manifests" / "python"))
@@ -265,6 +269,216 @@ class Recordings(program.InFolder):
         for sample in samples:
             window = rows_of_file[(rows_of_file[:, 0] > sample["times"][0]) & (rows_of_file[:, 0] <= sample["times"][1])]
             np.testing.assert_allclose(sample["volume"], volume_of(window[:, [1, 2, 0, 3]], height=180, width=240), rtol=0, atol=1e-5)
+
+
+class WithoutFrames(program.InFolder):
+    """Recordings of today's layouts, most of them events alone."""
+    SENSOR = {"width": WIDTH, "height": HEIGHT}
+
+    def setUp(self):
+        super().setUp()
+        self.events, self.ticks = whole_microseconds(random_events(5000, 20.0, 20.33, 8))
+        self.out = self.folder / "out"
+
+    def convert(self, root, expect=0, **source):
+        shutil.rmtree(self.out, ignore_errors=True)
+        source = {"dataset": "recording", "root": root, "window_s": 0.05, **source}
+        return run("convert", self.write_manifest(events_manifest(source)), expect=expect)
+
+    def check_windows(self, events, length=0.05):
+        """Consecutive windows, each event in one of them."""
+        begin = events[0, 2] - 2.5e-7
+        count = int(np.ceil((events[-1, 2] - begin) / length))
+        samples = rows(self.out)
+        self.assertEqual(len(samples), count)
+        held = 0
+        for k, sample in enumerate(samples.values()):
+            np.testing.assert_allclose(sample["times"], [begin + k * length, begin + (k + 1) * length], rtol=0, atol=1e-9)
+            window = events[(events[:, 2] > begin + k * length) & (events[:, 2] <= begin + (k + 1) * length)]
+            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
+            held += len(window)
+        self.assertEqual(held, len(events))
+        self.assertIn("sound", run("verify", self.out, "--deep")[0])
+
+    def test_dsec(self):
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=int(self.ticks[0]) - 700, compression="gzip")
+        told = self.convert("seq", sensor=self.SENSOR)[0]
+        self.assertIn("7 of 7 pairs written, 0 quarantined", told)
+        self.check_windows(self.events)
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "pictures")[1], "")
+        self.assertEqual(len(list((self.folder / "pictures").iterdir())), 7)
+        run("report", self.out)
+
+    def test_dsec_rectified(self):
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
+        x, y = np.meshgrid(np.arange(WIDTH), np.arange(HEIGHT))
+        places = np.stack([x * 1.1 - 2.3, y * 0.9 + 0.7], -1).astype(np.float32)
+        with h5py.File(self.folder / "seq/events/left/rectify_map.h5", "w") as file:
+            file["rectify_map"] = places
+        told = self.convert("seq", sensor=self.SENSOR, rectify=True)[0]
+        moved = np.floor(places + 0.5)[self.events[:, 1].astype(int), self.events[:, 0].astype(int)]
+        inside = (moved >= 0).all(1) & (moved[:, 0] < WIDTH) & (moved[:, 1] < HEIGHT)
+        self.assertGreater((~inside).sum(), 100)
+        outside = (np.floor(places + 0.5) < 0).any(-1) | (np.floor(places[..., 0] + 0.5) >= WIDTH)
+        self.assertIn(f"events of {outside.sum()} of {WIDTH * HEIGHT} pixels leave the image", told)
+        begin = self.events[0, 2] - 2.5e-7
+        for k, sample in enumerate(rows(self.out).values()):
+            chosen = inside & (self.events[:, 2] > begin + 0.05 * k) & (self.events[:, 2] <= begin + 0.05 * (k + 1))
+            window = np.c_[moved[chosen], self.events[chosen, 2:]]
+            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
+
+    def test_dsec_with_images_of_its_view(self):
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
+        times = [20.0 + 0.1 * k for k in range(4)]
+        images = self.folder / "seq/images/left/distorted"
+        images.mkdir(parents=True)
+        for k in range(4):
+            cv2.imwrite(str(images / f"{k:06}.png"), np.full((HEIGHT, WIDTH), 60 * k, np.uint8))
+        (self.folder / "seq/images/timestamps.txt").write_text("".join(f"{round(t * 1e6)}\n" for t in times))
+        manifest = self.write_manifest(events_manifest({"dataset": "recording", "root": "seq", "sensor": self.SENSOR}))
+        run("convert", manifest)
+        samples = rows(self.out)
+        self.assertEqual(list(samples), [f"seq/00000000{time:.6f}" for time in times[1:]])
+        for sample, begin, end in zip(samples.values(), times, times[1:]):
+            window = self.events[(self.events[:, 2] > begin) & (self.events[:, 2] <= end)]
+            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "pictures")[1], "")
+        (self.folder / "seq/images/timestamps.txt").write_text("".join(f"{round(t * 1e6) + 1}\n" for t in times))
+        self.assertIn("annotations", run("convert", manifest, expect=64)[1])  # another clock is another job
+
+    def test_blosc(self):
+        plugins = [path.parent for path in pathlib.Path("/usr/lib").glob("*/hdf5/serial/plugins/libH5Zblosc.so")]
+        if not plugins:
+            self.skipTest("no hdf5-filter-plugin-blosc-serial")
+        file = self.folder / "seq/events/left/events.h5"
+        write = ("import pickle, sys; from camera_files import *; "
+                 "write_columns(*pickle.load(sys.stdin.buffer), offset=0, compression=32001, compression_opts=(0, 0, 0, 0, 5, 1, 5))")
+        subprocess.run([sys.executable, "-c", write], check=True, input=pickle.dumps((file, self.events)),
+                       cwd=pathlib.Path(__file__).parent, env={**os.environ, "HDF5_PLUGIN_PATH": str(plugins[0])})
+        self.convert("seq", sensor=self.SENSOR)
+        self.check_windows(self.events)
+        empty = self.folder / "empty"
+        empty.mkdir()
+        error = run("plan", self.folder / "manifest.json", expect=66, environment={"HDF5_PLUGIN_PATH": str(empty)})[1]
+        self.assertIn("expected HDF5's filter Blosc to be installed, got none (apt-get install hdf5-filter-plugin-blosc-serial)", error)
+
+    def test_m3ed(self):
+        late = self.events[self.events[:, 2] > 20.1]
+        for camera, events in {"left": self.events, "right": late}.items():
+            write_columns(self.folder / f"{camera}.h5", events - [0, 0, 20, 0], f"prophesee/{camera}", f"prophesee/{camera}/ms_map_idx")
+        with h5py.File(self.folder / "left.h5", "a") as file, h5py.File(self.folder / "right.h5") as right:
+            right.copy("prophesee/right", file["prophesee"])
+            for camera in ("left", "right"):
+                file[f"prophesee/{camera}/calib/resolution"] = [WIDTH, HEIGHT]
+            file["ovc/left/data"] = np.zeros((2, 8, 8, 1), np.uint8)
+        (self.folder / "right.h5").unlink()
+        for camera, events in {"left": self.events, "right": late}.items():
+            told = self.convert("left.h5", camera=camera)[0]
+            self.assertIn("opened without frames, which are another camera's (ovc)", told)
+            self.check_windows(whole_microseconds(events - [0, 0, 20, 0])[0])
+
+    def test_tables(self):
+        columns = {"t_us": self.ticks, "x": self.events[:, 0].astype(np.uint16), "y": self.events[:, 1].astype(np.uint16),
+                   "p": (self.events[:, 3] > 0).astype(np.uint8)}
+        structured = np.zeros(len(self.ticks), [(name, values.dtype) for name, values in columns.items()])
+        for name, values in columns.items():
+            structured[name] = values
+        np.save(self.folder / "a.npy", structured)
+        np.savez(self.folder / "b.npz", **columns)
+        np.savez_compressed(self.folder / "c.npz", **columns)
+        np.savetxt(self.folder / "d.csv", np.stack(list(columns.values()), 1), fmt="%d", delimiter=",", header=",".join(columns), comments="")
+        for name in ("a.npy", "b.npz", "c.npz", "d.csv"):
+            self.convert(name, sensor=self.SENSOR, columns={"t": "t_us"})
+            self.check_windows(self.events)
+        np.save(self.folder / "e.npy", np.stack([self.ticks / 1e6, *list(columns.values())[1:]], 1))
+        self.convert("e.npy", sensor=self.SENSOR, columns={"unit": "s"})
+        self.check_windows(self.events)
+        self.assertIn("expected the sensor's size", self.convert("e.npy", expect=66)[1])
+        self.assertIn("expected window_s, or labels, since the recording has no frames", self.refused({"root": "e.npy", "sensor": self.SENSOR}))
+
+    def refused(self, source):
+        return run("plan", self.write_manifest(events_manifest({"dataset": "recording", **source})), expect=66)[1]
+
+    def test_a_folder_of_tables_with_labels(self):
+        folder = self.folder / "windows"
+        folder.mkdir()
+        halves = [self.events[:2000], self.events[2000:]]
+        for name, half in zip("ab", halves):
+            t, x, y, p = half[:, 2], half[:, 0], half[:, 1], half[:, 3] > 0
+            np.savez(folder / f"{name}.npz", t_us=np.round(t * 1e6).astype(np.int64), x=x.astype(np.int16), y=y.astype(np.int16), p=p)
+            (folder / f"{name}.csv").write_text(HEADER + f"{t[-1]:.6f},2,3,12,13,person,easy\n")
+        self.convert("windows", sensor=self.SENSOR, columns={"t": "t_us"}, window_s=1)
+        samples = rows(self.out)
+        self.assertEqual(list(samples), [f"{name}/{half[-1, 2]:017.6f}" for name, half in zip("ab", halves)])
+        for sample, half in zip(samples.values(), halves):
+            np.testing.assert_allclose(sample["volume"], volume_of(half), rtol=0, atol=1e-4)
+            self.assertEqual(sample["xyxy"].tolist(), [[2, 3, 12, 13]])
+
+    def test_prophesees_boxes(self):
+        write_columns(self.folder / "drive_td.h5", self.events, size=(HEIGHT, WIDTH), compression="gzip")
+        boxes = np.zeros(3, BBOX)
+        boxes[:] = [(20_100_000, 2, 3, 10.5, 7, 0, 5, 1), (20_100_000, 4, 4, 4, 4, 2, 6, 0.5), (20_300_000, 0, 0, 32, 24, 2, 6, 1)]
+        np.save(self.folder / "drive_bbox.npy", boxes)
+        (self.folder / "label_map_dictionary.json").write_text('{"0": "pedestrian", "1": "two wheeler", "2": "car"}')
+        self.convert("drive_td.h5")
+        samples = rows(self.out)
+        self.assertEqual(list(samples), ["drive_td/0000000020.100000", "drive_td/0000000020.300000"])
+        for sample, end in zip(samples.values(), (20.1, 20.3)):
+            window = self.events[(self.events[:, 2] > end - 0.05) & (self.events[:, 2] <= end)]
+            np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
+        self.assertEqual(samples["drive_td/0000000020.100000"]["xyxy"].tolist(), [[2, 3, 12.5, 10], [4, 4, 8, 8]])
+        with h5py.File(next(self.out.glob("*.h5"))) as shard:
+            names = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
+            self.assertEqual([names[k] for k in shard["labels/boxes/class_id"][:]], ["pedestrian", "car", "car"])
+            self.assertEqual(shard["labels/boxes/track_id"][:].tolist(), [5, 6, 6])
+        boxes["w"][1] = np.nan
+        boxes["class_id"][2] = 7
+        np.save(self.folder / "drive_bbox.npy", boxes)
+        error = self.refused({"root": "drive_td.h5", "window_s": 0.05})
+        self.assertIn("expected w in 0..1e+06, got nan", error)
+        self.assertIn("drive_bbox.npy (row 1)", error)
+        self.assertIn("expected a class of label_map_dictionary.json, got class_id 7", error)
+
+    def test_damage_is_named(self):
+        file = self.folder / "seq/events/left/events.h5"
+        write_columns(file, self.events, offset=0)
+        with h5py.File(file, "a") as h5:
+            h5["events/x"][1234] = WIDTH
+        lenient = {"errors": {"policy": "quarantine", "max_count": 9, "max_fraction": 1}}
+        source = {"dataset": "recording", "root": "seq", "sensor": self.SENSOR, "window_s": 0.05}
+        self.assertIn("1 quarantined", run("convert", self.write_manifest(events_manifest(source, **lenient)))[0])
+        self.assertIn("(event 1234)", "".join(path.read_text() for path in self.out.glob("job-*.json")))
+        with h5py.File(file, "a") as h5:
+            h5["ms_to_idx"][...] = h5["ms_to_idx"][...] + 1
+        self.assertIn("dataset ms_to_idx", self.refused({"root": "seq", "sensor": self.SENSOR, "window_s": 0.05}))
+
+    def test_what_needs_frames_says_so(self):
+        write_columns(self.folder / "seq/events/left/events.h5", self.events, offset=0)
+        expected = "expected a recording with frames, got one without"
+        self.assertIn(expected, run("realism", self.folder / "seq", "--with", "difference", expect=66)[1])
+        frames = {"dataset": "frames", "root": "clip", "pairs": program.pairs([1])}
+        manifest = self.write_manifest(program.manifest([frames]))
+        self.assertIn(expected, run("tradeoff", manifest, "--real", self.folder / "seq", expect=66)[1])
+
+    def test_prophesees_events(self):
+        x, y, positive = (self.events[:, 0].astype(int), self.events[:, 1].astype(int), (self.events[:, 3] > 0).astype(int))
+        header = f"% Data file containing CD events\n% Version 2\n% Height {HEIGHT}\n% Width {WIDTH}\n".encode() + b"\x0c\x08"
+        words = np.stack([self.ticks, x | y << 14 | positive << 28], 1).astype("<u4")
+        (self.folder / "gen1_td.dat").write_bytes(header + words.tobytes())
+        self.convert("gen1_td.dat")
+        self.check_windows(self.events)
+
+    def test_a_davis_recording_is_its_conversion(self):
+        if not SHARED.is_dir():
+            self.skipTest("no ../shared/data")
+        read = []
+        for name in ("davis346.aedat4", "davis346_eventgan_layout.hdf5"):
+            self.convert(str(SHARED / "davis" / name), window_s=0.03)
+            read.append(list(rows(self.out).values()))
+        self.assertEqual(len(read[0]), 3)
+        for ours, converted in zip(*read):
+            self.assertEqual(ours["times"], converted["times"])
+            np.testing.assert_array_equal(ours["volume"], converted["volume"])
 
 
 class Dhp19(program.InFolder):

@@ -24,6 +24,33 @@ def write_mvsec(path, events, frame_times):
         file["davis/left/image_raw_ts"] = np.asarray(frame_times, np.float64)
 
 
+def whole_microseconds(events):
+    """The same rows with times of whole microseconds, and these times."""
+    ticks = np.round(events[:, 2] * 1e6).astype(np.int64)
+    rounded = events.copy()
+    rounded[:, 2] = ticks / 1e6
+    return rounded, ticks
+
+
+def write_columns(path, events, group="events", index="ms_to_idx", offset=None, size=None, **filters):
+    """Events as DSEC and M3ED have them, a dataset a column; `size`: of RVT's files, height and width."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    ticks = whole_microseconds(events)[1] - (offset or 0)
+    with h5py.File(path, "w") as file:
+        for name, values in {"x": events[:, 0].astype(np.uint16), "y": events[:, 1].astype(np.uint16),
+                             "t": ticks.astype(np.int64 if size or group != "events" else np.uint32), "p": (events[:, 3] > 0).astype(np.uint8)}.items():
+            file.create_dataset(f"{group}/{name}", data=values, chunks=(1000,), **filters)
+        if size:
+            file["events/height"], file["events/width"] = size
+            return
+        ms = np.arange(0, ticks[-1] // 1000 + 1) * 1000
+        file[index] = np.searchsorted(ticks, ms).astype(np.uint64)
+        if offset is not None:
+            file["t_offset"] = np.int64(offset)
+
+
+BBOX = [("t", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "u1"), ("track_id", "<u4"), ("class_confidence", "<f4")]
+
 DHP19_JOINTS = ["head", "shoulderR", "shoulderL", "elbowR", "elbowL", "hipR", "hipL", "handR", "handL", "kneeR", "kneeL", "footR", "footL"]
 DHP19_MATRICES = {camera: np.array([[200.0 + camera, 0, 173, 346000], [0, 200, 130, 260000], [0, 0, 1, 2000]]) for camera in range(4)}
 

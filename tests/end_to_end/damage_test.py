@@ -345,7 +345,9 @@ class EveryColumn(program.InFolder):
                    {"dataset": "kitti_tracking", "root": "drive", "pairs": program.pairs([1])},
                    {"dataset": "human36m", "layout": "extracted", "root": "walk", "pairs": program.pairs([1])},
                    {"dataset": "mpii_list", "root": "people", "annotations": "people/people.json", "sequences": "people/sequences",
-                    "pairs": program.pairs([2], side="around")}]
+                    "pairs": program.pairs([2], side="around")},
+                   {"dataset": "kitti_object", "root": "cars", "split": "stills",
+                    "pairs": {"from": "stills", "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01}}}]
         path = self.write_manifest(program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
                                                     generator={"kind": "difference"}))
         run("convert", path, "--progress", "none")
@@ -374,7 +376,7 @@ class EveryColumn(program.InFolder):
         (root / "cameras.pkl").write_bytes(pickle.dumps({("S1", "54138969"): camera}, protocol=2))
 
     def test_a_changed_value_is_named_by_its_column(self):
-        self.assertIn("labels of 11 samples compared", run("verify", self.out, "--deep")[0])
+        self.assertIn("labels of 15 samples compared", run("verify", self.out, "--deep")[0])
         places = {}  # column: the shards that have rows of it
         for path in sorted(self.out.glob("*.h5")):
             with h5py.File(path) as shard:

@@ -15,7 +15,7 @@ import numpy as np
 
 import program
 from camera_files import random_events, write_dhp19, write_mvsec
-from moving_texture import texture, write_video
+from moving_texture import texture, write_images, write_video
 from program import SHARED, SOURCE, run, shard_bytes, text
 from small_job import save_image, small_job, write_cars, write_people
 
@@ -28,6 +28,9 @@ EXAMPLES = SOURCE / "manifests" / "examples"
 def read_commented(path):
     """A manifest, whose comments have lines of their own or after two spaces."""
     return json.loads(re.sub(r"(?m)(^|  )\s*//.*$", "", path.read_text()))
+
+
+STILLS = {"from": "stills", "motion": {"translation_px": [2, 8], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
 
 
 class Init(program.InFolder):
@@ -76,8 +79,8 @@ class Init(program.InFolder):
         shutil.rmtree(self.folder / "training" / "prev_2")
         told, manifest = self.init(self.folder)
         self.assertIn("no prev_2", told)
-        self.assertIn("no pairs can be made yet", told)
-        self.assertIn("expected at least 1 pairs", run("plan", manifest, expect=66)[1])
+        self.assertIn('no sequences: each image makes a pair with itself under a small motion ("from": "stills")', told)
+        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], STILLS)
 
     def test_gaps_without_paired_frames_are_left_out(self):
         write_cars(self.folder / "training", 2, np.random.default_rng(7))
@@ -95,7 +98,7 @@ class Init(program.InFolder):
         (self.folder / "t" / "label_02").mkdir()
         (self.folder / "t" / "label_02" / "0000.txt").write_text("")
         told, manifest = self.init("kitti_tracking", self.folder / "t")
-        self.assertIn("KITTI tracking: 4 labelled frames of 1 sequences", told)
+        self.assertIn("KITTI tracking: 4 labelled frames of 1 sequence", told)
         self.assertIn("gap 1: 3, gap 2: 2, gap 3: 1, gap 4: 0", told)
         self.trial(manifest, 3)
 
@@ -118,10 +121,8 @@ class Init(program.InFolder):
         self.assertIn("no sequences", self.init(root)[0])
 
     def test_images_and_videos(self):
-        random = np.random.default_rng(7)
         for clip in ["a", "b"]:
-            for k in range(4):
-                save_image(self.folder / "clips" / clip / f"f_{k}.png", random)
+            write_images(self.folder / "clips" / clip, range(4), 24, 32, seed=7)
         write_video(self.folder / "videos" / "one.mp4", 5)
         write_video(self.folder / "videos" / "two.mp4", 4)
         for path, frames, gap_1 in [("clips/a", 4, 3), ("clips", 8, 6), ("videos", 9, 7), ("videos/one.mp4", 5, 4)]:
@@ -217,11 +218,16 @@ class Init(program.InFolder):
         part = f"warning: this is only a part of KITTI object, without its labels and pairs: run eventgan init \"{root}\"\n"
         self.assertIn(part, told)
         self.assertIn(f"// {part}", manifest.read_text())
-        self.assertRegex(told, r"warning: 8 of 8 compared pairs of neighbouring images do not show the same scene, "
-                               r"first \S*image_2/000000.png and \S*image_2/000001.png: is it")
+        self.assertRegex(told, r"(?m)^8 of 8 compared pairs of neighbouring images do not show the same scene, "
+                               r"first \S*image_2/000000.png and \S*image_2/000001.png$")
+        self.assertIn("no sequences: each image makes a pair with itself", told)
         self.assertNotIn("several sizes", told)
+        self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], STILLS)
+        self.assertEqual(read_commented(manifest)["image"], {})
         cv2.imwrite(str(root / "image_2" / "000004.png"), np.zeros((20, 30), np.uint8))
-        self.assertIn("warning: images of several sizes in one folder, 32x24 in ", self.init(root / "image_2")[0])
+        told, manifest = self.init(root / "image_2")
+        self.assertIn("\nimages of several sizes in one folder, 32x24 in ", told)
+        self.assertEqual(read_commented(manifest)["image"], {"width": 346, "height": 260, "fit": "letterbox"})
 
         wide = texture(48, 80, 7)
         for folder in "ab":  # of two sizes, but each of one
@@ -229,7 +235,9 @@ class Init(program.InFolder):
             for k in range(5):
                 cv2.imwrite(str(self.folder / "clips" / folder / f"{k}.png"), wide[:, 3 * k:3 * k + 64 - 8 * (folder == "a")])
         for path in ["clips", "clips/a"]:
-            self.assertNotIn("warning", self.init(self.folder / path)[0])
+            told, manifest = self.init(self.folder / path)
+            self.assertNotIn("warning", told)
+            self.assertEqual(read_commented(manifest)["sources"][0]["pairs"], {"gaps": [1], "side": "before", "choose": "one"})
 
     @unittest.skipUnless(SHARED.is_dir(), "no ../shared/data")
     def test_real_sequences_and_stills_are_told_apart(self):
@@ -243,7 +251,8 @@ class Init(program.InFolder):
                   frames / "pennfudan/images", frames / "voc100/images", frames / "kitti_mini/images"]
         for path in sequences + stills:
             with self.subTest(path):
-                told, _ = self.init("frames", path)
+                told, manifest = self.init("frames", path)
+                self.assertEqual("from" in read_commented(manifest)["sources"][0]["pairs"], path in stills)
                 self.assertEqual("do not show the same scene" in told, path in stills, told)
                 self.assertEqual("several sizes" in told, path in stills, told)
 
@@ -252,20 +261,67 @@ class Init(program.InFolder):
         empty.mkdir()
         (self.folder / "notes.txt").write_text("notes")
         for path in [empty, self.folder / "notes.txt", pathlib.Path("/proc/self/fd")]:
-            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, images or videos, got none of these, "
+            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, recordings of an event camera, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
         self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
-        self.assertIn("expected PATH or DATASET PATH, got 3 arguments", self.init("kitti_object", empty, empty, expect=64))
-        self.assertIn("DATASET: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
-        self.assertIn("real_events.md has a manifest", self.init("recording", empty, expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
+        self.assertIn("expected a folder or a video, got nothing", self.init(self.folder / "k", "", expect=64))
+        self.assertIn("DATASET or PATH: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
+        self.assertIn("real_events.md has a manifest", self.init("dhp19", empty, expect=64))
         self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
         shutil.rmtree(self.folder / "k" / "image_2")
         self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))
         (self.folder / "v").mkdir()
         (self.folder / "v" / "broken.mp4").write_text("no video")
         self.assertIn("expected a video, got a file that cannot be read as one, in ", self.init(self.folder / "v", expect=66))
+
+    def test_several_make_one_manifest(self):
+        """Each with its own keys, gaps and findings; one size and one preset for all."""
+        random = np.random.default_rng(7)
+        write_cars(self.folder / "all" / "cars", 3, random)
+        write_people(self.folder / "all" / "people", 2, random)
+        write_video(self.folder / "all" / "one.mp4", 4)
+        write_video(self.folder / "other" / "one.mp4", 5)
+        given = [self.folder / path for path in ["all/cars", "all/people", "all/one.mp4", "other/one.mp4"]]
+        told, manifest = self.init(*given)
+        written = read_commented(manifest)
+        self.assertEqual([(source["dataset"], source["root"], source["pairs"]["gaps"], source["pairs"]["side"]) for source in written["sources"]],
+                         [("kitti_object", str(given[0]), [1, 2], "before"), ("mpii_list", str(given[1]), [2, 4], "around"),
+                          ("frames", str(given[2]), [1], "before"), ("frames", str(given[3]), [1], "before")])
+        self.assertEqual(written["image"], {"width": 346, "height": 260, "fit": "letterbox", "preset": "kitti"})
+        self.assertEqual((written["name"], written["output"]["directory"]), ("cars-events", "out/cars-events"))
+        for path, finding in zip(given, ["KITTI object: 3 labelled frames", "MPII as a list of people: 2 labelled frames",
+                                         "images or videos: 4 labelled frames", "images or videos: 5 labelled frames"]):
+            self.assertIn(f"{path}\n{finding}", told)
+            self.assertIn(f"    // {path}\n    // {finding}", manifest.read_text())
+        self.trial(manifest, 3 + 2 + 3 + 4, limit=100)
+
+        _, manifest = self.init(*given[:3])  # in one folder: named after that
+        self.assertEqual(read_commented(manifest)["name"], "all-events")
+        _, manifest = self.init("frames", *given[2:])  # of one kind: as of one
+        self.assertEqual((read_commented(manifest)["image"], len(read_commented(manifest)["sources"])), ({}, 2))
+        self.assertIn("expected kitti_object, got mpii_list, in ", self.init("kitti_object", *given[:3], expect=66))
+        for same in given[0] / "label_2" / "..", given[0]:
+            self.assertIn(f"expected each folder or video once, got it twice: {given[0]}", self.init(given[0], given[2], same, expect=64))
+
+    def test_several_paths_start_at_the_manifest_where_all_are_given_so(self):
+        write_video(self.folder / "a" / "one.mp4", 3)
+        write_video(self.folder / "b" / "two.mp4", 3)
+        here = os.getcwd()
+        os.chdir(self.folder)
+        self.addCleanup(os.chdir, here)
+        for given, roots in [(["a", "b/two.mp4"], ["a", "b/two.mp4"]), (["a", self.folder / "b"], [f"{self.folder}/a", f"{self.folder}/b"])]:
+            run("init", *given)
+            self.assertEqual([source["root"] for source in read_commented(pathlib.Path("manifest.json"))["sources"]], roots)
+            run("plan", "manifest.json")
+            pathlib.Path("manifest.json").unlink()
+        pathlib.Path("b").rename("frames")  # a folder named as a dataset
+        run("init", "a", "frames", "--out", "1.json")
+        run("init", "frames", "frames", "--out", "2.json")
+        run("init", "./frames", "a", "--out", "3.json")
+        self.assertEqual([[source["root"] for source in read_commented(pathlib.Path(f"{k}.json"))["sources"]] for k in (1, 2, 3)],
+                         [["a", "frames"], ["frames"], ["frames", "a"]])
 
     def test_of_several_datasets_one_must_be_named(self):
         for name in "ab":
@@ -277,7 +333,7 @@ class Init(program.InFolder):
     def test_real_datasets(self):
         # By folder: dataset, labelled frames, those with a paired frame at the first gap that its side has.
         expected = {"kitti_object": ("kitti_object", 4, 1), "kitti_raw": ("kitti_raw", 21, 20), "mpii": ("mpii", 2, 1),
-                    "human36m_fetch": ("human36m", 18, 16), "davis/slider_depth": ("frames", 3, 2),
+                    "human36m_fetch": ("human36m", 18, 16), "davis/slider_depth/images": ("frames", 3, 2),
                     "clips/01_dog.mp4": ("frames", 289, 288)}
         for path, (dataset, frames, partners) in expected.items():
             with self.subTest(path):
@@ -366,6 +422,7 @@ class Examples(program.InFolder):
         random = np.random.default_rng(7)
         for k in range(202):
             save_image(cls.tree / "drive" / "image_02" / "data" / f"{k:010d}.png", random)
+        save_image(cls.tree / "photos" / "one.png", random)
         cls.write_raw()
         write_mvsec(cls.tree / "drive.hdf5", random_events(2000, 0, 1, 7), [0, 0.25, 0.5, 0.75])
         (cls.tree / "drive.csv").write_text("time_s,left,top,right,bottom,class,category\n"

@@ -7,9 +7,18 @@
 #include <span>
 
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/frames/events/recording_labels.h"
 #include "stages/frames/mpii/detail/mat_json.h"
+#include "stages/frames/own_labels/detail/coco_entry.h"
+#include "stages/frames/own_labels/detail/csv_labels.h"
+#include "stages/frames/own_labels/detail/mot_labels.h"
+#include "stages/frames/own_labels/detail/voc_labels.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/safetensors.h"
+#include "stages/recordings/detail/aedat4_recording.h"
+#include "stages/recordings/detail/prophesee_recording.h"
+#include "stages/recordings/detail/table_recording.h"
 #include "tests/fuzz/readers.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -25,7 +34,11 @@ INSTANTIATE_TEST_SUITE_P(Readers, FuzzCorpus,
                          ::testing::Values(testing::read_checkpoint_input,
                                            testing::read_zip_pickle_input,
                                            testing::read_safetensors_input, testing::read_mat_input,
-                                           testing::read_cdf_input));
+                                           testing::read_cdf_input, testing::read_voc_input,
+                                           testing::read_mot_input, testing::read_csv_input,
+                                           testing::read_coco_input, testing::read_yolo_input,
+                                           testing::read_table_input, testing::read_aedat4_input,
+                                           testing::read_prophesee_input));
 
 TEST_P(FuzzCorpus, IsReadOrRefused) {
   const testing::TemporaryFolder folder;
@@ -64,6 +77,50 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
     EXPECT_EQ(std::get<std::vector<float>>(pose.values), (std::vector<float>{0, 1, 2, 3, 4, 5}))
         << name;
   }
+  const auto labels = [&](const char* name) {
+    return testing::read_file(corpus / std::filesystem::path(name));
+  };
+  EXPECT_FALSE(is_fault(parse_voc_labels(labels("voc/two"), "two")));
+  EXPECT_EQ(parse_mot_labels(labels("mot/two"), "two").size(), 2u);
+  EXPECT_EQ(parse_mot_sequence(labels("mot/seqinfo"), "seqinfo").frames_per_second, 30);
+  EXPECT_EQ(parse_csv_labels(labels("csv/three"), "three").size(), 3u);
+  const CocoIndex coco = index_coco(corpus / "coco" / "persons", "persons");
+  EXPECT_EQ(coco.annotations.size(), 1u);
+  Annotation annotation;
+  add_coco_annotation(
+      labels("coco/persons").substr(coco.annotations[0].offset, coco.annotations[0].length), 9,
+      {30, 40}, coco, coco_schema(coco, "persons"), "persons", annotation);
+  EXPECT_EQ(annotation.persons.size(), 1u);
+  EXPECT_EQ(parse_yolo_yaml(labels("yolo/data"), "data").names.joint_names.size(), 17u);
+  EXPECT_FALSE(is_fault(parse_yolo_text(labels("yolo/boxes"), parse_yolo_classes("a\nb", "classes"),
+                                        {30, 40}, "boxes")));
+  for (const char* name : {"plain", "lz4", "zstd"}) {
+    const StoredParts parts = open_aedat4(corpus / "aedat4" / name);
+    EXPECT_EQ(parts.events->count(), 4) << name;
+    EXPECT_EQ(parts.frames->times_s(), (std::vector<double>{6e-6, 10e-6})) << name;
+  }
+  const std::pair<const char*, int> recordings[] = {{"dat", 2}, {"evt2", 2}, {"evt3", 5}};
+  for (const auto& [name, count] : recordings) {
+    EXPECT_EQ(open_prophesee(corpus / "prophesee" / name, std::nullopt).events->count(), count)
+        << name;
+  }
+}
+
+TEST(FuzzCorpusSeeds, TablesAreReadWhereTheyAreSound) {
+  const std::filesystem::path corpus =
+      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "tests" / "fuzz" / "corpus" / "table";
+  const testing::TemporaryFolder folder;
+  RecordingOptions options;
+  options.sensor = ImageSize{3, 4};
+  for (const char* name : {"fields.npy", "rows.npy", "arrays.npz", "lines.csv"}) {
+    std::filesystem::copy_file(corpus / std::filesystem::path(name).stem(), folder / name);
+    const auto recording = open_table_recording(folder / name, options);
+    EXPECT_EQ(recording->events_in(0, 1),
+              (std::vector<Event>{{0, 2, 5e-6, true}, {3, 0, 7e-6, false}}))
+        << name;
+  }
+  std::filesystem::copy_file(corpus / "boxes", folder / "boxes.npy");
+  EXPECT_EQ(read_recording_labels(folder / "boxes.npy").annotations.size(), 1u);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 """Writes the seeds of the fuzz corpus: small checkpoints as PyTorch writes them, small weights files, small MATLAB and
-CDF files.
+CDF files, labels of a few boxes, tables of events, small recordings.
 
     python3 tests/fuzz/make_corpus.py tests/fuzz/corpus
 
@@ -198,8 +198,131 @@ class Cdf:
         return struct.pack(">II", 0xCDF30001, 0xCCCC0001) + whole + compression
 
 
+VOC_OBJECT = """<object><name>%s</name><truncated>1</truncated><difficult>0</difficult><occluded>0</occluded>
+<bndbox><xmin>%s</xmin><ymin>5</ymin><xmax>30.5</xmax><ymax>20</ymax></bndbox></object>
+"""
+
+
+def voc(*objects, before=""):
+    content = "".join(VOC_OBJECT % pair for pair in objects)
+    return (before + "<annotation><filename>a.jpg</filename><size><width>40</width><height>20</height></size>\n" + content +
+            "</annotation>\n").encode()
+
+
+def coco(annotation, category=None):
+    box = {"id": 4, "image_id": 9, "category_id": 3, "bbox": [1, 2.5, 30, 4]}
+    return json.dumps({"info": {"year": 2026}, "images": [{"id": 9, "file_name": "a.jpg", "width": 40, "height": 30}],
+                       "annotations": [{**box, **annotation}], "categories": [{"id": 3, "name": "person", **(category or {})}]}).encode()
+
+
+class Aedat4:
+    """Recordings in AEDAT 4.0. Its FlatBuffers have their length in front; of a field there is None, its bytes, or, for a
+    string or vector, the bytes with a count in front, as one in a tuple."""
+
+    INFO = b"""<dv version="2.0"><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr><node name="info">
+<attr key="sizeX">4</attr><attr key="sizeY">3</attr></node></node><node name="1"><attr key="typeIdentifier">FRME</attr></node>
+<node name="2"><attr key="typeIdentifier">IMUS</attr></node></node></dv>"""
+
+    def __init__(self, compression=0):
+        self.compression = compression
+
+    @staticmethod
+    def table(fields):
+        """A table with its list of places in front, where the table begins in it, and where its vectors are to be told."""
+        places, body, vectors = b"", bytes(8), []
+        for field in fields:
+            places += struct.pack("<H", 0 if field is None else len(body))
+            if isinstance(field, tuple):
+                vectors.append((len(body), field[0]))
+            body += b"" if field is None else bytes(8) if isinstance(field, tuple) else field + bytes(-len(field) % 8)
+        places = struct.pack("<HH", 4 + len(places), len(body)) + places
+        start = len(places) + -len(places) % 8
+        return places.ljust(start, b"\0") + struct.pack("<i", start) + body[4:], start, vectors
+
+    def root(self, identifier, *fields):
+        inner, start, vectors = self.table(fields)
+        whole = bytearray(struct.pack("<II4s4x", 0, 16 + start - 4, identifier) + inner)
+        for place, content in vectors:
+            whole += bytes((4 - len(whole)) % 8)
+            struct.pack_into("<I", whole, 16 + start + place, len(whole) - (16 + start + place))
+            whole += content
+        struct.pack_into("<I", whole, 0, len(whole) - 4)
+        return bytes(whole)
+
+    def packed(self, content):
+        if self.compression in (1, 2):  # one LZ4 block, as it is
+            return bytes.fromhex("04224d18604082") + struct.pack("<I", len(content) | 1 << 31) + content + bytes(4)
+        if self.compression in (3, 4):  # one Zstandard block, as it is
+            return bytes.fromhex("28b52ffda0") + struct.pack("<I", len(content)) + struct.pack("<I", len(content) << 3 | 1)[:3] + content
+        return content
+
+    def header(self, table_byte):
+        return b"#!AER-DAT4.0\r\n" + self.root(b"IOHE", struct.pack("<i", self.compression), struct.pack("<q", table_byte),
+                                               (struct.pack("<I", len(self.INFO)) + self.INFO + b"\0",))
+
+    def events(self, *events):
+        return self.root(b"EVTS", (struct.pack("<I", len(events)) + b"".join(struct.pack("<qhhB3x", *event) for event in events),))
+
+    def frame(self, time, channels=1):
+        numbers = [struct.pack("<q", value) for value in (time, 0, 0, time - 1, time + 1)]
+        numbers += [struct.pack("<b", 8 * channels - 8)] + [struct.pack("<h", value) for value in (4, 3, 0, 0)]
+        return self.root(b"FRME", *numbers, (struct.pack("<I", 12 * channels) + bytes(range(12 * channels)),))
+
+    def file(self, has_table=True):
+        packets = [(0, self.events((5, 0, 0, 1), (6, 3, 2, 0)), 2, 5, 6), (1, self.frame(6), 1, 6, 6), (2, b"other", 1, 0, 0),
+                   (0, self.events((6, 1, 1, 1), (9, 2, 2, 0)), 2, 6, 9), (1, self.frame(10, 3), 1, 10, 10)]
+        result, entries = self.header(-1), []
+        for stream, content, count, begin, end in packets:
+            content = self.packed(content)
+            entries.append(self.table([struct.pack("<q", len(result) + 8), struct.pack("<ii", stream, len(content)),
+                                       *(struct.pack("<q", value) for value in (count, begin, end))]))
+            result += struct.pack("<ii", stream, len(content)) + content
+        if not has_table:
+            return result
+        vector, tables = struct.pack("<I", len(entries)), b""
+        begin = 4 * len(entries) + -4 * len(entries) % 8  # of the first table, behind the count
+        for i, (entry, start, _) in enumerate(entries):
+            vector += struct.pack("<I", begin + len(tables) + start - 4 * i)
+            tables += entry
+        table = self.root(b"FTAB", (vector.ljust(4 + begin, b"\0") + tables,))
+        return self.header(len(result)) + result[len(self.header(-1)):] + self.packed(table)
+
+
+def prophesee(header, letter, *words):
+    return "".join(f"% {line}\n" for line in header).encode() + struct.pack(f"<{len(words)}{letter}", *words)
+
+
+def npy(descr, shape, data):
+    header = f"{{'descr': {descr!r}, 'fortran_order': False, 'shape': {shape!r}, }}".encode()
+    header += b" " * (-(11 + len(header)) % 64) + b"\n"
+    return b"\x93NUMPY\1\0" + struct.pack("<H", len(header)) + header + data
+
+
+def npz(arrays):
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in arrays.items():
+            archive.writestr(zipfile.ZipInfo(name + ".npy"), content, zipfile.ZIP_DEFLATED)
+    return file.getvalue()
+
+
+def tables():
+    fields = [("t", "<u8"), ("x", "<u2"), ("", "|V1"), ("y", "<i2"), ("p", "|b1")]
+    boxes = [("ts", "<u8"), ("x", "<f4"), ("y", "<f4"), ("w", "<f4"), ("h", "<f4"), ("class_id", "|u1")]
+    rows = [(5, 0, 2, 1), (7, 3, 0, 0)]
+    return {"fields": npy(fields, (2,), b"".join(struct.pack("<QHxhB", *row) for row in rows)),
+            "rows": npy("<f4", (2, 4), b"".join(struct.pack("<4f", *row) for row in rows)),
+            "arrays": npz({name: npy("<i4", (2,), struct.pack("<2i", *column)) for name, column in zip("txyp", zip(*rows))}),
+            "lines": b"x,t,y,p\n0,5,2,1\n3,7,0,0\n",
+            "boxes": npy(boxes, (1,), struct.pack("<Q4fB", 5, 1, 2, 3, 4, 0)),
+            "nothing": npy([("t", "|V0"), ("x", "<u2")], (1 << 40,), b""),
+            "huge": npy(fields, (1 << 60,), bytes(28)), "bomb": npz({name: npy("|u1", (1 << 20,), bytes(1 << 20)) for name in "txyp"})}
+
+
 def main(folder):
     mat = Mat()
+    dat = ["Data file containing CD events", "Version 2", "Width 8", "Height 6"]
+    evt2, evt3 = ["evt 2.0", "geometry 8x6", "end"], ["format EVT3;height=6;width=40", "end"]
     values = checkpoint()
     bare = collections.OrderedDict([("head.conv2d.weight", Tensor(Storage("0", "f", [1.0] * 4), [2, 2]))])
     tensor = {"dtype": "F32", "shape": [2], "data_offsets": [0, 8]}
@@ -236,8 +359,46 @@ def main(folder):
         "cdf/packed_file": Cdf(packs_file=True).file(),
         "cdf/huge": Cdf(packs_values=True).file(rows=0x7FFFFFFF),
         "cdf/bomb": Cdf(packs_file=True).file()[:28] + struct.pack(">Q", 1 << 40) + Cdf(packs_file=True).file()[36:],
+        "voc/two": voc(("person", 1), ("traffic &amp; light", 12.25)),
+        "voc/empty": voc(),
+        "voc/outside": voc(("person", 0)),
+        "voc/doctype": voc(before='<!DOCTYPE annotation [<!ENTITY a "b"><!ENTITY c "&a;&a;">]>'),
+        "voc/deep": b"<annotation>" + b"<a>" * 2000,
+        "voc/wide": voc(("person", 1)).decode().encode("utf-16"),
+        "mot/two": b"2,1,10,20,30.5,40,1,1,0.5\r\n1,1,9,20,30,40,0,7,1\r\n",
+        "mot/2015": b"1,1,10,20,30,40,1,-1,-1,-1\n1,2,10,20,30,40,0,5.5,0,1e3",
+        "mot/faults": b"1,1,1,1,1,1\n2,1,nan,1,1,1,1\n3,1,1,1,1,1,1,14\n4,1,1,1,1,1,1\n4,1,1,1,1,1,1\n",
+        "mot/seqinfo": b"[Sequence]\nname=a\nimDir=img1\nframeRate=30\nseqLength=9\nimWidth=40\nimHeight=20\nimExt=.jpg\n",
+        "csv/three": b'\xef\xbb\xbfimage,class,left,top,right,bottom,track\r\na.png,car,1,2,3.5,4,7\r\n"b ""1"", c.png","x,y",0,0,1,1,\r\n'
+                     b"c.png,,,,,,\r\n",
+        "csv/faults": b"class,bottom,right,top,left,image\ncar,4,3,2,1,a\ncar,4,nan,2,1,b\n,,,,,a\n,4,3,2,1,c\n",
+        "csv/quotes": b'image,class,left,top,right,bottom\n"a,""b\n"c,d,1,2,3,4\n',
+        "coco/instances": coco({}),
+        "coco/persons": coco({"keypoints": [1, 2, 2, 0, 0, 0], "num_keypoints": 1}, {"keypoints": ["nose", "tail"]}),
+        "coco/segments": coco({"segmentation": {"counts": "a", "size": [3, 4]}, "area": 1.5, "iscrowd": 1}),
+        "coco/outside": coco({"bbox": [90, 1, 2, 3]}),
+        "coco/nan": coco({"area": float("nan")}),
+        "coco/orphan": coco({"image_id": 8}),
+        "coco/deep": b'{"info": ' + b"[" * 4000,
+        "yolo/data": b"path: ../x\nnames:\n  0: person\n  1: 'a b'\nkpt_shape: [17, 3]\nflip_idx: [0, 2, 1]\n",
+        "yolo/aliases": b"a: &a [x, y]\nb: &b [*a, *a]\nnames: *a\n",
+        "yolo/boxes": b"0 0.5 0.5 0.25 1e-1\r\n1 0.1 0.2 0.2 0.4\n",
+        "yolo/pose": b"0 0.5 0.5 0.25 0.5 0.4 0.5 2 0 0 0\n",
+        "yolo/outline": b"0 0.1 0.1 0.2 0.1 0.2 0.2\n",
+        "yolo/deep": b"names: " + b"[" * 4000,
+        "aedat4/plain": Aedat4().file(),
+        "aedat4/lz4": Aedat4(1).file(),
+        "aedat4/zstd": Aedat4(4).file(),
+        "aedat4/unplugged": Aedat4(3).file(has_table=False)[:-7],
+        "aedat4/huge": Aedat4().file().replace(struct.pack("<Iq", 2, 5), struct.pack("<Iq", 1 << 31, 5)),
+        "prophesee/dat": prophesee(dat, "H", 0x080c) + struct.pack("<4I", 5, 1 << 28 | 5 << 14 | 7, 6, 0),
+        "prophesee/evt2": prophesee(evt2, "I", 0x10000000, 0x80000003, 0x11403805, 0xa0000000, 0x80000004, 0x00001003),
+        "prophesee/evt3": prophesee(evt3, "H", 0x2001, 0x8fff, 0x6fff, 0x0005, 0x2827, 0x3803, 0x4801, 0x5080, 0xa001,
+                                    0x8000, 0x6001, 0x2001, 0xe000, 0xf000, 0x7000),
+        "prophesee/falls": prophesee(evt3, "H", 0x8800, 0x8700),
         "mat/bomb": mat.file(mat.compressed(mat.numbers(14, 1 << 20) + bytes(1 << 20))),
     }
+    seeds.update({f"table/{name}": content for name, content in tables().items()})
     for name, content in seeds.items():
         path = pathlib.Path(folder) / name
         path.parent.mkdir(parents=True, exist_ok=True)

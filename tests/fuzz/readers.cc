@@ -1,16 +1,28 @@
 #include "tests/fuzz/readers.h"
 
+#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 #include <stdexcept>
 
 #include "manifests/values/faults.h"
 #include "stages/base/archives/cdf_matrix.h"
+#include "stages/frames/events/recording_labels.h"
+#include "stages/frames/label_name.h"
 #include "stages/frames/mpii/detail/mat_json.h"
+#include "stages/frames/own_labels/detail/coco_entry.h"
+#include "stages/frames/own_labels/detail/csv_labels.h"
+#include "stages/frames/own_labels/detail/mot_labels.h"
+#include "stages/frames/own_labels/detail/voc_labels.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
 #include "stages/generator/checkpoints/checkpoint.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/safetensors.h"
 #include "stages/generator/weights_file.h"
+#include "stages/recordings/detail/aedat4_recording.h"
+#include "stages/recordings/detail/prophesee_recording.h"
+#include "stages/recordings/detail/table_recording.h"
 #include "tests/testing/zip_file.h"
 
 namespace eventgan::testing {
@@ -41,6 +53,58 @@ void read_networks(const std::filesystem::path& file) {
     } catch (const std::runtime_error&) {
     }
   }
+}
+
+/// All events, in parts, and all frames.
+void read_parts(const StoredParts& parts) {
+  constexpr std::int64_t kPart = 1000;
+  for (std::int64_t first = 0; first < parts.events->count(); first += kPart) {
+    const std::int64_t count = std::min(kPart, parts.events->count() - first);
+    if (std::ssize(parts.events->read(first, count)) != count) std::abort();
+  }
+  for (std::size_t i = 0; parts.frames && i < parts.frames->times_s().size(); ++i) {
+    const GreyImage frame = parts.frames->read(static_cast<std::int64_t>(i));
+    if (frame.size != parts.size || frame.pixels.size() != parts.size.pixel_count()) std::abort();
+  }
+}
+
+/// Text that a shard can hold, and boxes that lie somewhere.
+void check_labels(const ImageLabels& labels) {
+  if (labels.original.find('\0') != std::string::npos) std::abort();
+  for (const NamedBox& read : labels.boxes) {
+    const Rectangle& xyxy = read.box.xyxy;
+    for (const double edge : {xyxy.left, xyxy.top, xyxy.right, xyxy.bottom}) {
+      if (!(std::abs(edge) <= 3 * kFarthest_px)) std::abort();
+    }
+    if (!(xyxy.left < xyxy.right && xyxy.top < xyxy.bottom)) std::abort();
+    if (!is_label_name(read.class_name)) std::abort();
+  }
+}
+
+/// Numbers of classes that are there, boxes that lie somewhere, and as many joints as there are.
+void check_annotation(const Annotation& annotation, const LabelSchema& schema) {
+  for (const Box& box : annotation.boxes) {
+    if (box.class_id < 0 || box.class_id >= std::ssize(schema.class_names)) std::abort();
+    if (!(box.xyxy.left < box.xyxy.right && box.xyxy.top < box.xyxy.bottom)) std::abort();
+  }
+  for (const Person& person : annotation.persons) {
+    if (person.joints.size() != schema.joint_names.size()) std::abort();
+    for (const Joint& joint : person.joints) {
+      if (!(std::abs(joint.at.x) <= 2 * kFarthest_px && joint.visible <= 1)) std::abort();
+    }
+  }
+}
+
+/// No byte may be there twice.
+template <class Images>
+void check_all(const Images& images, std::size_t input_size) {
+  std::size_t bytes = 0;
+  for (const auto& [name, outcome] : images) {
+    if (is_fault(outcome)) continue;
+    check_labels(std::get<ImageLabels>(outcome));
+    bytes += std::get<ImageLabels>(outcome).original.size();
+  }
+  if (bytes > input_size) std::abort();
 }
 
 }  // namespace
@@ -93,6 +157,121 @@ void read_cdf_input(std::span<const std::uint8_t> input, const std::filesystem::
     if (matrix.size() != matrix.shape.at(0) * matrix.shape.at(1)) std::abort();
   } catch (const std::runtime_error&) {
   }
+}
+
+void read_voc_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
+  const auto labels = parse_voc_labels(text_of(input), "input");
+  if (!is_fault(labels)) check_labels(std::get<ImageLabels>(labels));
+}
+
+void read_mot_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
+  try {
+    check_all(parse_mot_labels(text_of(input), "input"), input.size());
+  } catch (const InputError&) {
+  }
+  try {
+    parse_mot_sequence(text_of(input), "input");
+  } catch (const InputError&) {
+  }
+}
+
+void read_csv_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
+  try {
+    check_all(parse_csv_labels(text_of(input), "input"), input.size());
+  } catch (const InputError&) {
+  }
+}
+
+void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  const std::string text = text_of(input);
+  std::ofstream(scratch, std::ios::binary) << text;
+  CocoIndex index;
+  LabelSchema schema;
+  try {
+    index = index_coco(scratch, "input");
+    schema = coco_schema(index, "input");
+  } catch (const InputError&) {
+    return;
+  }
+  for (std::size_t i = 0; i < index.image_count(); ++i) {
+    const CocoIndex::Image& image = index.images[i];
+    Annotation annotation;
+    const auto part = [&](const ByteRange& range) {
+      return text.substr(range.offset, range.length);
+    };
+    try {
+      const ImageSize size = read_coco_image(part(image.entry), image.id, "input");
+      for (std::size_t k = image.first_annotation; k < index.images[i + 1].first_annotation; ++k) {
+        add_coco_annotation(part(index.annotations[k]), image.id, size, index, schema, "input",
+                            annotation);
+      }
+    } catch (const std::runtime_error&) {
+    }
+    check_annotation(annotation, schema);
+  }
+}
+
+void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem::path&) {
+  const std::string text = text_of(input);
+  std::vector<YoloSchema> schemas{parse_yolo_classes("a\nb\n", "classes")};
+  for (const bool is_yaml : {false, true}) {
+    try {
+      schemas.push_back(is_yaml ? parse_yolo_yaml(text, "input")
+                                : parse_yolo_classes(text, "input"));
+    } catch (const InputError&) {
+    }
+  }
+  schemas.push_back(parse_yolo_yaml("names: [a]\nkpt_shape: [2, 3]", "data"));
+  for (const YoloSchema& schema : schemas) {
+    const auto annotation = parse_yolo_text(text, schema, {480, 640}, "input");
+    if (!is_fault(annotation)) check_annotation(std::get<Annotation>(annotation), schema.names);
+  }
+}
+
+void read_aedat4_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  try {
+    read_parts(open_aedat4(scratch));
+  } catch (const InputError&) {
+  }
+}
+
+void read_prophesee_input(std::span<const std::uint8_t> input,
+                          const std::filesystem::path& scratch) {
+  std::ofstream(scratch, std::ios::binary) << text_of(input);
+  try {
+    read_parts(open_prophesee(scratch, std::nullopt));
+  } catch (const InputError&) {
+  }
+}
+
+void read_table_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch) {
+  RecordingOptions options;
+  options.sensor = ImageSize{3, 4};
+  for (const char* extension : {".npy", ".npz", ".csv"}) {
+    std::filesystem::path file = scratch;
+    file += extension;
+    std::ofstream(file, std::ios::binary) << text_of(input);
+    try {
+      is_event_table(file, options.columns);
+      const auto recording = open_table_recording(file, options);
+      for (const Event& event : recording->events_around(0, 1000, 1000)) {
+        if (event.x < 0 || event.x > 3 || event.y < 0 || event.y > 2) std::abort();
+      }
+    } catch (const InputError&) {
+    }
+    std::filesystem::remove(file);
+  }
+  std::filesystem::path boxes = scratch;
+  boxes += ".npy";
+  std::ofstream(boxes, std::ios::binary) << text_of(input);
+  try {
+    for (const auto& [time_s, annotation] : read_recording_labels(boxes).annotations) {
+      if (annotation.boxes.empty() || annotation.original.empty()) std::abort();
+    }
+  } catch (const std::runtime_error&) {
+  }
+  std::filesystem::remove(boxes);
 }
 
 }  // namespace eventgan::testing

@@ -41,4 +41,41 @@ constexpr std::uint64_t most_cdf_memory(std::uint64_t) { return std::uint64_t{20
 /// A CDF file: its variable "Pose".
 void read_cdf_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
 
+/// What reading labels may take: where all the text is faults of frames or empty elements, some
+/// hundred bytes for each two or four.
+constexpr std::uint64_t most_label_memory(std::uint64_t file_size) {
+  return file_size * 512 + (std::uint64_t{1} << 20);
+}
+
+/// Labels of one's own: Pascal VOC's XML; MOT's gt.txt, and the same as seqinfo.ini; a table; a
+/// COCO file with all its entries; YOLO's data.yaml, classes.txt and an image's text.
+void read_voc_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+void read_mot_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+void read_csv_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+void read_yolo_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+/// What reading a recording in AEDAT 4.0 may take: of what is unpacked, at most 256 MiB and as much
+/// again while that grows, its events and its XML, and what the unpackers keep.
+constexpr std::uint64_t most_aedat4_memory(std::uint64_t) { return std::uint64_t{1536} << 20; }
+
+/// A recording in AEDAT 4.0: all its events and frames.
+void read_aedat4_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
+/// What reading a recording of Prophesee's may take: a word of two bytes is twelve events at most.
+constexpr std::uint64_t most_prophesee_memory(std::uint64_t file_size) {
+  return file_size * 6 * 32 * 2 + (std::uint64_t{1} << 20);
+}
+
+/// A recording of Prophesee's: all its events.
+void read_prophesee_input(std::span<const std::uint8_t> input,
+                          const std::filesystem::path& scratch);
+
+/// What reading a table of events may take: deflate's growth, and an event for every four numbers.
+constexpr std::uint64_t most_table_memory(std::uint64_t file_size) {
+  return file_size * 1032 * 64 + (std::uint64_t{32} << 20);
+}
+
+/// Events as .npy, .npz and .csv, and boxes as .npy.
+void read_table_input(std::span<const std::uint8_t> input, const std::filesystem::path& scratch);
+
 }  // namespace eventgan::testing

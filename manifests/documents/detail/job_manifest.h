@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "manifests/documents/detail/strict_json.h"
@@ -20,6 +21,15 @@ std::vector<int> read_gaps(const StrictValue& value, PairSide side);
 /// Reads the manifest's `image`. The preset, named or else that of the sources' datasets, fills in
 /// `grey` and `blur`, unless these are given.
 ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& sources);
+
+/// Reads "left" or "right".
+std::string read_stereo_camera(const StrictValue& value);
+
+/// Reads width and height, each in least..most.
+ImageSize read_size(const StrictValue& value, int least, int most);
+
+/// Reads a recording's `columns`.
+EventFields read_columns(const StrictValue& value);
 
 /// Reads a manifest's `sensor`, whose keys are SensorSpec's.
 SensorSpec read_sensor(const StrictValue& value);

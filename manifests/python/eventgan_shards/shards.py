@@ -218,6 +218,13 @@ class Shards(Sequence):
         low = maps[:, :, 2] - scale / 2 + 0.5
         volumes = self._gathered(lambda file: np.tile(file.size[::-1], (len(file.column("valid")), 1)))
         high = np.minimum(low + scale * sizes[:, ::-1], volumes)
+        if self._have("motion"):  # stills are larger by the borders that they have lost, which a letterbox shows none of
+            boxed = self._gathered(lambda file: np.full(len(file.column("valid")), file.fit() == "letterbox"))
+            boxed &= np.isfinite(self.column("motion")).all(1) & (sizes > 0).all(1)
+            whole, into = sizes[boxed][:, ::-1], volumes[boxed]
+            scaled = np.maximum(np.floor(whole * (into / whole).min(1, keepdims=True) + 0.5), 1)
+            low[boxed] = (into - scaled) // 2
+            high[boxed] = low[boxed] + scaled
         return np.concatenate([np.nanmin(np.maximum(low, 0), axis=0), np.nanmax(high, axis=0)])
 
     def groups(self, by: str = "sequence") -> np.ndarray:
@@ -377,6 +384,9 @@ class _OpenShard:
         self._kept = kept
         self._volume = self.file["events/volume"]
         self.size = self._volume.shape[2:]  # H, W
+
+    def fit(self) -> str:
+        return json.loads(self.file.attrs["preprocessing"])["fit"]
 
     def volume(self, slot: int, decode: bool) -> Sample:
         stored, scale = self._volume[slot], self.column("events/scale")[slot]

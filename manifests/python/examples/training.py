@@ -187,7 +187,8 @@ def without_noise(sample: Sample) -> np.ndarray:
 
 
 def place_of(sample: Sample) -> tuple[int, int, int, int]:
-    """Where the image lies in the volume, in whole pixels: left, top, width, height."""
+    """Where the whole image lies in the volume, in whole pixels: left, top, width, height. Of a still its borders, which are cut, lie
+    outside the volume, or outside what a letterbox shows."""
     (scale_x, _, x), (_, scale_y, y) = sample["pair"]["source_to_volume"]
     height, width = sample["pair"]["source_size"]
     return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
@@ -200,7 +201,9 @@ def labelled_frame(sample: Sample) -> np.ndarray:
     if image is None:
         raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
     left, top, width, height = place_of(sample)
-    volume[0, top:top + height, left:left + width] = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA) / 255
+    whole = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    seen = whole[max(0, -top):, max(0, -left):][:volume.shape[1] - max(0, top), :volume.shape[2] - max(0, left)]
+    volume[0, max(0, top):, max(0, left):][:seen.shape[0], :seen.shape[1]] = seen / 255
     return volume
 
 

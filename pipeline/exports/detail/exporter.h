@@ -4,6 +4,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,6 +12,8 @@
 #include "pipeline/exports/export_folder.h"
 #include "pipeline/exports/export_input.h"
 #include "pipeline/exports/export_job.h"
+#include "stages/exports/detection_labels.h"
+#include "stages/exports/pose_list.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {
@@ -79,6 +82,9 @@ class Exporter {
 
   /// What of a sample's labels is not exported.
   virtual void account(const OutgoingSample&, LeftOut&) const {}
+
+  /// What of whole samples is not exported, as far as `finish` alone can tell.
+  virtual LeftOut whole_samples_left_out() const { return {}; }
 };
 
 std::unique_ptr<Exporter> yolo_exporter(const ExportInput& input, const ExportOptions& options);
@@ -87,6 +93,8 @@ std::unique_ptr<Exporter> mpii_exporter(const ExportOptions& options);
 std::unique_ptr<Exporter> davis_exporter(const ExportOptions& options);
 std::unique_ptr<Exporter> webdataset_exporter();
 std::unique_ptr<Exporter> events_exporter(const ExportOptions& options);
+std::unique_ptr<Exporter> dsec_exporter(const ExportInput& input, const ExportOptions& options);
+std::unique_ptr<Exporter> rvt_exporter(const ExportInput& input, const ExportOptions& options);
 
 // What several of them share.
 
@@ -105,6 +113,15 @@ void write_image_pair(const OutgoingSample& sample, const std::string& folder, d
 
 /// Counts a sample that has values above the full scale.
 void account_full_scale(const OutgoingSample& sample, double full_scale, LeftOut& left_out);
+
+/// The person's box: as annotated, else around its chosen joints and its head; cut to the volume.
+/// None if nothing is left.
+std::optional<Rectangle> person_box(const VolumePerson& person, const JointChoice& choice,
+                                    ImageSize volume);
+
+/// The chosen joints of a person of a sample.
+std::vector<ExportedJoint> exported_joints(const ShardSample& sample, std::size_t person,
+                                           const JointChoice& choice);
 
 /// values [channel, pixel] as [pixel, channel].
 template <class Value>
@@ -126,6 +143,10 @@ class ClassNumbers {
   /// on, KITTI's DontCare left out. Throws UsageError for a map that is none, a name that no source
   /// has, or a number below `first`.
   ClassNumbers(const ExportInput& input, const ExportOptions& options, int first);
+
+  /// Gives the names in `given`, those that are there, these numbers, all distinct, and the others
+  /// the least numbers from `first` on that are free.
+  void renumber(const std::map<std::string, int>& given, int first);
 
   enum class Fate { kKept, kLeftOut, kUnmapped };
   struct Entry {

@@ -58,6 +58,20 @@ std::vector<T> copy_numbers(std::span<const std::byte> data) {
   return values;
 }
 
+/// Of a type that is not kept as it is.
+template <class Stored, class Kept>
+std::vector<Kept> widen_numbers(std::span<const std::byte> data, const std::string& name) {
+  const std::vector<Stored> stored = copy_numbers<Stored>(data);
+  std::vector<Kept> values(stored.size());
+  for (std::size_t i = 0; i < stored.size(); ++i) {
+    if (!std::in_range<Kept>(stored[i])) {
+      refuse_numpy("numbers below 2^63", std::to_string(stored[i]), name);
+    }
+    values[i] = static_cast<Kept>(stored[i]);
+  }
+  return values;
+}
+
 std::string utf32_text(std::span<const std::byte> element, const std::string& name) {
   std::string text;
   std::size_t end = element.size();
@@ -98,9 +112,10 @@ std::vector<std::string> copy_text(std::span<const std::byte> data, std::size_t 
 
 // Size of one element in bytes; none if the dtype is not one of ours.
 std::optional<std::size_t> item_size_of(std::string_view descr) {
-  if (descr == "|u1" || descr == "|b1") return 1;
-  if (descr == "<f4" || descr == "<i4") return 4;
-  if (descr == "<f8" || descr == "<i8") return 8;
+  if (descr == "|u1" || descr == "|b1" || descr == "|i1") return 1;
+  if (descr == "<u2" || descr == "<i2") return 2;
+  if (descr == "<f4" || descr == "<i4" || descr == "<u4") return 4;
+  if (descr == "<f8" || descr == "<i8" || descr == "<u8") return 8;
   const bool unicode = descr.starts_with("<U");
   if (!unicode && !descr.starts_with("|S")) return std::nullopt;
   std::uint32_t length = 0;
@@ -126,7 +141,7 @@ TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std:
   }
   const auto item_size = item_size_of(descr);
   if (!item_size) {
-    refuse_numpy("dtype <f4, <f8, <i4, <i8, |u1, |b1, <U or |S", "'" + descr + "'", name);
+    refuse_numpy("dtype <f4, <f8, <i, <u, |b1, <U or |S", "'" + descr + "'", name);
   }
   TypedArray array{.shape = layout.shape, .values = {}};
   if (array.shape.size() > kMostDimensions) {
@@ -157,6 +172,16 @@ TypedArray decode_numpy_elements(const NumpyLayout& layout, std::span<const std:
     array.values = copy_numbers<std::int32_t>(data);
   } else if (descr == "|u1") {
     array.values = copy_numbers<std::uint8_t>(data);
+  } else if (descr == "|i1") {
+    array.values = widen_numbers<std::int8_t, std::int32_t>(data, name);
+  } else if (descr == "<i2") {
+    array.values = widen_numbers<std::int16_t, std::int32_t>(data, name);
+  } else if (descr == "<u2") {
+    array.values = widen_numbers<std::uint16_t, std::int32_t>(data, name);
+  } else if (descr == "<u4") {
+    array.values = widen_numbers<std::uint32_t, std::int64_t>(data, name);
+  } else if (descr == "<u8") {
+    array.values = widen_numbers<std::uint64_t, std::int64_t>(data, name);
   } else if (descr == "|b1") {
     std::vector<bool> values(data.size());
     for (std::size_t i = 0; i < data.size(); ++i) values[i] = data[i] != std::byte{0};
@@ -187,15 +212,20 @@ class HeaderReader {
   HeaderReader(std::string_view text, const std::string& name) : text_(text), name_(name) {}
 
   NumpyLayout read() {
-    std::optional<std::string> descr;
+    std::optional<NumpyLayout> type;
     std::optional<bool> fortran_order;
     std::optional<std::vector<std::size_t>> shape;
     need("{");
     while (!take("}")) {
       const std::string key = quoted();
       need(":");
-      if (key == "descr" && !descr) {
-        descr = quoted();
+      if (key == "descr" && !type) {
+        type = NumpyLayout();
+        if (take("[")) {
+          type->fields = fields();
+        } else {
+          type->descr = quoted();
+        }
       } else if (key == "fortran_order" && !fortran_order) {
         fortran_order = truth();
       } else if (key == "shape" && !shape) {
@@ -210,8 +240,10 @@ class HeaderReader {
     }
     skip_spaces();
     if (!text_.empty()) fail("nothing after the header's dictionary");
-    if (!descr || !fortran_order || !shape) fail("the keys descr, fortran_order and shape");
-    return {*descr, *fortran_order, *shape};
+    if (!type || !fortran_order || !shape) fail("the keys descr, fortran_order and shape");
+    type->fortran_order = *fortran_order;
+    type->shape = *shape;
+    return *type;
   }
 
  private:
@@ -238,12 +270,36 @@ class HeaderReader {
 
   std::string quoted() {
     const std::string_view quote = take("'") ? "'" : "\"";
-    if (quote == "\"") need(quote);  // structured dtypes, which are lists, end here
+    if (quote == "\"") need(quote);
     const std::size_t end = text_.find(quote);
     if (end == std::string_view::npos) fail("a closing quote");
     const std::string value(text_.substr(0, end));
     text_.remove_prefix(end + 1);
     return value;
+  }
+
+  /// Of a structured dtype: ('x', '<f4'), and no arrays or fields in fields.
+  std::vector<NumpyField> fields() {
+    std::vector<NumpyField> fields;
+    while (!take("]")) {
+      need("(");
+      NumpyField field;
+      field.name = quoted();
+      need(",");
+      field.descr = quoted();
+      need(")");
+      const bool is_known =
+          !field.name.empty() &&
+          std::ranges::find(fields, field.name, &NumpyField::name) != fields.end();
+      if (is_known) fail("each field once");
+      fields.push_back(std::move(field));
+      if (!take(",")) {
+        need("]");
+        break;
+      }
+    }
+    if (fields.empty()) fail("a field");
+    return fields;
   }
 
   bool truth() {
@@ -280,7 +336,8 @@ constexpr std::string_view kMagic = "\x93NUMPY";
 
 }  // namespace
 
-TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) {
+NumpyLayout parse_npy_header(std::span<const std::byte> bytes, const std::string& name,
+                             std::size_t& data_begin) {
   const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   if (!text.starts_with(kMagic) || text.size() < 8) {
     refuse_numpy("a .npy file", std::to_string(text.size()) + " bytes without its magic", name);
@@ -297,15 +354,67 @@ TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) 
     refuse_numpy("a .npy header of " + std::to_string(length) + " bytes",
                  std::to_string(text.size() - start), name);
   }
-  const NumpyLayout layout = HeaderReader(text.substr(start, length), name).read();
-  return decode_numpy_elements(layout, bytes.subspan(start + length), name);
+  data_begin = start + length;
+  return HeaderReader(text.substr(start, length), name).read();
 }
 
-std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
-                     std::span<const std::byte> values) {
-  std::size_t item_bytes = 0;
-  std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), item_bytes);
-  if (dtype[1] == 'U') item_bytes *= sizeof(char32_t);
+TypedArray parse_npy(std::span<const std::byte> bytes, const std::string& name) {
+  std::size_t begin = 0;
+  const NumpyLayout layout = parse_npy_header(bytes, name, begin);
+  if (!layout.fields.empty()) {
+    refuse_numpy("an array of numbers or text", "one of fields (a structured dtype)", name);
+  }
+  return decode_numpy_elements(layout, bytes.subspan(begin), name);
+}
+
+std::vector<NamedArray> parse_npy_fields(std::span<const std::byte> bytes,
+                                         const std::string& name) {
+  std::size_t begin = 0;
+  const NumpyLayout layout = parse_npy_header(bytes, name, begin);
+  if (layout.fields.empty() || layout.shape.size() != 1) {
+    refuse_numpy("a structured array [N]",
+                 layout.fields.empty() ? "'" + layout.descr + "'"
+                                       : std::to_string(layout.shape.size()) + " dimensions",
+                 name);
+  }
+  const std::span<const std::byte> data = bytes.subspan(begin);
+  std::vector<std::size_t> sizes;
+  std::size_t row = 0;
+  for (const NumpyField& field : layout.fields) {
+    std::string descr = field.descr;
+    if (field.name.empty() && descr.starts_with("|V")) descr[1] = 'S';
+    const auto size = item_size_of(descr);
+    if (!size) refuse_numpy("a field of numbers or text", "'" + field.descr + "'", name);
+    sizes.push_back(*size);
+    row += *size;
+  }
+  const std::size_t count = layout.shape[0];
+  if (product(row, count) != data.size()) {
+    refuse_numpy(std::to_string(count) + " rows of " + std::to_string(row) + " bytes",
+                 std::to_string(data.size()) + " bytes", name);
+  }
+  std::vector<NamedArray> arrays;
+  std::size_t offset = 0;
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (!layout.fields[i].name.empty()) {
+      std::vector<std::byte> column(sizes[i] * count);
+      for (std::size_t k = 0; k < count; ++k) {
+        std::ranges::copy(data.subspan(k * row + offset, sizes[i]), column.begin() + k * sizes[i]);
+      }
+      arrays.push_back({layout.fields[i].name,
+                        decode_numpy_elements({layout.fields[i].descr, false, {count}}, column,
+                                              name + " (" + layout.fields[i].name + ")")});
+    }
+    offset += sizes[i];
+  }
+  return arrays;
+}
+
+namespace {
+
+/// `descr` as Python writes it.
+std::string npy_bytes(std::string_view descr, const std::vector<std::size_t>& shape,
+                      std::size_t item_bytes, std::string_view values) {
   const std::size_t count =
       std::accumulate(shape.begin(), shape.end(), std::size_t{1}, std::multiplies<>());
   if (values.size() != count * item_bytes) {
@@ -317,7 +426,7 @@ std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& sha
   if (shape.size() > 1) sides.erase(sides.size() - 2);
   if (shape.size() == 1) sides.pop_back();  // "(4,)"
   std::string header =
-      fmt::format("{{'descr': '{}', 'fortran_order': False, 'shape': ({}), }}", dtype, sides);
+      fmt::format("{{'descr': {}, 'fortran_order': False, 'shape': ({}), }}", descr, sides);
   constexpr std::size_t kPreamble = 10;
   constexpr std::size_t kAlignment = 64;
   header.append(kAlignment - 1 - (kPreamble + header.size()) % kAlignment, ' ');
@@ -327,7 +436,22 @@ std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& sha
   file += static_cast<char>(header.size() & 0xff);
   file += static_cast<char>(header.size() >> 8);
   file += header;
-  return file.append(reinterpret_cast<const char*>(values.data()), values.size());
+  return file.append(values);
+}
+
+}  // namespace
+
+std::string npy_file(std::string_view dtype, const std::vector<std::size_t>& shape,
+                     std::span<const std::byte> values) {
+  std::size_t item_bytes = 0;
+  std::from_chars(dtype.data() + 2, dtype.data() + dtype.size(), item_bytes);
+  if (dtype[1] == 'U') item_bytes *= sizeof(char32_t);
+  return npy_bytes(fmt::format("'{}'", dtype), shape, item_bytes,
+                   {reinterpret_cast<const char*>(values.data()), values.size()});
+}
+
+std::string npy_records(std::string_view descr, std::size_t record_bytes, std::string_view values) {
+  return npy_bytes(descr, {values.size() / record_bytes}, record_bytes, values);
 }
 
 std::string npy_texts(const std::vector<std::string>& texts) {

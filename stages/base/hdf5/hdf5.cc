@@ -192,6 +192,8 @@ Hdf5Handle number_type(std::size_t size, bool is_float, bool is_signed) {
   switch (size) {
     case 1:
       return copy_of(is_signed ? H5T_STD_I8LE : H5T_STD_U8LE);
+    case 2:
+      return copy_of(is_signed ? H5T_STD_I16LE : H5T_STD_U16LE);
     case 4:
       return copy_of(is_signed ? H5T_STD_I32LE : H5T_STD_U32LE);
     case 8:

@@ -12,30 +12,35 @@ namespace eventgan {
 
 // One decoder for each format of image files. Each takes a file that is open at its start and gives
 // the same pixels as OpenCV's imread: grey and palettes become colour, 16 bits become 8,
-// transparency is dropped, and an orientation tag is not applied, since labels are given in stored
-// pixels. But where OpenCV returns an image with a grey or invented rest, these throw
-// std::runtime_error saying what is wrong if any pixel is missing or in doubt, as they do if the
-// image is too large (check_image_size, before memory is taken) or of a kind that is not read. All
-// are thread safe and write nothing to the standard streams.
-// The sizes are from the header alone.
+// transparency is dropped, and an orientation tag is not applied. But where OpenCV returns an image
+// with a grey or invented rest, these throw std::runtime_error saying what is wrong if any pixel is
+// missing or in doubt, as they do if the image is too large (check_image_size, before memory is
+// taken) or of a kind that is not read. All are thread safe and write nothing to the standard
+// streams. The sizes are from the header alone, and so are the orientations: 1 to 8 as EXIF counts,
+// 1 where none is told.
 
 /// Grey, YCbCr and RGB.
 ColourFrame decode_jpeg(std::FILE* file);
 ImageSize jpeg_size(std::FILE* file);
+int jpeg_orientation(std::FILE* file);
 
 /// Every PNG; 16 bits are cut to the upper 8. Throws also if a checksum of what decides the pixels
 /// does not match, or a pixel is a colour that its palette does not have.
 ColourFrame decode_png(std::FILE* file);
 ImageSize png_size(std::FILE* file);
+/// By its chunk eXIf, wherever it stands.
+int png_orientation(std::FILE* file);
 
 /// One image, no animation. WebP has no checksum: changed bytes may be other pixels.
 ColourFrame decode_webp(std::FILE* file);
 ImageSize webp_size(std::FILE* file);
+int webp_orientation(std::FILE* file);
 
 /// The first page, if libtiff makes 8-bit colour of it: 16 bits are rounded, and a colour is
 /// multiplied by its transparency unless it is so in the file. No floating point.
 ColourFrame decode_tiff(std::FILE* file);
 ImageSize tiff_size(std::FILE* file);
+int tiff_orientation(std::FILE* file);
 
 /// 1, 4, 8, 24 and 32 bits a pixel, not compressed.
 ColourFrame decode_bmp(std::FILE* file);
@@ -46,6 +51,15 @@ ColourFrame decode_pnm(std::FILE* file);
 ImageSize pnm_size(std::FILE* file);
 
 using Buffer = std::vector<std::uint8_t>;
+
+/// The orientation in a block of EXIF, as it is in a file's metadata: "Exif", two NULs, a TIFF
+/// header and its directories; 1 if it tells none. Thread safe.
+int exif_orientation(const Buffer& block);
+
+/// The image turned by 180 (3), 90 (6) or 270 degrees (8) clockwise, and the size of such a one; as
+/// it is by 1. Thread safe.
+ColourFrame turned(ColourFrame stored, int orientation);
+ImageSize turned(ImageSize stored, int orientation);
 
 /// The whole file, from its start, wherever it is open at; empty if it cannot be read, or has more
 /// than `most` bytes. Thread safe.

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <system_error>
+#include <utility>
 
 #include "stages/base/images/image_codecs.h"
 
@@ -44,30 +45,32 @@ struct Format {
   bool (*starts)(std::string_view bytes);  ///< a file of it, by the first 12
   ColourFrame (*decode)(std::FILE*);
   ImageSize (*size)(std::FILE*);
+  int (*orientation)(std::FILE*);  ///< null: it tells none
 };
 
 constexpr std::array<Format, 6> kFormats = {{
     {"JPEG", [](std::string_view bytes) { return bytes.starts_with("\xff\xd8\xff"); }, decode_jpeg,
-     jpeg_size},
+     jpeg_size, jpeg_orientation},
     {"PNG", [](std::string_view bytes) { return bytes.starts_with("\x89PNG\r\n\x1a\n"); },
-     decode_png, png_size},
+     decode_png, png_size, png_orientation},
     {"WebP",
      [](std::string_view bytes) { return bytes.starts_with("RIFF") && bytes.ends_with("WEBP"); },
-     decode_webp, webp_size},
+     decode_webp, webp_size, webp_orientation},
     {"TIFF",
      [](std::string_view bytes) {
        using namespace std::string_view_literals;
        return bytes.starts_with("II*\0"sv) || bytes.starts_with("MM\0*"sv) ||
               bytes.starts_with("II+\0"sv) || bytes.starts_with("MM\0+"sv);
      },
-     decode_tiff, tiff_size},
-    {"BMP", [](std::string_view bytes) { return bytes.starts_with("BM"); }, decode_bmp, bmp_size},
+     decode_tiff, tiff_size, tiff_orientation},
+    {"BMP", [](std::string_view bytes) { return bytes.starts_with("BM"); }, decode_bmp, bmp_size,
+     nullptr},
     {"PNM",
      [](std::string_view bytes) {
        return bytes.size() > 2 && bytes[0] == 'P' && bytes[1] >= '1' && bytes[1] <= '6' &&
               std::isspace(static_cast<unsigned char>(bytes[2])) != 0;
      },
-     decode_pnm, pnm_size},
+     decode_pnm, pnm_size, nullptr},
 }};
 
 /// None: the file is no image. Leaves `file` at its start.
@@ -82,21 +85,34 @@ const Format* format_of(std::FILE* file) {
   return format == kFormats.end() ? nullptr : format;
 }
 
-/// What one of a format's functions makes of the file, with its errors completed.
+/// What one of a format's functions makes of the file, turned as is wanted; with its errors
+/// completed.
 template <class Result>
-Result read_by_format(const std::filesystem::path& path, Result (*Format::*read)(std::FILE*)) {
+Result read_by_format(const std::filesystem::path& path, Result (*Format::*read)(std::FILE*),
+                      ImageOrientation wanted) {
   const OpenFile file = open_file(path);
   const Format* const format = format_of(file.get());
   if (format == nullptr) {
     throw std::runtime_error(
         "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind");
   }
+  int orientation = 1;
+  Result result;
   try {
-    return (format->*read)(file.get());
+    if (wanted == ImageOrientation::kUpright && format->orientation != nullptr) {
+      orientation = format->orientation(file.get());
+      std::rewind(file.get());
+    }
+    result = (format->*read)(file.get());
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string("expected a whole ") + format->name + ", got " +
                              error.what());
   }
+  if (orientation == 2 || orientation == 4 || orientation == 5 || orientation == 7) {
+    throw std::runtime_error("expected an image that is not mirrored, got EXIF orientation " +
+                             std::to_string(orientation));
+  }
+  return turned(std::move(result), orientation);
 }
 
 }  // namespace
@@ -115,12 +131,12 @@ bool is_image_file(const std::filesystem::path& file) {
   return format_of(open_file(file).get()) != nullptr;
 }
 
-ColourFrame decode_image_file(const std::filesystem::path& file) {
-  return read_by_format(file, &Format::decode);
+ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
+  return read_by_format(file, &Format::decode, orientation);
 }
 
-ImageSize image_file_size(const std::filesystem::path& file) {
-  return read_by_format(file, &Format::size);
+ImageSize image_file_size(const std::filesystem::path& file, ImageOrientation orientation) {
+  return read_by_format(file, &Format::size, orientation);
 }
 
 }  // namespace eventgan

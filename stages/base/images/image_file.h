@@ -34,13 +34,24 @@ void check_image_size(ImageSize size);
 /// folder.
 bool is_image_file(const std::filesystem::path& file);
 
+/// How an image is taken: as it is stored, or turned as its orientation says (EXIF 2.32, tag
+/// 0x0112), which cameras write that were held upright.
+enum class ImageOrientation { kStored, kUpright };
+
 /// Decodes a JPEG, PNG, WebP, TIFF, BMP or PNM file, told by its first bytes, strictly
 /// (image_codecs.h). Throws std::runtime_error saying what is wrong ("expected a whole PNG, got
 /// ..."), without the file's name. Thread safe.
-ColourFrame decode_image_file(const std::filesystem::path& file);
+///
+/// Upright, orientations 3, 6 and 8 are turned by 180, 90 and 270 degrees clockwise. Those that
+/// mirror (2, 4, 5, 7) throw too, "expected an image that is not mirrored, got EXIF orientation 2":
+/// one that was drawn from the other side is no other view of the scene. A file that tells none, or
+/// a number beyond 1 to 8, is taken as stored, as all do.
+ColourFrame decode_image_file(const std::filesystem::path& file,
+                              ImageOrientation orientation = ImageOrientation::kStored);
 
-/// The size alone, from the header. Throws as above. Thread safe.
-ImageSize image_file_size(const std::filesystem::path& file);
+/// The size alone, from the header, turned as the image would be. Throws as above. Thread safe.
+ImageSize image_file_size(const std::filesystem::path& file,
+                          ImageOrientation orientation = ImageOrientation::kStored);
 
 /// The bytes of a PNG, or of a JPEG of a quality of 1 to 100. Throw std::runtime_error if the image
 /// is empty or too large for the format. Thread safe.

@@ -88,6 +88,19 @@ class JpegFile {
     return size;
   }
 
+  int read_orientation() {
+    run_guarded(escape_, [&] { jpeg_save_markers(&codec_, JPEG_APP0 + 1, 0xffff); });
+    read_header();
+    for (jpeg_saved_marker_ptr marker = codec_.marker_list; marker; marker = marker->next) {
+      const Buffer block(marker->data, marker->data + marker->data_length);
+      constexpr std::array<std::uint8_t, 6> kName = {'E', 'x', 'i', 'f', 0, 0};
+      if (block.size() >= kName.size() && std::equal(kName.begin(), kName.end(), block.begin())) {
+        return exif_orientation(block);
+      }
+    }
+    return 1;
+  }
+
   ColourFrame read() {
     ColourFrame frame{read_header(), {}};
     if (codec_.num_components != 1 && codec_.num_components != 3) {
@@ -118,6 +131,8 @@ class JpegFile {
 ColourFrame decode_jpeg(std::FILE* file) { return JpegFile(file).read(); }
 
 ImageSize jpeg_size(std::FILE* file) { return JpegFile(file).read_header(); }
+
+int jpeg_orientation(std::FILE* file) { return JpegFile(file).read_orientation(); }
 
 std::string encode_jpeg(const ColourView& image, int quality) {
   jpeg_compress_struct codec{};

@@ -88,6 +88,12 @@ class TiffFile {
     return size;
   }
 
+  int orientation() {
+    std::uint16_t orientation = 1;
+    TIFFGetField(tiff_, TIFFTAG_ORIENTATION, &orientation);
+    return orientation >= 1 && orientation <= 8 ? orientation : 1;
+  }
+
   ColourFrame read() {
     ColourFrame frame{size(), {}};
     char reason[1024] = "";
@@ -140,6 +146,8 @@ class TiffFile {
 }  // namespace
 
 ImageSize tiff_size(std::FILE* file) { return TiffFile(file).size(); }
+
+int tiff_orientation(std::FILE* file) { return TiffFile(file).orientation(); }
 
 ColourFrame decode_tiff(std::FILE* file) { return TiffFile(file).read(); }
 

@@ -313,7 +313,7 @@ cv::Mat scaled(const cv::Mat& image, ImageSize volume, PanelScale scale) {
 }
 
 cv::Mat frame_panel(const std::vector<std::uint8_t>& bgr, ImageSize size, PanelScale scale) {
-  if (bgr.empty()) return blank_panel(panel_size(size, scale), "frame not found");
+  if (bgr.empty()) return blank_panel(panel_size(size, scale), "no frame");
   return scaled(cv::Mat(size.height, size.width, CV_8UC3, const_cast<std::uint8_t*>(bgr.data())),
                 size, scale);
 }

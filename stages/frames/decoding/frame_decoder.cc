@@ -9,9 +9,10 @@
 
 namespace eventgan {
 
-Outcome<ImageSize> probe_image_size(const std::filesystem::path& file) {
+Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
+                                    ImageOrientation orientation) {
   try {
-    if (is_image_file(file)) return image_file_size(file);
+    if (is_image_file(file)) return image_file_size(file, orientation);
     const auto size_of = [](const ColourView& frame) { return frame.size; };
     return VideoWindow<ImageSize>(file, 1, size_of).frame(0);
   } catch (const std::runtime_error& error) {
@@ -31,10 +32,11 @@ FrameDecoder::FrameDecoder(std::filesystem::path base, int kept_frames)
     : base_(std::move(base)),
       videos_(std::make_unique<OpenVideos<ColourFrame>>(kept_frames, copy_of)) {}
 
-Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame, std::int64_t video_stride) const {
+Outcome<ColourFrame> FrameDecoder::decode(const FrameRef& frame, std::int64_t video_stride,
+                                          ImageOrientation orientation) const {
   const std::filesystem::path path = base_ / frame.path;
   try {
-    return frame.video_frame < 0 ? decode_image_file(path)
+    return frame.video_frame < 0 ? decode_image_file(path, orientation)
                                  : videos_->frames<1>(path, {frame.video_frame}, video_stride)[0];
   } catch (const std::runtime_error& error) {
     return SampleFault{std::string(error.what()) + ", in " + frame.path};

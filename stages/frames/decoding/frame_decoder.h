@@ -6,19 +6,24 @@
 
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
+#include "manifests/values/job.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/decoding/video_frames.h"
 
 namespace eventgan {
 
-/// The size of an image as stored, read from its header alone (PNG, JPEG); other formats are
-/// decoded. For a video, the size of its first frame. A fault names the file. Thread safe.
-Outcome<ImageSize> probe_image_size(const std::filesystem::path& file);
+/// How the images of a dataset are taken.
+inline ImageOrientation orientation_of(DatasetKind dataset) {
+  return is_turned_upright(dataset) ? ImageOrientation::kUpright : ImageOrientation::kStored;
+}
+
+/// The size of an image, read from its header alone; of a video, the size of its first frame. A
+/// fault names the file. Thread safe.
+Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
+                                    ImageOrientation orientation);
 
 /// Decodes single frames of images and videos. An image that decodes only in part (a truncated
-/// JPEG, a PNG with a bad checksum) is a fault, never an image with a grey rest. Images are
-/// taken as stored: an orientation tag (EXIF) is not applied, since labels are given in stored
-/// pixels.
+/// JPEG, a PNG with a bad checksum) is a fault, never an image with a grey rest.
 ///
 /// Thread safety: `decode` may be called from several threads. Frames of videos are decoded one
 /// after another under a lock, from the video's start (seeking is not exact), and the latest ones
@@ -32,9 +37,11 @@ class FrameDecoder {
   explicit FrameDecoder(std::filesystem::path base, int kept_frames = kDefaultKeptFrames);
 
   /// A fault if the file is missing, empty, truncated, not an image, or larger than
-  /// kMaxImagePixels, or if a video ends before the frame; it names the frame's path. Of a video
-  /// whose frames are asked for at multiples of `video_stride`, only these are kept.
-  Outcome<ColourFrame> decode(const FrameRef& frame, std::int64_t video_stride = 1) const;
+  /// kMaxImagePixels, is mirrored (decode_image_file), or if a video ends before the frame; it
+  /// names the frame's path. Of a video whose frames are asked for at multiples of `video_stride`,
+  /// only these are kept.
+  Outcome<ColourFrame> decode(const FrameRef& frame, std::int64_t video_stride = 1,
+                              ImageOrientation orientation = ImageOrientation::kStored) const;
 
  private:
   std::filesystem::path base_;

@@ -71,22 +71,25 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
     : base_(std::move(base)),
       spec_(std::move(spec)),
       images_(std::make_unique<SharedImages>(2 * pairs_under_way + kLongestGap + kMargin)),
+      stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
           pairs_under_way + kLongestGap + kMargin, [spec = spec_](const ColourView& view) {
             return frame_or_fault([&] { return prepare_frame(view, spec); });
           })) {}
 
-SharedFrame PairReader::frame(const FrameRef& ref) const {
+SharedFrame PairReader::frame(const FrameRef& ref, ImageOrientation orientation) const {
   if (ref.video_frame >= 0) return videos_->frames<1>(base_ / ref.path, {ref.video_frame})[0];
-  return images_->get(ref.path, [&] {
+  const char* how = orientation == ImageOrientation::kUpright ? "upright " : "stored ";
+  return images_->get(how + ref.path, [&] {
     return frame_or_fault([&] {
-      const ColourFrame image = decode_image_file(base_ / ref.path);
+      const ColourFrame image = decode_image_file(base_ / ref.path, orientation);
       return prepare_frame({image.size, image.bgr.data()}, spec_);
     });
   });
 }
 
-Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair) const {
+Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
+                                                       ImageOrientation orientation) const {
   const FrameRef& previous = pair.previous;
   const FrameRef& next = pair.next;
   std::array<SharedFrame, 2> both;
@@ -96,23 +99,62 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair) co
       return videos_->frames<2>(base_ / previous.path, {previous.video_frame, next.video_frame},
                                 pair.video_stride());
     }
-    both[0] = frame(previous);
+    both[0] = frame(previous, orientation);
     current = &next;
-    both[1] = frame(next);
+    both[1] = frame(next, orientation);
   } catch (const std::runtime_error& error) {
     return fault_in(*current, error.what());
   }
   return both;
 }
 
+Outcome<std::array<PreparedFrame, 2>> PairReader::still(const FramePair& pair,
+                                                        ImageOrientation orientation,
+                                                        std::int64_t stride) const {
+  const Outcome<ColourFrame> image = stills_.decode(pair.next, stride, orientation);
+  if (is_fault(image)) return std::get<SampleFault>(image);
+  const ColourFrame& colour = std::get<ColourFrame>(image);
+  try {
+    return prepare_still({colour.size, colour.bgr.data()}, pair, spec_);
+  } catch (const std::runtime_error& error) {
+    return fault_in(pair.next, error.what());
+  }
+}
+
 void PairReader::expect(const FramePair& pair) const {
   for (const FrameRef* frame : {&pair.previous, &pair.next}) {
+    if (pair.motion && frame == &pair.next) break;  // both are one image
     if (frame->video_frame < 0) load_ahead(base_ / frame->path);
   }
 }
 
-Outcome<PreparedPair> PairReader::read(const FramePair& pair) const {
-  const auto outcome = frames(pair);
+namespace {
+
+PreparedPair input_of(const PreparedFrame& previous, const PreparedFrame& next) {
+  PreparedPair prepared;
+  prepared.placement = previous.placement;
+  const VisiblePart part = visible_part(prepared.placement);
+  prepared.content = part.size;
+  prepared.content_x = part.volume_x;
+  prepared.content_y = part.volume_y;
+  prepared.input.resize(2 * part.size.pixel_count());
+  const std::span<float> input = prepared.input;
+  to_input(previous.grey, input.first(previous.grey.size()));
+  to_input(next.grey, input.last(next.grey.size()));
+  return prepared;
+}
+
+}  // namespace
+
+Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
+                                       std::int64_t still_stride) const {
+  if (pair.motion) {
+    const auto outcome = still(pair, orientation, still_stride);
+    if (is_fault(outcome)) return std::get<SampleFault>(outcome);
+    const auto& [previous, next] = std::get<0>(outcome);
+    return input_of(previous, next);
+  }
+  const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return std::get<SampleFault>(outcome);
   const auto& [previous, next] = std::get<0>(outcome);
   for (const auto& [frame, ref] : {std::pair{&previous, &pair.previous}, {&next, &pair.next}}) {
@@ -125,18 +167,7 @@ Outcome<PreparedPair> PairReader::read(const FramePair& pair) const {
                        to_string(before.placement.source) + " in " + pair.previous.path + " and " +
                        to_string(after.placement.source) + ", in " + pair.next.path};
   }
-
-  PreparedPair prepared;
-  prepared.placement = before.placement;
-  const VisiblePart part = visible_part(prepared.placement);
-  prepared.content = part.size;
-  prepared.content_x = part.volume_x;
-  prepared.content_y = part.volume_y;
-  prepared.input.resize(2 * part.size.pixel_count());
-  const std::span<float> input = prepared.input;
-  to_input(before.grey, input.first(before.grey.size()));
-  to_input(after.grey, input.last(after.grey.size()));
-  return prepared;
+  return input_of(before, after);
 }
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <functional>
 #include <future>
@@ -17,6 +18,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
 #include "manifests/values/placement.h"
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/decoding/video_frames.h"
 
@@ -70,6 +72,9 @@ struct PreparedPair {
 /// last are kept, so that each is decoded once. A file that changes meanwhile may be seen as it
 /// was.
 ///
+/// A still's pair (FramePair::motion) is made of its one image (prepare_still); of a video,
+/// besides, as many whole colour frames are kept as prepared ones.
+///
 /// The two frames must have one size. Thread safety: `read` may be called from several threads;
 /// images are decoded in parallel, videos one frame after another under a lock.
 class PairReader {
@@ -81,20 +86,28 @@ class PairReader {
   /// each pair under way are kept, besides those 6 and the margin.
   PairReader(std::filesystem::path base, ImageSpec spec, int pairs_under_way = 16);
 
-  /// A fault if a file is missing, empty, truncated, not an image, or the sizes differ.
-  Outcome<PreparedPair> read(const FramePair& pair) const;
+  /// A fault if a file is missing, empty, truncated, not an image, or mirrored, if the sizes
+  /// differ, or if too little can be seen of a still after its motion. `still_stride`: of the video
+  /// that a still is in, each so many of whose frames are taken (SourceSpec::every).
+  Outcome<PreparedPair> read(const FramePair& pair,
+                             ImageOrientation orientation = ImageOrientation::kStored,
+                             std::int64_t still_stride = 1) const;
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
   void expect(const FramePair& pair) const;
 
  private:
-  Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair) const;
-  SharedFrame frame(const FrameRef& ref) const;
+  Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
+                                             ImageOrientation orientation) const;
+  SharedFrame frame(const FrameRef& ref, ImageOrientation orientation) const;
+  Outcome<std::array<PreparedFrame, 2>> still(const FramePair& pair, ImageOrientation orientation,
+                                              std::int64_t stride) const;
 
   std::filesystem::path base_;
   ImageSpec spec_;
   std::unique_ptr<SharedImages> images_;
+  FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;
 };
 

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace eventgan {
 
@@ -30,17 +31,41 @@ cv::Mat as_grey(const cv::Mat& colour) {
   return grey;
 }
 
-/// Grey, resized and blurred, uncut.
-cv::Mat scaled_grey(const ColourView& frame, ImageSize scaled, const ImageSpec& spec) {
-  cv::Mat image(frame.size.height, frame.size.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr));
-  if (spec.grey == GreyOrder::kBeforeResize) image = as_grey(image);
+cv::Mat matrix_of(const ColourView& frame) {
+  return {frame.size.height, frame.size.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr)};
+}
+
+/// What is resized: of the image what `placement` leaves of it.
+cv::Mat without_borders(const cv::Mat& image, const Placement& placement) {
+  const ImageSize cut = placement.cut();
+  return image(cv::Rect(placement.border_x, placement.border_y, cut.width, cut.height));
+}
+
+/// Resized, grey and blurred, uncut; `image` is grey already if that comes first.
+cv::Mat scaled_grey(const cv::Mat& image, const Placement& placement, const ImageSpec& spec) {
+  const ImageSize scaled = placement.scaled;
   cv::Mat resized;
-  cv::resize(image, resized, cv::Size(scaled.width, scaled.height), 0, 0, cv::INTER_LINEAR);
+  cv::resize(without_borders(image, placement), resized, cv::Size(scaled.width, scaled.height), 0,
+             0, cv::INTER_LINEAR);
   if (spec.grey == GreyOrder::kAfterResize) resized = as_grey(resized);
   if (spec.blur == 0) return resized;
   cv::Mat blurred;
   cv::GaussianBlur(resized, blurred, cv::Size(spec.blur, spec.blur), 0);
   return blurred;
+}
+
+/// See move_still.
+cv::Mat moved(const cv::Mat& image, const FramePair& pair) {
+  const ImageSize size{image.rows, image.cols};
+  if (std::max(size.height, size.width) > kMostStillSide) {
+    throw std::invalid_argument("expected a still of at most " + std::to_string(kMostStillSide) +
+                                " pixels a side, got " + to_string(size));
+  }
+  std::array<double, 6> map = moved_to_labelled(size, pair);
+  cv::Mat result;
+  cv::warpAffine(image, result, cv::Mat(2, 3, CV_64F, map.data()), image.size(),
+                 cv::INTER_CUBIC | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  return result;
 }
 
 std::vector<std::uint8_t> cut(const cv::Mat& grey, const VisiblePart& part) {
@@ -61,21 +86,54 @@ constexpr auto kInputOfGrey = [] {
   return table;
 }();
 
-[[noreturn]] void refuse(const std::string& why) {
-  std::throw_with_nested(std::runtime_error("expected frames that can be resized, got " + why));
+/// What `prepare` returns; what OpenCV and `place` throw becomes a std::runtime_error.
+template <class Prepare>
+auto unless_refused(Prepare prepare) {
+  try {
+    return prepare();
+  } catch (const cv::Exception& exception) {
+    std::throw_with_nested(
+        std::runtime_error("expected frames that can be resized, got " + exception.err));
+  } catch (const std::invalid_argument& exception) {
+    std::throw_with_nested(std::runtime_error(exception.what()));
+  }
+}
+
+PreparedFrame prepare(const cv::Mat& image, const Placement& placement, const ImageSpec& spec) {
+  return {cut(scaled_grey(image, placement, spec), visible_part(placement)), placement};
+}
+
+cv::Mat grey_if_first(const ColourView& frame, const ImageSpec& spec) {
+  const cv::Mat image = matrix_of(frame);
+  return spec.grey == GreyOrder::kBeforeResize ? as_grey(image) : image;
 }
 
 }  // namespace
 
 PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec) {
-  try {
+  return unless_refused([&] {
     const Placement placement = place(frame.size, spec);
-    return {cut(scaled_grey(frame, placement.scaled, spec), visible_part(placement)), placement};
-  } catch (const cv::Exception& exception) {
-    refuse(exception.err);
-  } catch (const std::invalid_argument& exception) {
-    refuse(exception.what());
-  }
+    return prepare(grey_if_first(frame, spec), placement, spec);
+  });
+}
+
+std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
+                                           const ImageSpec& spec) {
+  return unless_refused([&] {
+    const Placement placement = place(image.size, spec, pair);
+    const cv::Mat still = grey_if_first(image, spec);
+    std::array<PreparedFrame, 2> frames = {prepare(moved(still, pair), placement, spec),
+                                           prepare(still, placement, spec)};
+    if (pair.label_position == 0) std::swap(frames[0], frames[1]);
+    return frames;
+  });
+}
+
+ColourFrame move_still(const ColourFrame& image, const FramePair& pair) {
+  return unless_refused([&] {
+    const cv::Mat result = moved(matrix_of({image.size, image.bgr.data()}), pair);
+    return ColourFrame{image.size, {result.datastart, result.dataend}};
+  });
 }
 
 void to_input(std::span<const std::uint8_t> grey, std::span<float> input) {
@@ -89,11 +147,10 @@ std::vector<std::uint8_t> place_colour(const ColourFrame& frame, const Placement
   }
   const ImageSize volume = placement.volume;
   std::vector<std::uint8_t> placed(3 * volume.pixel_count(), 0);
-  const cv::Mat source(frame.size.height, frame.size.width, CV_8UC3,
-                       const_cast<std::uint8_t*>(frame.bgr.data()));
+  const cv::Mat source = matrix_of({frame.size, frame.bgr.data()});
   cv::Mat scaled;
-  cv::resize(source, scaled, cv::Size(placement.scaled.width, placement.scaled.height), 0, 0,
-             cv::INTER_LINEAR);
+  cv::resize(without_borders(source, placement), scaled,
+             cv::Size(placement.scaled.width, placement.scaled.height), 0, 0, cv::INTER_LINEAR);
 
   const VisiblePart part = visible_part(placement);
   const cv::Size size(part.size.width, part.size.height);

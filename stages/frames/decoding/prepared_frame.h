@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -36,9 +37,26 @@ struct PreparedFrame {
 using SharedFrame = std::shared_ptr<const Outcome<PreparedFrame>>;
 
 /// Prepares a frame as `spec` says: grey (ITU-R BT.601, 8 bit), bilinear resizing, Gaussian blur
-/// (OpenCV's 8-bit filters, sigma from the kernel's side), cut. Throws std::runtime_error "expected
-/// frames that can be resized, got ..." if it cannot be placed or resized. Thread safe.
+/// (OpenCV's 8-bit filters, sigma from the kernel's side), cut. Throws std::runtime_error
+/// "expected X, got Y" if it cannot be placed or resized. Thread safe.
 PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec);
+
+/// OpenCV counts the pixels that it moves in 16 bits.
+inline constexpr int kMostStillSide = 32766;
+
+/// Both frames of a still's pair, which has a motion, previous first: the image itself at
+/// `pair.label_position`, and the image moved as move_still does, both without the borders that
+/// only one of them shows (placement.h). Where grey is made before resizing the grey image is
+/// moved. Throws as above, also if too little would be left or a side is beyond kMostStillSide.
+/// Thread safe.
+std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FramePair& pair,
+                                           const ImageSpec& spec);
+
+/// The moved frame of a still's pair, of the image's size: each pixel is the image where
+/// moved_to_labelled leads from it, bicubic (Keys with a = -0.75, places rounded to 1/32 px);
+/// places beyond the image take its nearest pixel, for `place` to cut away. Throws
+/// std::runtime_error as prepare_still. Thread safe.
+ColourFrame move_still(const ColourFrame& image, const FramePair& pair);
 
 /// The generator's input of 8-bit grey: x = (u/255 - 0.5) * 2 in [-1, 1], in single precision.
 /// `input` must have the size of `grey`. Thread safe.

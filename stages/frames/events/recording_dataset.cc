@@ -13,6 +13,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -32,6 +33,12 @@ namespace fs = std::filesystem;
 constexpr double kSameTime_s = 1e-6;  // what labels written with six decimals can lose
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
+/// Consecutive windows from `begin_s` on.
+struct Windows {
+  double begin_s = 0;
+  std::int64_t count = 0;
+};
+
 /// One recording of the source.
 struct Recorded {
   std::string path;  ///< as FrameRef::path is written
@@ -39,6 +46,7 @@ struct Recorded {
   std::vector<double> frame_times_s;
   std::array<double, 2> span{};                     ///< first and last time of a frame or an event
   std::optional<std::array<double, 2>> event_span;  ///< of an event; none: there are none
+  Windows windows;                                  ///< if it has neither frames nor labels
   std::string label_file;                           ///< written as `path`; empty: none
   RecordingLabels labels;                           ///< class_id is the source's
 
@@ -78,10 +86,25 @@ bool is_manifest(const fs::path& file) try {
   return false;
 }
 
+/// Prophesee's NAME_bbox.npy is that of NAME_td.dat, NAME_td.dat.h5 and NAME.raw.
+std::string bbox_name(std::string name) {
+  for (const std::string_view events : {std::string_view("_td.dat"), std::string_view("_td")}) {
+    if (!name.ends_with(events)) continue;
+    name.resize(name.size() - events.size());
+    break;
+  }
+  return name + "_bbox.npy";
+}
+
+bool is_label_file(const fs::path& file) {
+  return file.extension() == ".csv" || file.extension() == ".json" ||
+         file.filename().string().ends_with("_bbox.npy");
+}
+
 class RecordingDataset final : public Dataset {
  public:
   RecordingDataset(const SourceSpec& spec, const fs::path& base)
-      : window_(spec.window), camera_(spec.camera) {
+      : window_(spec.window), options_(spec.recording) {
     find_recordings(spec, base);
     find_labels(spec, base);
     for (auto& [name, recorded] : recordings_) open(recorded, base);
@@ -185,6 +208,14 @@ class RecordingDataset final : public Dataset {
   std::optional<Span> span_of(const Recorded& recorded, double time_s) const {
     if (window_.events) return std::nullopt;
     if (!window_.duration_s) return frame_window(recorded.frame_times_s, time_s, window_.label);
+    if (recorded.windows.count > 0) {
+      // From the window's number, so that one's end is the next one's begin to the last bit: no
+      // event falls between two.
+      const double place = window_.label == LabelPlace::kMiddle ? 0.5 : 1;
+      const double begin_s = recorded.windows.begin_s, length_s = *window_.duration_s;
+      const double i = std::round((time_s - begin_s) / length_s - place);
+      return Span{begin_s + i * length_s, begin_s + (i + 1) * length_s};
+    }
     const double after_s = window_.label == LabelPlace::kMiddle ? *window_.duration_s / 2 : 0;
     return Span{time_s - (*window_.duration_s - after_s), time_s + after_s};
   }
@@ -199,26 +230,28 @@ class RecordingDataset final : public Dataset {
   }
 
   void find_recordings(const SourceSpec& spec, const fs::path& base) {
-    const auto format_at = [&](const fs::path& path) {
-      return find_recording_format(path, camera_);
-    };
-    const auto spelled = [](const std::string& path, RecordingFormat format) {
-      const bool is_folder = format == RecordingFormat::kEcd;
-      return is_folder ? (fs::path(path) / "events.txt").generic_string() : path;
+    const auto is_recording = [&](const fs::path& path) {
+      return find_recording_format(path, options_).has_value();
     };
     const fs::path root = base / spec.root;
-    if (const auto format = format_at(root)) {
+    /// `written`: as FrameRef::path is.
+    const auto spelled = [&](const fs::path& written) {
+      const fs::path file = event_file(base / written, options_);
+      return (written / file.lexically_relative(base / written)).generic_string();
+    };
+    if (is_recording(root)) {
       fs::path named = fs::absolute(root).lexically_normal();
       if (!named.has_filename()) named = named.parent_path();
-      const bool is_folder = *format == RecordingFormat::kEcd;
-      add((is_folder ? named.filename() : named.stem()).string(), spelled(spec.root, *format));
+      const bool is_folder = fs::is_directory(root);
+      add((is_folder ? named.filename() : named.stem()).string(),
+          is_folder ? spelled(spec.root) : spec.root);
       default_labels_ = named.parent_path();
       return;
     }
     const auto refuse = [&] {
       throw InputError(
-          "expected a recording in the layout of MVSEC, ECD or EventGAN, or a folder of them, got "
-          "none, in " +
+          "expected a recording of an event camera (AEDAT4, RAW, DAT, DSEC, ECD, EventGAN, M3ED, "
+          "MVSEC, a table of events), or a folder of them, got none, in " +
           root.string());
     };
     if (fs::is_regular_file(root)) refuse();
@@ -226,16 +259,16 @@ class RecordingDataset final : public Dataset {
     folder.require_folder("");
     std::vector<std::string> left_out;
     for (const std::string& name : folder.folders_in("")) {
-      if (const auto format = format_at(folder.on_disk(name))) {
-        add(name, spelled(folder.written(name), *format));
+      if (is_recording(folder.on_disk(name))) {
+        add(name, spelled(folder.written(name)));
       } else {
         left_out.push_back(name);
       }
     }
     for (const fs::path name : folder.files_in("")) {
-      if (const auto format = format_at(folder.on_disk(name.string()))) {
-        add(name.stem().string(), spelled(folder.written(name.string()), *format));
-      } else if (name.extension() != ".csv" && name.extension() != ".json") {
+      if (is_recording(folder.on_disk(name.string()))) {
+        add(name.stem().string(), folder.written(name.string()));
+      } else if (!is_label_file(name)) {
         left_out.push_back(name.string());
       }
     }
@@ -250,18 +283,23 @@ class RecordingDataset final : public Dataset {
     const fs::path named = base / spec.annotations.value_or("");
     if (spec.annotations && !fs::is_directory(named)) {
       if (recordings_.size() > 1) {
-        throw UsageError("annotations: expected a folder of NAME.csv or NAME.json for " +
-                         std::to_string(recordings_.size()) + " recordings, got a file, in " +
-                         spec.root);
+        throw UsageError(
+            "annotations: expected a folder of NAME.csv, NAME.json or NAME_bbox.npy for " +
+            std::to_string(recordings_.size()) + " recordings, got a file, in " + spec.root);
       }
       read_labels(recordings_.begin()->second, *spec.annotations, named);
       return;
     }
     const fs::path folder = spec.annotations ? named : default_labels_;
     for (auto& [name, recorded] : recordings_) {
-      std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json")};
-      std::erase_if(files,
-                    [](const fs::path& file) { return !fs::exists(file) || is_manifest(file); });
+      std::vector<fs::path> files = {folder / (name + ".csv"), folder / (name + ".json"),
+                                     folder / bbox_name(name)};
+      // A table of events is a .csv, too.
+      const fs::path own = fs::absolute(base / recorded.path).lexically_normal();
+      std::erase_if(files, [&](const fs::path& file) {
+        return !fs::exists(file) || is_manifest(file) ||
+               fs::absolute(file).lexically_normal() == own;
+      });
       if (files.size() > 1) {
         throw InputError("expected labels in one file, got two, in " + files[0].string() + " and " +
                          files[1].string());
@@ -270,8 +308,9 @@ class RecordingDataset final : public Dataset {
     }
     if (annotation_files_.empty()) {
       if (!spec.annotations) return;
-      throw InputError("expected NAME.csv or NAME.json of a recording, got none, in " +
-                       folder.string());
+      throw InputError(
+          "expected NAME.csv, NAME.json or NAME_bbox.npy of a recording, got none, in " +
+          folder.string());
     }
     std::vector<std::string> without;
     std::erase_if(recordings_, [&](const auto& entry) {
@@ -293,28 +332,31 @@ class RecordingDataset final : public Dataset {
         .generic_string();
   }
 
-  void read_labels(Recorded& recorded, const std::string& path, const fs::path& file) try {
+  void read_labels(Recorded& recorded, const std::string& path, const fs::path& file) {
     recorded.labels = read_recording_labels(file);
     recorded.label_file = path;
     annotation_files_.push_back(path);
-  } catch (const InputError&) {
-    throw;
-  } catch (const std::runtime_error& error) {
-    throw InputError(error.what());
   }
 
   void open(Recorded& recorded, const fs::path& base) {
-    fs::path path = base / recorded.path;
-    if (path.filename() == "events.txt") {
-      annotation_files_.push_back(
-          (fs::path(recorded.path).parent_path() / "images.txt").generic_string());
-      path = path.parent_path();
+    const fs::path path = base / recorded.path;
+    const fs::path own = fs::absolute(path).lexically_normal();
+    for (const fs::path& file : event_companions(own, options_)) {
+      const fs::path beside = file.lexically_relative(own.parent_path());
+      fs::path written = fs::path(recorded.path).parent_path() / beside;
+      if (beside.has_parent_path()) written = written.lexically_normal();  // left/../../images
+      annotation_files_.push_back(written.generic_string());
     }
-    const auto format = find_recording_format(path, camera_);
-    recorded.recording = open_recording(path, format.value_or(RecordingFormat::kMvsec), camera_);
+    const auto format = find_recording_format(path, options_);
+    recorded.recording = open_recording(path, format.value_or(RecordingFormat::kMvsec), options_);
     const Recording& recording = *recorded.recording;
     for (std::int64_t i = 0; i < recording.frame_count(); ++i) {
       recorded.frame_times_s.push_back(recording.frame_time_s(i));
+    }
+    recorded.event_span = recording.event_span();
+    if (recorded.frame_times_s.empty()) {
+      open_without_frames(recorded);
+      return;
     }
     if (recorded.frame_times_s.size() < 2 && !window_.duration_s && !window_.events) {
       throw InputError(
@@ -323,11 +365,38 @@ class RecordingDataset final : public Dataset {
           recorded.path);
     }
     recorded.span = {recorded.frame_times_s.front(), recorded.frame_times_s.back()};
-    recorded.event_span = recording.event_span();
     if (const auto& events = recorded.event_span) {
       recorded.span[0] = std::min(recorded.span[0], (*events)[0]);
       recorded.span[1] = std::max(recorded.span[1], (*events)[1]);
     }
+  }
+
+  void open_without_frames(Recorded& recorded) const {
+    if (!recorded.event_span) {
+      throw InputError("expected events or frames, got neither, in " + recorded.path);
+    }
+    const bool is_labelled = !recorded.label_file.empty();
+    if (!window_.duration_s && !(is_labelled && window_.events)) {
+      throw InputError(
+          fmt::format("expected window_s{}, since the recording has no frames, got {}, in {}",
+                      is_labelled ? " or window_events" : ", or labels",
+                      window_.events ? "window_events alone" : "neither", recorded.path));
+    }
+    recorded.span = *recorded.event_span;
+    if (is_labelled) return;
+    // A quarter of a microsecond before the first event: an event at a window's begin is not in it,
+    // and none at whole microseconds lies on the border of two.
+    const double length_s = *window_.duration_s;
+    const double begin_s = recorded.span[0] - kSameTime_s / 4;
+    const double count = std::ceil((recorded.span[1] - begin_s) / length_s);
+    constexpr double kMostWindows = 1e7;
+    if (count > kMostWindows) {
+      throw InputError(fmt::format(
+          "expected events of at most {:.0f} windows, got times from {} s to {} s, in {}",
+          kMostWindows, recorded.span[0], recorded.span[1], recorded.path));
+    }
+    recorded.windows = {begin_s, static_cast<std::int64_t>(count)};
+    recorded.span[1] = begin_s + count * length_s;
   }
 
   /// Numbers the classes of all recordings by their names' order, whatever the order of the files.
@@ -366,6 +435,12 @@ class RecordingDataset final : public Dataset {
       const bool by_frames = !window_.duration_s && !window_.events;
       for (std::size_t i = by_frames ? 1 : 0; i < frames.size(); ++i) {
         list_time(name, recorded, frames[i]);
+      }
+      const double length_s = window_.duration_s.value_or(0);
+      const double place = window_.label == LabelPlace::kMiddle ? 0.5 : 1;
+      for (std::int64_t i = 0; i < recorded.windows.count; ++i) {
+        list_time(name, recorded,
+                  recorded.windows.begin_s + (static_cast<double>(i) + place) * length_s);
       }
       return;
     }
@@ -431,7 +506,7 @@ class RecordingDataset final : public Dataset {
   }
 
   WindowSpec window_;
-  std::string camera_;
+  RecordingOptions options_;
   std::map<std::string, Recorded> recordings_;  ///< by name
   fs::path default_labels_;                     ///< where labels lie unless the manifest says
   LabelSchema schema_;

@@ -8,13 +8,16 @@
 
 namespace eventgan {
 
-/// Recordings of an event camera with frames (stages/recordings), with labels or without.
+/// Recordings of an event camera (stages/recordings), with frames or without, with labels or
+/// without.
 ///
-/// The root is a recording (an HDF5 file, an ECD folder) or a folder of recordings, named NAME as
-/// its file or folder. Labels are NAME.csv or NAME.json (read_recording_labels) beside it, or what
-/// the manifest's `annotations` names; a manifest of this program that has such a name is left
-/// alone. A sample is a labelled time; of a source without labels the time of a frame. Of a source
-/// with labels, recordings without are left out, with a note.
+/// The root is a recording (a file; a folder of ECD or DSEC) or a folder of recordings, named NAME
+/// as its file or folder. Labels are NAME.csv, NAME.json or NAME_bbox.npy (of NAME_td.* as well;
+/// read_recording_labels) beside it, or what the manifest's `annotations` names; a manifest of this
+/// program that has such a name is left alone. A sample is a labelled time; of a source without
+/// labels the time of a frame, or, of recordings without frames, of one of the windows of
+/// duration_s that follow each other from a quarter of a microsecond before the first event until
+/// all events are in one. Of a source with labels, recordings without are left out, with a note.
 ///
 /// The window of a time t, which lies at its end (SourceSpec::window):
 ///   frames      (t - d, t], d the interval between the two frames around t, or next to it beyond
@@ -27,7 +30,7 @@ namespace eventgan {
 /// all of a recording's are.
 ///
 /// sample_id is NAME/SECONDS with six decimals, and the same two are in label_key. FrameRef::path
-/// is the HDF5 file or the folder's events.txt, and FrameRef::video_frame the last frame at or
+/// is the recording's event_file, and FrameRef::video_frame the last frame at or
 /// before the time, -1 if there is none.
 ///
 /// Relative paths start at `base`. Throws InputError if there is no recording, or one or its labels

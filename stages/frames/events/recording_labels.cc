@@ -1,16 +1,14 @@
 #include "stages/frames/events/recording_labels.h"
 
 #include <fmt/core.h>
-#include <utf8.h>
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <span>
 #include <string_view>
-#include <system_error>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -18,7 +16,12 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
+#include "stages/base/archives/detail/typed_array.h"
+#include "stages/base/archives/numpy_arrays.h"
 #include "stages/base/files/input_file.h"
+#include "stages/frames/csv_records.h"
+#include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/label_name.h"
 
 namespace eventgan {
 namespace {
@@ -51,10 +54,6 @@ class ClassNumbers {
   std::vector<std::string> names_;
 };
 
-/// A shard's text ends at a NUL, so that two names could become one; other control characters have
-/// no place in a name either.
-bool is_label_name(std::string_view text) { return !text.empty() && escape_controls(text) == text; }
-
 // ---- CSV
 
 constexpr std::array<std::string_view, 7> kColumns = {"time_s", "left",  "top",     "right",
@@ -62,52 +61,21 @@ constexpr std::array<std::string_view, 7> kColumns = {"time_s", "left",  "top", 
 constexpr std::size_t kCategory = 6;  // may be absent
 using Fields = std::array<std::string_view, kColumns.size()>;
 
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> fields;
-  for (std::size_t begin = 0; begin <= line.size();) {
-    const std::size_t end = std::min(line.find(',', begin), line.size());
-    fields.push_back(trimmed(line.substr(begin, end - begin)));
-    begin = end + 1;
-  }
-  return fields;
-}
-
-std::optional<double> number_of(std::string_view text) {
-  double value = 0;
-  const auto [stop, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  const bool is_number = error == std::errc() && stop == text.data() + text.size();
-  return is_number && std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
-
-class CsvReader {
+class CsvLabels {
  public:
-  explicit CsvReader(std::string file) : file_(std::move(file)) {}
+  explicit CsvLabels(std::string file) : file_(std::move(file)) {}
 
   RecordingLabels read(std::string_view text) {
-    constexpr std::string_view kMark = "\xEF\xBB\xBF";
-    if (text.starts_with(kMark)) text.remove_prefix(kMark.size());
-    for (std::size_t begin = 0; begin < text.size();) {
-      const std::size_t end = std::min(text.find('\n', begin), text.size());
-      const std::string_view line = text.substr(begin, end - begin);
-      begin = end + 1;
-      ++line_;
-      if (!utf8::is_valid(line)) {
-        fault("UTF-8", "other bytes");
-        continue;
-      }
-      if (trimmed(line).empty()) continue;
-      if (places_.empty()) {
-        read_header(line);
+    CsvReader reader(text);
+    while (const std::optional<CsvRecord> record = reader.next()) {
+      line_ = record->line;
+      if (!record->fault.empty()) {
+        add_fault(record->fault);
+      } else if (places_.empty()) {
+        read_header(*record);
         if (!faults_.empty()) break;
       } else {
-        read_row(line);
+        read_row(*record);
       }
     }
     if (places_.empty() && faults_.empty()) {
@@ -119,51 +87,46 @@ class CsvReader {
   }
 
  private:
-  void fault(std::string_view expected, std::string_view got) {
+  void add_fault(std::string_view reason) {
     constexpr std::size_t kMostText = 4000;
     if (faults_.size() > kMostText) return;
     if (!faults_.empty()) faults_ += '\n';
-    faults_.append("expected ").append(expected).append(", got ").append(got);
+    faults_.append(reason);
     faults_ += ", in " + file_ + " (line " + std::to_string(line_) + ")";
+  }
+
+  void fault(std::string_view expected, std::string_view got) {
+    add_fault(fmt::format("expected {}, got {}", expected, got));
   }
 
   static std::string quoted(std::string_view text) { return '"' + escape_controls(text) + '"'; }
 
-  void read_header(std::string_view line) {
-    for (const std::string_view name : split(line)) {
-      const auto column = std::ranges::find(kColumns, name);
-      const auto place = static_cast<std::size_t>(column - kColumns.begin());
-      if (column == kColumns.end() || std::ranges::find(places_, place) != places_.end()) {
-        fault("columns time_s, left, top, right, bottom, class, category, each once", quoted(name));
-        return;
-      }
-      places_.push_back(place);
-    }
-    for (std::size_t place = 0; place < kCategory; ++place) {
-      if (std::ranges::find(places_, place) == places_.end()) {
-        fault("a column " + std::string(kColumns[place]), "none");
-      }
-    }
+  void read_header(const CsvRecord& header) {
+    const auto places = csv_columns(header, kColumns, kCategory);
+    if (is_fault(places)) return add_fault(std::get<SampleFault>(places).reason);
+    places_ = std::get<0>(places);
+    columns_ = header.fields.size();
   }
 
-  void read_row(std::string_view line) {
-    const std::vector<std::string_view> fields = split(line);
+  void read_row(const CsvRecord& record) {
     // A time alone may do without the commas.
-    if (fields.size() != places_.size() && !(fields.size() == 1 && places_[0] == 0)) {
-      fault(std::to_string(places_.size()) + " fields, none with a comma in it",
-            std::to_string(fields.size()));
+    if (record.fields.size() != columns_ && !(record.fields.size() == 1 && places_[0] == 0)) {
+      fault(std::to_string(columns_) + " fields", std::to_string(record.fields.size()));
       return;
     }
     Fields row;
-    for (std::size_t i = 0; i < fields.size(); ++i) row[places_[i]] = fields[i];
-    const std::optional<double> time_s = number_of(row[0]);
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      if (places_[i] && *places_[i] < record.fields.size()) row[i] = record.fields[*places_[i]];
+    }
+    const std::optional<double> time_s = parse_number<double>(row[0]);
     if (!time_s || std::abs(*time_s) > kLatest_s) {
       fault("a time in seconds", quoted(row[0]));
       return;
     }
     Annotation& annotation = labels_.annotations[*time_s];
-    if (line.ends_with('\r')) line.remove_suffix(1);
-    annotation.original.append(line).append("\n");
+    std::string_view bytes = record.bytes;
+    while (bytes.ends_with('\n') || bytes.ends_with('\r')) bytes.remove_suffix(1);
+    annotation.original.append(bytes).append("\n");
     const bool is_alone = std::ranges::all_of(row.begin() + 1, row.end(),
                                               [](std::string_view field) { return field.empty(); });
     if (!is_alone) read_box(row, annotation);
@@ -173,7 +136,7 @@ class CsvReader {
     Box box;
     const std::array edges{&box.xyxy.left, &box.xyxy.top, &box.xyxy.right, &box.xyxy.bottom};
     for (std::size_t i = 0; i < edges.size(); ++i) {
-      const std::optional<double> edge = number_of(row[1 + i]);
+      const std::optional<double> edge = parse_number<double>(row[1 + i]);
       if (!edge || std::abs(*edge) > kFarthest_px) {
         return fault(fmt::format("{} within {:g} pixels", kColumns[1 + i], kFarthest_px),
                      quoted(row[1 + i]));
@@ -197,8 +160,9 @@ class CsvReader {
 
   std::string file_;
   std::string faults_;
-  std::size_t line_ = 0;
-  std::vector<std::size_t> places_;  ///< in kColumns, of the file's columns
+  int line_ = 1;
+  std::vector<std::optional<std::size_t>> places_;  ///< of kColumns
+  std::size_t columns_ = 0;
   ClassNumbers classes_;
   RecordingLabels labels_;
 };
@@ -323,12 +287,135 @@ RecordingLabels read_json(std::string_view text, const std::string& file) {
   return labels;
 }
 
+// ---- NumPy
+
+/// Names of classes by their numbers; none: there is no such file.
+std::optional<std::unordered_map<int, std::string>> read_class_map(
+    const std::filesystem::path& file) {
+  if (!std::filesystem::exists(file)) return std::nullopt;
+  std::unordered_map<int, std::string> names;
+  const nlohmann::ordered_json document =
+      parse_json_data(read_text_file(file), file.string(), JsonComments::kRefused);
+  const auto refuse = [&](const std::string& got) {
+    throw InputError(
+        fmt::format(R"(expected {{"0": "car", ...}}, got {}, in {})", got, file.string()));
+  };
+  if (!document.is_object()) refuse("no object");
+  for (const auto& [key, name] : document.items()) {
+    int number = 0;
+    const auto [stop, error] = std::from_chars(key.data(), key.data() + key.size(), number);
+    if (error != std::errc() || stop != key.data() + key.size()) {
+      refuse(fmt::format("\"{}\"", escape_controls(key)));
+    }
+    if (!name.is_string() || !is_label_name(name.get_ref<const std::string&>())) {
+      refuse(fmt::format("another value of \"{}\"", escape_controls(key)));
+    }
+    names[number] = name.get<std::string>();
+  }
+  return names;
+}
+
+class BboxReader {
+ public:
+  explicit BboxReader(const std::filesystem::path& file) : file_(file.string()) {
+    const std::string bytes = read_text_file(file);
+    fields_ = parse_npy_fields(std::as_bytes(std::span(bytes)), file_);
+    for (const NamedArray& field : fields_) {
+      if (field.values.is_text()) {
+        throw InputError("expected numbers, got text, in " + file_ + " (" + field.name + ")");
+      }
+    }
+    names_ = read_class_map(file.parent_path() / "label_map_dictionary.json");
+  }
+
+  RecordingLabels read() {
+    const TypedArray& t = find("t") != nullptr ? need("t") : need("ts");
+    const TypedArray &x = need("x"), &y = need("y"), &w = need("w"), &h = need("h");
+    const TypedArray& class_id = need("class_id");
+    const TypedArray* const track_id = find("track_id");
+    RecordingLabels labels;
+    ClassNumbers classes;
+    for (row_ = 0; row_ < t.size(); ++row_) {
+      const double time_s = value("t", t, 0, kLatest_s * kTicksPerSecond) / kTicksPerSecond;
+      Box box;
+      box.xyxy.left = value("x", x, -kFarthest_px, kFarthest_px);
+      box.xyxy.top = value("y", y, -kFarthest_px, kFarthest_px);
+      box.xyxy.right = box.xyxy.left + value("w", w, 0, kFarthest_px);
+      box.xyxy.bottom = box.xyxy.top + value("h", h, 0, kFarthest_px);
+      constexpr double kMostClasses = 1e6, kMostTracks = 9007199254740992;
+      box.class_id = classes.of(class_name(value("class_id", class_id, 0, kMostClasses)));
+      if (track_id != nullptr) {
+        box.track_id = static_cast<std::int64_t>(value("track_id", *track_id, -1, kMostTracks));
+      }
+      Annotation& annotation = labels.annotations[time_s];
+      annotation.boxes.push_back(box);
+      nlohmann::ordered_json original;
+      for (const NamedArray& field : fields_) {
+        original[field.name] = to_json(field.values, row_);
+      }
+      annotation.original += original.dump() + "\n";
+    }
+    if (!faults_.empty()) throw InputError(faults_);
+    labels.class_names = classes.names();
+    return labels;
+  }
+
+ private:
+  static constexpr double kTicksPerSecond = 1e6;
+
+  const TypedArray* find(std::string_view name) const {
+    const auto field = std::ranges::find(fields_, name, &NamedArray::name);
+    return field == fields_.end() ? nullptr : &field->values;
+  }
+
+  const TypedArray& need(std::string_view name) const {
+    if (const TypedArray* const array = find(name)) return *array;
+    throw InputError(fmt::format("expected a field \"{}\" of boxes, got none, in {}", name, file_));
+  }
+
+  void fault(const std::string& expected, const std::string& got) {
+    constexpr std::size_t kMostText = 4000;
+    if (faults_.size() > kMostText) return;
+    faults_ += fmt::format("{}expected {}, got {}, in {} (row {})", faults_.empty() ? "" : "\n",
+                           expected, got, file_, row_);
+  }
+
+  /// 0 and a fault if it is no such number; NaN is none.
+  double value(const char* name, const TypedArray& array, double least, double most) {
+    const double number = array.number(row_);
+    if (number >= least && number <= most) return number;
+    fault(fmt::format("{} in {:g}..{:g}", name, least, most), fmt::format("{}", number));
+    return 0;
+  }
+
+  std::string class_name(double number) {
+    const int id = static_cast<int>(number);
+    if (id != number) fault("a whole class_id", fmt::format("{}", number));
+    if (!names_) return fmt::format("class {}", id);
+    const auto name = names_->find(id);
+    if (name != names_->end()) return name->second;
+    fault("a class of label_map_dictionary.json", fmt::format("class_id {}", id));
+    return "unknown";
+  }
+
+  std::string file_;
+  std::vector<NamedArray> fields_;
+  std::optional<std::unordered_map<int, std::string>> names_;
+  std::size_t row_ = 0;
+  std::string faults_;
+};
+
 }  // namespace
 
-RecordingLabels read_recording_labels(const std::filesystem::path& file) {
+RecordingLabels read_recording_labels(const std::filesystem::path& file) try {
+  if (file.extension() == ".npy") return BboxReader(file).read();
   const std::string text = read_text_file(file);
   return file.extension() == ".json" ? read_json(text, file.string())
-                                     : CsvReader(file.string()).read(text);
+                                     : CsvLabels(file.string()).read(text);
+} catch (const InputError&) {
+  throw;
+} catch (const std::runtime_error& error) {
+  throw InputError(error.what());
 }
 
 }  // namespace eventgan

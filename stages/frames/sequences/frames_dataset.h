@@ -12,30 +12,35 @@
 
 namespace eventgan {
 
-/// Frames without labels of a known form, each of them a sample. ROOT is one of
+/// Images and videos of one's own. ROOT is one of
 ///   a folder of images: one sequence, named ""; sample_id is the file name without extension;
-///   a folder of such folders: each a sequence; sample_id is "FOLDER/NAME";
+///   a folder of such folders: each a sequence; sample_id is "FOLDER/NAME"; with MOT's labels the
+///     images may lie in FOLDER/img1;
 ///   a video (mp4, avi, mov, mkv): one sequence named as the file without extension; sample_id is
 ///     "NAME/000012", counted from 0;
 ///   a folder of videos: each a sequence. One that cannot be read is left out, with a note.
 /// How images are numbered, ImageFolder says. time_s is the frame's number through
 /// `frames_per_second`, else the video's own (VideoClip::time_s), else NaN.
 ///
-/// A label is any JSON: NAME.json (the extension in small or capital letters) beside an image,
-/// unchanged byte for byte; for a video NAME.json beside it, an object from frame number to the
-/// label, whose text is made compact; a manifest of this program is not taken for one. It is passed
-/// through as Annotation::original, which is empty for a frame without label; there are no boxes
-/// and no persons.
+/// With SourceSpec::labels (stages/frames/own_labels/own_labels.h) the frames that have a label are
+/// the samples, and all others serve as paired frames. A frame that the labels name and ROOT does
+/// not have is a sample, too, whose frames are missing; its FrameRef::index is -1.
+///
+/// Without, each frame is a sample. A label is any JSON then: NAME.json (the extension in small or
+/// capital letters) beside an image, unchanged byte for byte; for a video NAME.json beside it, an
+/// object from frame number to the label, whose text is made compact; a manifest of this program is
+/// not taken for one. It is passed through as Annotation::original, which is empty for a frame
+/// without label; there are no boxes and no persons.
 ///
 /// Where several of these lie in one folder, images count before videos, and videos before
 /// folders; what is left out, the notes name. A video is decoded once at opening, to count and time
-/// its frames. Relative paths start at `base`. Throws InputError if ROOT is none of these or a
-/// video's labels are malformed.
+/// its frames. Relative paths start at `base`. Throws InputError if ROOT is none of these or
+/// labels as a whole are malformed.
 std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 
-/// open_frames_dataset for folders of images. The label_key is the sidecar's path below ROOT; the
-/// image's if there is none.
+/// open_frames_dataset for folders of images. Without SourceSpec::labels the label_key is the
+/// sidecar's path below ROOT; the image's if there is none.
 std::unique_ptr<Dataset> open_images_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 
@@ -53,8 +58,8 @@ std::optional<VideoLabels> read_video_labels(const std::filesystem::path& file,
 /// True for mp4, avi, mov and mkv, in small or capital letters.
 bool is_video_name(const std::filesystem::path& file);
 
-/// open_frames_dataset for a video or a folder of them. The label_key is "NAME/12"; "NAME/" if
-/// frame 12 has no label.
+/// open_frames_dataset for a video or a folder of them. Without SourceSpec::labels the label_key is
+/// "NAME/12"; "NAME/" if frame 12 has no label.
 std::unique_ptr<Dataset> open_videos_dataset(const SourceSpec& spec,
                                              const std::filesystem::path& base);
 

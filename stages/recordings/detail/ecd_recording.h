@@ -1,13 +1,14 @@
 #pragma once
 
-#include <atomic>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "stages/recordings/detail/ecd_event_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/image_frames.h"
 #include "stages/recordings/recording.h"
 
 namespace eventgan {
@@ -29,10 +30,8 @@ class EcdRecording final : public Recording {
   explicit EcdRecording(const std::filesystem::path& folder);
 
   const std::string& name() const override { return name_; }
-  ImageSize size() const override { return size_; }
-  std::int64_t frame_count() const override {
-    return static_cast<std::int64_t>(images_.times_s.size());
-  }
+  ImageSize size() const override { return frames_.size(); }
+  std::int64_t frame_count() const override { return std::ssize(frames_.times_s()); }
   double frame_time_s(std::int64_t index) const override;
   GreyImage frame(std::int64_t index) const override;
   std::vector<Event> events_between(std::int64_t first_frame,
@@ -42,19 +41,15 @@ class EcdRecording final : public Recording {
                                    std::int64_t after) const override;
   std::optional<std::array<double, 2>> event_span() const override { return events_.span(); }
   std::optional<FlowField> flow(std::int64_t index) const override;
-  std::vector<std::string> notes() const override;
+  std::vector<std::string> notes() const override { return frames_.notes(); }
 
  private:
-  GreyImage read_frame(std::size_t position) const;
+  EcdRecording(const std::filesystem::path& folder, EcdImageList images);
   std::int64_t first_byte_after(std::size_t frame) const;
 
-  std::filesystem::path folder_;
   std::string name_;
-  EcdImageList images_;
   EcdEventFile events_;
-  mutable std::atomic<std::ptrdiff_t> colour_frame_ =
-      -1;  ///< the first read in colour; -1: none yet
-  ImageSize size_;
+  ImageFrames frames_;
   EventBoundaries boundaries_;
 };
 

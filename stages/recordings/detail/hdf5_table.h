@@ -1,16 +1,35 @@
 #pragma once
 
+#include <exception>
+#include <filesystem>
 #include <string>
 
+#include "manifests/values/faults.h"
 #include "stages/base/hdf5/detail/hdf5.h"
 
 namespace eventgan {
 
+/// Opens a recording's file. Throws InputError "expected an HDF5 file, got X, in PATH".
+Hdf5Handle open_recording_file(const std::filesystem::path& path);
+
+/// Runs `read` under the lock. Throws InputError "expected readable values, got damage, in PLACE"
+/// with the cause nested if HDF5 fails.
+template <class Read>
+auto read_hdf5(const std::string& place, Read read) {
+  const Hdf5Lock lock;
+  try {
+    return read();
+  } catch (const Hdf5Error&) {
+    std::throw_with_nested(InputError("expected readable values, got damage, in " + place));
+  }
+}
+
 /// An open dataset of numbers, of which parts are read.
 class Hdf5Table {
  public:
-  /// Throws InputError if there is no such dataset, if it does not hold numbers, or if its shape
-  /// claims more values than the bytes it stores can give. `file_name` is for messages.
+  /// Throws InputError if there is no such dataset, if it does not hold numbers, if its shape
+  /// claims more values than the bytes it stores can give, or if it is compressed with what is not
+  /// installed. `file_name` is for messages.
   Hdf5Table(hid_t file, const std::string& path, const std::string& file_name);
 
   const Dims& dims() const { return dims_; }

@@ -29,13 +29,13 @@ TEST(ManifestSchema, AcceptsAndRejectsWhatTheProgramDoes) {
   }
 }
 
-TEST(ManifestSchema, LeavesOnlyTheSizeOfVolumesToTheProgram) {
+TEST(ManifestSchema, LeavesOnlyTheOrderOfARangeAndTheSizeOfVolumesToTheProgram) {
   // Double keys and the text's encoding, too, but of these a parsed document shows nothing.
   std::vector<std::string> beyond;
   for (const testing::ManifestCase& c : testing::manifest_cases()) {
     if (c.beyond_schema) beyond.push_back(c.name);
   }
-  EXPECT_THAT(beyond, ::testing::ElementsAre("volumes of 4 GiB"));
+  EXPECT_THAT(beyond, ::testing::ElementsAre("a range the wrong way round", "volumes of 4 GiB"));
 }
 
 template <class T, std::size_t N>
@@ -51,10 +51,15 @@ TEST(ManifestSchema, ListsTheSameWords) {
   };
   EXPECT_EQ(listed("/definitions/source/properties/dataset"), words(kDatasetWords));
   EXPECT_EQ(listed("/definitions/source/properties/layout"), words(kLayoutWords));
+  EXPECT_EQ(listed("/definitions/pairs/properties/from"), words(kPairOriginWords));
+  EXPECT_EQ(listed("/definitions/source/properties/columns/properties/unit"),
+            words(kTimeUnitWords));
   EXPECT_EQ(listed("/definitions/pairs/properties/side"), words(kSideWords));
   EXPECT_EQ(listed("/definitions/pairs/properties/choose"), words(kChoiceWords));
   EXPECT_EQ(listed("/definitions/image/properties/fit"), words(kFitWords));
   EXPECT_EQ(listed("/definitions/image/properties/grey"), words(kGreyWords));
+  EXPECT_EQ(listed("/definitions/source/properties/labels/properties/format"),
+            words(kLabelFormatWords));
   EXPECT_EQ(listed("/properties/generator/properties/kind"), words(kGeneratorWords));
   EXPECT_EQ(listed("/properties/generator/properties/engine"), words(kEngineWords));
   EXPECT_EQ(listed("/properties/generator/properties/device"), words(kDeviceWords));
@@ -72,9 +77,26 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/seed"), manifest.seed);
   EXPECT_EQ(stated("/definitions/source/properties/split"), source.split);
   EXPECT_EQ(stated("/definitions/source/properties/every"), source.every);
+  const std::string columns = "/definitions/source/properties/columns/properties/";
+  const EventFields& fields = source.recording.columns;
+  EXPECT_EQ(stated((columns + "t").c_str()), fields.t);
+  EXPECT_EQ(stated((columns + "x").c_str()), fields.x);
+  EXPECT_EQ(stated((columns + "y").c_str()), fields.y);
+  EXPECT_EQ(stated((columns + "p").c_str()), fields.p);
+  EXPECT_EQ(stated((columns + "unit").c_str()), word_of(kTimeUnitWords, fields.tick_s));
+  EXPECT_EQ(stated("/definitions/source/properties/camera"), source.recording.camera);
+  EXPECT_EQ(stated("/definitions/source/properties/rectify"), source.recording.rectify);
   EXPECT_EQ(stated("/definitions/pairs/properties/side"), to_string(source.pairs.side));
   EXPECT_EQ(stated("/definitions/pairs/properties/choose"), to_string(source.pairs.choose));
   EXPECT_EQ(stated("/definitions/pairs/properties/min_pairs"), source.pairs.min_pairs);
+  EXPECT_EQ(stated("/definitions/pairs/properties/from"),
+            word_of(kPairOriginWords, source.pairs.stills.has_value()));
+  const StillsSpec stills;
+  const std::string motion = "/definitions/pairs/properties/motion/properties/";
+  EXPECT_EQ(stated((motion + "translation_px").c_str()), json(stills.translation_px));
+  EXPECT_EQ(stated((motion + "rotation_deg").c_str()), stills.rotation_deg);
+  EXPECT_EQ(stated((motion + "scale").c_str()), stills.scale);
+  EXPECT_EQ(stated((motion + "frames").c_str()), stills.frames);
   EXPECT_EQ(stated("/definitions/image/properties/fit"), to_string(manifest.image.fit));
   const GeneratorSpec& generator = manifest.generator;
   EXPECT_EQ(stated("/properties/generator/properties/kind"), to_string(generator.kind));

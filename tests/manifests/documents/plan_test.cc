@@ -47,6 +47,22 @@ TEST(PlanJson, AShardOfUnknownSizeSaysSo) {
   EXPECT_EQ(to_json(back), text);
 }
 
+TEST(PlanJson, AStillsMotionIsStoredToTheLastBit) {
+  Plan plan = small_plan();
+  const ImageMotion motion{1.0 / 3, -1e-17, 2 - 1e-15, 1 + 1e-15};
+  plan.shards[1].samples[0].pair.motion = motion;
+  const std::string text = to_json(plan);
+  EXPECT_THAT(text, HasSubstr("\"motion\":{\"angle_deg\":1.999999999999999,\"scale\":"));
+  const Plan back = parse_plan(text, "plan.json");
+  EXPECT_EQ(back.shards[0].samples[0].pair.motion, std::nullopt);
+  EXPECT_EQ(back.shards[1].samples[0].pair.motion, motion);
+  EXPECT_EQ(to_json(back), text);
+  const auto at = text.find("\"scale\":") + 8;
+  const std::string zero = text.substr(0, at) + "0" + text.substr(text.find(',', at));
+  EXPECT_THAT([&] { parse_plan(zero, "p"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("motion.scale: expected a number")));
+}
+
 TEST(Notes, OfAllSourcesAndOfVeryManyTheFirst) {
   Plan plan = small_plan();
   EXPECT_EQ(notes_text({}), "");

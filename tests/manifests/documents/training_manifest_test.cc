@@ -42,7 +42,7 @@ const ManifestCase kTrainingCases[] = {
      {{"/recordings/0", R"({"path": "", "format": "v2e", "weight": 0, "first_frame": -1,
                             "last_frame": 0, "wieght": 1})"}},
      {R"($.recordings[0].path: expected a path, got "")",
-      R"($.recordings[0].format: expected "mvsec", "eventgan" or "ecd", got "v2e")",
+      R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4" or "dsec", got "v2e")",
       "$.recordings[0].weight: expected a number 1e-06..1e+06, got 0",
       "$.recordings[0].first_frame: expected an integer 0..1000000000, got -1",
       "$.recordings[0].last_frame: expected an integer 1..1000000000, got 0",
@@ -54,6 +54,13 @@ const ManifestCase kTrainingCases[] = {
     {"a camera of a format without",
      {{"/recordings/0/camera", R"("left")"}, {"/recordings/0/format", R"("ecd")"}},
      {R"($.recordings[0].camera: expected no such key for format "ecd" (only for mvsec), got "left")"}},
+    {"rectified", {{"/recordings/0/rectify", "true"}, {"/recordings/0/format", R"("dsec")"}}, {}},
+    {"a recording without frames",
+     {{"/recordings/0/format", R"("m3ed")"}},
+     {R"($.recordings[0].format: expected "mvsec", "eventgan", "ecd", "aedat4" or "dsec", got "m3ed")"}},
+    {"rectified without a map",
+     {{"/recordings/0/rectify", "true"}},
+     {R"($.recordings[0].rectify: expected no such key for format "mvsec" (only for dsec), got true)"}},
     {"a recording of one frame",
      {{"/recordings/0/first_frame", "5"}, {"/recordings/0/last_frame", "5"}},
      {"$.recordings[0].last_frame: expected a frame after first_frame (5), got 5"},
@@ -179,10 +186,11 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
     "precision": "bfloat16", "steps": {"flow": 1, "reconstruction": 2, "generator": 3},
     "output": {"directory": "o", "checkpoint_minutes": 0, "picture_minutes": 0.5}})");
   EXPECT_EQ(manifest.seed, 9u);
-  RecordingSpec first{"a", RecordingFormat::kMvsec, "right", 2.5, 3, 8};
+  RecordingSpec first{"a", RecordingFormat::kMvsec, {}, 2.5, 3, 8};
+  first.options.camera = "right";
   EXPECT_EQ(manifest.recordings.at(0), first);
   EXPECT_EQ(manifest.recordings.at(1),
-            (RecordingSpec{"b", RecordingFormat::kEcd, "left", 1, 0, std::nullopt}));
+            (RecordingSpec{"b", RecordingFormat::kEcd, {}, 1, 0, std::nullopt}));
   EXPECT_EQ(manifest.validation.at(0).format, RecordingFormat::kEventgan);
   EXPECT_THAT(manifest.gaps, ::testing::ElementsAre(1, 3));
   EXPECT_EQ(manifest.crop, (ImageSize{.height = 64, .width = 96}));

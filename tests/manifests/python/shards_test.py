@@ -277,6 +277,12 @@ def test_what_images_cover(folder):
         del file["pairs/source_to_volume"]
         file["pairs/source_to_volume"] = [[[0.25, 0, 1.625], [0, 0.25, 0.625]]] * 5
     assert Shards(folder / NAME).image_area().tolist() == [2, 1, 6, 4]
+    with h5py.File(folder / NAME, "r+") as file:  # stills of 16x8, of which the letterbox shows the middle 8x4 in 8x4 of its 8x6 pixels
+        file["pairs/motion"][:] = [[1, 0, 0, 1]] * 5
+        file["pairs/source_size"][:] = [[8, 16]] * 4 + [[0, 0]]
+        file["pairs/source_to_volume"][:] = [[[1, 0, -4], [0, 1, -1]]] * 4 + [[[np.nan] * 3] * 2]
+        file.attrs["preprocessing"] = json.dumps({"fit": "letterbox"})
+    assert Shards(folder / NAME).image_area().tolist() == [0, 1, 8, 5]
     with pytest.raises(ValueError, match="expected samples with images, got none"):
         shards[:0].image_area()
 

@@ -166,6 +166,115 @@ TEST_P(AnyPlacement, MatrixAgreesWithPointsAndEdges) {
   }
 }
 
+FramePair still(const ImageMotion& motion, double label_position = 1) {
+  FramePair pair;
+  pair.gap_frames = 1;
+  pair.label_position = label_position;
+  pair.motion = motion;
+  return pair;
+}
+
+TEST(StillPlacement, AShiftCutsAsMuchOnEitherSideInTheImagesShape) {
+  // Shifted by 3 along the longer axis of 48x24: 2 n >= 3 there, so n = 2 along the shorter one.
+  const Placement along = place({24, 48}, {}, still({.x_px = 3}));
+  EXPECT_EQ(along, (Placement{{24, 48}, {24, 48}, {24, 48}, 0, 0, 4, 2}));
+  EXPECT_EQ(along.cut(), (ImageSize{20, 40}));
+  EXPECT_EQ(along.scale_x(), 1.2);
+  // Along the shorter one n = 3, since n must be whole: 2.5 px do not fit into 2.
+  const Placement across = place({24, 48}, {}, still({.y_px = -2.5}, 0));
+  EXPECT_EQ(across, (Placement{{24, 48}, {24, 48}, {24, 48}, 0, 0, 6, 3}));
+}
+
+TEST(StillPlacement, WithoutAMotionIsThatOfAnyPair) {
+  const ImageSpec spec = spec_of(ImageSize{64, 64}, ImageFit::kLetterbox);
+  EXPECT_EQ(place({50, 100}, spec, FramePair()), place({50, 100}, spec));
+  EXPECT_EQ(place({50, 100}, spec, still({})), place({50, 100}, spec)) << "nothing moves";
+  EXPECT_EQ(place({1, 1}, {}, still({}, 0)), place({1, 1}, {}));
+}
+
+TEST(StillPlacement, TheWholeImagesPlaceInTheVolumeIsKept) {
+  // 50x100 with n = 5: 10 and 5 px a side. What is left, 40x80, comes to lie as 50x100 would: in a
+  // letterbox 32x64, 16 px from the top. An edge at 10 (5) lies at 0 (16), one at 90 (45) at 64.
+  const Placement placement =
+      place({50, 100}, spec_of(ImageSize{64, 64}, ImageFit::kLetterbox), still({.y_px = 5}));
+  EXPECT_EQ(placement, (Placement{{50, 100}, {32, 64}, {64, 64}, 0, 16, 10, 5}));
+  // s = 0.8: a point maps as (x - 10 + 0.5) 0.8 - 0.5 and (y - 5 + 0.5) 0.8 - 0.5 + 16.
+  const std::array<double, 6> map = placement.source_to_volume();
+  EXPECT_DOUBLE_EQ(map[0], 0.8);
+  EXPECT_DOUBLE_EQ(map[2], -9.5 * 0.8 - 0.5);
+  EXPECT_DOUBLE_EQ(map[5], -4.5 * 0.8 + 15.5);
+}
+
+TEST(StillPlacement, MotionsThatLeaveLessThanHalfAreRefused) {
+  EXPECT_NO_THROW(place({16, 16}, {}, still({.x_px = 4})));
+  EXPECT_THROW(place({16, 16}, {}, still({.x_px = 4.01})), std::invalid_argument);
+  EXPECT_THROW(place({16, 16}, {}, still({.x_px = 100})), std::invalid_argument);
+  EXPECT_THROW(place({1, 1}, {}, still({.y_px = 0.1})), std::invalid_argument);
+  EXPECT_THROW(place({16, 16}, {}, still({.angle_deg = 180, .scale = 0.4}, 0)),
+               std::invalid_argument);
+  EXPECT_NO_THROW(place({16, 16}, {}, still({.angle_deg = 180}))) << "upside down, but all there";
+}
+
+TEST(MovedToLabelled, IsTheMotionOrItsInverse) {
+  // About the centre (10, 5) of 21x11, by 90 degrees from x to y, twice as large, then by (1, -2):
+  // one pixel right of the centre comes to lie two below it, plus the shift.
+  const ImageMotion motion{1, -2, 90, 2};
+  const std::array<double, 6> there = moved_to_labelled({11, 21}, still(motion, 1));
+  const auto apply = [](const std::array<double, 6>& m, double x, double y) {
+    return std::array{m[0] * x + m[1] * y + m[2], m[3] * x + m[4] * y + m[5]};
+  };
+  const auto moved = apply(there, 11, 5);
+  EXPECT_NEAR(moved[0], 10 + 1, 1e-12);
+  EXPECT_NEAR(moved[1], 5 + 2 - 2, 1e-12);
+  const auto back = apply(moved_to_labelled({11, 21}, still(motion, 0)), moved[0], moved[1]);
+  EXPECT_NEAR(back[0], 11, 1e-12);
+  EXPECT_NEAR(back[1], 5, 1e-12);
+}
+
+TEST(StillPlacement, OfAnyMotionIsTheTightestThatShowsNothingFromOutside) {
+  const CounterRandom random = CounterRandom(2).keyed("stills");
+  int cut_further = 0;
+  for (std::uint64_t trial = 0; trial < 2000; ++trial) {
+    const auto between = [&](std::uint64_t counter, double least, double most) {
+      return least + (most - least) * random.uniform(8 * trial + counter);
+    };
+    const ImageSize source{static_cast<int>(between(0, 90, 300)),
+                           static_cast<int>(between(1, 90, 300))};
+    const FramePair pair =
+        still({between(2, -6, 6), between(3, -6, 6), between(4, -4, 4), between(5, 0.95, 1.05)},
+              trial % 2 == 0 ? 1 : 0);
+    const std::array<double, 6> map = moved_to_labelled(source, pair);
+    // Every pixel at the rim of what is left, one by one.
+    const auto is_inside = [&](int border_x, int border_y) {
+      for (int y = border_y; y < source.height - border_y; ++y) {
+        const bool whole_row = y == border_y || y == source.height - border_y - 1;
+        const int step = whole_row ? 1 : source.width - 2 * border_x - 1;
+        for (int x = border_x; x < source.width - border_x; x += step) {
+          const double u = map[0] * x + map[1] * y + map[2];
+          const double v = map[3] * x + map[4] * y + map[5];
+          const bool inside = u >= -1e-6 && u <= source.width - 1 + 1e-6 && v >= -1e-6 &&
+                              v <= source.height - 1 + 1e-6;
+          if (!inside) return false;
+        }
+      }
+      return true;
+    };
+    const Placement placement = place(source, {}, pair);
+    ASSERT_TRUE(is_inside(placement.border_x, placement.border_y)) << trial;
+    const int shorter = std::min(source.width, source.height);
+    const int n = std::min(placement.border_x, placement.border_y);
+    ASSERT_EQ(placement.border_x, std::lround(static_cast<double>(n) * source.width / shorter));
+    ASSERT_EQ(placement.border_y, std::lround(static_cast<double>(n) * source.height / shorter));
+    if (n == 0) continue;
+    ++cut_further;
+    const auto border = [&](int side) {
+      return static_cast<int>(std::lround((n - 1.0) * side / shorter));
+    };
+    ASSERT_FALSE(is_inside(border(source.width), border(source.height))) << trial;
+  }
+  EXPECT_GT(cut_further, 1900);
+}
+
 INSTANTIATE_TEST_SUITE_P(Fits, AnyPlacement,
                          ::testing::Values(ImageFit::kStretch, ImageFit::kLetterbox,
                                            ImageFit::kCrop));

@@ -18,7 +18,7 @@ class PlanSummary : public ::testing::Test {
     manifest_.sources.resize(1);
     manifest_.sources[0].root = "kitti/training";
     manifest_.sources[0].dataset = DatasetKind::kKittiObject;
-    manifest_.sources[0].pairs = {{1, 3}, PairSide::kBefore, PairChoice::kAll};
+    manifest_.sources[0].pairs = {.gaps = {1, 3}, .choose = PairChoice::kAll};
     job_.unpaired_by_gap = {{{1, 3}, {3, 6}}};
     SourceSummary source;
     source.labelled_frames = 12;
@@ -52,6 +52,18 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "thread, measured on 2 pairs)\n");
 }
 
+TEST_F(PlanSummary, CountsStills) {
+  manifest_.sources[0].pairs.stills = StillsSpec();
+  job_.plan.sources[0].unpaired = 0;
+  const std::string text = plan_text(manifest_, job_, estimate_, 2);
+  EXPECT_THAT(text, ::testing::HasSubstr("  stills under a drawn motion: 3\n  to quarantine"));
+  EXPECT_EQ(nlohmann::json::parse(
+                plan_summary_json(manifest_, job_, estimate_, 2))["sources"][0]["stills"],
+            3);
+  job_.plan.sources[0].unpaired = 6;
+  EXPECT_THAT(plan_text(manifest_, job_, estimate_, 2), ::testing::HasSubstr("no paired frame"));
+}
+
 TEST_F(PlanSummary, SaysWhenThereIsNoEstimate) {
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1), ::testing::HasSubstr("no pair could be measured"));
 }
@@ -68,6 +80,7 @@ TEST_F(PlanSummary, JsonHasTheSameNumbers) {
   EXPECT_EQ(json["pairs"], 3);
   EXPECT_EQ(json["estimated_bytes"], 4e6);
   EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
+  EXPECT_EQ(json["sources"][0]["stills"], 0);
   EXPECT_EQ(json["sources"][0]["without_partner"], 9);
   EXPECT_EQ(json["sources"][0]["without_partner_by_gap"]["3"], 6);
   EXPECT_EQ(json["sources"][0]["frames_without_partner"], 6);

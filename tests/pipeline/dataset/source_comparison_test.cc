@@ -222,6 +222,12 @@ TEST_F(SourceComparisonTest, NamesASampleOfOtherFramesThanPlannedUnlessAMissingF
   EXPECT_THAT(faults(), IsEmpty());
 }
 
+TEST_F(SourceComparisonTest, NamesAMotionThatIsNotThePlannedOne) {
+  plan_.shards[0].samples[0].pair.motion = ImageMotion{.x_px = 2};
+  EXPECT_THAT(faults(),
+              ElementsAre("expected the motion of the plan, got another (sample 0, 000000)"));
+}
+
 TEST_F(SourceComparisonTest, NamesAPlacementThatTheSettingsDoNotGive) {
   manifest_.image.fit = ImageFit::kStretch;
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected source_to_volume of an image of 36x24"),

@@ -22,6 +22,8 @@ class Fingerprint : public ::testing::Test {
   Fingerprint() {
     manifest_.directory = folder_.path();
     manifest_.text = R"({"seed": 1})";
+    manifest_.sources.resize(1);
+    manifest_.sources[0].dataset = DatasetKind::kKittiRaw;
     testing::write_file(folder_ / "labels.txt", "Car 1");
     testing::write_file(folder_ / "a.png", "12345");
     plan_.shards = {{"s.h5", 0, {1, 1}, {{"id", "", "", {{"a.png"}, {"b.png"}, 1, 0, 1}, ""}}}};
@@ -150,6 +152,17 @@ TEST_F(Fingerprint, SaysWhichTilesPersonsHave) {
     manifest_.generator.scope.scope = scope;
     EXPECT_EQ(make().contains("persons' tiles"), scope >= Scope::kLabels);
   }
+}
+
+// Images of one's own were taken as stored, in folders without the field.
+TEST_F(Fingerprint, SaysThatImagesAreTurned) {
+  EXPECT_FALSE(make().contains("orientation"));
+  manifest_.sources[0].dataset = DatasetKind::kFrames;
+  EXPECT_THAT(make().at("orientation"), ::testing::StartsWith("upright, by libexif.so."));
+  PlannedSample& sample = plan_.shards[0].samples[0];
+  sample.pair.previous.video_frame = 0;
+  sample.pair.next.video_frame = 1;
+  EXPECT_FALSE(make().contains("orientation"));
 }
 
 /// Its samples are quarantined; the run goes on, and knows the file once it is mended.

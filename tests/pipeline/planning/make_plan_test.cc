@@ -1,7 +1,11 @@
 #include "pipeline/planning/make_plan.h"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
 
 #include "manifests/values/faults.h"
 #include "tests/testing/image_file.h"
@@ -119,7 +123,7 @@ class MakePlan : public ::testing::Test {
     SourceSpec source;
     source.dataset = DatasetKind::kFrames;
     source.root = "clip";
-    source.pairs = {{1}, PairSide::kBefore, PairChoice::kOne, 1};
+    source.pairs = {.gaps = {1}};
     manifest_.sources = {source};
   }
 
@@ -244,7 +248,7 @@ TEST_F(MakePlan, ALimitIsSharedByTheSources) {
   EXPECT_THAT(planned(3), ::testing::ElementsAre(2, 1));
   EXPECT_THAT(planned(5), ::testing::ElementsAre(3, 2));
   EXPECT_THAT(planned(100), ::testing::ElementsAre(3, 3));
-  manifest_.sources[0].pairs = {{1, 2}, PairSide::kBefore, PairChoice::kAll};
+  manifest_.sources[0].pairs = {.gaps = {1, 2}, .choose = PairChoice::kAll};
   EXPECT_THAT(planned(6), ::testing::ElementsAre(2, 3)) << "a frame's second pair is one more";
   manifest_.sources[0].pairs.min_pairs = 6;
   EXPECT_THROW(planned(100), InputError);
@@ -306,6 +310,120 @@ TEST_F(MakePlan, AddingASourceDoesNotMoveThePairsOfAnother) {
     for (const auto& sample : shard.samples) after.push_back(sample.pair.gap_frames);
   }
   EXPECT_EQ(before, after);
+}
+
+/// The motions of a source's stills, in the plan's order.
+std::vector<ImageMotion> motions(const Plan& plan, int source = 0) {
+  std::vector<ImageMotion> all;
+  for (const PlannedShard& shard : plan.shards) {
+    if (shard.source != source) continue;
+    for (const PlannedSample& sample : shard.samples) {
+      EXPECT_EQ(sample.pair.previous, sample.pair.next);
+      EXPECT_EQ(sample.pair.previous.index, sample.pair.label_index);
+      all.push_back(sample.pair.motion.value());
+    }
+  }
+  return all;
+}
+
+class MakePlanOfStills : public MakePlan {
+ protected:
+  MakePlanOfStills() {
+    source().pairs.gaps = {1};
+    source().pairs.stills = StillsSpec();
+  }
+
+  SourceSpec& source() { return manifest_.sources[0]; }
+  Plan plan() { return make_plan(manifest_, "w", "e").plan; }
+};
+
+TEST_F(MakePlanOfStills, EveryLabelledFrameIsPairedWithItself) {
+  source().pairs.stills->frames = 3;
+  source().pairs.gaps = {3};
+  source().frames_per_second = 10;
+  for (const PairSide side : {PairSide::kBefore, PairSide::kAfter}) {
+    source().pairs.side = side;
+    const Plan stills = plan();
+    EXPECT_EQ(stills.sources[0].pairs_by_gap, (std::map<int, std::int64_t>{{3, 4}}));
+    EXPECT_EQ(stills.sources[0].unpaired, 0);
+    EXPECT_EQ(motions(stills).size(), 4u);
+    const FramePair& pair = stills.shards[0].samples[1].pair;
+    EXPECT_EQ(pair.label_position, side == PairSide::kBefore ? 1 : 0);
+    const FrameRef& labelled = side == PairSide::kBefore ? pair.next : pair.previous;
+    const FrameRef& moved = side == PairSide::kBefore ? pair.previous : pair.next;
+    EXPECT_EQ(labelled.path, "clip/f_01.png");
+    EXPECT_DOUBLE_EQ(labelled.time_s, 0.1);
+    EXPECT_TRUE(std::isnan(moved.time_s)) << "nobody knows when";
+    EXPECT_TRUE(std::isnan(pair.gap_s()));
+  }
+}
+
+TEST_F(MakePlanOfStills, MotionsAreDrawnWithinTheirLimitsAndFillThem) {
+  for (int i = 4; i < 300; ++i) {
+    testing::write_flat_image(folder_ / "clip" / fmt::format("f_{:03}.png", i), {1, 1}, 1);
+  }
+  source().pairs.stills = StillsSpec{{2, 8}, 3, 0.1, 1};
+  double shortest = 9, longest = 0, least_angle = 9, most_angle = -9, smallest = 9, largest = 0;
+  int right = 0, down = 0;
+  const std::vector<ImageMotion> drawn = motions(plan());
+  ASSERT_EQ(drawn.size(), 300u);
+  for (const ImageMotion& motion : drawn) {
+    const double length = std::hypot(motion.x_px, motion.y_px);
+    shortest = std::min(shortest, length);
+    longest = std::max(longest, length);
+    least_angle = std::min(least_angle, motion.angle_deg);
+    most_angle = std::max(most_angle, motion.angle_deg);
+    smallest = std::min(smallest, motion.scale);
+    largest = std::max(largest, motion.scale);
+    right += motion.x_px > 0;
+    down += motion.y_px > 0;
+  }
+  const auto expect_spans = [](double least, double most, double from, double to) {
+    EXPECT_GE(least, from - 1e-9);
+    EXPECT_LE(most, to + 1e-9);
+    EXPECT_GT(most - least, 0.95 * (to - from));
+  };
+  expect_spans(shortest, longest, 2, 8);
+  expect_spans(least_angle, most_angle, -3, 3);
+  expect_spans(smallest, largest, 0.9, 1.1);
+  EXPECT_NEAR(right, 150, 35);  // four standard deviations
+  EXPECT_NEAR(down, 150, 35);
+
+  source().pairs.stills = StillsSpec{{0, 0}, 0, 0, 1};
+  EXPECT_EQ(motions(plan()), std::vector<ImageMotion>(300));
+}
+
+TEST_F(MakePlanOfStills, TheSeedAndTheSampleAloneDecideTheMotion) {
+  const std::vector<ImageMotion> alone = motions(plan());
+  EXPECT_EQ(motions(plan()), alone);
+  EXPECT_NE(alone[0], alone[1]);
+  const auto changed = parse_plan(to_json(plan()), "plan");
+  EXPECT_EQ(motions(changed), alone) << "the frozen plan has every bit of them";
+  for (const char* name : {"g_1.png", "f_02.png"}) {
+    testing::write_flat_image(folder_ / "other" / name, {4, 6}, 100);
+  }
+  SourceSpec other = source();
+  other.root = "other";
+  manifest_.sources.insert(manifest_.sources.begin(), other);
+  EXPECT_EQ(motions(plan(), 1), alone) << "whatever other sources there are";
+  manifest_.sources.erase(manifest_.sources.begin());
+  ++manifest_.seed;
+  EXPECT_NE(motions(plan()), alone);
+}
+
+TEST_F(MakePlanOfStills, RenewedOnesKeepTheirMotionAndUnknownTime) {
+  source().frames_per_second = 10;
+  testing::write_file(folder_ / "clip" / "f_01.json", "{}");
+  auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
+  const std::string whole = to_json(plan);
+  plan.shards[0].samples[0].label_key = "another's";
+  plan.shards[0].samples[0].pair.next.time_s = 99;
+  complete_plan(manifest_, datasets, plan);
+  EXPECT_EQ(to_json(plan), whole);
+  plan.shards[0].samples[0].fault = "expected a frame, got no file";
+  plan.shards[0].samples[0].pair.motion.reset();
+  complete_plan(manifest_, datasets, plan);
+  EXPECT_EQ(to_json(plan), whole);
 }
 
 }  // namespace

@@ -14,7 +14,7 @@ using testing::FakeDataset;
 SourceSpec source(std::vector<int> gaps, PairSide side, PairChoice choose) {
   SourceSpec spec;
   spec.dataset = DatasetKind::kKittiObject;
-  spec.pairs = {std::move(gaps), side, choose};
+  spec.pairs = {.gaps = std::move(gaps), .side = side, .choose = choose};
   return spec;
 }
 

@@ -140,7 +140,8 @@ TEST_F(Preview, ASheetIsOneImage) {
 TEST_F(Preview, AVideoHasTheSequence) {
   options_.video = true;
   EXPECT_THAT(draw("out"), ElementsAre("sequence.mp4"));
-  EXPECT_EQ(probe_image_size(folder_ / "pictures/sequence.mp4").index(), 0u);
+  EXPECT_EQ(probe_image_size(folder_ / "pictures/sequence.mp4", ImageOrientation::kStored).index(),
+            0u);
 }
 
 TEST_F(Preview, WarnsOfFramesThatAreGone) {

@@ -12,6 +12,7 @@
 #include "tests/pipeline/training/fake_training_recording.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -58,6 +59,22 @@ TEST(OpenTrainingRecordings, ListsEveryRecordingOfNoUse) {
                       HasSubstr("got frames 8 to 8"), HasSubstr("bar.hdf5")));
   }
   EXPECT_THROW(open_training_recordings(std::vector{late}, folder.path(), {57, 64}, 1), UsageError);
+}
+
+TEST(OpenTrainingRecordings, NeedFrames) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "events.csv", "t,x,y,p\n1,2,3,1\n");
+  RecordingSpec table;
+  table.path = "events.csv";
+  table.format = RecordingFormat::kTable;
+  table.options.sensor = ImageSize{16, 16};
+  EXPECT_THAT(
+      [&] {
+        open_training_recordings(std::vector{table}, folder.path(), {16, 16}, 1);
+      },
+      ::testing::ThrowsMessage<UsageError>(
+          AllOf(HasSubstr("expected a recording with frames, got one without"),
+                HasSubstr("events.csv"))));
 }
 
 TEST(OpenTrainingRecordings, SaysWhatIsAbsent) {

@@ -28,6 +28,40 @@ TEST(YoloDataYaml, NamesClassesChannelsAndLists) {
             "names: [\"Car\",\"a \\\"b\\\"\"]\n");
 }
 
+TEST(YoloPoseLine, HasEachJointOrZeros) {
+  // Of 80 x 64 px: a pixel's centre is half a pixel from its edge.
+  const std::vector<ExportedJoint> joints{{{19.5, 15.5}, 1},  {{39.5, 31.5}, 0}, {{79.5, 63.5}, -1},
+                                          {kMissingPoint, 0}, {{79.6, 10}, 1},   {{-0.5, -0.5}, 1}};
+  EXPECT_EQ(yolo_pose_line(0, {10, 8, 30, 24}, joints, {64, 80}),
+            "0 0.250000000 0.250000000 0.250000000 0.250000000"
+            " 0.250000000 0.250000000 2 0.500000000 0.500000000 1 1.000000000 1.000000000 2"
+            " 0 0 0 0 0 0 0.000000000 0.000000000 2");
+  EXPECT_FALSE(is_within(joints[4], {64, 80}));
+}
+
+TEST(FlipIndices, SwapTheSides) {
+  using Places = std::vector<int>;
+  EXPECT_EQ(flip_indices({"nose", "left_eye", "right_eye"}), (Places{0, 2, 1}));
+  EXPECT_EQ(flip_indices({"RKnee", "Root", "LKnee", "Left"}), std::nullopt);
+  EXPECT_EQ(flip_indices({"RKnee", "Root", "LKnee"}), (Places{2, 1, 0}));
+  EXPECT_EQ(flip_indices({"r_hip", "l_hip", "head_top"}), (Places{1, 0, 2}));
+  EXPECT_EQ(flip_indices({"hip_R", "hip_L"}), (Places{1, 0}));
+}
+
+TEST(FlipIndices, AreNoneWhereNamesDoNotTell) {
+  EXPECT_EQ(flip_indices({}), std::nullopt);
+  EXPECT_EQ(flip_indices({"a", "b"}), std::nullopt);
+  EXPECT_EQ(flip_indices({"left_eye", "nose"}), std::nullopt);
+  EXPECT_EQ(flip_indices({"left_eye", "right_eye", "right_eye"}), std::nullopt);
+}
+
+TEST(YoloPoseYaml, HasTheShapeAndHowToMirror) {
+  EXPECT_EQ(yolo_pose_yaml({"l_eye", "r_eye"}, 18, {"val"}),
+            "path: .\nval: val.txt\nnc: 1\nchannels: 18\nnames: [\"person\"]\nkpt_shape: [2, 3]\n"
+            "kpt_names: {0: [\"l_eye\",\"r_eye\"]}\nflip_idx: [1,0]\n");
+  EXPECT_EQ(yolo_pose_yaml({"a"}, 18, {}).find("flip_idx"), std::string::npos);
+}
+
 TEST(CocoImage, HasSizeAndId) {
   EXPECT_EQ(Json::parse(coco_image(5, "v/a.npy", {60, 80}, "S1/a")), (Json{{"id", 5},
                                                                            {"file_name", "v/a.npy"},

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "manifests/values/faults.h"
+#include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -119,9 +120,7 @@ TEST_F(FindSource, AListOfPeopleIsKnownByItsContent) {
   EXPECT_EQ(find("people").dataset, DatasetKind::kMpii) << "it has more than the list";
 }
 
-TEST_F(FindSource, ImagesTellNoTimes) {
-  write("pictures/1.png");
-  EXPECT_THAT(find("pictures").remarks, Contains(HasSubstr("frames_per_second")));
+TEST_F(FindSource, VideosAreFoundByThemselvesAndInFolders) {
   write("videos/1.mp4");
   EXPECT_THAT(find("videos").remarks, IsEmpty());
   EXPECT_THAT(find("videos/1.mp4").remarks, IsEmpty());
@@ -168,6 +167,169 @@ TEST_F(FindSource, SaysWhatThereIsInstead) {
               refused("expected mpii, got frames, in "));
   EXPECT_THAT([&] { find("notes", DatasetKind::kFrames); },
               refused("expected frames, got none of these, in "));
+}
+
+TEST_F(FindSource, LabelsOfOnesOwnLieBesideTheImages) {
+  const std::string coco = R"({"info": {}, "images": [{"id": 1, "file_name": "1.jpg"}], )"
+                           R"("annotations": [], "categories": []})";
+  const struct {
+    LabelFormat format;
+    std::string root, path;  ///< what is to be found
+    std::vector<std::pair<std::string, std::string>> files;
+  } cases[] = {
+      {LabelFormat::kCoco,
+       "train2017",
+       "annotations/instances_train2017.json",
+       {{"train2017/1.jpg", ""},
+        {"annotations/instances_train2017.json", coco},
+        {"annotations/captions_train2017.json", coco},
+        {"annotations/person_keypoints_train2017.json", coco}}},
+      {LabelFormat::kCoco, "images", "boxes.json", {{"images/1.jpg", ""}, {"boxes.json", coco}}},
+      {LabelFormat::kCoco,
+       "train",
+       "train/_annotations.coco.json",
+       {{"train/1.jpg", ""}, {"train/_annotations.coco.json", coco}, {"test/2.jpg", ""}}},
+      {LabelFormat::kCoco,
+       "",
+       "_annotations.coco.json",
+       {{"1.jpg", ""}, {"_annotations.coco.json", coco}}},
+      {LabelFormat::kYolo,
+       "images",
+       "",
+       {{"images/train/1.jpg", ""}, {"labels/train/1.txt", ""}, {"data.yaml", ""}}},
+      {LabelFormat::kYolo,
+       "images",
+       "labels",
+       {{"images/1.jpg", ""}, {"labels/1.txt", ""}, {"labels/classes.txt", ""}}},
+      {LabelFormat::kYolo,
+       "train/images",
+       "",
+       {{"train/images/1.jpg", ""}, {"train/labels/1.txt", ""}, {"data.yaml", ""}}},
+      {LabelFormat::kYolo, "", "", {{"1.jpg", ""}, {"1.txt", ""}, {"classes.txt", ""}}},
+      {LabelFormat::kVoc,
+       "JPEGImages",
+       "Annotations",
+       {{"JPEGImages/1.jpg", ""}, {"Annotations/1.xml", ""}, {"SegmentationClass/1.png", ""}}},
+      {LabelFormat::kVoc, "", "", {{"1.jpg", ""}, {"1.xml", ""}}},
+      {LabelFormat::kMot, "", "", {{"s/img1/000001.jpg", ""}, {"s/gt/gt.txt", ""}}},
+      {LabelFormat::kMot, "img1", "", {{"img1/000001.jpg", ""}, {"gt/gt.txt", ""}}},
+      {LabelFormat::kMot, "images", "", {{"images/s/000001.jpg", ""}, {"s/gt.txt", ""}}},
+      {LabelFormat::kCsv,
+       "images",
+       "boxes.csv",
+       {{"images/1.jpg", ""},
+        {"boxes.csv", "image,class,left,top,right,bottom\n1.jpg,,,,,\n"},
+        {"others.csv", "image,class,left,top,right,bottom\n2.jpg,,,,,\n"},
+        {"frames.csv", "image,width\n"}}},
+      {LabelFormat::kCsv,
+       "",
+       "boxes.csv",
+       {{"clip.mp4", ""},
+        {"boxes.csv", "image,class,left,top,right,bottom,track\nclip/0,,,,,,\n"}}},
+  };
+  int number = 0;
+  for (const auto& expected : cases) {
+    const std::string name = "own" + std::to_string(number++);
+    for (const auto& [file, text] : expected.files) write(name + "/" + file, text);
+    const FoundSource found = find(name);
+    EXPECT_EQ(found.dataset, DatasetKind::kFrames) << name;
+    EXPECT_EQ(found.root, (at(name) / expected.root / "").parent_path()) << name;
+    ASSERT_TRUE(found.labels) << name;
+    EXPECT_EQ(found.labels->format, expected.format) << name;
+    EXPECT_EQ(found.labels->path / "", at(name) / expected.path / "") << name;
+    EXPECT_EQ(find(name + "/" + expected.root).labels->path, found.labels->path) << name;
+  }
+}
+
+TEST_F(FindSource, TextsBesideTheImagesAreTakenWhereTheReaderLooks) {
+  write("a/imgs/1.jpg");
+  write("a/imgs/1.txt");
+  write("a/data.yaml");
+  EXPECT_EQ(find("a/imgs").labels->path, at("a/imgs")) << "a has neither labels nor these texts";
+}
+
+TEST_F(FindSource, LabelsThatAreLeftOutAreRemarks) {
+  write("a/images/1.jpg");
+  write("a/labels/1.txt");
+  FoundSource found = find("a");
+  EXPECT_FALSE(found.labels);
+  EXPECT_EQ(found.root, at("a"));
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("no data.yaml or classes.txt")));
+  write("a/data.yaml");
+  write("a/boxes.csv", "image,class,left,top,right,bottom\n1.jpg,,,,,\n");
+  found = find("a");
+  EXPECT_EQ(found.labels->format, LabelFormat::kYolo);
+  EXPECT_THAT(found.remarks, Contains(HasSubstr("labels in another format (csv) left out: " +
+                                                at("a/boxes.csv").string())));
+  for (const char* split : {"train2017", "val2017"}) {
+    write(std::string("c/") + split + "/1.jpg");
+    write(std::string("c/annotations/instances_") + split + ".json",
+          R"({"annotations": [], "images": []})");
+  }
+  write("c/annotations/instances_val2017.json", R"({"images": [{"file_name": "gone.jpg"}]})");
+  found = find("c");
+  EXPECT_EQ(found.root, at("c/train2017"));
+  EXPECT_EQ(found.labels->path, at("c/annotations/instances_train2017.json"));
+  write("d/1.jpg");
+  write("d/1.json", R"({"images": "none"})");
+  write("d/other.json", R"({"images": [{"file_name": "2.jpg"}]})");
+  write("d/table.csv", "image,class\n");
+  write("d/notes.txt");
+  EXPECT_FALSE(find("d").labels);
+  write("d/near.csv", "image,class,left,top,right,bottom,score\n1.jpg,a,0,0,1,1,1\n");
+  found = find("d");
+  EXPECT_FALSE(found.labels);
+  EXPECT_THAT(found.remarks,
+              Contains("a table with other columns left out: " + at("d/near.csv").string()));
+}
+
+TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
+  for (const char* split : {"train", "valid"}) {
+    write(std::string("a/") + split + "/images/1.jpg");
+    write(std::string("a/") + split + "/labels/1.txt");
+  }
+  write("a/data.yaml");
+  write("a/other/2.png");
+  FoundSource found = find("a");
+  EXPECT_EQ(found.root, at("a/train/images"));
+  EXPECT_THAT(found.remarks, Contains("warning: 2 folders of images left out: other, valid"));
+  EXPECT_THAT(find("a/train").remarks, IsEmpty());
+  for (const char* split : {"train", "val"}) {
+    write(std::string("b/images/") + split + "/1.jpg");
+    write(std::string("b/labels/") + split + "/1.txt");
+  }
+  write("b/data.yaml");
+  EXPECT_THAT(find("b").remarks,
+              ::testing::ElementsAre(HasSubstr("warning: images of val are in split train, too")));
+}
+
+TEST_F(FindSource, KnowsRecordingsOfEventCameras) {
+  write("ecd/events.txt");
+  write("ecd/images/1.png");
+  write("tables/a.csv", "t,x,y,p\n");
+  write("tables/notes.txt");
+  write("many/one/events.txt");
+  write("many/two/events.txt");
+  for (const char* root : {"ecd", "tables/a.csv", "tables", "many"}) {
+    const FoundSource found = find(root);
+    EXPECT_EQ(found.dataset, DatasetKind::kRecording) << root;
+    EXPECT_EQ(found.root, at(root));
+  }
+  EXPECT_EQ(find("ecd").title, "recording of an event camera (ECD)");
+  EXPECT_THAT(find("ecd").remarks, IsEmpty());
+  EXPECT_EQ(find("tables").title, "recording of an event camera (table)");
+  EXPECT_EQ(find("tables").columns, EventFields());
+  write("microseconds/a.csv", "x,y,t_us,p\n");
+  EXPECT_EQ(find("microseconds").columns.t, "t_us");
+  // Numbers beside images are no events; [N, 4] of them are only if one says so.
+  write("numbers/clip/1.png");
+  write("numbers/boxes/a.npy", testing::npy_doubles({1, 4}, {0, 0, 1, 1}));
+  EXPECT_EQ(find("numbers").dataset, DatasetKind::kFrames);
+  EXPECT_EQ(find("numbers/boxes/a.npy").dataset, DatasetKind::kRecording);
+  write("clip/1.png");
+  write("clip/2.png");
+  write("clip/a.csv", "t,x,y,p\n");
+  EXPECT_EQ(find("clip").dataset, DatasetKind::kFrames);
 }
 
 }  // namespace

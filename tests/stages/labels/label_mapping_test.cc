@@ -82,6 +82,24 @@ TEST(MapLabels, ABoxThatACropLeavesNothingOfStaysAndIsIgnored) {
   EXPECT_FALSE(labels.boxes[1].ignore);
 }
 
+TEST(MapLabels, WhatAStillsBordersHideIsCutEvenWhereALetterboxHasRoom) {
+  // 100x50 without borders of 10 and 5 px, doubled: 160x80, 15 px from the top of 160x110.
+  const Placement still{{50, 100}, {80, 160}, {110, 160}, 0, 15, 10, 5};
+  const auto labels =
+      mapped({"", {box(12, 6, 20, 49), box(30, 1, 40, 4), box(0, 0, 100, 50)}, {}}, still);
+  // (12 - 10) 2 = 4, (20 - 10) 2 = 20; (6 - 5) 2 + 15 = 17, (49 - 5) 2 + 15 = 103, cut at 15 + 80.
+  EXPECT_EQ(labels.boxes[0].unclipped, (Rectangle{4, 17, 20, 103}));
+  EXPECT_EQ(labels.boxes[0].clipped, (Rectangle{4, 17, 20, 95}));
+  EXPECT_FALSE(labels.boxes[0].ignore);
+  EXPECT_EQ(labels.boxes[1].unclipped, (Rectangle{40, 7, 60, 13})) << "in the letterbox's border";
+  EXPECT_TRUE(is_empty(labels.boxes[1].clipped));
+  EXPECT_TRUE(labels.boxes[1].ignore);
+  EXPECT_EQ(labels.boxes[2].clipped, (Rectangle{0, 15, 160, 95}));
+  EXPECT_EQ(to_volume(still, Point{12, 6}), (Point{4.5, 17.5}));  // (12 - 10 + 0.5) 2 - 0.5
+  EXPECT_EQ(to_source(still, Point{4.5, 17.5}), (Point{12, 6}));
+  EXPECT_EQ(to_source(still, labels.boxes[0].unclipped), (Rectangle{12, 6, 20, 49}));
+}
+
 TEST(MapLabels, DontCareStaysIgnored) {
   Box dont_care = box(10, 10, 20, 20);
   dont_care.ignore = true;

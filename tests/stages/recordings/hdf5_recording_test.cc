@@ -91,9 +91,9 @@ class Hdf5RecordingTest : public ::testing::Test {
  protected:
   Hdf5RecordingTest() : datasets_(testing::small_mvsec()) {}
 
-  Hdf5Recording open() {
+  std::unique_ptr<Recording> open() {
     testing::write_hdf5(path_, datasets_);
-    return Hdf5Recording(path_, mvsec_layout("left"));
+    return open_hdf5_recording(path_, mvsec_layout("left"));
   }
   /// A cell of the events' table.
   double& cell(std::size_t event, std::size_t column) {
@@ -112,68 +112,68 @@ class Hdf5RecordingTest : public ::testing::Test {
 };
 
 TEST_F(Hdf5RecordingTest, ReadsFramesTimesAndFlow) {
-  const Hdf5Recording recording = open();
-  EXPECT_EQ(recording.name(), path_.string());
-  EXPECT_EQ(recording.size(), (ImageSize{3, 4}));
-  EXPECT_EQ(recording.frame_count(), 3);
-  EXPECT_EQ(recording.frame_time_s(2), 2.0);
-  EXPECT_EQ(recording.frame(1).size, (ImageSize{3, 4}));
-  EXPECT_THAT(recording.frame(1).pixels, Each(20));
-  const auto flow = recording.flow(1);
+  const auto recording = open();
+  EXPECT_EQ(recording->name(), path_.string());
+  EXPECT_EQ(recording->size(), (ImageSize{3, 4}));
+  EXPECT_EQ(recording->frame_count(), 3);
+  EXPECT_EQ(recording->frame_time_s(2), 2.0);
+  EXPECT_EQ(recording->frame(1).size, (ImageSize{3, 4}));
+  EXPECT_THAT(recording->frame(1).pixels, Each(20));
+  const auto flow = recording->flow(1);
   ASSERT_TRUE(flow.has_value());
-  EXPECT_EQ(flow->size, recording.size());
+  EXPECT_EQ(flow->size, recording->size());
   EXPECT_THAT(flow->x_px, Each(2.0f));
   EXPECT_THAT(flow->y_px, Each(-2.0f));
 }
 
 TEST_F(Hdf5RecordingTest, ReadsEventsAfterAFrameUpToAnother) {
-  const Hdf5Recording recording = open();
+  const auto recording = open();
   const std::vector<Event> all = testing::small_events();
-  EXPECT_EQ(recording.events_between(0, 1), (std::vector<Event>{all[2], all[3]}));
-  EXPECT_EQ(recording.events_between(1, 2), (std::vector<Event>{all[4], all[5]}));
-  EXPECT_EQ(recording.events_between(0, 2).size(), 4u);
-  EXPECT_THAT(recording.events_between(2, 2), IsEmpty());
+  EXPECT_EQ(recording->events_between(0, 1), (std::vector<Event>{all[2], all[3]}));
+  EXPECT_EQ(recording->events_between(1, 2), (std::vector<Event>{all[4], all[5]}));
+  EXPECT_EQ(recording->events_between(0, 2).size(), 4u);
+  EXPECT_THAT(recording->events_between(2, 2), IsEmpty());
 }
 
 // The index of files of others counts differently, or is not there.
 TEST_F(Hdf5RecordingTest, ReadsEventsOfAnyTimes) {
-  const Hdf5Recording recording = open();
+  const auto recording = open();
   const std::vector<Event> all = testing::small_events();  // 0.5 1 1.25 1.25 1.75 2 2.5 s
-  EXPECT_THAT(recording.events_in(1.0, 1.25), ElementsAre(all[2], all[3]));
-  EXPECT_THAT(recording.events_in(0.4, 1.1), ElementsAre(all[0], all[1]));
-  EXPECT_THAT(recording.events_in(2.4, 9.0), ElementsAre(all[6]));
-  EXPECT_THAT(recording.events_in(1.25, 1.7), IsEmpty());
-  EXPECT_THAT(recording.events_in(7, 9), IsEmpty());
-  EXPECT_EQ(recording.event_span(), (std::array{0.5, 2.5}));
+  EXPECT_THAT(recording->events_in(1.0, 1.25), ElementsAre(all[2], all[3]));
+  EXPECT_THAT(recording->events_in(0.4, 1.1), ElementsAre(all[0], all[1]));
+  EXPECT_THAT(recording->events_in(2.4, 9.0), ElementsAre(all[6]));
+  EXPECT_THAT(recording->events_in(1.25, 1.7), IsEmpty());
+  EXPECT_THAT(recording->events_in(7, 9), IsEmpty());
+  EXPECT_EQ(recording->event_span(), (std::array{0.5, 2.5}));
 }
 
 TEST_F(Hdf5RecordingTest, ReadsSoManyEventsAroundATime) {
-  const Hdf5Recording recording = open();
+  const auto recording = open();
   const std::vector<Event> all = testing::small_events();
-  EXPECT_THAT(recording.events_around(1.3, 2, 0), ElementsAre(all[2], all[3]));
-  EXPECT_THAT(recording.events_around(1.25, 1, 1), ElementsAre(all[3], all[4]));
-  EXPECT_THAT(recording.events_around(1.0, 9, 1), ElementsAre(all[0], all[1], all[2]));
-  EXPECT_THAT(recording.events_around(2.1, 0, 9), ElementsAre(all[6]));
-  EXPECT_THAT(recording.events_around(0.1, 5, 0), IsEmpty());
+  EXPECT_THAT(recording->events_around(1.3, 2, 0), ElementsAre(all[2], all[3]));
+  EXPECT_THAT(recording->events_around(1.25, 1, 1), ElementsAre(all[3], all[4]));
+  EXPECT_THAT(recording->events_around(1.0, 9, 1), ElementsAre(all[0], all[1], all[2]));
+  EXPECT_THAT(recording->events_around(2.1, 0, 9), ElementsAre(all[6]));
+  EXPECT_THAT(recording->events_around(0.1, 5, 0), IsEmpty());
 }
 
 TEST_F(Hdf5RecordingTest, MayHaveNoEvents) {
   datasets_["davis/left/events"] = {{0, 4}, std::vector<double>{}};
   datasets_["davis/left/image_raw_event_inds"] = {{3}, std::vector<std::int64_t>{-1, -1, -1}};
-  const Hdf5Recording empty = open();
-  EXPECT_THAT(empty.events_around(1, 5, 5), IsEmpty());
-  EXPECT_THAT(empty.events_in(0, 5), IsEmpty());
-  EXPECT_EQ(empty.event_span(), std::nullopt);
+  const auto empty = open();
+  EXPECT_THAT(empty->events_around(1, 5, 5), IsEmpty());
+  EXPECT_THAT(empty->events_in(0, 5), IsEmpty());
+  EXPECT_EQ(empty->event_span(), std::nullopt);
 }
 
 TEST_F(Hdf5RecordingTest, TrustsTimesMoreThanTheEventIndex) {
   for (const std::vector<std::int64_t>& index :
        {std::vector<std::int64_t>{2, 4, 6}, {0, 0, 0}, {-9, 700, std::int64_t{1} << 62}}) {
     datasets_[kIndex].values = index;
-    EXPECT_EQ(open().events_between(0, 1).size(), 2u);
+    EXPECT_EQ(open()->events_between(0, 1).size(), 2u);
   }
   datasets_.erase(kIndex);
-  EXPECT_EQ(open().events_between(0, 1).size(), 2u);
+  EXPECT_EQ(open()->events_between(0, 1).size(), 2u);
 }
 
 TEST_F(Hdf5RecordingTest, ReadsFloat32AndPolarityZero) {
@@ -181,15 +181,15 @@ TEST_F(Hdf5RecordingTest, ReadsFloat32AndPolarityZero) {
   const auto wide = std::get<std::vector<double>>(datasets_[kEvents].values);
   datasets_[kEvents].values = std::vector<float>(wide.begin(), wide.end());
   const std::vector<Event> all = testing::small_events();
-  EXPECT_EQ(open().events_between(0, 2), (std::vector<Event>{all[2], all[3], all[4], all[5]}));
+  EXPECT_EQ(open()->events_between(0, 2), (std::vector<Event>{all[2], all[3], all[4], all[5]}));
 }
 
 TEST_F(Hdf5RecordingTest, GivesFewerEventsWhereThereAreNone) {
   datasets_[kEvents] = {{0, 4}, std::vector<double>{}};
-  EXPECT_THAT(open().events_between(0, 2), IsEmpty());
+  EXPECT_THAT(open()->events_between(0, 2), IsEmpty());
   datasets_[kEvents] = {{1, 4}, std::vector<double>{0, 0, 1.75, 1}};
-  EXPECT_THAT(open().events_between(0, 1), IsEmpty());
-  EXPECT_EQ(open().events_between(0, 2).size(), 1u);
+  EXPECT_THAT(open()->events_between(0, 1), IsEmpty());
+  EXPECT_EQ(open()->events_between(0, 2).size(), 1u);
 }
 
 TEST_F(Hdf5RecordingTest, NeedsOneFrameOnly) {
@@ -197,28 +197,28 @@ TEST_F(Hdf5RecordingTest, NeedsOneFrameOnly) {
   datasets_[kTimes] = {{1}, std::vector<double>{1}};
   datasets_[kIndex] = {{1}, std::vector<std::int64_t>{1}};
   datasets_.erase(kFlow);
-  const Hdf5Recording recording = open();
-  EXPECT_EQ(recording.frame_count(), 1);
-  EXPECT_THAT(recording.events_between(0, 0), IsEmpty());
-  EXPECT_THROW(recording.flow(0), std::out_of_range);
+  const auto recording = open();
+  EXPECT_EQ(recording->frame_count(), 1);
+  EXPECT_THAT(recording->events_between(0, 0), IsEmpty());
+  EXPECT_THROW(recording->flow(0), std::out_of_range);
 }
 
 TEST_F(Hdf5RecordingTest, RefusesFramesThatAreNotThere) {
   datasets_.erase(kFlow);
-  const Hdf5Recording recording = open();
-  EXPECT_FALSE(recording.flow(1).has_value());
-  EXPECT_THROW(recording.flow(2), std::out_of_range);
-  EXPECT_THROW(recording.frame(3), std::out_of_range);
-  EXPECT_THROW(recording.frame(-1), std::out_of_range);
-  EXPECT_THROW(recording.frame_time_s(3), std::out_of_range);
-  EXPECT_THROW(recording.events_between(2, 0), std::out_of_range);
+  const auto recording = open();
+  EXPECT_FALSE(recording->flow(1).has_value());
+  EXPECT_THROW(recording->flow(2), std::out_of_range);
+  EXPECT_THROW(recording->frame(3), std::out_of_range);
+  EXPECT_THROW(recording->frame(-1), std::out_of_range);
+  EXPECT_THROW(recording->frame_time_s(3), std::out_of_range);
+  EXPECT_THROW(recording->events_between(2, 0), std::out_of_range);
 }
 
 TEST_F(Hdf5RecordingTest, NamesTheEventThatIsWrong) {
   const auto refused = [&](const std::string& what, int event) {
-    const Hdf5Recording recording = open();
+    const auto recording = open();
     EXPECT_THAT(
-        [&] { recording.events_between(0, 2); },
+        [&] { recording->events_between(0, 2); },
         ThrowsMessage<InputError>(
             AllOf(HasSubstr(what), HasSubstr("small.hdf5 (event " + std::to_string(event) + ")"))));
     datasets_ = testing::small_mvsec();
@@ -241,8 +241,8 @@ TEST_F(Hdf5RecordingTest, NamesTheEventThatIsWrong) {
 
 TEST_F(Hdf5RecordingTest, RefusesFlowThatIsNotFinite) {
   std::get<std::vector<float>>(datasets_[kFlow].values)[13] = std::nanf("");
-  const Hdf5Recording recording = open();
-  EXPECT_THAT([&] { recording.flow(0); },
+  const auto recording = open();
+  EXPECT_THAT([&] { recording->flow(0); },
               ThrowsMessage<InputError>(HasSubstr("small.hdf5 (flow of frame 0)")));
 }
 
@@ -259,14 +259,13 @@ TEST_F(Hdf5RecordingTest, TellsOfDamagedValuesWithTheCause) {
   std::string bytes = testing::read_file(path_);
   bytes[bytes.size() / 2] ^= 1;  // the middle of the file is events
   testing::write_file(path_, bytes);
-  const Hdf5Recording recording(path_, mvsec_layout("left"));
-  EXPECT_THAT(recording.frame(1).pixels, Each(0));
+  const auto recording = open_hdf5_recording(path_, mvsec_layout("left"));
+  EXPECT_THAT(recording->frame(1).pixels, Each(0));
   try {
-    recording.events_between(0, 1);
+    recording->events_between(0, 1);
     FAIL() << "expected InputError";
   } catch (const InputError& error) {
-    EXPECT_THAT(error.what(),
-                HasSubstr("got damage, in " + path_.string() + " (events of frames 0..1)"));
+    EXPECT_THAT(error.what(), HasSubstr("got damage, in " + path_.string() + " (events "));
     EXPECT_THROW(std::rethrow_if_nested(error), Hdf5Error);
   }
 }
@@ -278,9 +277,9 @@ TEST_F(Hdf5RecordingTest, NamesTheDatasetThatIsMissing) {
     datasets_ = testing::small_mvsec();
   }
   testing::write_hdf5(path_, datasets_);
-  EXPECT_THAT([&] { Hdf5Recording(path_, mvsec_layout("right")); },
+  EXPECT_THAT([&] { open_hdf5_recording(path_, mvsec_layout("right")); },
               ThrowsMessage<InputError>(HasSubstr("(dataset davis/right/events)")));
-  EXPECT_THAT([&] { Hdf5Recording(path_, eventgan_layout()); },
+  EXPECT_THAT([&] { open_hdf5_recording(path_, eventgan_layout()); },
               ThrowsMessage<InputError>(HasSubstr("(dataset davis/events/data)")));
 }
 
@@ -320,7 +319,7 @@ TEST_F(Hdf5RecordingTest, RefusesOtherShapesAndTypes) {
 }
 
 TEST_F(Hdf5RecordingTest, RefusesWhatIsNoHdf5File) {
-  const auto open_it = [&] { Hdf5Recording recording(path_, mvsec_layout("left")); };
+  const auto open_it = [&] { open_hdf5_recording(path_, mvsec_layout("left")); };
   EXPECT_THAT(open_it, ThrowsMessage<InputError>(HasSubstr("got none, in " + path_.string())));
   testing::write_hdf5(path_, datasets_);
   const std::string whole = testing::read_file(path_);
@@ -328,7 +327,7 @@ TEST_F(Hdf5RecordingTest, RefusesWhatIsNoHdf5File) {
     testing::write_file(path_, bytes);
     EXPECT_THAT(open_it, ThrowsMessage<InputError>(HasSubstr("one that does not open")));
   }
-  EXPECT_THAT([&] { Hdf5Recording(folder_.path(), mvsec_layout("left")); },
+  EXPECT_THAT([&] { open_hdf5_recording(folder_.path(), mvsec_layout("left")); },
               ThrowsMessage<InputError>(HasSubstr("got a folder")));
 }
 

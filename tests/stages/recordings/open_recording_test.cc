@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -13,6 +14,12 @@
 namespace eventgan {
 namespace {
 
+RecordingOptions right_camera() {
+  RecordingOptions options;
+  options.camera = "right";
+  return options;
+}
+
 TEST(OpenRecordingTest, OpensTheRightCameraAndTheAuthorsLayout) {
   const testing::TemporaryFolder folder;
   const std::map<std::string, testing::Hdf5Dataset> left = testing::small_mvsec();
@@ -25,7 +32,7 @@ TEST(OpenRecordingTest, OpensTheRightCameraAndTheAuthorsLayout) {
        {"davis/image_raw/data", left.at("davis/left/image_raw")},
        {"davis/image_raw/timestamps", left.at("davis/left/image_raw_ts")},
        {"davis/image_raw/event_index", left.at("davis/left/image_raw_event_inds")}});
-  const auto camera = open_recording(folder / "right.h5", RecordingFormat::kMvsec, "right");
+  const auto camera = open_recording(folder / "right.h5", RecordingFormat::kMvsec, right_camera());
   const auto authors = open_recording(folder / "authors.h5", RecordingFormat::kEventgan);
   EXPECT_EQ(camera->events_between(0, 2), authors->events_between(0, 2));
   EXPECT_TRUE(camera->flow(0).has_value());
@@ -92,11 +99,33 @@ TEST(FindRecordingFormat, TellsByWhatIsThere) {
   const testing::TemporaryFolder folder;
   testing::write_hdf5(folder / "m.h5", testing::small_mvsec());
   EXPECT_EQ(find_recording_format(folder / "m.h5"), RecordingFormat::kMvsec);
-  EXPECT_EQ(find_recording_format(folder / "m.h5", "right"), std::nullopt);
+  EXPECT_EQ(find_recording_format(folder / "m.h5", right_camera()), std::nullopt);
   testing::write_hdf5(folder / "e.h5", {{"davis/events/data", {{0, 4}, std::vector<double>{}}}});
   EXPECT_EQ(find_recording_format(folder / "e.h5"), RecordingFormat::kEventgan);
   testing::write_file(folder / "ecd/events.txt", "");
   EXPECT_EQ(find_recording_format(folder / "ecd"), RecordingFormat::kEcd);
+  EXPECT_EQ(find_recording_format(folder / "ecd/events.txt"), RecordingFormat::kEcd);
+  EXPECT_EQ(event_file(folder / "ecd"), folder / "ecd/events.txt");
+  EXPECT_THAT(event_companions(folder / "ecd/events.txt"),
+              ::testing::ElementsAre(folder / "ecd/images.txt"));
+  std::filesystem::create_directories(folder / "seq/events/left");
+  const auto columns = folder / "seq/events/left/events.h5";
+  testing::write_hdf5(columns, {{"events/t", {{1}, std::vector<std::int64_t>{0}}}});
+  for (const auto& path : {folder / "seq", columns}) {
+    EXPECT_EQ(find_recording_format(path), RecordingFormat::kDsec);
+    EXPECT_EQ(event_file(path), columns);
+  }
+  EXPECT_EQ(find_recording_format(folder / "seq", right_camera()), std::nullopt);
+  EXPECT_THAT(event_companions(columns), ::testing::IsEmpty());
+  testing::write_file(folder / "seq/images/timestamps.txt", "");
+  RecordingOptions rectified;
+  rectified.rectify = true;
+  EXPECT_THAT(event_companions(columns, rectified),
+              ::testing::ElementsAre(folder / "seq/events/left/rectify_map.h5",
+                                     folder / "seq/images/timestamps.txt"));
+  testing::write_file(folder / "events.csv", "t,x,y,p\n");
+  EXPECT_EQ(find_recording_format(folder / "events.csv"), RecordingFormat::kTable);
+  EXPECT_EQ(event_file(folder / "events.csv"), folder / "events.csv");
   testing::write_file(folder / "text", "text");
   EXPECT_EQ(find_recording_format(folder / "text"), std::nullopt);
   EXPECT_EQ(find_recording_format(folder.path()), std::nullopt);

@@ -180,7 +180,10 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   add_box(cut, 0, {10, -3, 17, 6}, {5, 0, 8, 3});
   add(shard, cut, volume(3, size));
 
-  ShardSample person = sample(4);
+  ShardSample person = sample(4);  // of a still
+  person.pair.previous = person.pair.next;
+  person.pair.previous.time_s = kNan;
+  person.pair.motion = ImageMotion{-1.5, 0.25, 0.75, 1.0078125};
   add_person(person, plain_person());
   add(shard, person, volume(4, size));
   return shard;

@@ -296,6 +296,42 @@ TEST_F(ShardCheck, OffsetsThatDoNotAscendToTheRowsAreFound) {
               Contains(HasSubstr("expected shape [4, 4] of /labels/boxes/xyxy, got [3, 4]")));
 }
 
+TEST_F(ShardCheck, MotionsOfNoStillAreFound) {
+  write(testing::example_shard());
+  const double none = std::nan("");
+  std::vector<double> motions(20, none);
+  motions[16] = 1;  // slot 4, the still: one number alone
+  overwrite("/pairs/motion", H5T_NATIVE_DOUBLE, motions);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected finite numbers in motion"),
+                                          HasSubstr("(sample 4, 000004)"))));
+  motions = std::vector<double>(20, none);
+  for (const int slot : {0, 4}) std::fill_n(&motions[4 * slot], 4, slot / 4.0);  // scales 0 and 1
+  overwrite("/pairs/motion", H5T_NATIVE_DOUBLE, motions);
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected a motion of scale > 0"),
+                                          HasSubstr("(sample 0, 000000)"))));
+}
+
+TEST_F(ShardCheck, AStillsBoxIsCutToWhatIsSeenOfTheImage) {
+  // 16x12 pixels shifted by 2 down: n = 2 along 12, 2 * 16 / 12 = 2.67, so 3, along 16. What is
+  // left, 10x8, is scaled to 8x4 in a letterbox of 8x6: an edge maps as (x - 3) 0.8 and (y - 2) / 2
+  // + 1. So 5 1 13 8 becomes 1.6 0.5 8 4, seen from row 1 on.
+  testing::ExampleShard example = testing::unlabelled_shard();
+  example.header.label_schema.class_names = {"Car"};
+  ShardSample& sample = example.samples[0];
+  sample.pair.previous = sample.pair.next;
+  sample.pair.motion = ImageMotion{.y_px = 2};
+  sample.source_to_volume = {0.8, 0, -2.5 * 0.8 - 0.5, 0, 0.5, -1.5 * 0.5 + 0.5};
+  sample.annotation.boxes.resize(1);
+  sample.annotation.boxes[0].class_id = 0;
+  sample.annotation.boxes[0].xyxy = {5, 1, 13, 8};
+  sample.labels.boxes = {{{1.6, 1, 8, 4}, {1.6, 0.5, 8, 4}, false}};
+  write(example);
+  EXPECT_THAT(faults(), IsEmpty());
+  sample.labels.boxes[0].clipped.top = 0.5;
+  write(example);
+  EXPECT_THAT(faults(), ElementsAre(HasSubstr("xyxy of box 0 to be xyxy_unclipped cut")));
+}
+
 TEST_F(ShardCheck, VolumesWithNanOrOtherValuesAreFound) {
   const testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
   write(example);

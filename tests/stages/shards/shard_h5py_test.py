@@ -68,7 +68,7 @@ class ShardInH5py(unittest.TestCase):
 
     def test_texts_and_attributes(self):
         file = self.open("uint8-9")
-        self.assertEqual(file["pairs/prev_path"].asstr()[4], "kitti/prev_2/000004_02.png")
+        self.assertEqual(file["pairs/prev_path"].asstr()[3], "kitti/prev_2/000003_02.png")
         self.assertEqual(file.attrs["manifest"], '{ "name": "d\u00e9mo" }\n')
         self.assertEqual(list(file["labels/boxes/class_id"].attrs["class_names"]),
                          ["Car", "DontCare"])
@@ -91,6 +91,8 @@ class ShardInH5py(unittest.TestCase):
         file = self.open("float16-1")
         self.assertEqual(file["pairs/action"].asstr()[:].tolist(), ["", "Walking-1", "Walking-1", "Walking-1", "Walking-1"])
         self.assertEqual(file["labels/boxes/difficulty"][:].tolist(), [1, -1, -1])
+        np.testing.assert_array_equal(file["pairs/motion"][:], [[np.nan] * 4] * 4 + [[-1.5, 0.25, 0.75, 1.0078125]])
+        self.assertEqual(file["pairs/motion"].attrs["columns"].tolist(), ["x_px", "y_px", "angle_deg", "scale"])
         np.testing.assert_array_equal(file["pairs/next_time_s"][:], [1.2, np.nan, 1.2, 1.2, 1.2])
         self.assertTrue(np.isnan(file["labels/projection"][1:]).all())
 

@@ -43,9 +43,9 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
       record.contents.optional_columns,
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
-                  "/pairs/drive", "/labels/projection", "/labels/projection_source",
-                  "/labels/boxes/difficulty", "/labels/poses/box", "/labels/poses/box_source",
-                  "/labels/poses/joints3d_mm", "/labels/poses/camera",
+                  "/pairs/drive", "/pairs/motion", "/labels/projection",
+                  "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
+                  "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
 }
 
@@ -140,6 +140,10 @@ TEST_F(ShardSummary, TextSaysWhatIsInASample) {
   EXPECT_THAT(first, HasSubstr("nose (1.5 1.75), visible\n"));
   EXPECT_THAT(first, HasSubstr("0.2 s"));
   EXPECT_THAT(first, HasSubstr("75 % of its tiles"));  // 3 of 4
+  EXPECT_THAT(first, Not(HasSubstr("motion")));
+  EXPECT_THAT(
+      describe_sample(reader_, 4),
+      HasSubstr("motion         of a still: (-1.5 0.25) px, 0.75 degrees, scale 1.00781\n"));
   EXPECT_THAT(describe_sample(reader_, 1), Not(HasSubstr("nan")));
   EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
   EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
@@ -182,6 +186,10 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
   EXPECT_EQ(first["persons"][1]["camera_distortion"]["p1"], -0.0014);
   EXPECT_EQ(first["persons"][1]["joints3d_mm"],
             nlohmann::json::parse("[null, [4, 5, 3001], [7, 8, 3002]]"));
+  EXPECT_TRUE(first["motion"].is_null());
+  EXPECT_EQ(nlohmann::json::parse(sample_json(reader_, 4))["motion"],
+            nlohmann::json::parse(
+                R"({"x_px": -1.5, "y_px": 0.25, "angle_deg": 0.75, "scale": 1.0078125})"));
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 1))["gap_s"].is_null());
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 2))["source_to_volume"][0].is_null());
 }

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
+#include <limits>
 #include <random>
 #include <span>
 #include <stdexcept>
@@ -46,6 +47,55 @@ TEST(NumpyElementsTest, ReadsEveryDtype) {
       ElementsAre(std::int64_t{1} << 32));
   EXPECT_THAT(values<std::uint8_t>(decode({"|u1", false, {2}}, "\x00\xff"s)), ElementsAre(0, 255));
   EXPECT_THAT(values<bool>(decode({"|b1", false, {2}}, "\x00\x01"s)), ElementsAre(false, true));
+  // Those without a type of their own are kept in a larger one.
+  EXPECT_THAT(values<std::int32_t>(decode({"|i1", false, {2}}, "\x7f\x80"s)),
+              ElementsAre(127, -128));
+  EXPECT_THAT(values<std::int32_t>(decode({"<i2", false, {1}}, "\x00\x80"s)), ElementsAre(-32768));
+  EXPECT_THAT(values<std::int32_t>(decode({"<u2", false, {1}}, "\xff\xff"s)), ElementsAre(65535));
+  EXPECT_THAT(values<std::int64_t>(decode({"<u4", false, {1}}, "\xff\xff\xff\xff"s)),
+              ElementsAre(4294967295));
+  EXPECT_THAT(values<std::int64_t>(decode({"<u8", false, {1}}, std::string(7, '\xff') + '\x7f')),
+              ElementsAre(std::numeric_limits<std::int64_t>::max()));
+  EXPECT_THAT(
+      [] {
+        decode({"<u8", false, {1}}, std::string(7, '\0') + '\x80');
+      },
+      ThrowsMessage<std::runtime_error>(
+          HasSubstr("expected numbers below 2^63, got 9223372036854775808, in x.npy")));
+}
+
+std::vector<NamedArray> fields(const std::string& bytes) {
+  return parse_npy_fields(std::as_bytes(std::span(bytes)), "f.npy");
+}
+
+TEST(NpyFieldsTest, ReadsTheFieldsOfAStructuredArray) {
+  // As numpy writes {'t': <i2, 'name': |S2} with two bytes between them.
+  constexpr char kHeader[] =
+      "{'descr': [('t', '<i2'), ('', '|V2'), ('name', '|S2')], 'fortran_order': False, "
+      "'shape': (2,), }";
+  const std::string data = "\x01\x00??ab\xff\xff??c\0"s;
+  const std::vector<NamedArray> read = fields(npy_file(kHeader, data));
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(read[0].name, "t");
+  EXPECT_THAT(values<std::int32_t>(read[0].values), ElementsAre(1, -1));
+  EXPECT_EQ(read[1].name, "name");
+  EXPECT_THAT(values<std::string>(read[1].values), ElementsAre("ab", "c"));
+  for (const auto& [bytes, what] : std::vector<std::pair<std::string, std::string>>{
+           {npy_file(kHeader, data + "?"), "expected 2 rows of 6 bytes, got 13 bytes, in f.npy"},
+           {npy_file("{'descr': '<i2', 'fortran_order': False, 'shape': (1,), }", "ab"),
+            "expected a structured array [N], got '<i2'"},
+           {npy_file("{'descr': [], 'fortran_order': False, 'shape': (1,), }", ""),
+            "expected a field in the .npy header"},
+           {npy_file("{'descr': [('a', '|O')], 'fortran_order': False, 'shape': (0,), }", ""),
+            "expected a field of numbers or text, got '|O'"},
+           {npy_file("{'descr': [('a', '<i2')], 'fortran_order': False, 'shape': (1, 1), }", "ab"),
+            "got 2 dimensions"}}) {
+    EXPECT_THAT([&text = bytes] { fields(text); },
+                ThrowsMessage<std::runtime_error>(HasSubstr(what)));
+  }
+  const std::string structured = npy_file(kHeader, data);
+  EXPECT_THAT([&] { parse_npy(std::as_bytes(std::span(structured)), "f.npy"); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("got one of fields")));
 }
 
 TEST(NumpyElementsTest, ReadsText) {
@@ -295,6 +345,17 @@ TEST(NpyFile, ASingleValueHasNoSides) {
 
 TEST(NpyFile, RefusesAnotherNumberOfValues) {
   EXPECT_THROW(npy_file("<f4", {2}, std::vector<float>{1}), std::invalid_argument);
+}
+
+TEST(NpyRecordsTest, HaveTheirFieldsInTheHeader) {
+  constexpr char kFields[] = "[('t', '|u1'), ('', '|V1')]";
+  const std::string file = npy_records(kFields, 2, "\x07\x00\x09\x00"s);
+  EXPECT_EQ(file.size(), 128u + 4);
+  EXPECT_THAT(file, HasSubstr("{'descr': [('t', '|u1'), ('', '|V1')], 'fortran_order': False, "
+                              "'shape': (2,), }"));
+  EXPECT_TRUE(file.ends_with("\n\x07\x00\x09\x00"s));
+  EXPECT_THAT(npy_records(kFields, 2, ""), HasSubstr("'shape': (0,)"));
+  EXPECT_THROW(npy_records(kFields, 2, "123"), std::invalid_argument);
 }
 
 TEST(NpyTexts, AreReadBack) {

@@ -88,15 +88,7 @@ TEST(JpegImage, OrientationTagIsNotApplied) {
   cv::imwrite(file.string(), gradient_image({40, 60}));
   const std::string bytes = read_file(file);
   const cv::Mat stored = opencv_read(file);
-  // APP1 with a TIFF header (little endian, directory at 8) of one entry: tag 0x0112 (orientation),
-  // type 3 (short), count 1, value 6 (turn by 90 degrees).
-  using namespace std::string_literals;
-  const std::string exif =
-      "Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0\x06\0\0\0\0\0\0\0"s;
-  std::string tagged = bytes.substr(0, 2) + "\xff\xe1\0"s;
-  tagged += static_cast<char>(exif.size() + 2);
-  tagged += exif;
-  write_file(file, tagged + bytes.substr(2));
+  write_file(file, testing::with_orientation(bytes, 6));
   ASSERT_EQ(cv::imread(file.string()).rows, 60) << "the tag is not understood, so it tests nothing";
 
   EXPECT_TRUE(same_pixels(with_open(file, decode_jpeg), stored));

@@ -30,6 +30,16 @@ inline cv::Mat opencv_read(const std::filesystem::path& file) {
   return cv::imread(file.string(), cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
 }
 
+/// The same JPEG with an APP1 of EXIF: a TIFF header (little endian, directory at 8) of one entry,
+/// tag 0x0112 (orientation), type 3 (short), count 1.
+inline std::string with_orientation(const std::string& jpeg, int orientation) {
+  using namespace std::string_literals;
+  const std::string exif = "Exif\0\0II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"s +
+                           static_cast<char>(orientation) + "\0\0\0\0\0\0\0"s;
+  return jpeg.substr(0, 2) + "\xff\xe1\0"s + static_cast<char>(exif.size() + 2) + exif +
+         jpeg.substr(2);
+}
+
 /// Calls `read(std::FILE*)` on an open file.
 template <class Read>
 auto with_open(const std::filesystem::path& path, Read read) {

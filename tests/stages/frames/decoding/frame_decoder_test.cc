@@ -34,10 +34,13 @@ TEST(ImageSizeProbe, ImagesAndVideos) {
   const TemporaryFolder folder;
   for (const std::string name : {"a.png", "b.jpg", "c.bmp"}) {
     cv::imwrite((folder / name).string(), gradient_image({31, 57}));
-    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{31, 57})) << name;
+    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name, ImageOrientation::kStored)),
+              (ImageSize{31, 57}))
+        << name;
   }
   testing::write_counting_video(folder / "clip.avi", 3);
-  EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / "clip.avi")), (ImageSize{48, 64}));
+  EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / "clip.avi", ImageOrientation::kStored)),
+            (ImageSize{48, 64}));
 }
 
 TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
@@ -46,7 +49,9 @@ TEST(ImageSizeProbe, ReadsOnlyTheHeader) {
     cv::imwrite((folder / name).string(), gradient_image({120, 160}));
     const auto size = std::filesystem::file_size(folder / name);
     std::filesystem::resize_file(folder / name, size * 3 / 4);
-    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name)), (ImageSize{120, 160})) << name;
+    EXPECT_EQ(std::get<ImageSize>(probe_image_size(folder / name, ImageOrientation::kStored)),
+              (ImageSize{120, 160}))
+        << name;
   }
 }
 
@@ -56,7 +61,7 @@ TEST(ImageSizeProbe, FaultsNameTheFile) {
   write_file(folder / "words.txt", "no image");
   write_file(folder / "zeros.mp4", std::string(4096, '\0'));
   for (const std::string name : {"empty.png", "words.txt", "zeros.mp4", "none.jpg"}) {
-    const auto outcome = probe_image_size(folder / name);
+    const auto outcome = probe_image_size(folder / name, ImageOrientation::kStored);
     ASSERT_TRUE(is_fault(outcome)) << name;
     EXPECT_THAT(std::get<SampleFault>(outcome).reason, StartsWith("expected a"));
     EXPECT_THAT(std::get<SampleFault>(outcome).reason,
@@ -83,6 +88,29 @@ TEST(FrameDecoder, DecodesEveryFormatBelowItsBase) {
     ASSERT_EQ(fault(outcome), "no fault");
     EXPECT_TRUE(same_pixels(std::get<ColourFrame>(outcome), opencv_read(folder / name))) << name;
   }
+}
+
+TEST(FrameDecoder, TurnsImagesWhereItIsAskedTo) {
+  const TemporaryFolder folder;
+  const FrameDecoder decoder(folder.path());
+  const auto file = folder / "a.jpg";
+  cv::imwrite(file.string(), gradient_image({12, 20}));
+  write_file(file, testing::with_orientation(testing::read_file(file), 8));
+  EXPECT_EQ(std::get<ImageSize>(probe_image_size(file, ImageOrientation::kStored)),
+            (ImageSize{12, 20}));
+  EXPECT_EQ(std::get<ImageSize>(probe_image_size(file, ImageOrientation::kUpright)),
+            (ImageSize{20, 12}));
+  EXPECT_TRUE(
+      same_pixels(std::get<ColourFrame>(decoder.decode(image_ref("a.jpg"))), opencv_read(file)));
+  const auto upright = decoder.decode(image_ref("a.jpg"), 1, ImageOrientation::kUpright);
+  EXPECT_TRUE(same_pixels(std::get<ColourFrame>(upright), cv::imread(file.string())));
+  write_file(file, testing::with_orientation(testing::read_file(file), 5));
+  EXPECT_EQ(fault(decoder.decode(image_ref("a.jpg"), 1, ImageOrientation::kUpright)),
+            "expected an image that is not mirrored, got EXIF orientation 5, in a.jpg");
+  EXPECT_EQ(std::get<SampleFault>(probe_image_size(file, ImageOrientation::kUpright)).reason,
+            "expected an image that is not mirrored, got EXIF orientation 5, in " + file.string());
+  EXPECT_EQ(orientation_of(DatasetKind::kFrames), ImageOrientation::kUpright);
+  EXPECT_EQ(orientation_of(DatasetKind::kMpii), ImageOrientation::kStored);
 }
 
 TEST(FrameDecoder, FormatIsToldByContentNotByName) {

@@ -15,6 +15,7 @@
 #include "tests/stages/base/images/test_images.h"
 #include "tests/stages/frames/decoding/test_video.h"
 #include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 // What pairs of one PairReader share.
 
@@ -268,6 +269,32 @@ TEST(PairSharing, ManyThreadsGetTheInputsThatOneThreadGets) {
   }
   for (auto& thread : threads) thread.join();
   EXPECT_EQ(wrong, 0);
+}
+
+// Of a source that is turned upright and one that is not.
+TEST(SharedImages, OneFileIsTakenAsStoredAndUpright) {
+  const TemporaryFolder folder;
+  const auto file = folder / "a.jpg";
+  cv::imwrite(file.string(), testing::gradient_image({20, 36}));
+  testing::write_file(file, testing::with_orientation(testing::read_file(file), 6));
+  const PairReader reader(folder.path(), {});
+  const FramePair pair = shared_pair("a.jpg", "a.jpg");
+  for (int turn = 0; turn < 2; ++turn) {
+    const auto stored = std::get<PreparedPair>(reader.read(pair));
+    EXPECT_EQ(stored.content, (ImageSize{20, 36}));
+    const auto upright = std::get<PreparedPair>(reader.read(pair, ImageOrientation::kUpright));
+    EXPECT_EQ(upright.content, (ImageSize{36, 20}));
+    EXPECT_EQ(upright.placement.source, (ImageSize{36, 20}));
+    // Turned by 90 degrees clockwise, the bottom left pixel comes to lie at the top left, and the
+    // top left one at the top right.
+    EXPECT_EQ(upright.input[0], stored.input[19 * 36]);
+    EXPECT_EQ(upright.input[19], stored.input[0]);
+    EXPECT_NE(upright.input[0], upright.input[19]);
+  }
+  testing::write_file(folder / "b.jpg", testing::with_orientation(testing::read_file(file), 2));
+  EXPECT_EQ(why_none(reader.read(shared_pair("b.jpg", "b.jpg"), ImageOrientation::kUpright)),
+            "expected an image that is not mirrored, got EXIF orientation 2, in b.jpg");
+  EXPECT_EQ(why_none(reader.read(shared_pair("b.jpg", "b.jpg"))), "no fault");
 }
 
 }  // namespace

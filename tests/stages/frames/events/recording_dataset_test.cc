@@ -1,5 +1,6 @@
 #include "stages/frames/events/recording_dataset.h"
 
+#include <fmt/core.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -263,14 +264,14 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   testing::write_file(folder_ / "drive.json", R"({"format": "eventgan-manifest"})");
   label("1.75\n");
   EXPECT_EQ(open()->labelled_frames().size(), 1u);  // a job beside it
-  spec_.camera = "right";
+  spec_.recording.camera = "right";
   EXPECT_THROW(open(), InputError);
   spec_.root = "absent";
   EXPECT_THROW(open(), InputError);
   testing::write_hdf5(folder_ / "all/a.h5", testing::small_mvsec());
   testing::write_hdf5(folder_ / "all/a.hdf5", testing::small_mvsec());
   spec_.root = "all";
-  spec_.camera = "left";
+  spec_.recording.camera = "left";
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got a twice")));
   const auto dataset = [&] {
     spec_.root = "drive.h5";
@@ -282,6 +283,97 @@ TEST_F(RecordingDatasetTest, RefusesWhatDoesNotFit) {
   EXPECT_TRUE(is_fault(dataset->annotation("drive/1.5")));
   EXPECT_TRUE(is_fault(dataset->annotation("other/1.75")));
   EXPECT_EQ(dataset->label_place("other/1.75"), "other/1.75");
+}
+
+/// The small recording's events alone, at 0.5, 1, 1.25, 1.25, 1.75, 2 and 2.5 s.
+class WithoutFramesTest : public RecordingDatasetTest {
+ protected:
+  WithoutFramesTest() {
+    std::string table = "t,x,y,p\n";
+    for (const Event& event : all_) {
+      table += fmt::format("{},{},{},{}\n", event.t_s, event.x, event.y, event.positive ? 1 : 0);
+    }
+    testing::write_file(folder_ / "table.csv", table);
+    spec_.root = "table.csv";
+    spec_.recording.sensor = ImageSize{3, 4};
+    spec_.recording.columns.tick_s = 1;
+  }
+};
+
+TEST_F(WithoutFramesTest, WindowsFollowEachOtherFromTheFirstEventOn) {
+  spec_.window.duration_s = 0.75;
+  auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const double begin_s = 0.49999975 + 0.75 * static_cast<double>(i);
+    EXPECT_DOUBLE_EQ(window(*dataset, i)[0], begin_s);
+    EXPECT_DOUBLE_EQ(window(*dataset, i)[1], begin_s + 0.75);
+    EXPECT_EQ(dataset->labelled_frames()[i].fault, "");
+    EXPECT_EQ(dataset->labelled_frames()[i].frame, (FrameRef{"table.csv", -1, -1}));
+  }
+  EXPECT_THAT(events(*dataset, 0), ElementsAre(all_[0], all_[1]));
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[2], all_[3], all_[4]));
+  EXPECT_THAT(events(*dataset, 2), ElementsAre(all_[5], all_[6]));
+  EXPECT_THAT(dataset->notes(), IsEmpty());
+  spec_.window.label = LabelPlace::kMiddle;
+  dataset = open();
+  EXPECT_DOUBLE_EQ(window(*dataset, 1)[0], 1.24999975);
+  EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[2], all_[3], all_[4]));
+  spec_.window.duration_s = 100;
+  EXPECT_EQ(events(*open(), 0).size(), 7u);
+}
+
+TEST_F(WithoutFramesTest, NoEventFallsBetweenTwoWindowsOfAClockOfTheDay) {
+  // At 1.6e9 s two doubles are 0.24 us apart, and 0.1 s is none of them.
+  constexpr std::int64_t kBegin_us = 1'600'000'000'000'000, kLength_us = 100'000, kWindows = 500;
+  std::string table = "t,x,y,p\n";
+  for (std::int64_t i = 0; i <= kWindows; ++i) {
+    for (const int beside : {0, 1, 2}) {
+      table += fmt::format("{},1,1,1\n", kBegin_us + i * kLength_us + beside);
+    }
+  }
+  testing::write_file(folder_ / "table.csv", table);
+  spec_.recording.columns.tick_s = 1e-6;
+  for (const LabelPlace place : {LabelPlace::kEnd, LabelPlace::kMiddle}) {
+    spec_.window = {.duration_s = 0.1, .events = std::nullopt, .label = place};
+    const auto dataset = open();
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < dataset->labelled_frames().size(); ++i) {
+      found += events(*dataset, i).size();
+    }
+    EXPECT_EQ(found, 3u * (kWindows + 1));
+  }
+}
+
+TEST_F(WithoutFramesTest, LabelsMakeWindowsOfTimeOrOfEvents) {
+  testing::write_file(folder_ / "labels.csv", std::string(kLabelHeader) + "1.25,0,0,2,1,car,\n3\n");
+  spec_.annotations = "labels.csv";
+  spec_.window.events = 2;
+  EXPECT_THAT(events(*open(), 0), ElementsAre(all_[2], all_[3]));
+  EXPECT_THAT(open()->labelled_frames()[1].fault, HasSubstr("which the recording lasts, got 3 s"));
+  spec_.window.events.reset();
+  spec_.window.duration_s = 0.25;
+  EXPECT_THAT(events(*open(), 0), ElementsAre(all_[2], all_[3]));
+  spec_.window.duration_s.reset();
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("expected window_s or window_events, since the "
+                                                  "recording has no frames, got neither")));
+}
+
+TEST_F(WithoutFramesTest, NothingIsGuessed) {
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(
+                  HasSubstr("expected window_s, or labels, since the recording has no frames")));
+  spec_.window.events = 3;
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("got window_events alone")));
+  spec_.window.events.reset();
+  spec_.window.duration_s = 1e-7;
+  EXPECT_THAT([&] { open(); },
+              ThrowsMessage<InputError>(HasSubstr("expected events of at most 10000000 windows")));
+  testing::write_file(folder_ / "table.csv", "t,x,y,p\n");
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("expected events or frames")));
+  spec_.recording.sensor.reset();
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("\"sensor\" in the manifest")));
 }
 
 }  // namespace

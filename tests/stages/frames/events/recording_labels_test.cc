@@ -3,9 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <string>
 
 #include "manifests/values/faults.h"
+#include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -64,19 +67,26 @@ TEST_F(RecordingLabelsTest, CsvMayHaveItsColumnsInAnyOrderAndNoCategory) {
   EXPECT_EQ(labels.annotations.at(0.25).boxes.at(0), (Box{.class_id = 0, .xyxy = {1, 2, 3, 4}}));
 }
 
+TEST_F(RecordingLabelsTest, CsvMayHaveCommasInQuotes) {
+  const RecordingLabels labels =
+      read("a.csv", std::string(kHeader) + "1,1,2,3,4,\"a, \"\"b\"\"\",easy\r\n");
+  EXPECT_THAT(labels.class_names, ElementsAre("a, \"b\""));
+  EXPECT_EQ(labels.annotations.at(1).original, "1,1,2,3,4,\"a, \"\"b\"\"\",easy\n");
+}
+
 TEST_F(RecordingLabelsTest, CsvNamesEveryLineThatIsWrong) {
   const std::string place = (folder_ / "a.csv").string();
   refuses("a.csv",
           std::string(kHeader) +
               "x,1,2,3,4,car,\n1,1,2,nan,4,car,\n1,1,2,3,4,,\n"
-              "1,1,2,3,4,car,eazy\n1,2,3\n\xff\n1,1,2,3,4,\"a,b\",easy\n",
+              "1,1,2,3,4,car,eazy\n1,2,3\n\xff\n1,1,2,3,4,\"a\"b,easy\n",
           {"expected a time in seconds, got \"x\", in " + place + " (line 2)",
            "expected right within 1e+06 pixels, got \"nan\", in " + place + " (line 3)",
            "expected a class, got none, in " + place + " (line 4)",
            "expected easy, hard, dont_care or nothing, got \"eazy\", in " + place + " (line 5)",
-           "expected 7 fields, none with a comma in it, got 3, in " + place + " (line 6)",
+           "expected 7 fields, got 3, in " + place + " (line 6)",
            "expected UTF-8, got other bytes, in " + place + " (line 7)",
-           "got 8, in " + place + " (line 8)"});
+           "got other quotes, in " + place + " (line 8)"});
   refuses("a.csv", "time_s,left,top,right,bottom,class,catgory\n1,1,2,3,4,car,easy\n",
           {"each once, got \"catgory\", in " + place + " (line 1)"});
   refuses("a.csv", "time_s,left,top,right,bottom,class,class\n", {"got \"class\""});
@@ -180,6 +190,66 @@ TEST_F(RecordingLabelsTest, ClassesAreNumberedAsTheyFirstOccurHoweverManyThereAr
   EXPECT_EQ(labels.class_names[1], "class 59998");
   const std::vector<Box>& boxes = labels.annotations.at(1).boxes;
   for (int i = 0; i < kCount; ++i) ASSERT_EQ(boxes.at(kCount + i).class_id, i);
+}
+
+/// Rows of t, x, y, w, h, class_id and track_id.
+std::string boxes(const std::vector<std::array<double, 7>>& rows) {
+  std::string bytes;
+  const auto append = [&](const auto& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(value));
+  };
+  for (const auto& row : rows) {
+    append(static_cast<std::uint64_t>(row[0]));
+    for (std::size_t i = 1; i < 5; ++i) append(static_cast<float>(row[i]));
+    append(static_cast<std::uint8_t>(row[5]));
+    append(static_cast<std::uint32_t>(row[6]));
+  }
+  return testing::npy_file(
+      "{'descr': [('t', '<u8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), "
+      "('class_id', '|u1'), ('track_id', '<u4')], 'fortran_order': False, 'shape': (" +
+          std::to_string(rows.size()) + ",), }",
+      bytes);
+}
+
+TEST_F(RecordingLabelsTest, NpyHasPropheseesBoxes) {
+  const std::string text = boxes({{2'500'000, 1, 2, 3, 4, 1, 9},
+                                  {1'500'000, 0.5, 0, 1, 1, 0, 8},
+                                  {2'500'000, 5, 6, 0, 1, 0, 8}});
+  RecordingLabels labels = read("a_bbox.npy", text);
+  EXPECT_THAT(labels.class_names, ElementsAre("class 1", "class 0"));
+  ASSERT_EQ(labels.annotations.size(), 2u);
+  const Annotation& late = labels.annotations.at(2.5);
+  ASSERT_EQ(late.boxes.size(), 2u);
+  EXPECT_EQ(late.boxes[0], (Box{.class_id = 0, .xyxy = {1, 2, 4, 6}, .track_id = 9}));
+  EXPECT_EQ(late.boxes[1], (Box{.class_id = 1, .xyxy = {5, 6, 5, 7}, .track_id = 8}));
+  EXPECT_EQ(labels.annotations.at(1.5).original,
+            R"({"t":1500000,"x":0.5,"y":0.0,"w":1.0,"h":1.0,"class_id":0,"track_id":8})"
+            "\n");
+  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car", "1": "two wheeler"})");
+  labels = read("a_bbox.npy", text);
+  EXPECT_THAT(labels.class_names, ElementsAre("two wheeler", "car"));
+  EXPECT_THAT(read("b_bbox.npy", boxes({})).annotations, IsEmpty());
+}
+
+TEST_F(RecordingLabelsTest, NpyIsStrict) {
+  const double nan = std::nan("");
+  refuses("a.npy",
+          boxes({{1, nan, 2, 3, 4, 1, 9}, {2, 1, 2, -3, 4, 1, 9}, {3, 1, 2e6, 3, 4, 1, 9}}),
+          {"expected x in -1e+06..1e+06, got nan, in", "a.npy (row 0)",
+           "expected w in 0..1e+06, got -3, in", "a.npy (row 1)", "expected y in", "(row 2)"});
+  refuses("b.npy", boxes({{1e19, 1, 2, 3, 4, 1, 9}}), {"expected numbers below 2^63"});
+  refuses("c.npy", boxes({{1, 1, 2, 3, 4, 1, 9}}) + "x", {"expected 1 rows of 29 bytes"});
+  refuses("d.npy", testing::npy_doubles({2}, {1, 2}), {"expected a structured array [N]"});
+  refuses("e.npy",
+          testing::npy_file("{'descr': [('t', '<u8'), ('x', '<f4')], 'fortran_order': False, "
+                            "'shape': (0,), }",
+                            ""),
+          {"expected a field \"y\" of boxes, got none"});
+  testing::write_file(folder_ / "label_map_dictionary.json", R"({"0": "car"})");
+  refuses("f.npy", boxes({{1, 1, 2, 3, 4, 1, 9}}),
+          {"expected a class of label_map_dictionary.json, got class_id 1"});
+  testing::write_file(folder_ / "label_map_dictionary.json", R"({"car": 0})");
+  refuses("g.npy", boxes({}), {"expected {\"0\": \"car\", ...}, got \"car\""});
 }
 
 }  // namespace

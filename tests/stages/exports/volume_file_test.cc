@@ -1,4 +1,4 @@
-#include "stages/exports/davis_file.h"
+#include "stages/exports/volume_file.h"
 
 #include <gtest/gtest.h>
 
@@ -21,9 +21,9 @@ std::vector<float> row_of(float first) {
   return values;
 }
 
-TEST(DavisFile, RowsThatAreNotGivenAreZeros) {
+TEST(VolumeFile, RowsThatAreNotGivenAreZeros) {
   const testing::TemporaryFolder folder;
-  DavisFile file(folder / "d.hdf5", 3, kRowShape, sizeof(float));
+  VolumeFile file(folder / "d.hdf5", VolumeLayout::kDavis, 3, kRowShape, sizeof(float));
   const std::vector<float> row = row_of(1);
   file.write_row(2, std::as_bytes(std::span(row)));
   EXPECT_THROW(file.write_row(2, std::as_bytes(std::span(row))), std::logic_error);
@@ -38,9 +38,9 @@ TEST(DavisFile, RowsThatAreNotGivenAreZeros) {
   EXPECT_EQ(valid.number(2), 1);
 }
 
-TEST(DavisFile, HoldsHalves) {
+TEST(VolumeFile, HoldsHalves) {
   const testing::TemporaryFolder folder;
-  DavisFile file(folder / "d.hdf5", 1, kRowShape, 2);
+  VolumeFile file(folder / "d.hdf5", VolumeLayout::kDavis, 1, kRowShape, 2);
   const std::vector<std::uint16_t> row(kRowShape.value_count(), 0x3800);  // 0.5
   file.write_row(0, std::as_bytes(std::span(row)));
   file.commit();
@@ -48,10 +48,22 @@ TEST(DavisFile, HoldsHalves) {
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(read.arrays.at("davis/events").number(i), 0.5);
 }
 
-TEST(DavisFile, IsTheSameEachTime) {
+TEST(VolumeFile, OfRvtHasChannelsFirstAndNothingElse) {
+  const testing::TemporaryFolder folder;
+  VolumeFile file(folder / "d.h5", VolumeLayout::kRvt, 2, kRowShape, sizeof(float));
+  const std::vector<float> row = row_of(1);
+  file.write_row(1, std::as_bytes(std::span(row)));
+  file.commit();
+  const Hdf5Arrays read = read_hdf5_arrays(folder / "d.h5");
+  ASSERT_EQ(read.arrays.size(), 1u);
+  EXPECT_EQ(read.arrays.at("data").shape, (std::vector<std::size_t>{2, 2, 2, 3}));
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(read.arrays.at("data").number(12 + i), row[i]);
+}
+
+TEST(VolumeFile, IsTheSameEachTime) {
   const testing::TemporaryFolder folder;
   for (const char* name : {"a", "b"}) {
-    DavisFile file(folder / name, 2, kRowShape, sizeof(float));
+    VolumeFile file(folder / name, VolumeLayout::kDavis, 2, kRowShape, sizeof(float));
     const std::vector<float> row = row_of(0.5f);
     file.write_row(1, std::as_bytes(std::span(row)));
     file.commit();
@@ -59,11 +71,11 @@ TEST(DavisFile, IsTheSameEachTime) {
   EXPECT_EQ(testing::read_file(folder / "a"), testing::read_file(folder / "b"));
 }
 
-TEST(DavisFile, IsWholeOrNotThere) {
+TEST(VolumeFile, IsWholeOrNotThere) {
   const testing::TemporaryFolder folder;
   const VolumeShape large{9, {64, 64}};
   const std::string error = testing::error_on_full_disk(16384, [&] {
-    DavisFile file(folder / "d.hdf5", 2, large, sizeof(float));
+    VolumeFile file(folder / "d.hdf5", VolumeLayout::kDavis, 2, large, sizeof(float));
     std::vector<float> row(large.value_count());
     for (std::size_t i = 0; i < row.size(); ++i) row[i] = static_cast<float>(i * i % 9973);
     file.write_row(0, std::as_bytes(std::span(row)));

@@ -1,0 +1,108 @@
+#include "pipeline/commands/given_job.h"
+
+#include <fmt/format.h>
+
+#include <stdexcept>
+#include <system_error>
+#include <utility>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "pipeline/commands/standard_streams.h"
+#include "pipeline/planning/draft_manifest.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/frames/find_source.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Where labels came to the folder since, its images may be found in another place below it.
+bool is_of(const JobManifest& manifest, const FoundSource& found, const fs::path& given) {
+  if (manifest.sources.size() != 1) return false;
+  const SourceSpec& source = manifest.sources.front();
+  const fs::path root = resolve(manifest, source.root).lexically_normal();
+  const fs::path below = root.lexically_relative(fs::absolute(given).lexically_normal());
+  const bool is_within = !below.empty() && *below.begin() != "..";
+  std::error_code unknown;
+  return source.dataset == found.dataset &&
+         (is_within || root == found.root || fs::equivalent(root, found.root, unknown));
+}
+
+JobManifest read_kept(const fs::path& file, const FoundSource& found, const fs::path& given) {
+  JobManifest manifest = read_job_manifest(file);
+  if (!is_of(manifest, found, given)) {
+    throw UsageError(fmt::format(
+        "expected the manifest for {} ({}), got that of another job, in {} (--output names another "
+        "folder; eventgan convert {} goes on with that job)",
+        found.root.string(), to_string(found.dataset), file.string(), file.string()));
+  }
+  return manifest;
+}
+
+}  // namespace
+
+GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& output) {
+  GivenJob job;
+  if (!may_be_source(given)) {
+    job.manifest = read_job_manifest(given);
+    job.output =
+        output.value_or(resolve(job.manifest, job.manifest.output.directory).lexically_normal());
+    if (!job.output.has_filename()) job.output = job.output.parent_path();  // "out/"
+    return job;
+  }
+  const FoundSource found = find_source(given);
+  job.output = output.value_or(fs::path("out") / draft_name({found}));
+  const fs::path file = job.output / "manifest.json";
+  // In this order: another worker may keep the manifest and freeze the plan meanwhile.
+  const bool has_plan = fs::exists(fs::symlink_status(job.output / "plan.json"));
+  if (fs::exists(fs::symlink_status(file))) {
+    job.manifest = read_kept(file, found, given);
+    job.findings = {"manifest: " + file.string() + ", kept as it was when the job began"};
+    if (found.labels && !job.manifest.sources.front().labels) {
+      job.findings.push_back("warning: that manifest does not name the labels in " +
+                             found.labels->path.string());
+    }
+    return job;
+  }
+  if (has_plan) {
+    throw UsageError(
+        "expected a new output folder, or one with the manifest.json of this job, got that of a "
+        "job whose manifest is elsewhere, in " +
+        job.output.string() + " (--output names another folder)");
+  }
+  const fs::path folder = fs::absolute(file).parent_path();
+  ManifestDraft draft = draft_manifest({found}, {folder, /*is_relative=*/false, "."});
+  if (!draft.has_samples) {
+    throw InputError(fmt::format(
+        "expected {}, got none, in {} ({}; eventgan init writes a manifest to complete)",
+        has_events(found.dataset) ? "a recording that makes samples as it is"
+                                  : "labelled frames that make pairs",
+        found.root.string(), fmt::join(draft.findings, "; ")));
+  }
+  job.manifest = parse_job_manifest(draft.text, folder, file.string());
+  job.findings = std::move(draft.findings);
+  job.unwritten = file;
+  return job;
+}
+
+void keep_manifest(const GivenJob& job) {
+  if (!job.unwritten) return;
+  const fs::path& file = *job.unwritten;
+  std::error_code error;
+  fs::create_directories(file.parent_path(), error);
+  if (error) {
+    throw std::runtime_error("cannot create " + file.parent_path().string() + ": " +
+                             error.message());
+  }
+  const bool is_new =
+      create_file_atomically(file, [&](const TextSink& sink) { sink(job.manifest.text); });
+  if (!is_new && read_job_manifest(file).text != job.manifest.text) {
+    throw UsageError("expected no manifest yet, got one that another run has kept meanwhile, in " +
+                     file.string() + ": run again");
+  }
+  tell("manifest: " + file.string());
+}
+
+}  // namespace eventgan

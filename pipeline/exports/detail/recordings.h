@@ -1,0 +1,131 @@
+#pragma once
+
+#include <algorithm>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "pipeline/exports/detail/exporter.h"
+#include "stages/recordings/event_columns_writer.h"
+
+namespace eventgan {
+
+/// The events of a sample, from 0 to `duration_s`: drawn by the options' seed, the dataset and the
+/// sample's id, the same in all formats.
+std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOptions& options,
+                                double duration_s);
+
+/// Seconds from a pair's previous frame to its next one; 1 where that is not known.
+double known_gap_s(const FramePair& pair);
+
+/// A sample as a part of a recording: its events lie in [begin_us, end_us). The label's time is
+/// that of the labelled frame. Times are on the recording's clock, >= 0.
+struct SampleWindow {
+  const ExportShard* shard = nullptr;
+  int slot = 0;
+  std::int64_t begin_us = 0;
+  std::int64_t end_us = 0;
+  std::int64_t label_us = 0;
+  bool is_labelled = false;  ///< as RecordingsExporter::is_labelled says
+};
+
+/// What one camera could have seen: samples of one sequence and of one shape in time order, whose
+/// windows do not overlap and whose labels are at different times.
+struct OutgoingRecording {
+  std::string name;  ///< of its files
+  const ExportSource* source = nullptr;
+  VolumeShape shape;
+  bool is_timed = true;               ///< else its clock counts frames, a second each
+  std::vector<SampleWindow> windows;  ///< at least one
+
+  std::int64_t begin_us() const { return windows.front().begin_us; }
+  std::int64_t end_us() const { return windows.back().end_us; }
+  bool is_labelled() const { return std::ranges::any_of(windows, &SampleWindow::is_labelled); }
+};
+
+/// The recordings that are made together.
+struct RecordingGroup {
+  std::string step;
+  bool is_loose = false;  ///< samples of one shard, each by itself
+  std::vector<OutgoingRecording> recordings;
+};
+
+/// A box as recordings have it: with a time and an object's number.
+struct RecordedBox {
+  std::int64_t t_us = 0;
+  Rectangle box;  ///< cut to the volume
+  int class_number = 0;
+  std::int64_t track_id = -1;
+};
+
+/// One sample on its way into a recording.
+struct RecordedSample {
+  std::string sample_id;
+  std::vector<StampedEvent> events;  ///< within the window
+  std::vector<RecordedBox> boxes;    ///< those that are exported, at label_us
+  std::vector<float> volume;         ///< [2 bins, H, W]; where the exporter keeps it
+};
+
+/// An exporter of recordings. Samples of a sequence whose frames' times are known share its clock;
+/// of those whose frames have but numbers, frame k is at k seconds. Where their windows overlap
+/// they are spread over as few recordings as need be, NAME, NAME~2 ..., so that no moment has the
+/// events of two samples. A sample of no sequence is a recording by itself, from 0 to its gap (1 s
+/// if that is not known). The recordings of a sequence are one step of the export, so are the
+/// samples of a shard that are alone. label_map_dictionary.json has the classes, {"0": "Car"}, as
+/// Prophesee's datasets have them.
+class RecordingsExporter : public Exporter {
+ public:
+  RecordingsExporter(const ExportInput& input, const ExportOptions& options, bool keeps_volumes);
+
+  std::string settings() const override;
+  bool works_by_shard() const override { return false; }
+  void finish(const ExportWork& work, const std::vector<const ExportShard*>& shards) const override;
+  void account(const OutgoingSample& sample, LeftOut& left_out) const override;
+  LeftOut whole_samples_left_out() const override;
+
+ protected:
+  /// Where the samples of a recording come from, one after the other.
+  using ForEachSample =
+      std::function<void(const std::function<void(const SampleWindow&, RecordedSample&)>&)>;
+
+  /// Writes the files of a recording. Called side by side.
+  virtual void write_recording(const OutgoingRecording& recording, const ForEachSample& for_each,
+                               ExportFolder::Step& step) const = 0;
+
+  /// Whether a sample has a label that the format has a use for.
+  virtual bool is_labelled(const OutgoingSample&) const { return true; }
+
+  /// None if no source has boxes.
+  const ClassNumbers* numbers() const { return numbers_.get(); }
+
+ private:
+  std::vector<RecordingGroup> lay_recordings(const ExportWork& work,
+                                             const std::vector<const ExportShard*>& shards) const;
+  void write_classes(const ExportWork& work, const std::vector<const ExportShard*>& shards) const;
+  RecordedSample recorded(const OutgoingSample& sample, const SampleWindow& window) const;
+
+  ExportOptions options_;
+  std::unique_ptr<ClassNumbers> numbers_;
+  bool keeps_volumes_;
+  mutable std::int64_t unlabelled_ = 0;  ///< samples of recordings without labels; of `finish`
+};
+
+/// Gives each box without a track a number of its own, beyond those that there are: an object that
+/// was seen once. Throws std::runtime_error for a number beyond 2^32 - 1, which RVT's fields do not
+/// hold.
+void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& recording);
+
+/// A line for each sample: begin, end and label in microseconds as in the recording's files, which
+/// count from `clock_us` on, the number of events, and the sample's id.
+std::string window_line(const SampleWindow& window, const RecordedSample& sample,
+                        std::int64_t clock_us);
+
+/// Appends a number's bytes, little endian.
+template <class Number>
+void put(std::string& bytes, Number number) {
+  bytes.append(reinterpret_cast<const char*>(&number), sizeof(number));
+}
+
+}  // namespace eventgan

@@ -1,0 +1,318 @@
+#include "pipeline/exports/detail/recordings.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cmath>
+#include <deque>
+#include <limits>
+#include <map>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/base/files/sha256.h"
+#include "stages/exports/export_name.h"
+#include "stages/exports/sampled_events.h"
+
+namespace eventgan {
+namespace {
+
+constexpr double kMicroseconds = 1e6;                                            // in a second
+constexpr std::int64_t kLongest_us = std::numeric_limits<std::uint32_t>::max();  // DSEC's times
+
+/// A sample before it has found its recording.
+struct LaidSample {
+  SampleWindow window;
+  VolumeShape shape;
+  bool is_timed = false;  ///< by its frames' times, not their numbers
+};
+
+/// The sequence that the sample is of; none if it is of none. A folder of images is one without a
+/// name.
+std::optional<std::string> sequence_of(const OutgoingSample& sample) {
+  if (!sample.labels.sequence.empty()) return sample.labels.sequence;
+  if (sample.source.dataset == to_string(DatasetKind::kFrames)) return sample.source.dataset;
+  return std::nullopt;
+}
+
+/// The sample on its sequence's clock: by the times of its frames, or else by their numbers, a
+/// second each. None if neither tells when it is.
+std::optional<LaidSample> on_clock(const OutgoingSample& sample) {
+  constexpr double kLast_s = 1e12;
+  const FramePair& pair = sample.labels.pair;
+  if (!sequence_of(sample)) return std::nullopt;
+  const bool is_timed = std::isfinite(pair.gap_s());
+  const double begin_s = is_timed ? pair.previous.time_s : static_cast<double>(pair.previous.index);
+  const double end_s = is_timed ? pair.next.time_s : static_cast<double>(pair.next.index);
+  if (!(begin_s >= 0 && end_s <= kLast_s)) return std::nullopt;
+  const SampleWindow window{.shard = &sample.shard,
+                            .slot = sample.slot,
+                            .begin_us = std::llround(begin_s * kMicroseconds),
+                            .end_us = std::llround(end_s * kMicroseconds)};
+  const std::int64_t length_us = window.end_us - window.begin_us;
+  if (length_us < 1 || length_us > kLongest_us) return std::nullopt;
+  return LaidSample{window, sample.reader.header().volume, is_timed};
+}
+
+/// The window of a sample by itself.
+SampleWindow window_alone(const OutgoingSample& sample) {
+  const double gap_us = std::round(known_gap_s(sample.labels.pair) * kMicroseconds);
+  const double length_us = std::clamp(gap_us, 1.0, static_cast<double>(kLongest_us));
+  return {.shard = &sample.shard,
+          .slot = sample.slot,
+          .begin_us = 0,
+          .end_us = static_cast<std::int64_t>(length_us)};
+}
+
+void set_label_time(SampleWindow& window, double label_position) {
+  const auto length_us = static_cast<double>(window.end_us - window.begin_us);
+  window.label_us = window.begin_us + std::llround(label_position * length_us);
+}
+
+/// The samples of one sequence as recordings, each in the one that ends last before it.
+std::vector<OutgoingRecording> spread(std::vector<LaidSample> samples, const std::string& name,
+                                      const ExportSource& source) {
+  std::ranges::stable_sort(samples, {}, [](const LaidSample& sample) {
+    return std::pair(sample.window.begin_us, sample.window.end_us);
+  });
+  std::vector<OutgoingRecording> recordings;
+  for (const LaidSample& sample : samples) {
+    const SampleWindow& window = sample.window;
+    OutgoingRecording* best = nullptr;
+    for (OutgoingRecording& recording : recordings) {
+      const bool fits = recording.shape == sample.shape && recording.is_timed == sample.is_timed &&
+                        recording.end_us() <= window.begin_us &&
+                        recording.windows.back().label_us < window.label_us &&
+                        window.end_us - recording.begin_us() <= kLongest_us;
+      if (fits && (best == nullptr || recording.end_us() > best->end_us())) best = &recording;
+    }
+    if (best == nullptr) {
+      const std::string number =
+          recordings.empty() ? "" : fmt::format("~{}", recordings.size() + 1);
+      best = &recordings.emplace_back(
+          OutgoingRecording{name + number, &source, sample.shape, sample.is_timed, {}});
+    }
+    best->windows.push_back(window);
+  }
+  return recordings;
+}
+
+/// Hash of everything that the recordings are made from.
+std::string hash_of(const RecordingGroup& group) {
+  Sha256 hash;
+  for (const OutgoingRecording& recording : group.recordings) {
+    hash.update(recording.name + "\n");
+    for (const SampleWindow& window : recording.windows) {
+      hash.update(fmt::format("{} {} {} {} {} {}\n", window.shard->sha256, window.slot,
+                              window.begin_us, window.end_us, window.label_us, window.is_labelled));
+    }
+  }
+  return hash.hex();
+}
+
+/// The readers of the shards that were opened last. Thread safe.
+class LastReaders {
+ public:
+  explicit LastReaders(const ExportInput& input) : input_(input) {}
+
+  std::shared_ptr<const ShardReader> of(const ExportShard& shard) {
+    constexpr std::size_t kMost = 8;
+    const std::lock_guard lock(mutex_);
+    const auto known = std::ranges::find(readers_, &shard, &Entry::first);
+    if (known != readers_.end()) return known->second;
+    readers_.emplace_front(&shard, std::make_shared<ShardReader>(input_.open(shard)));
+    if (readers_.size() > kMost) readers_.pop_back();
+    return readers_.front().second;
+  }
+
+ private:
+  using Entry = std::pair<const ExportShard*, std::shared_ptr<const ShardReader>>;
+  const ExportInput& input_;
+  std::mutex mutex_;
+  std::deque<Entry> readers_;
+};
+
+}  // namespace
+
+double known_gap_s(const FramePair& pair) {
+  const double gap_s = pair.gap_s();
+  return gap_s > 0 ? gap_s : 1;
+}
+
+std::vector<Event> drawn_events(const OutgoingSample& sample, const ExportOptions& options,
+                                double duration_s) {
+  const CounterRandom random =
+      CounterRandom(options.seed).keyed(sample.source.dataset).keyed(sample.labels.sample_id);
+  return sample_events(sample.reader.volume(sample.slot), sample.reader.header().volume, duration_s,
+                       options.counts, random);
+}
+
+RecordingsExporter::RecordingsExporter(const ExportInput& input, const ExportOptions& options,
+                                       bool keeps_volumes)
+    : options_(options), keeps_volumes_(keeps_volumes) {
+  if (std::ranges::any_of(input.sources(), &ExportSource::has_boxes)) {
+    numbers_ = std::make_unique<ClassNumbers>(input, options, 0);
+  } else if (options.classes) {
+    throw UsageError("--classes: expected a source with boxes, got none");
+  }
+}
+
+std::string RecordingsExporter::settings() const {
+  return fmt::format("classes {}\ncounts {}\nseed {}\n", numbers_ ? numbers_->text() : "none",
+                     options_.counts == EventCounts::kPoisson ? "poisson" : "rounded",
+                     options_.seed);
+}
+
+RecordedSample RecordingsExporter::recorded(const OutgoingSample& sample,
+                                            const SampleWindow& window) const {
+  RecordedSample result{sample.labels.sample_id, {}, {}, {}};
+  const std::int64_t length_us = window.end_us - window.begin_us;
+  const auto events =
+      drawn_events(sample, options_, static_cast<double>(length_us) / kMicroseconds);
+  result.events.reserve(events.size());
+  for (const Event& event : events) {
+    // What lies at the end belongs to this window, and a window's end to the next one.
+    const auto t_us = static_cast<std::int64_t>(event.t_s * kMicroseconds);
+    result.events.push_back({window.begin_us + std::min(t_us, length_us - 1),
+                             static_cast<std::uint16_t>(event.x),
+                             static_cast<std::uint16_t>(event.y), event.positive});
+  }
+  if (sample.source.has_boxes()) {
+    const auto take = [&](const ClassNumbers::Entry& entry, const VolumeBox& box) {
+      const auto index = static_cast<std::size_t>(&box - sample.labels.labels.boxes.data());
+      result.boxes.push_back({window.label_us, box.clipped, entry.number,
+                              sample.labels.annotation.boxes.at(index).track_id});
+    };
+    for_each_box(sample, *numbers_, /*keep_ignored=*/false, take, [](const std::string&) {});
+  }
+  if (keeps_volumes_) result.volume = sample.reader.volume(sample.slot);
+  return result;
+}
+
+std::vector<RecordingGroup> RecordingsExporter::lay_recordings(
+    const ExportWork& work, const std::vector<const ExportShard*>& shards) const {
+  std::vector<RecordingGroup> groups;
+  for (const std::string& split : work.input.splits()) {
+    std::map<std::string, std::pair<const ExportSource*, std::vector<LaidSample>>> sequences;
+    std::map<std::string, RecordingGroup> loose;
+    work.walk(of_split(work.input, shards, split), [&](const OutgoingSample& sample) {
+      if (auto laid = on_clock(sample)) {
+        set_label_time(laid->window, sample.labels.pair.label_position);
+        laid->window.is_labelled = is_labelled(sample);
+        auto& [source, samples] =
+            sequences[sample.source.name_prefix + export_name(*sequence_of(sample))];
+        source = &sample.source;
+        samples.push_back(*laid);
+        return;
+      }
+      SampleWindow alone = window_alone(sample);
+      set_label_time(alone, sample.labels.pair.label_position);
+      alone.is_labelled = is_labelled(sample);
+      loose[sample.shard.outline.name].recordings.push_back(
+          {sample.name, &sample.source, sample.reader.header().volume, true, {alone}});
+    });
+    for (auto& [shard, group] : loose) {
+      for (OutgoingRecording& recording : group.recordings) {
+        // A sequence may be called as a sample of no known time.
+        if (sequences.contains(recording.name)) recording.name += "~alone";
+      }
+      groups.push_back({shard, true, std::move(group.recordings)});
+    }
+    for (auto& [name, sequence] : sequences) {
+      auto& [source, samples] = sequence;
+      groups.push_back({split + "+" + name, false, spread(std::move(samples), name, *source)});
+    }
+  }
+  return groups;
+}
+
+void RecordingsExporter::finish(const ExportWork& work,
+                                const std::vector<const ExportShard*>& shards) const {
+  LastReaders readers(work.input);
+  unlabelled_ = 0;
+  for (const RecordingGroup& group : lay_recordings(work, shards)) {
+    ExportFolder::Step step(work.folder, group.step, hash_of(group));
+    if (!step.is_done()) {
+      // Samples alone are made side by side, those of one recording within it.
+      const auto write = [&](const OutgoingRecording& recording) {
+        const auto for_each = [&](const auto& take) {
+          constexpr std::size_t kAtOnce = 16;
+          const std::vector<SampleWindow>& windows = recording.windows;
+          for (std::size_t first = 0; first < windows.size(); first += kAtOnce) {
+            std::vector<RecordedSample> made(std::min(kAtOnce, windows.size() - first));
+            for_each_index(made.size(), work.threads, [&](std::size_t i) {
+              const SampleWindow& window = windows[first + i];
+              const auto reader = readers.of(*window.shard);
+              work.with_sample(
+                  *window.shard, *reader, window.slot,
+                  [&](const OutgoingSample& sample) { made[i] = recorded(sample, window); });
+            });
+            for (std::size_t i = 0; i < made.size(); ++i) take(windows[first + i], made[i]);
+          }
+        };
+        write_recording(recording, for_each, step);
+      };
+      for_each_index(group.recordings.size(), group.is_loose ? work.threads : 1,
+                     [&](std::size_t i) { write(group.recordings[i]); });
+      step.finish();
+    }
+    for (const OutgoingRecording& recording : group.recordings) {
+      const auto count = static_cast<std::int64_t>(recording.windows.size());
+      if (!recording.is_labelled()) unlabelled_ += count;
+      work.advance(count);
+    }
+  }
+  if (numbers_ && !numbers_->names().empty()) write_classes(work, shards);
+}
+
+void RecordingsExporter::write_classes(const ExportWork& work,
+                                       const std::vector<const ExportShard*>& shards) const {
+  ExportFolder::Step step(work.folder, "label_map", input_hash(shards));
+  if (step.is_done()) return;
+  nlohmann::ordered_json classes = nlohmann::ordered_json::object();
+  for (const auto& [number, name] : numbers_->names()) classes[std::to_string(number)] = name;
+  step.write("label_map_dictionary.json", dump_json(classes) + "\n");
+  step.finish();
+}
+
+void RecordingsExporter::account(const OutgoingSample& sample, LeftOut& left_out) const {
+  if (!sample.source.has_boxes()) return;
+  for_each_box(
+      sample, *numbers_, /*keep_ignored=*/false, [](const auto&, const auto&) {},
+      [&](const std::string& why) { ++left_out[why]; });
+}
+
+LeftOut RecordingsExporter::whole_samples_left_out() const {
+  if (unlabelled_ == 0) return {};
+  return {{"samples of recordings without boxes (in raw alone)", unlabelled_}};
+}
+
+void number_tracks(std::vector<RecordedBox>& boxes, const OutgoingRecording& recording) {
+  constexpr std::int64_t kMost = std::numeric_limits<std::uint32_t>::max();
+  std::int64_t last = -1;
+  for (const RecordedBox& box : boxes) last = std::max(last, box.track_id);
+  for (RecordedBox& box : boxes) {
+    if (box.track_id < 0 && last <= kMost) box.track_id = ++last;
+  }
+  if (last > kMost) {
+    throw std::runtime_error(fmt::format("expected track numbers of at most {}, got {}, in {}",
+                                         kMost, last, recording.name));
+  }
+}
+
+std::string window_line(const SampleWindow& window, const RecordedSample& sample,
+                        std::int64_t clock_us) {
+  return fmt::format("{} {} {} {} {}\n", window.begin_us - clock_us, window.end_us - clock_us,
+                     window.label_us - clock_us, sample.events.size(),
+                     escape_controls(sample.sample_id));
+}
+
+}  // namespace eventgan

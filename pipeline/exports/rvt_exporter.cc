@@ -1,0 +1,192 @@
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "pipeline/exports/detail/recordings.h"
+#include "stages/base/archives/numpy_arrays.h"
+#include "stages/exports/array_files.h"
+#include "stages/exports/volume_file.h"
+#include "stages/shards/codec/quantization.h"
+
+namespace eventgan {
+namespace {
+
+constexpr ImageSize kGen1{240, 304};
+
+/// Prophesee's boxes as numpy has them: BBOX_DTYPE of RVT's utils/evaluation/prophesee.
+constexpr char kBoxFields[] =
+    "[('t', '<i8'), ('x', '<f4'), ('y', '<f4'), ('w', '<f4'), ('h', '<f4'), ('class_id', '<u4'), "
+    "('track_id', '<u4'), ('class_confidence', '<f4'), ('', '|V4')]";
+constexpr std::size_t kBoxBytes = 40;
+
+/// Left, top, width and height as float32.
+struct PlacedBox {
+  float x = 0, y = 0, width = 0, height = 0;
+
+  explicit PlacedBox(const Rectangle& box)
+      : x(static_cast<float>(box.left)),
+        y(static_cast<float>(box.top)),
+        width(static_cast<float>(box.right - box.left)),
+        height(static_cast<float>(box.bottom - box.top)) {}
+
+  /// Whether anything is left where RVT's loader looks, from 0 to one pixel less than the size: it
+  /// stops at a box of which nothing is (ObjectLabelBase.clamp_to_frame_, computed here as there).
+  bool is_in_frame_of_rvt(ImageSize size) const {
+    const auto length = [](float begin, float extent, int side) {
+      const auto last = static_cast<float>(side - 1);
+      return std::clamp(begin + extent, 0.0f, last) - std::clamp(begin, 0.0f, last);
+    };
+    return length(x, width, size.width) > 0 && length(y, height, size.height) > 0;
+  }
+};
+
+void put_box(std::string& rows, const RecordedBox& box) {
+  const PlacedBox placed(box.box);
+  put(rows, box.t_us);
+  put(rows, placed.x);
+  put(rows, placed.y);
+  put(rows, placed.width);
+  put(rows, placed.height);
+  put(rows, static_cast<std::uint32_t>(box.class_number));
+  put(rows, static_cast<std::uint32_t>(box.track_id));
+  put(rows, 1.0f);
+  put(rows, std::uint32_t{0});
+}
+
+/// RVT has the negative polarity first.
+std::vector<std::uint16_t> negative_first(const std::vector<float>& volume) {
+  std::vector<std::uint16_t> halves(volume.size());
+  to_halves(volume, halves.data());
+  std::ranges::rotate(halves, halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2));
+  return halves;
+}
+
+/// What RVT (github.com/uzh-rpg/RVT, commit 515034c; data/genx_utils, scripts/genx) and eTraM's
+/// copy of it (github.com/eventbasedvision/eTraM, commit 96bf9cd) read:
+///   raw/SPLIT/RECORDING_td.h5, RECORDING_bbox.npy: for scripts/genx/preprocess_dataset.py;
+///   preprocessed/SPLIT/RECORDING/...: for its dataset class, a representation for each sample.
+/// Times count from the recording's begin.
+class RvtExporter : public RecordingsExporter {
+ public:
+  RvtExporter(const ExportInput& input, const ExportOptions& options)
+      : RecordingsExporter(input, options, /*keeps_volumes=*/true) {}
+
+  bool takes(const ExportSource& source) const override { return source.has_boxes(); }
+
+  void account(const OutgoingSample& sample, LeftOut& left_out) const override {
+    RecordingsExporter::account(sample, left_out);
+    const ImageSize size = sample.reader.header().volume.size;
+    const auto take = [&](const auto&, const VolumeBox& box) {
+      if (!PlacedBox(box.clipped).is_in_frame_of_rvt(size)) {
+        ++left_out["boxes within the last pixel, where RVT's frame ends (in raw alone)"];
+      }
+    };
+    for_each_box(sample, *numbers(), /*keep_ignored=*/false, take, [](const std::string&) {});
+  }
+
+ private:
+  bool is_labelled(const OutgoingSample& sample) const override {
+    bool is_any_left = false;
+    const ImageSize size = sample.reader.header().volume.size;
+    const auto take = [&](const auto&, const VolumeBox& box) {
+      is_any_left |= PlacedBox(box.clipped).is_in_frame_of_rvt(size);
+    };
+    for_each_box(sample, *numbers(), /*keep_ignored=*/false, take, [](const std::string&) {});
+    return is_any_left;
+  }
+
+  void write_recording(const OutgoingRecording& recording, const ForEachSample& for_each,
+                       ExportFolder::Step& step) const override {
+    const std::string below = recording.source->split + "/" + name_of(recording);
+    const std::int64_t clock_us = recording.begin_us();
+    // Of Gen1's size RVT looks for this name.
+    const char* ending = recording.shape.size == kGen1 ? "_td.dat.h5" : "_td.h5";
+    EventColumnsWriter events(step.file("raw/" + below + ending), ColumnFile::kProphesee,
+                              recording.shape.size);
+    // RVT has no sequences without labels.
+    std::optional<VolumeFile> volumes;
+    const std::string representation = fmt::format(
+        "preprocessed/{}/event_representations_v2/eventgan_nbins={}/", below, recording.shape.bins);
+    if (recording.is_labelled()) {
+      volumes.emplace(step.file(representation + "event_representations.h5"), VolumeLayout::kRvt,
+                      recording.windows.size(), recording.shape, sizeof(std::uint16_t));
+    }
+    std::vector<RecordedBox> boxes;
+    std::vector<std::int64_t> times_us;
+    std::string windows;
+    for_each([&](const SampleWindow& window, RecordedSample& sample) {
+      windows += window_line(window, sample, clock_us);
+      for (StampedEvent& event : sample.events) event.t_us -= clock_us;
+      events.add_events(sample.events);
+      if (volumes) {
+        const std::vector<std::uint16_t> halves = negative_first(sample.volume);
+        volumes->write_row(times_us.size(), std::as_bytes(std::span(halves)));
+      }
+      for (RecordedBox& box : sample.boxes) {
+        box.t_us -= clock_us;
+        boxes.push_back(box);
+      }
+      times_us.push_back(window.end_us - clock_us);
+    });
+    events.commit(recording.end_us() - clock_us);
+    step.write("raw/" + below + "_windows.txt", windows);
+    if (boxes.empty()) return;
+    number_tracks(boxes, recording);
+    std::string rows;
+    for (const RecordedBox& box : boxes) put_box(rows, box);
+    step.write("raw/" + below + "_bbox.npy", npy_records(kBoxFields, kBoxBytes, rows));
+    if (!volumes) return;
+    volumes->commit();
+    step.write(representation + "timestamps_us.npy", npy_file("<i8", {times_us.size()}, times_us));
+    write_labels(recording, boxes, "preprocessed/" + below + "/labels_v2/", representation, step);
+  }
+
+  /// The frames that have boxes: their times, where in the list of boxes each begins, and which
+  /// representation each is of.
+  static void write_labels(const OutgoingRecording& recording,
+                           const std::vector<RecordedBox>& boxes, const std::string& labels,
+                           const std::string& representation, ExportFolder::Step& step) {
+    std::string rows;
+    std::vector<std::int64_t> times_us, label_index, representation_index;
+    std::size_t sample = 0;
+    for (const RecordedBox& box : boxes) {
+      if (!PlacedBox(box.box).is_in_frame_of_rvt(recording.shape.size)) continue;
+      if (times_us.empty() || times_us.back() != box.t_us) {
+        while (recording.windows.at(sample).label_us - recording.begin_us() != box.t_us) ++sample;
+        times_us.push_back(box.t_us);
+        label_index.push_back(static_cast<std::int64_t>(rows.size() / kBoxBytes));
+        representation_index.push_back(static_cast<std::int64_t>(sample));
+      }
+      put_box(rows, box);
+    }
+    const std::vector<std::size_t> frames{times_us.size()};
+    step.write(labels + "labels.npz",
+               npz_file({{"labels", npy_records(kBoxFields, kBoxBytes, rows)},
+                         {"objframe_idx_2_label_idx", npy_file("<i8", frames, label_index)}}));
+    step.write(labels + "timestamps_us.npy", npy_file("<i8", frames, times_us));
+    step.write(representation + "objframe_idx_2_repr_idx.npy",
+               npy_file("<i8", frames, representation_index));
+  }
+
+  /// RVT cuts a file's name at its first "bbox".
+  static std::string name_of(const OutgoingRecording& recording) {
+    std::string name = recording.name;
+    for (auto at = name.find("bbox"); at != name.npos; at = name.find("bbox", at)) {
+      name.replace(at, 1, "%62");
+    }
+    return name;
+  }
+};
+
+}  // namespace
+
+std::unique_ptr<Exporter> rvt_exporter(const ExportInput& input, const ExportOptions& options) {
+  return std::make_unique<RvtExporter>(input, options);
+}
+
+}  // namespace eventgan

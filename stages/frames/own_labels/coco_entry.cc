@@ -1,0 +1,145 @@
+#include "stages/frames/own_labels/detail/coco_entry.h"
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/detail/strict_json.h"
+#include "manifests/values/faults.h"
+#include "stages/frames/own_labels/detail/frame_names.h"
+
+namespace eventgan {
+namespace {
+
+/// An entry as a document whose faults are collected, and thrown all together.
+class CocoEntry {
+ public:
+  /// `place` is the file, `what` the entry's kind; its id follows.
+  CocoEntry(const std::string& text, const std::string& place, const std::string& what)
+      : place_(place + " (" + what + ")"), faults_(place_) {
+    auto document = parse_json_text(text, faults_);
+    check();
+    document_ = *std::move(document);
+    const auto id = document_.find("id");
+    if (id == document_.end()) return;
+    place_ = place + " (" + what + " " + dump_json(*id, JsonLayout::kAsciiLine) + ")";
+    faults_ = FaultList(place_);
+  }
+
+  const std::string& place() const { return place_; }
+  StrictObject object() { return StrictValue(document_, faults_).object(); }
+  void check() const {
+    if (!faults_.empty()) throw std::runtime_error(faults_.text());
+  }
+
+ private:
+  std::string place_;
+  FaultList faults_;
+  nlohmann::json document_;
+};
+
+Rectangle read_bbox(const StrictValue& value) {
+  const std::vector<StrictValue> sides = value.elements();
+  if (sides.size() != 4) {
+    value.fault("left, top, width, height");
+    return {};
+  }
+  const double left = sides[0].number(-kFarthest_px, kFarthest_px);
+  const double top = sides[1].number(-kFarthest_px, kFarthest_px);
+  return {left, top, left + sides[2].number(0, kFarthest_px),
+          top + sides[3].number(0, kFarthest_px)};
+}
+
+/// Whether a joint of the annotation is annotated.
+bool read_keypoints(StrictObject& object, std::size_t joints, Person& person) {
+  const auto keypoints = object.find("keypoints");
+  if (!keypoints) return false;
+  const std::vector<StrictValue> numbers = keypoints->elements();
+  if (numbers.empty()) return false;  // of classes without joints
+  if (numbers.size() != 3 * joints) {
+    keypoints->fault("x, y, v of each of " + std::to_string(joints) + " joints");
+    return false;
+  }
+  constexpr double kHalf = 0.5;  // edges to pixels' centres
+  std::int64_t annotated = 0;
+  for (std::size_t i = 0; i < joints; ++i) {
+    Joint joint{kMissingPoint, 0};
+    const Point at{numbers[3 * i].number(-kFarthest_px, kFarthest_px) - kHalf,
+                   numbers[3 * i + 1].number(-kFarthest_px, kFarthest_px) - kHalf};
+    const int visible = numbers[3 * i + 2].integer(0, 2);
+    if (visible > 0) {
+      joint = {at, visible == 2 ? 1 : 0};
+      ++annotated;
+    }
+    person.joints.push_back(joint);
+  }
+  if (const auto count = object.find("num_keypoints")) count->integer(annotated, annotated);
+  return annotated > 0;
+}
+
+}  // namespace
+
+ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path) {
+  constexpr int kLargest = 1'000'000;
+  CocoEntry entry(text, path, "image");
+  StrictObject object = entry.object();
+  const ImageSize size{object.at("height").integer(1, kLargest),
+                       object.at("width").integer(1, kLargest)};
+  object.at("id").integer(id, id);  // another: the file has changed
+  entry.check();
+  return size;
+}
+
+LabelSchema coco_schema(const CocoIndex& index, const std::string& path) {
+  LabelSchema schema;
+  for (const CocoIndex::Category& category : index.categories) {
+    schema.class_names.push_back(category.name);
+    if (category.keypoints.empty()) continue;
+    if (schema.joint_names.empty()) schema.joint_names = category.keypoints;
+    if (schema.joint_names == category.keypoints) continue;
+    throw InputError("expected one list of keypoints, got two, of \"" + category.name +
+                     "\" another, in " + path);
+  }
+  return schema;
+}
+
+void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSize image,
+                         const CocoIndex& index, const LabelSchema& schema, const std::string& path,
+                         Annotation& annotation) {
+  CocoEntry entry(text, path, "annotation");
+  StrictObject object = entry.object();
+  object.at("image_id").integer(image_id, image_id);
+  using Limits = std::numeric_limits<std::int64_t>;
+  Box box;
+  const StrictValue category = object.at("category_id");
+  if (const auto id = category.sound_integer(Limits::min(), Limits::max())) {
+    const auto known =
+        std::ranges::lower_bound(index.categories, *id, {}, &CocoIndex::Category::id);
+    if (known == index.categories.end() || known->id != *id) {
+      category.fault("the id of a category");
+    } else {
+      box.class_id = static_cast<int>(known - index.categories.begin());
+    }
+  }
+  box.xyxy = read_bbox(object.at("bbox"));
+  if (const auto crowd = object.find("iscrowd")) box.ignore = crowd->integer(0, 1) == 1;
+  if (const auto area = object.find("area")) area->number(0, kFarthest_px * kFarthest_px);
+  Person person;
+  const bool is_person = read_keypoints(object, schema.joint_names.size(), person);
+  entry.check();
+  if (!overlaps(box.xyxy, image)) {
+    throw std::runtime_error(outside_text(box.xyxy, image) + ", in " + entry.place());
+  }
+  if (is_person) {
+    person.box = box.xyxy;
+    annotation.persons.push_back(std::move(person));
+  }
+  annotation.boxes.push_back(box);
+}
+
+}  // namespace eventgan

@@ -1,0 +1,381 @@
+#include "stages/frames/own_labels/detail/coco_index.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <iterator>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+
+#include "manifests/documents/detail/json_text.h"
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
+#include "stages/frames/label_name.h"
+#include "stages/frames/source_folders.h"
+
+namespace eventgan {
+namespace {
+
+/// A file read byte for byte, which knows how many the parser has taken.
+class CountedBytes {
+ public:
+  CountedBytes(const std::filesystem::path& file, const std::string& written) : written_(written) {
+    std::string reason;
+    file_ = open_input(file, reason);
+    if (!file_) throw InputError("expected a COCO file, got '" + reason + "', in " + written);
+    fill();
+  }
+
+  bool at_end() const { return next_ == end_; }
+  char current() const { return block_[next_]; }
+  void advance() {
+    ++taken_;
+    if (++next_ == end_) fill();
+  }
+  /// Bytes taken so far: right after a brace, the offset of what follows it.
+  std::uint64_t taken() const { return taken_; }
+
+ private:
+  void fill() {
+    next_ = 0;
+    end_ = std::fread(block_.data(), 1, block_.size(), file_.get());
+    if (end_ == 0 && std::ferror(file_.get())) {
+      throw InputError("expected a readable file, got '" + std::string(std::strerror(errno)) +
+                       "', in " + written_);
+    }
+  }
+
+  std::string written_;
+  InputFile file_;
+  std::array<char, 1 << 16> block_;
+  std::size_t next_ = 0, end_ = 0;
+  std::uint64_t taken_ = 0;
+};
+
+/// The same as the parser takes it. All copies share the bytes; one without is the end.
+class CountedIterator {
+ public:
+  using iterator_category = std::input_iterator_tag;
+  using value_type = char;
+  using difference_type = std::ptrdiff_t;
+  using pointer = const char*;
+  using reference = char;
+
+  CountedIterator() = default;
+  explicit CountedIterator(CountedBytes& bytes) : bytes_(&bytes) {}
+  char operator*() const { return bytes_->current(); }
+  CountedIterator& operator++() {
+    bytes_->advance();
+    return *this;
+  }
+  CountedIterator operator++(int) {
+    CountedIterator before = *this;
+    bytes_->advance();
+    return before;
+  }
+  bool is_end() const { return bytes_ == nullptr || bytes_->at_end(); }
+  friend bool operator==(const CountedIterator& a, const CountedIterator& b) {
+    return a.is_end() == b.is_end();
+  }
+  friend bool operator!=(const CountedIterator& a, const CountedIterator& b) { return !(a == b); }
+
+ private:
+  CountedBytes* bytes_ = nullptr;
+};
+
+/// What joins entries, of one entry.
+struct EntryFields {
+  std::optional<std::int64_t> id, image_id;
+  std::optional<std::string> file_name, name;
+  std::vector<std::string> keypoints;
+};
+
+/// Takes what it wants of the parser's events.
+class CocoReader : public nlohmann::json_sax<nlohmann::json> {
+ public:
+  CocoReader(const CountedBytes& bytes, const std::string& written)
+      : bytes_(bytes), written_(written) {}
+
+  struct Annotation {
+    std::int64_t image_id;
+    ByteRange entry;
+  };
+  CocoIndex index;
+  std::vector<Annotation> annotations;
+
+  bool null() override { return take_value("null"); }
+  bool boolean(bool) override { return take_value("true or false"); }
+  bool number_integer(std::int64_t value) override { return take_integer(value); }
+  bool number_unsigned(std::uint64_t value) override {
+    constexpr auto kMost = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
+    return value <= kMost ? take_integer(static_cast<std::int64_t>(value))
+                          : take_value("a huge number");
+  }
+  bool number_float(double, const std::string&) override { return take_value("a fraction"); }
+  bool binary(nlohmann::json::binary_t&) override { return false; }  // not in JSON text
+
+  bool string(std::string& value) override {
+    if (depth_ == kInEntry && is_image() && key_ == "file_name") {
+      return set(fields_.file_name, std::move(value));
+    }
+    if (depth_ == kInEntry && is_category() && key_ == "name") {
+      return set(fields_.name, std::move(value));
+    }
+    if (depth_ == kInEntry + 1 && in_keypoints_) {
+      fields_.keypoints.push_back(std::move(value));
+      return true;
+    }
+    return take_value("text");
+  }
+
+  bool key(std::string& value) override {
+    if (depth_ == 1) {
+      const auto section = std::ranges::find(kSections, value);
+      section_ = static_cast<std::size_t>(section - kSections.begin());
+      if (section_ < kSections.size() && std::exchange(has_section_[section_], true)) {
+        refuse("the key \"" + value + "\" once", "it twice");
+      }
+    } else if (depth_ == kInEntry) {
+      key_ = std::move(value);
+    }
+    return true;
+  }
+
+  bool start_object(std::size_t) override {
+    if (depth_ == 1 && in_section()) refuse_value("an object");
+    check_not_wanted("an object");
+    if (depth_ == 2 && in_section()) {
+      begin_ = bytes_.taken() - 1;
+      fields_ = {};
+      key_.clear();
+    }
+    ++depth_;
+    return true;
+  }
+
+  bool end_object() override {
+    --depth_;
+    if (depth_ == 2 && in_section()) take_entry();
+    return true;
+  }
+
+  bool start_array(std::size_t) override {
+    if (depth_ == 0) refuse("an object", "a list");
+    if (depth_ == 2 && in_section()) refuse_value("a list");
+    in_keypoints_ = depth_ == kInEntry && is_category() && key_ == "keypoints";
+    if (in_keypoints_ && !fields_.keypoints.empty()) refuse("the key \"keypoints\" once", "twice");
+    check_not_wanted("a list");
+    ++depth_;
+    return true;
+  }
+
+  bool end_array() override {
+    --depth_;
+    if (depth_ == kInEntry) in_keypoints_ = false;
+    return true;
+  }
+
+  bool parse_error(std::size_t, const std::string&,
+                   const nlohmann::detail::exception& error) override {
+    // "[json.exception.parse_error.101] parse error at line 1, column 2: syntax error while ..."
+    std::string reason = error.what();
+    if (const std::size_t at = reason.find("] "); at != std::string::npos) reason.erase(0, at + 2);
+    constexpr std::size_t kLongest = 200;  // it quotes what it read last, which may be long
+    throw InputError("expected JSON, got a " + escape_controls(reason.substr(0, kLongest)) +
+                     ", in " + written_);
+  }
+
+  void check_whole() const {
+    for (std::size_t i = 0; i < kSections.size(); ++i) {
+      if (!has_section_[i]) refuse("a list \"" + std::string(kSections[i]) + "\"", "none");
+    }
+  }
+
+ private:
+  static constexpr std::array<std::string_view, 3> kSections{"images", "annotations", "categories"};
+  static constexpr int kInEntry = 3;  // open: the document, the list, the entry
+
+  bool is_image() const { return section_ == 0; }
+  bool is_annotation() const { return section_ == 1; }
+  bool is_category() const { return section_ == 2; }
+  bool in_section() const { return section_ < kSections.size(); }
+
+  [[noreturn]] void refuse(const std::string& expected, const std::string& got) const {
+    throw InputError("expected " + expected + ", got " + got + ", in " + written_ + " (byte " +
+                     std::to_string(bytes_.taken()) + ")");
+  }
+
+  /// Of a value where the list or an entry of it should be.
+  [[noreturn]] void refuse_value(const std::string& got) const {
+    refuse("a list of objects as \"" + std::string(kSections[section_]) + "\"", got);
+  }
+
+  /// Refuses a value of another kind where an entry has what joins it.
+  void check_not_wanted(const std::string& got) const {
+    if (depth_ == kInEntry + 1 && in_keypoints_) refuse("names as keypoints", got);
+    if (depth_ != kInEntry) return;
+    const auto wants = [&](std::string_view key, const char* expected) {
+      if (key_ == key) refuse(std::string(expected) + " as \"" + key_ + "\"", got);
+    };
+    if (is_image() || is_category()) wants("id", "a whole number");
+    if (is_annotation()) wants("image_id", "a whole number");
+    if (is_image()) wants("file_name", "text");
+    if (is_category()) wants("name", "text");
+    if (is_category() && !in_keypoints_) wants("keypoints", "a list of names");
+  }
+
+  bool take_value(const std::string& got) const {
+    if (depth_ == 0) refuse("an object", got);
+    if (depth_ <= 2 && in_section()) refuse_value(got);
+    check_not_wanted(got);
+    return true;
+  }
+
+  bool take_integer(std::int64_t value) {
+    if (depth_ == kInEntry && (is_image() || is_category()) && key_ == "id") {
+      return set(fields_.id, value);
+    }
+    if (depth_ == kInEntry && is_annotation() && key_ == "image_id") {
+      return set(fields_.image_id, value);
+    }
+    return take_value("a number");
+  }
+
+  template <class T>
+  bool set(std::optional<T>& field, T value) const {
+    if (field) refuse("the key \"" + key_ + "\" once", "it twice");
+    field = std::move(value);
+    return true;
+  }
+
+  void take_entry() {
+    const std::uint64_t length = bytes_.taken() - begin_;
+    if (length > std::numeric_limits<std::uint32_t>::max()) {
+      refuse("an entry of less than 4 GiB", std::to_string(length) + " bytes");
+    }
+    const ByteRange range{begin_, static_cast<std::uint32_t>(length)};
+    const auto need = [&](const auto& field, const char* name) {
+      if (!field) {
+        refuse("an entry of \"" + std::string(kSections[section_]) + "\" with " + name, "none");
+      }
+    };
+    if (is_annotation()) {
+      need(fields_.image_id, "image_id");
+      annotations.push_back({*fields_.image_id, range});
+      return;
+    }
+    need(fields_.id, "id");
+    if (is_image()) {
+      need(fields_.file_name, "file_name");
+      index.images.push_back({*fields_.id, range, *std::move(fields_.file_name)});
+    } else {
+      need(fields_.name, "name");
+      index.categories.push_back(
+          {*fields_.id, *std::move(fields_.name), std::move(fields_.keypoints)});
+    }
+  }
+
+  const CountedBytes& bytes_;
+  std::string written_;
+  int depth_ = 0;  // of objects and lists that are open
+  std::size_t section_ = kSections.size();
+  std::array<bool, kSections.size()> has_section_{};
+  std::string key_;  // the entry's last
+  bool in_keypoints_ = false;
+  std::uint64_t begin_ = 0;
+  EntryFields fields_;
+};
+
+void refuse_any(const std::vector<std::string>& names, const std::string& expected,
+                const std::string& got, const std::string& written) {
+  if (names.empty()) return;
+  throw InputError("expected " + expected + ", got " + counted(names, got) + ", in " + written);
+}
+
+void check_categories(CocoIndex& index, const std::string& written) {
+  auto& categories = index.categories;
+  std::ranges::stable_sort(categories, {}, &CocoIndex::Category::id);
+  std::vector<std::string> ids, names;
+  std::set<std::string> known;
+  for (std::size_t i = 0; i < categories.size(); ++i) {
+    if (i > 0 && categories[i].id == categories[i - 1].id) {
+      ids.push_back(std::to_string(categories[i].id));
+    }
+    const bool is_sound =
+        is_label_name(categories[i].name) && known.insert(categories[i].name).second;
+    if (!is_sound) names.push_back("\"" + escape_controls(categories[i].name) + "\"");
+  }
+  refuse_any(ids, "each category's id once", "more often", written);
+  refuse_any(names, "each category with a name of its own, without control characters", "others",
+             written);
+  for (const CocoIndex::Category& category : categories) {
+    std::set<std::string> joints;
+    for (const std::string& joint : category.keypoints) {
+      if (is_label_name(joint) && joints.insert(joint).second) continue;
+      refuse_any({escape_controls(joint)}, "each keypoint with a name of its own", "another",
+                 written);
+    }
+  }
+}
+
+/// Sorts the annotations by image, in linear time.
+void join(const std::vector<CocoReader::Annotation>& annotations, CocoIndex& index,
+          const std::string& written) {
+  std::unordered_map<std::int64_t, std::size_t> image_of_id;
+  image_of_id.reserve(index.images.size());
+  std::vector<std::string> twice;
+  for (std::size_t i = 0; i < index.images.size(); ++i) {
+    if (!image_of_id.emplace(index.images[i].id, i).second) {
+      twice.push_back(std::to_string(index.images[i].id));
+    }
+  }
+  refuse_any(twice, "each image's id once", "more often", written);
+
+  index.images.emplace_back();
+  std::vector<std::uint32_t> images;
+  images.reserve(annotations.size());
+  std::vector<std::string> of_none;
+  for (const CocoReader::Annotation& annotation : annotations) {
+    const auto image = image_of_id.find(annotation.image_id);
+    if (image == image_of_id.end()) {
+      of_none.push_back(std::to_string(annotation.image_id));
+      continue;
+    }
+    images.push_back(static_cast<std::uint32_t>(image->second));
+    ++index.images[image->second + 1].first_annotation;
+  }
+  refuse_any(of_none, "annotations of the file's images", "of other image_ids", written);
+  for (std::size_t i = 1; i < index.images.size(); ++i) {
+    index.images[i].first_annotation += index.images[i - 1].first_annotation;
+  }
+  std::vector<std::size_t> next;
+  next.reserve(index.images.size());
+  for (const CocoIndex::Image& image : index.images) next.push_back(image.first_annotation);
+  index.annotations.resize(annotations.size());
+  for (std::size_t i = 0; i < annotations.size(); ++i) {
+    index.annotations[next[images[i]]++] = annotations[i].entry;
+  }
+}
+
+}  // namespace
+
+CocoIndex index_coco(const std::filesystem::path& file, const std::string& written) {
+  CountedBytes bytes(file, written);
+  CocoReader reader(bytes, written);
+  nlohmann::json::sax_parse(CountedIterator(bytes), CountedIterator(), &reader);
+  // The parser takes a NUL for the end.
+  if (!bytes.at_end()) throw InputError("expected JSON, got a NUL, in " + written);
+  reader.check_whole();
+  CocoIndex index = std::move(reader.index);
+  check_categories(index, written);
+  join(reader.annotations, index, written);
+  return index;
+}
+
+}  // namespace eventgan

@@ -1,0 +1,102 @@
+#include <charconv>
+#include <stdexcept>
+#include <unordered_map>
+#include <utility>
+
+#include "stages/base/files/input_file.h"
+#include "stages/frames/own_labels/detail/coco_entry.h"
+#include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/own_labels/own_labels.h"
+
+namespace eventgan {
+namespace {
+
+class CocoLabels : public OwnLabels {
+ public:
+  CocoLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
+      : OwnLabels(std::move(labelled)),
+        file_(base / spec.path),
+        written_(spec.path),
+        index_(index_coco(file_, written_)) {
+    annotation_files_.push_back(written_);
+    schema_ = coco_schema(index_, written_);
+    find_images(FrameNames(source()));
+    note_without_label(written_);
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override try {
+    const CocoIndex::Image& image = find(label_key);
+    const FileBytes bytes(file_);
+    const auto read = [&](const ByteRange& range) {
+      const auto part = bytes.read(range.offset, range.length);
+      return std::string(reinterpret_cast<const char*>(part.data()), part.size());
+    };
+    std::string text = read(image.entry);
+    Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
+    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
+    Annotation annotation;
+    annotation.original = "{\"image\": " + text + ", \"annotations\": [";
+    const CocoIndex::Image* const next = &image + 1;
+    for (std::size_t i = image.first_annotation; i < next->first_annotation; ++i) {
+      text = read(index_.annotations[i]);
+      annotation.original += (i > image.first_annotation ? ", " : "") + text;
+      add_coco_annotation(text, image.id, std::get<ImageSize>(size), index_, schema_, written_,
+                          annotation);
+    }
+    annotation.original += "]}";
+    return annotation;
+  } catch (const std::runtime_error& error) {
+    return SampleFault{error.what()};
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return written_ + "#images/" + label_key;
+  }
+
+ private:
+  void find_images(const FrameNames& names) {
+    std::vector<std::string> of_several;
+    for (std::size_t i = 0; i < index_.image_count(); ++i) {
+      CocoIndex::Image& image = index_.images[i];
+      const std::string key = std::to_string(image.id);
+      place_of_id_.emplace(image.id, i);
+      const FrameNames::Match match = names.find(image.file_name);
+      if (match.frame == FrameNames::kSeveral) {
+        of_several.push_back(image.file_name);
+      } else if (match.frame == FrameNames::kNone) {
+        give_absent(match.below_root, key);
+      } else {
+        give(match.frame, key);
+      }
+      std::string().swap(image.file_name);
+    }
+    refuse_bare_names(of_several, written_);
+  }
+
+  const CocoIndex::Image& find(const std::string& label_key) const {
+    std::int64_t id = 0;
+    const char* const end = label_key.data() + label_key.size();
+    const auto [stop, error] = std::from_chars(label_key.data(), end, id);
+    const auto place = place_of_id_.find(id);
+    if (error != std::errc() || stop != end || place == place_of_id_.end()) {
+      throw std::runtime_error("expected an image of the file, got none, in " +
+                               label_place(label_key));
+    }
+    return index_.images[place->second];
+  }
+
+  std::filesystem::path file_;
+  std::string written_;
+  CocoIndex index_;
+  std::unordered_map<std::int64_t, std::size_t> place_of_id_;
+};
+
+}  // namespace
+
+std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
+                                            const std::filesystem::path& base,
+                                            LabelledSource source) {
+  return std::make_unique<CocoLabels>(spec, base, std::move(source));
+}
+
+}  // namespace eventgan

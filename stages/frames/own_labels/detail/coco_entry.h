@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+#include "stages/frames/own_labels/detail/coco_index.h"
+
+namespace eventgan {
+
+// Entries of a COCO file that was indexed, read strictly; keys that are not needed are passed over.
+// All throw std::runtime_error, "PATH (annotation 17): $.bbox[2]: expected X, got Y", a line a
+// fault; an id that is another than expected is a fault too, since the file has changed then.
+
+/// What an entry of `images` says of the image's size.
+ImageSize read_coco_image(const std::string& text, std::int64_t id, const std::string& path);
+
+/// What classes and joints a file has: the categories in their order, and the joints that one of
+/// them has. Throws InputError if two have different ones.
+LabelSchema coco_schema(const CocoIndex& index, const std::string& path);
+
+/// Adds an entry of `annotations`, a box and perhaps a person, to those of the image.
+void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSize image,
+                         const CocoIndex& index, const LabelSchema& schema, const std::string& path,
+                         Annotation& annotation);
+
+}  // namespace eventgan

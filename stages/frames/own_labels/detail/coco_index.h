@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace eventgan {
+
+/// A part of a file.
+struct ByteRange {
+  std::uint64_t offset = 0;
+  std::uint32_t length = 0;
+};
+
+/// What a COCO file holds, and where: of its images and annotations only what joins them is read.
+struct CocoIndex {
+  struct Image {
+    std::int64_t id = 0;
+    ByteRange entry;  ///< from '{' to '}'
+    std::string file_name;
+    std::size_t first_annotation = 0;  ///< in `annotations`; its last is before the next image's
+  };
+  struct Category {
+    std::int64_t id = 0;
+    std::string name;
+    std::vector<std::string> keypoints;
+  };
+  std::vector<Image> images;           ///< in the file's order, and one without id behind them
+  std::vector<ByteRange> annotations;  ///< by image, of each in the file's order
+  std::vector<Category> categories;    ///< ascending by id, distinct ids and names
+
+  std::size_t image_count() const { return images.size() - 1; }
+};
+
+/// Reads a COCO file once from its begin to its end, in time and memory that grow with its length
+/// alone. Throws InputError naming the file (`written`) if it cannot be read, is not JSON, or has
+/// no lists `images`, `annotations` and `categories` of entries that each have what joins them
+/// (images[].id and file_name, annotations[].image_id, categories[].id and name); if an image, a
+/// category or a category's name is there twice, or an annotation is of no image: these all
+/// counted, and the first twenty named.
+CocoIndex index_coco(const std::filesystem::path& file, const std::string& written);
+
+}  // namespace eventgan

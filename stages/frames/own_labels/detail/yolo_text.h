@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/labels.h"
+
+namespace eventgan {
+
+/// What classes and joints a YOLO dataset has.
+struct YoloSchema {
+  LabelSchema names;
+  bool has_visibility = false;  ///< of joints: kpt_shape [J, 3]
+};
+
+/// Of data.yaml the keys `names` (a list, or a map from 0, 1, ...), `nc` (how many), `kpt_shape`
+/// ([J, 2] or [J, 3]) and `kpt_names` (a list, or a map from classes to lists that are all one).
+/// Throws InputError if the text is no YAML, is longer than 1 MiB, or one of these is not so.
+YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path);
+
+/// classes.txt: a name a line. Throws InputError if there is none, one is empty or there twice.
+YoloSchema parse_yolo_classes(std::string_view text, const std::string& path);
+
+/// An image's text (open_yolo_labels): its boxes, and with joints its persons, in pixels of an
+/// image of that size; `original` is the text. A fault names `path` and the line: another number of
+/// columns, a class beyond the names, a share that is not within 0..1 by more than 1e-6.
+Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
+                                    const std::string& path);
+
+}  // namespace eventgan

@@ -1,0 +1,139 @@
+#include "stages/frames/own_labels/detail/file_per_image.h"
+
+#include <algorithm>
+#include <system_error>
+#include <utility>
+
+#include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/sequences/image_folder.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string joined(const std::string& folder, const std::string& name) {
+  return folder.empty() || name.empty() ? folder + name : folder + "/" + name;
+}
+
+fs::path normal(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
+
+bool is_folder(const fs::path& path) {
+  std::error_code error;
+  return fs::is_directory(path, error);
+}
+
+}  // namespace
+
+FilePerImage::FilePerImage(const LabelSpec& spec, const fs::path& base, LabelledSource labelled,
+                           LabelFiles names)
+    : OwnLabels(std::move(labelled)), root_(spec.path, base), names_(std::move(names)) {
+  root_.require_folder("");
+  if (source().is_video) {
+    find_of_videos();
+  } else {
+    find_of_images();
+  }
+  std::ranges::sort(annotation_files_);
+  note_without_label(root_.written(""));
+}
+
+/// Names of the labels in a folder below `path`.
+std::vector<std::string> FilePerImage::files_in(const std::string& folder) const {
+  std::vector<std::string> names = root_.files_in(folder);
+  std::erase_if(names, [&](const std::string& name) {
+    return lower_extension(name) != names_.extension || name == names_.other_file ||
+           name.starts_with('.');
+  });
+  return names;
+}
+
+/// Where the labels of a folder of images lie, below `path`.
+std::string FilePerImage::folder_of(const std::string& images) const {
+  const fs::path on_disk = normal(source().root.on_disk(images));
+  std::vector<fs::path> parts(on_disk.begin(), on_disk.end());
+  const auto last = std::find_if(parts.rbegin(), parts.rend(), [&](const fs::path& part) {
+    return std::ranges::find(names_.image_folders, part.string()) != names_.image_folders.end();
+  });
+  if (last != parts.rend()) {
+    *last = names_.label_folder;
+    fs::path replaced;
+    for (const fs::path& part : parts) {
+      if (!part.empty()) replaced /= part;
+    }
+    fs::path path = normal(root_.on_disk(""));
+    if (!path.has_filename()) path = path.parent_path();  // "data/"
+    const std::string below = replaced.lexically_relative(path).generic_string();
+    const bool is_below = !below.empty() && below != ".." && !below.starts_with("../");
+    if (is_below && is_folder(replaced)) return below == "." ? "" : below;
+  }
+  std::string in_labels = joined(std::string(names_.label_folder), images);
+  return is_folder(root_.on_disk(in_labels)) ? in_labels : images;
+}
+
+void FilePerImage::find_of_images() {
+  std::map<std::string, std::map<std::string, std::size_t>> folders;  // of images: stem to frame
+  for (std::size_t i = 0; i < source().frames.size(); ++i) {
+    const fs::path name(source().frames[i].name);
+    folders[name.parent_path().generic_string()].emplace(name.stem().string(), i);
+  }
+  std::set<std::string> used;
+  for (const auto& [images, stems] : folders) {
+    const std::string folder = folder_of(images);
+    used.insert(folder);
+    // What an absent image is called nobody says: most likely as the others.
+    const fs::path extension = fs::path(source().frames[stems.begin()->second].name).extension();
+    for (const std::string& name : files_in(folder)) {
+      const std::string key = joined(folder, name);
+      const std::string stem = fs::path(name).stem().string();
+      annotation_files_.push_back(root_.written(key));
+      const auto frame = stems.find(stem);
+      if (frame != stems.end()) {
+        give(frame->second, key);
+      } else {
+        give_absent(joined(images, stem + extension.string()), key);
+      }
+    }
+  }
+  note_unused(folder_of(""), used);
+}
+
+/// Tells of folders with labels beside those that have images.
+void FilePerImage::note_unused(const std::string& folder, const std::set<std::string>& used) {
+  std::vector<std::string> unused;
+  for (const std::string& name : root_.folders_in(folder)) {
+    const std::string below = joined(folder, name);
+    if (!used.contains(below) && !files_in(below).empty()) unused.push_back(name);
+  }
+  if (unused.empty()) return;
+  notes_.push_back(
+      counted(unused, "folders of labels without images left out in " + root_.written(folder)));
+}
+
+void FilePerImage::find_of_videos() {
+  const FrameNames names(source());
+  const std::string label_folder(names_.label_folder);
+  const std::string folder = is_folder(root_.on_disk(label_folder)) ? label_folder : "";
+  const auto take = [&](const std::string& key, const std::string& frame_name) {
+    annotation_files_.push_back(root_.written(key));
+    const std::size_t frame = names.find(frame_name).frame;
+    if (frame < source().frames.size()) {
+      give(frame, key);
+    } else {
+      give_absent(frame_name, key);
+    }
+  };
+  for (const std::string& name : files_in(folder)) {
+    const std::string stem = fs::path(name).stem().string();
+    const std::size_t mark = stem.rfind('_');
+    take(joined(folder, name),
+         mark == std::string::npos ? stem : stem.substr(0, mark) + "/" + stem.substr(mark + 1));
+  }
+  for (const std::string& clip : root_.folders_in(folder)) {
+    for (const std::string& name : files_in(joined(folder, clip))) {
+      take(joined(joined(folder, clip), name), clip + "/" + fs::path(name).stem().string());
+    }
+  }
+}
+
+}  // namespace eventgan

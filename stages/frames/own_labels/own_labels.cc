@@ -1,0 +1,75 @@
+#include "stages/frames/own_labels/own_labels.h"
+
+#include <stdexcept>
+#include <utility>
+
+#include "stages/frames/decoding/frame_decoder.h"
+
+namespace eventgan {
+
+void OwnLabels::give(std::size_t frame, const std::string& key) {
+  FrameLabel& label = labels_.at(frame);
+  frame_of_key_.emplace(key, frame);
+  if (label.key.empty()) {
+    label.key = key;
+  } else if (label.fault.empty()) {
+    label.fault = "expected one label of " + source_.root.written(source_.frames[frame].name) +
+                  ", got two, in " + label_place(label.key) + " and " + label_place(key);
+  }
+}
+
+void OwnLabels::give_absent(const std::string& name, const std::string& key) {
+  absent_.push_back({name, key});
+}
+
+void OwnLabels::refuse_bare_names(const std::vector<std::string>& names,
+                                  const std::string& labels_path) const {
+  if (names.empty()) return;
+  throw InputError("expected images' paths below " + source_.root.written("") + ", got " +
+                   counted(names, "bare names that several of its folders have") + ", in " +
+                   labels_path);
+}
+
+void OwnLabels::note_without_label(const std::string& labels_path) {
+  std::size_t without = 0;
+  for (const FrameLabel& label : labels_) without += label.key.empty();
+  if (without == 0) return;
+  notes_.push_back(std::to_string(without) + " of " + std::to_string(labels_.size()) +
+                   " frames have no label in " + labels_path + ": no samples, but paired frames");
+}
+
+Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,
+                                         std::optional<ImageSize> claimed) const {
+  const auto found = frame_of_key_.find(label_key);
+  if (found == frame_of_key_.end()) {
+    return SampleFault{"expected a label of an image of the source, got one of none, in " +
+                       label_place(label_key)};
+  }
+  const SourceFrame& frame = source_.frames[found->second];
+  Outcome<ImageSize> size =
+      frame.size ? Outcome<ImageSize>(*frame.size)
+                 : probe_image_size(source_.root.on_disk(frame.name), ImageOrientation::kUpright);
+  if (is_fault(size) || !claimed || std::get<ImageSize>(size) == *claimed) return size;
+  return SampleFault{"expected an image of " + to_string(*claimed) + ", as " +
+                     label_place(label_key) + " says, got " + to_string(std::get<ImageSize>(size)) +
+                     ", in " + source_.root.written(frame.name)};
+}
+
+std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source) {
+  switch (spec.format) {
+    case LabelFormat::kCoco:
+      return open_coco_labels(spec, base, std::move(source));
+    case LabelFormat::kYolo:
+      return open_yolo_labels(spec, base, std::move(source));
+    case LabelFormat::kVoc:
+      return open_voc_labels(spec, base, std::move(source));
+    case LabelFormat::kMot:
+      return open_mot_labels(spec, base, std::move(source));
+    case LabelFormat::kCsv:
+      return open_csv_labels(spec, base, std::move(source));
+  }
+  throw std::logic_error("open_own_labels: not a format of labels");
+}
+
+}  // namespace eventgan

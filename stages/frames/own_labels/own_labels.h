@@ -1,0 +1,174 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "manifests/values/frames.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+#include "stages/frames/source_folders.h"
+
+namespace eventgan {
+
+/// A frame of a source of images or videos, as labels may name it.
+struct SourceFrame {
+  /// Of an image its path below ROOT, with forward slashes ("clip/000012.jpg"); of frame 12 of
+  /// clip.mp4, "clip/12".
+  std::string name;
+  std::string sequence;
+  std::int64_t number = 0;        ///< FrameRef::index
+  std::optional<ImageSize> size;  ///< of a video's frames; an image is asked when it is needed
+};
+
+/// What a source is that has labels of its own.
+struct LabelledSource {
+  SourceRoot root;
+  std::vector<SourceFrame> frames;  ///< by sequence, in each ascending by number
+  bool is_video = false;            ///< its frames are of videos
+};
+
+/// What the labels say of one frame of the source.
+struct FrameLabel {
+  std::string key;    ///< LabelledFrame::label_key; empty: the frame has no label
+  std::string fault;  ///< LabelledFrame::fault
+};
+
+/// A frame that the labels name and the source does not have.
+struct AbsentFrame {
+  std::string name;  ///< as SourceFrame::name; of a video perhaps with zeros
+  std::string key;
+};
+
+/// Labels of one's own for the frames of a source. What `label_key`s are, and where each format's
+/// labels lie, the functions below say. Coordinates are in pixels of the image turned upright as
+/// its EXIF orientation says. A box is a fault of its image if it is nowhere within it; one that
+/// reaches beyond an edge is kept as it is.
+///
+/// Thread safety: all methods may be called from several threads at once.
+class OwnLabels {
+ public:
+  virtual ~OwnLabels() = default;
+  OwnLabels(const OwnLabels&) = delete;
+  OwnLabels& operator=(const OwnLabels&) = delete;
+
+  const LabelledSource& source() const { return source_; }
+  const LabelSchema& schema() const { return schema_; }
+  /// One for each of the source's frames.
+  const std::vector<FrameLabel>& labels() const { return labels_; }
+  const std::vector<AbsentFrame>& absent() const { return absent_; }
+
+  /// As those of Dataset.
+  const std::vector<std::string>& annotation_files() const { return annotation_files_; }
+  const std::vector<std::string>& notes() const { return notes_; }
+  virtual Outcome<Annotation> annotation(const std::string& label_key) const = 0;
+  virtual std::string label_place(const std::string& label_key) const = 0;
+
+  /// What the labels say about a sequence's rate; none if they do not.
+  virtual std::optional<double> frames_per_second(const std::string& /*sequence*/) const {
+    return std::nullopt;
+  }
+
+ protected:
+  explicit OwnLabels(LabelledSource source)
+      : source_(std::move(source)), labels_(source_.frames.size()) {}
+
+  /// Gives a frame its label. A second one is a fault of the sample, which names both places.
+  void give(std::size_t frame, const std::string& key);
+
+  /// Adds a frame that the source does not have.
+  void give_absent(const std::string& name, const std::string& key);
+
+  /// Throws InputError if there are any: names of images that several folders of ROOT have.
+  void refuse_bare_names(const std::vector<std::string>& names,
+                         const std::string& labels_path) const;
+
+  /// Tells how many frames have no label; called once all are given.
+  void note_without_label(const std::string& labels_path);
+
+  /// The size of the image that the key is of, upright; a fault if it cannot be read or is another
+  /// than the labels claim.
+  Outcome<ImageSize> image_size(const std::string& label_key,
+                                std::optional<ImageSize> claimed = std::nullopt) const;
+
+  LabelSchema schema_;
+  std::vector<std::string> annotation_files_;
+  std::vector<std::string> notes_;
+
+ private:
+  LabelledSource source_;
+  std::vector<FrameLabel> labels_;
+  std::vector<AbsentFrame> absent_;
+  std::unordered_map<std::string, std::size_t> frame_of_key_;
+};
+
+/// Opens the labels that `spec` tells of; its path starts at `base`, the manifest's folder. Throws
+/// InputError if a file of them is missing or broken as a whole.
+std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source);
+
+/// COCO's instances and person keypoints: `path` is the JSON file. `file_name` is the image's path
+/// below ROOT; or begins with the folders that ROOT ends in ("val2017/1.jpg" of ROOT/1.jpg in
+/// .../val2017); or is a bare name that is in one folder of ROOT alone. Of a video's frame it is
+/// "STEM/NUMBER", perhaps with an extension, counted from 0. The label_key is the image's id, its
+/// place is "FILE#images/ID".
+///
+/// Classes are numbered by ascending category id. `iscrowd` becomes Box::ignore. An annotation with
+/// keypoints is a Box, and a Person with it if a joint is annotated; `bbox` and `keypoints` are
+/// both measured from the image's left and upper edge, as exports have them, so that a joint lies
+/// half a pixel less in Joint::at. Annotation::original is {"image": ENTRY, "annotations": [ENTRY,
+/// ...]}, each entry byte for byte as in the file.
+///
+/// The file is read through once, whatever its size, and of each entry its place is kept: about 20
+/// bytes an annotation and 200 an image. An entry is read again, and strictly, when its annotation
+/// is asked for. Throws InputError where the file is no COCO file: broken JSON, an id twice, an
+/// annotation of no image, a bare name that several images have.
+std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
+                                            const std::filesystem::path& base,
+                                            LabelledSource source);
+
+/// YOLO's text files: `path` is their folder, or one above it, and it or the folder above it has
+/// data.yaml (`names`, a list or a map from number; `kpt_shape`) or classes.txt (a name a line). An
+/// image's text is at the image's own path with the last folder "images" replaced by "labels" if
+/// that is below `path`, else at the image's path below ROOT, below `path`/labels or `path`. Of
+/// frame 12 of clip.mp4 it is clip_000012.txt or clip/000012.txt, with any number of zeros, counted
+/// from 0. The label_key is the text's path below `path`. An empty text is an image without
+/// objects; an image without text is no sample.
+///
+/// A line is "class xc yc w h", shares of the image's width and height from its left and upper
+/// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
+/// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
+/// if there are 17, else "0", "1", ... Outlines (segmentation) are refused.
+std::unique_ptr<OwnLabels> open_yolo_labels(const LabelSpec& spec,
+                                            const std::filesystem::path& base,
+                                            LabelledSource source);
+
+/// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
+/// "JPEGImages" or "images" replaced by "Annotations". All are read at opening, since classes are
+/// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
+/// file without <object>.
+std::unique_ptr<OwnLabels> open_voc_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source);
+
+/// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
+/// SEQUENCE/gt/gt.txt or SEQUENCE/gt.txt; of images right in ROOT gt/gt.txt or gt.txt. Frame 1 is
+/// the image numbered 1, or the first where images are numbered from 0 (which a note tells), or a
+/// video's frame 0. Images without numbers are counted in their order, and must be all of the
+/// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
+/// above its folder gt, gives the sequence's rate and the images' size. The label_key is
+/// "GT_FILE#FRAME", GT_FILE below `path`.
+std::unique_ptr<OwnLabels> open_mot_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source);
+
+/// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The
+/// label_key is the image as the table writes it.
+std::unique_ptr<OwnLabels> open_csv_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source);
+
+}  // namespace eventgan

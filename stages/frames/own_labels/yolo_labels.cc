@@ -1,0 +1,62 @@
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "stages/frames/own_labels/detail/file_per_image.h"
+#include "stages/frames/own_labels/detail/yolo_text.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::string_view kClassesFile = "classes.txt";
+
+class YoloLabels : public FilePerImage {
+ public:
+  YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
+      : FilePerImage(spec, base, std::move(labelled),
+                     {".txt", {"images"}, "labels", kClassesFile}) {
+    read_classes(base);
+    std::ranges::sort(annotation_files_);
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    Outcome<std::string> text = root().read(label_key);
+    if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
+    Outcome<ImageSize> size = image_size(label_key);
+    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
+    return parse_yolo_text(std::get<std::string>(std::move(text)), classes_,
+                           std::get<ImageSize>(size), label_place(label_key));
+  }
+
+ private:
+  void read_classes(const std::filesystem::path& base) {
+    const std::string folder = root().written("");
+    const SourceRoot above(std::filesystem::path(folder).parent_path().generic_string(), base);
+    for (const SourceRoot& place : {root(), above}) {
+      for (const std::string_view name : {std::string_view("data.yaml"), kClassesFile}) {
+        if (!place.has_file(name)) continue;
+        const std::string text = place.read_or_throw(name);
+        const std::string path = place.written(name);
+        classes_ =
+            name == kClassesFile ? parse_yolo_classes(text, path) : parse_yolo_yaml(text, path);
+        schema_ = classes_.names;
+        annotation_files_.push_back(path);
+        return;
+      }
+    }
+    throw InputError("expected data.yaml or classes.txt with the classes' names, got neither, in " +
+                     folder + " and the folder above it");
+  }
+
+  YoloSchema classes_;
+};
+
+}  // namespace
+
+std::unique_ptr<OwnLabels> open_yolo_labels(const LabelSpec& spec,
+                                            const std::filesystem::path& base,
+                                            LabelledSource source) {
+  return std::make_unique<YoloLabels>(spec, base, std::move(source));
+}
+
+}  // namespace eventgan

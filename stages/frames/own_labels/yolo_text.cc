@@ -1,0 +1,282 @@
+#include "stages/frames/own_labels/detail/yolo_text.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <optional>
+#include <set>
+#include <span>
+#include <stdexcept>
+#include <utility>
+#include <vector>
+
+#include "manifests/documents/detail/json_text.h"
+#include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/label_name.h"
+#include "stages/frames/own_labels/detail/frame_names.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::array<const char*, 17> kCocoJoints{
+    "nose",           "left_eye",   "right_eye",   "left_ear",   "right_ear",   "left_shoulder",
+    "right_shoulder", "left_elbow", "right_elbow", "left_wrist", "right_wrist", "left_hip",
+    "right_hip",      "left_knee",  "right_knee",  "left_ankle", "right_ankle"};
+
+/// Reads the few keys that are needed; throws InputError.
+class YoloYaml {
+ public:
+  YoloYaml(const YAML::Node& document, const std::string& path) : path_(path) {
+    if (!document.IsMap()) refuse("keys and values", "something else");
+    for (const auto& entry : document) {
+      if (!entry.first.IsScalar()) continue;
+      const std::string key = entry.first.Scalar();
+      const bool is_known =
+          key == "names" || key == "nc" || key == "kpt_shape" || key == "kpt_names";
+      if (is_known && !keys_.emplace(key, entry.second).second) refuse(key + " once", "it twice");
+    }
+  }
+
+  YoloSchema read() const {
+    YoloSchema schema;
+    const auto names = keys_.find("names");
+    if (names == keys_.end()) refuse("names", "none");
+    schema.names.class_names = read_names("names", names->second);
+    if (const auto count = keys_.find("nc"); count != keys_.end()) {
+      const std::size_t classes = schema.names.class_names.size();
+      if (read_number("nc", count->second) != static_cast<int>(classes)) {
+        refuse("nc: " + std::to_string(classes) + ", as many as names", count->second.Scalar());
+      }
+    }
+    if (const auto shape = keys_.find("kpt_shape"); shape != keys_.end()) {
+      read_joints(shape->second, schema);
+    }
+    return schema;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& expected, const std::string& got) const {
+    throw InputError("expected " + expected + ", got " + escape_controls(got) + ", in " + path_);
+  }
+
+  int read_number(const std::string& key, const YAML::Node& node) const {
+    const auto number = node.IsScalar() ? parse_number<int>(node.Scalar()) : std::nullopt;
+    if (!number) refuse("a whole number as " + key, node.IsScalar() ? node.Scalar() : "a list");
+    return *number;
+  }
+
+  std::vector<std::string> read_names(const std::string& key, const YAML::Node& node) const {
+    std::map<int, std::string> by_number;
+    const auto add = [&](int number, const YAML::Node& name) {
+      if (!name.IsScalar() || !is_label_name(name.Scalar())) {
+        refuse("a name each in " + key, "another value");
+      }
+      if (!by_number.emplace(number, name.Scalar()).second) {
+        refuse("each number once in " + key, std::to_string(number) + " twice");
+      }
+    };
+    if (node.IsSequence()) {
+      for (const auto& name : node) add(static_cast<int>(by_number.size()), name);
+    } else if (node.IsMap()) {
+      for (const auto& entry : node) add(read_number(key, entry.first), entry.second);
+    }
+    if (by_number.empty()) refuse("a list of names, or a map of them, as " + key, "none");
+    const int last = static_cast<int>(by_number.size()) - 1;
+    if (by_number.begin()->first != 0 || by_number.rbegin()->first != last) {
+      refuse("the numbers 0.." + std::to_string(last) + " in " + key, "others");
+    }
+    std::vector<std::string> names;
+    for (auto& [number, name] : by_number) names.push_back(std::move(name));
+    check_distinct(key, names);
+    return names;
+  }
+
+  void check_distinct(const std::string& key, const std::vector<std::string>& names) const {
+    std::set<std::string> known;
+    for (const std::string& name : names) {
+      if (!known.insert(name).second) refuse("each name once in " + key, "\"" + name + "\" twice");
+    }
+  }
+
+  void read_joints(const YAML::Node& shape, YoloSchema& schema) const {
+    constexpr int kMostJoints = 1000;
+    if (!shape.IsSequence() || shape.size() != 2) refuse("kpt_shape: [J, 2 or 3]", "another");
+    const int count = read_number("kpt_shape", shape[0]);
+    const int numbers = read_number("kpt_shape", shape[1]);
+    if (count < 1 || count > kMostJoints || numbers < 2 || numbers > 3) {
+      refuse("kpt_shape: [1.." + std::to_string(kMostJoints) + ", 2 or 3]",
+             "[" + std::to_string(count) + ", " + std::to_string(numbers) + "]");
+    }
+    schema.has_visibility = numbers == 3;
+    std::vector<std::string>& joints = schema.names.joint_names;
+    joints = joint_names();
+    if (joints.empty() && count == static_cast<int>(kCocoJoints.size())) {
+      joints.assign(kCocoJoints.begin(), kCocoJoints.end());
+    }
+    for (int i = 0;
+         i < count && static_cast<int>(joints.size()) <= i && keys_.count("kpt_names") == 0; ++i) {
+      joints.push_back(std::to_string(i));
+    }
+    if (static_cast<int>(joints.size()) != count) {
+      refuse("kpt_names of " + std::to_string(count) + " joints", std::to_string(joints.size()));
+    }
+  }
+
+  /// None if the file has none.
+  std::vector<std::string> joint_names() const {
+    const auto names = keys_.find("kpt_names");
+    if (names == keys_.end()) return {};
+    const bool by_class = names->second.IsMap() && names->second.size() > 0 &&
+                          names->second.begin()->second.IsSequence();
+    if (!by_class) return read_names("kpt_names", names->second);
+    std::optional<std::vector<std::string>> first;
+    for (const auto& entry : names->second) {
+      auto of_class = read_names("kpt_names", entry.second);
+      if (first && *first != of_class) refuse("the same kpt_names of all classes", "others");
+      first = std::move(of_class);
+    }
+    return *std::move(first);
+  }
+
+  std::string path_;
+  std::map<std::string, YAML::Node> keys_;
+};
+
+/// Reads one line; the first that is not as it should be is the complaint.
+class YoloLine {
+ public:
+  YoloLine(const std::vector<std::string_view>& columns, const YoloSchema& schema, ImageSize image)
+      : columns_(columns), schema_(schema), image_(image) {}
+
+  void read(Annotation& annotation) {
+    const std::size_t joints = schema_.names.joint_names.size();
+    const std::size_t numbers = schema_.has_visibility ? 3 : 2;
+    const std::size_t expected = 5 + joints * numbers;
+    if (columns_.size() != expected) {
+      throw std::runtime_error("expected " + std::to_string(expected) + " columns, got " +
+                               std::to_string(columns_.size()) + surplus(joints));
+    }
+    Box box;
+    const auto number = parse_number<int>(columns_[0]);
+    const auto classes = static_cast<int>(schema_.names.class_names.size());
+    if (!number || *number < 0 || *number >= classes) {
+      throw std::runtime_error("expected a class 0.." + std::to_string(classes - 1) + ", got " +
+                               in_quotes(columns_[0]));
+    }
+    box.class_id = *number;
+    const double x = share(1) * image_.width, y = share(2) * image_.height;
+    const double half_width = share(3) * image_.width / 2;
+    const double half_height = share(4) * image_.height / 2;
+    box.xyxy = {x - half_width, y - half_height, x + half_width, y + half_height};
+    if (!overlaps(box.xyxy, image_)) throw std::runtime_error(outside_text(box.xyxy, image_));
+    annotation.boxes.push_back(box);
+    if (joints == 0) return;
+    Person person;
+    person.box = box.xyxy;
+    bool any = false;
+    for (std::size_t i = 0; i < joints; ++i) {
+      person.joints.push_back(joint(5 + i * numbers));
+      any = any || person.joints.back().at != kMissingPoint;
+    }
+    if (any) annotation.persons.push_back(std::move(person));
+  }
+
+ private:
+  /// What the columns may be in place of a box's.
+  std::string surplus(std::size_t joints) const {
+    const bool is_outline = joints == 0 && columns_.size() >= 7 && columns_.size() % 2 == 1;
+    return is_outline ? " (an outline, which is not read, or joints without kpt_shape)" : "";
+  }
+
+  double number_at(std::size_t column) const {
+    const auto number = parse_number<double>(columns_[column]);
+    if (!number) {
+      throw std::runtime_error("expected a number, got " + in_quotes(columns_[column]));
+    }
+    return *number;
+  }
+
+  double share(std::size_t column) const {
+    constexpr double kRounding = 1e-6;
+    const double number = number_at(column);
+    if (number >= -kRounding && number <= 1 + kRounding) return number;
+    throw std::runtime_error("expected a share 0..1, got " + in_quotes(columns_[column]));
+  }
+
+  Joint joint(std::size_t column) const {
+    constexpr double kHalf = 0.5;  // edges to pixels' centres
+    Joint missing{kMissingPoint, 0};
+    int visible = -1;
+    if (schema_.has_visibility) {
+      const double given = number_at(column + 2);
+      if (given != 0 && given != 1 && given != 2) {
+        throw std::runtime_error("expected a visibility 0, 1 or 2, got " +
+                                 in_quotes(columns_[column + 2]));
+      }
+      if (given == 0) return missing;
+      visible = given == 2 ? 1 : 0;
+    } else if (number_at(column) == 0 && number_at(column + 1) == 0) {
+      return missing;
+    }
+    return {{share(column) * image_.width - kHalf, share(column + 1) * image_.height - kHalf},
+            visible};
+  }
+
+  const std::vector<std::string_view>& columns_;
+  const YoloSchema& schema_;
+  ImageSize image_;
+};
+
+}  // namespace
+
+YoloSchema parse_yolo_yaml(const std::string& text, const std::string& path) try {
+  constexpr std::size_t kMostBytes = 1 << 20;
+  if (text.size() > kMostBytes) {
+    throw InputError("expected at most 1 MiB, got " + std::to_string(text.size()) + " bytes, in " +
+                     path);
+  }
+  return YoloYaml(YAML::Load(text), path).read();
+} catch (const YAML::Exception& error) {
+  throw InputError("expected YAML, got '" + escape_controls(error.what()) + "', in " + path);
+}
+
+YoloSchema parse_yolo_classes(std::string_view text, const std::string& path) {
+  YoloSchema schema;
+  std::vector<std::string>& names = schema.names.class_names;
+  for (const TextLine& line : split_lines(text)) {
+    const std::size_t begin = line.bytes.find_first_not_of(" \t\r\n");
+    const std::size_t end = line.bytes.find_last_not_of(" \t\r\n");
+    names.emplace_back(begin == std::string_view::npos ? std::string_view()
+                                                       : line.bytes.substr(begin, end - begin + 1));
+  }
+  while (!names.empty() && names.back().empty()) names.pop_back();
+  if (names.empty()) throw InputError("expected a name a line, got none, in " + path);
+  std::set<std::string> known;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const bool is_sound = is_label_name(names[i]) && known.insert(names[i]).second;
+    if (is_sound) continue;
+    throw InputError("expected a name of its own a line, got " + in_quotes(names[i]) + ", in " +
+                     place_in_file(path, static_cast<int>(i) + 1));
+  }
+  return schema;
+}
+
+Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, ImageSize image,
+                                    const std::string& path) {
+  Annotation annotation;
+  for (const TextLine& line : split_lines(text)) {
+    const auto columns = split_columns(line.bytes);
+    if (columns.empty()) continue;
+    try {
+      YoloLine(columns, schema, image).read(annotation);
+    } catch (const std::runtime_error& error) {
+      return SampleFault{error.what() + (", in " + place_in_file(path, line.number))};
+    }
+  }
+  annotation.original = std::move(text);
+  return annotation;
+}
+
+}  // namespace eventgan

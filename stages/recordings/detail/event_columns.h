@@ -1,0 +1,56 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// Where an HDF5 file has a dataset for each column of its events: whole numbers [events], x and y
+/// in pixels, t in µs, p 0 or 1 (or -1 or 1).
+struct ColumnLayout {
+  std::string events;    ///< the group of x, y, t, p
+  std::string ms_index;  ///< whole numbers [ms]: the first event at or after each ms; may be absent
+  std::string t_offset;  ///< µs, added to t; may be absent
+  std::vector<std::string> size;  ///< of the sensor: [width, height], or height and width
+};
+
+/// DSEC's. Files of RVT and Prophesee (NAME_td.h5) are read as well, which have no index and no
+/// offset, but height and width.
+ColumnLayout dsec_layout();
+
+/// M3ED's, of one camera: "left" or "right".
+ColumnLayout m3ed_layout(const std::string& camera);
+
+/// SEQUENCE/events/left/events.h5 of DSEC, where `path` is SEQUENCE; else none.
+std::optional<std::filesystem::path> dsec_events_file(const std::filesystem::path& path,
+                                                      const std::string& camera);
+
+/// What of a DSEC sequence may be read beside its events.h5: timestamps.txt of the frames, if it is
+/// there, and rectify_map.h5, if the options ask for it.
+std::vector<std::filesystem::path> dsec_companions(const std::filesystem::path& events_file,
+                                                   const RecordingOptions& options);
+
+/// `path` is a sequence's folder, or its events.h5. The sensor is what the file says, else the
+/// options', else 640x480.
+///
+/// Frames are the PNGs of SEQUENCE/images/left/distorted, as DSEC-Det has them, with the times of
+/// SEQUENCE/images/timestamps.txt; with `rectify` those of images/left/rectified. DSEC's own images
+/// are of another camera: where they have another size than the sensor, the recording has no
+/// frames, and a note says so.
+///
+/// With `rectify` an event at [y, x] moves to rectify_map[y, x] of rectify_map.h5 beside the
+/// events, rounded to a pixel; events that leave the image are left out, and a note tells of how
+/// many of the sensor's pixels. Throws InputError.
+std::unique_ptr<Recording> open_dsec_recording(const std::filesystem::path& path,
+                                               const RecordingOptions& options);
+
+/// Events alone: M3ED's images are of another camera, which a note says. Throws InputError.
+std::unique_ptr<Recording> open_m3ed_recording(const std::filesystem::path& path,
+                                               const RecordingOptions& options);
+
+}  // namespace eventgan

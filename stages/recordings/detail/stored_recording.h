@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/values/frames.h"
+#include "stages/recordings/detail/event_check.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// Pixels, as the manifest's `sensor` may have.
+inline constexpr int kMostSensorSide = 8192;
+
+/// The events of a file by their positions 0..count-1, in the file's order. Thread safe.
+class EventStore {
+ public:
+  virtual ~EventStore() = default;
+  virtual std::int64_t count() const = 0;
+
+  /// Events first..first + count - 1, which must be there; nothing is known of their values but
+  /// that they were stored. Throws InputError "expected X, got Y, in PATH (event 12)".
+  virtual std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const = 0;
+
+  /// Their times alone, in seconds; throws likewise.
+  virtual std::vector<double> times_s(std::int64_t first, std::int64_t count) const;
+
+  /// Where to look first for the event of a time; any number serves.
+  virtual std::int64_t near(double) const { return count() / 2; }
+};
+
+/// The frames of a recording. Thread safe.
+class FrameStore {
+ public:
+  virtual ~FrameStore() = default;
+  /// Strictly ascending, seconds on the events' clock.
+  virtual const std::vector<double>& times_s() const = 0;
+  /// Frame 0..size-1 of the recording's size. Throws InputError.
+  virtual GreyImage read(std::int64_t index) const = 0;
+
+  /// As Recording::notes.
+  virtual std::vector<std::string> notes() const { return {}; }
+
+  /// Recording::flow of an index of times_s() but the last. Throws InputError.
+  virtual std::optional<FlowField> flow(std::int64_t) const { return std::nullopt; }
+};
+
+/// What a recording is made of.
+struct StoredParts {
+  std::string name;  ///< Recording::name
+  ImageSize size;
+  std::unique_ptr<EventStore> events;
+  std::unique_ptr<FrameStore> frames = nullptr;  ///< null: there are none
+  /// Where to look first for the last event before each frame; empty: nothing is known.
+  std::vector<std::int64_t> event_index = {};
+  /// Moves an event; false where it leaves the image and is left out. Null: events stay.
+  std::function<bool(Event&)> move = nullptr;
+  std::vector<std::string> notes = {};
+};
+
+/// The recording of these parts, with the checks that Recording promises: times that never fall,
+/// pixels inside the image, finite values. Where a frame's events end is looked up by time, a
+/// file's own event index being only a guess, since its meaning differs among files.
+std::unique_ptr<Recording> make_stored_recording(StoredParts parts);
+
+}  // namespace eventgan

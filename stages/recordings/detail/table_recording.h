@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// Whether the file is a table of events by its header: .npy with a structured array that has the
+/// fields t, x, y and p, or [N, 4] numbers; .npz with arrays of these names; .csv whose header line
+/// has them. The names are the options'.
+bool is_event_table(const std::filesystem::path& path, const EventFields& columns);
+
+/// Such a table: an element, or a line, for each event, in time order. Of an array [N, 4] the
+/// columns are t, x, y and p; a name in the options that is a number 0..3 is another column.
+/// Everything else in the file is passed over. The sensor's size is the options'. There are no
+/// frames.
+///
+/// A file is read as a whole, first when it is opened; the tables used last are kept. Throws
+/// InputError "expected X, got Y, in PATH (line 3)".
+std::unique_ptr<Recording> open_table_recording(const std::filesystem::path& path,
+                                                const RecordingOptions& options);
+
+}  // namespace eventgan

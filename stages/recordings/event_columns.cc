@@ -1,0 +1,352 @@
+#include "stages/recordings/detail/event_columns.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+#include <system_error>
+#include <utility>
+
+#include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
+#include "stages/base/images/image_file.h"
+#include "stages/recordings/detail/frame_intervals.h"
+#include "stages/recordings/detail/hdf5_table.h"
+#include "stages/recordings/detail/image_frames.h"
+#include "stages/recordings/detail/stored_recording.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr double kTicksPerSecond = 1e6;
+constexpr std::int64_t kTicksPerMs = 1000;
+constexpr std::int64_t kLatest_us = std::int64_t{1} << 53;  // a double has each of them exactly
+
+Hdf5Table open_whole_numbers(hid_t file, const std::string& path, const std::string& name) {
+  Hdf5Table table(file, path, name);
+  if (table.is_float() || table.dims().size() != 1) table.refuse("whole numbers [N]");
+  return table;
+}
+
+/// All numbers of a small dataset of any shape, at most `most` of them.
+std::vector<std::int64_t> read_few(hid_t file, const std::string& path, const std::string& name,
+                                   std::size_t most) {
+  const Hdf5Table table(file, path, name);
+  if (table.is_float() || element_count(table.dims()) > most) {
+    table.refuse(fmt::format("{} whole number{}", most, most > 1 ? "s" : ""));
+  }
+  return read_elements<std::int64_t>(open_object(file, path), path, element_type<std::int64_t>());
+}
+
+class ColumnStore final : public EventStore {
+ public:
+  ColumnStore(Hdf5Handle file, const ColumnLayout& layout, const std::string& name)
+      : name_(name),
+        file_(std::move(file)),
+        x_(open_whole_numbers(file_, layout.events + "/x", name)),
+        y_(open_whole_numbers(file_, layout.events + "/y", name)),
+        t_(open_whole_numbers(file_, layout.events + "/t", name)),
+        p_(open_whole_numbers(file_, layout.events + "/p", name)) {
+    for (const Hdf5Table* column : {&x_, &y_, &p_}) {
+      if (column->dims() == t_.dims()) continue;
+      column->refuse("as many numbers as " + layout.events + "/t, " + std::to_string(count()));
+    }
+    if (!layout.t_offset.empty() && has_object(file_, layout.t_offset)) {
+      const std::vector<std::int64_t> offset = read_few(file_, layout.t_offset, name, 1);
+      if (offset.size() != 1 || offset[0] <= -kLatest_us || offset[0] >= kLatest_us) {
+        throw InputError(fmt::format("expected an offset of fewer than 2^53 us, got {}, in {} ({})",
+                                     fmt::join(offset, ", "), name, layout.t_offset));
+      }
+      offset_us_ = offset[0];
+    }
+    if (!layout.ms_index.empty() && has_object(file_, layout.ms_index)) {
+      ms_index_ = open_whole_numbers(file_, layout.ms_index, name);
+      check_index();
+    }
+  }
+
+  std::int64_t count() const override { return static_cast<std::int64_t>(t_.dims()[0]); }
+
+  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
+    const std::vector<std::int64_t> x = column(x_, first, count), y = column(y_, first, count),
+                                    p = column(p_, first, count);
+    const std::vector<double> t = times_s(first, count);
+    std::vector<StoredEvent> events(t.size());
+    for (std::size_t i = 0; i < t.size(); ++i) {
+      events[i] = {static_cast<double>(x[i]), static_cast<double>(y[i]), t[i],
+                   static_cast<double>(p[i])};
+    }
+    return events;
+  }
+
+  std::vector<double> times_s(std::int64_t first, std::int64_t count) const override {
+    const std::vector<std::int64_t> ticks = column(t_, first, count);
+    std::vector<double> times(ticks.size());
+    for (std::size_t i = 0; i < ticks.size(); ++i) {
+      if (ticks[i] <= -kLatest_us || ticks[i] >= kLatest_us) {
+        throw InputError(
+            fmt::format("expected a time of fewer than 2^53 us, got {}, in {} (event {})", ticks[i],
+                        name_, first + static_cast<std::int64_t>(i)));
+      }
+      times[i] = static_cast<double>(ticks[i] + offset_us_) / kTicksPerSecond;
+    }
+    return times;
+  }
+
+  std::int64_t near(double time_s) const override {
+    const std::int64_t entries = ms_index_ ? static_cast<std::int64_t>(ms_index_->dims()[0]) : 0;
+    if (entries == 0) return count() / 2;
+    const double ms = (time_s * kTicksPerSecond - static_cast<double>(offset_us_)) / kTicksPerMs;
+    const double entry = std::clamp(ms, 0.0, static_cast<double>(entries - 1));
+    return column(*ms_index_, static_cast<std::int64_t>(entry), 1)[0];
+  }
+
+ private:
+  std::vector<std::int64_t> column(const Hdf5Table& table, std::int64_t first,
+                                   std::int64_t count) const {
+    std::vector<std::int64_t> values(static_cast<std::size_t>(count));
+    if (count == 0) return values;
+    read_hdf5(fmt::format("{} (entries {}..{})", table.place(), first, first + count - 1),
+              [&] { table.read({static_cast<hsize_t>(first)}, {values.size()}, values.data()); });
+    return values;
+  }
+
+  /// Some entries are looked up: an index of other events would say that the times are others.
+  void check_index() const {
+    const auto entries = static_cast<std::int64_t>(ms_index_->dims()[0]);
+    const std::int64_t checks = std::min<std::int64_t>(entries, 16);
+    for (std::int64_t check = 0; check < checks; ++check) {
+      const std::int64_t ms = check * (entries - 1) / std::max<std::int64_t>(checks - 1, 1);
+      const std::int64_t event = column(*ms_index_, ms, 1)[0];
+      const bool is_event = event >= 0 && event <= count();
+      const bool is_after =
+          is_event && (event == count() || column(t_, event, 1)[0] >= ms * kTicksPerMs);
+      const bool is_first =
+          is_event && (event == 0 || column(t_, event - 1, 1)[0] < ms * kTicksPerMs);
+      if (is_after && is_first) continue;
+      throw InputError(fmt::format(
+          "expected the first of {} events at or after {} ms, got event {}, in {} (entry {})",
+          count(), ms, event, ms_index_->place(), ms));
+    }
+  }
+
+  std::string name_;
+  Hdf5Handle file_;  ///< before what is in it, so that it closes last
+  Hdf5Table x_, y_, t_, p_;
+  std::optional<Hdf5Table> ms_index_;
+  std::int64_t offset_us_ = 0;
+};
+
+/// What the file says of the sensor; none if it does not.
+std::optional<ImageSize> read_size(hid_t file, const ColumnLayout& layout,
+                                   const std::string& name) {
+  std::vector<std::int64_t> sides;  // height, width
+  for (const std::string& path : layout.size) {
+    if (!has_object(file, path)) return std::nullopt;
+    const std::vector<std::int64_t> found = read_few(file, path, name, 2 / layout.size.size());
+    sides.insert(sides.end(), found.begin(), found.end());
+  }
+  if (sides.size() != 2) return std::nullopt;
+  if (layout.size.size() == 1) std::swap(sides[0], sides[1]);
+  constexpr std::int64_t kMostPixels = kMaxImagePixels;
+  if (sides[0] < 1 || sides[1] < 1 || sides[0] > kMostPixels / sides[1]) {
+    throw InputError(fmt::format("expected a sensor of 1 to {} pixels, got {}x{}, in {} ({})",
+                                 kMostPixels, sides[1], sides[0], name, layout.size[0]));
+  }
+  return ImageSize{static_cast<int>(sides[0]), static_cast<int>(sides[1])};
+}
+
+/// The events and the size. `otherwise`: of a file that does not tell it.
+StoredParts open_columns(const fs::path& path, const ColumnLayout& layout,
+                         std::optional<ImageSize> otherwise) {
+  const Hdf5Lock lock;
+  StoredParts parts;
+  parts.name = path.string();
+  Hdf5Handle file = open_recording_file(path);
+  const std::optional<ImageSize> size =
+      read_hdf5(parts.name, [&] { return read_size(file, layout, parts.name); });
+  if (!size && !otherwise) {
+    throw InputError("expected the sensor's size in " + layout.size[0] +
+                     ", or \"sensor\" in the manifest, got none, in " + parts.name);
+  }
+  parts.size = size ? *size : *otherwise;
+  parts.events = read_hdf5(parts.name, [&] {
+    return std::make_unique<ColumnStore>(std::move(file), layout, parts.name);
+  });
+  return parts;
+}
+
+/// timestamps.txt: a line with µs for each frame.
+std::vector<double> read_timestamps(const fs::path& file) {
+  std::string reason;
+  const auto text = try_read_file(file, reason);
+  if (!text) {
+    throw InputError("expected the frames' times, got no readable file (" + reason + "), in " +
+                     file.string());
+  }
+  std::vector<double> times_s;
+  std::istringstream stream(*text);
+  for (std::string line; std::getline(stream, line);) {
+    std::int64_t time_us = 0;
+    const char* const end = line.data() + line.find_last_not_of(" \r") + 1;
+    const auto [stop, error] = std::from_chars(line.data(), end, time_us);
+    if (error != std::errc() || stop != end || time_us <= -kLatest_us || time_us >= kLatest_us) {
+      throw InputError(fmt::format("expected a time in whole us, got another line, in {} (line {})",
+                                   file.string(), times_s.size() + 1));
+    }
+    times_s.push_back(static_cast<double>(time_us) / kTicksPerSecond);
+  }
+  check_frame_times(times_s, file.string());
+  return times_s;
+}
+
+std::vector<fs::path> images_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code ignored;
+  for (const auto& entry : fs::directory_iterator(folder, ignored)) {
+    if (entry.path().extension() == ".png") files.push_back(entry.path());
+  }
+  std::ranges::sort(files);
+  return files;
+}
+
+/// The folder of a sequence, of its events/left/events.h5; empty for a file that lies elsewhere.
+fs::path sequence_of(const fs::path& events_file) {
+  const fs::path side = events_file.parent_path();
+  return side.parent_path().filename() == "events" ? side.parent_path().parent_path() : fs::path();
+}
+
+/// Images of the events' own view and size; where there are others, a note says why not.
+std::vector<fs::path> find_frames(const fs::path& sequence, ImageSize size,
+                                  const RecordingOptions& options,
+                                  std::vector<std::string>& notes) {
+  if (sequence.empty()) return {};
+  const fs::path side = sequence / "images" / options.camera;
+  const fs::path own = side / (options.rectify ? "rectified" : "distorted");
+  const fs::path other = side / (options.rectify ? "distorted" : "rectified");
+  std::vector<fs::path> files = images_in(own);
+  if (!files.empty()) {
+    ImageSize found;
+    try {
+      found = image_file_size(files[0]);
+    } catch (const std::runtime_error& error) {
+      std::throw_with_nested(InputError(std::string(error.what()) + ", in " + files[0].string()));
+    }
+    if (found == size) return files;
+    notes.push_back("opened without frames, which are another camera's: expected images of " +
+                    to_string(size) + " as the events', got " + to_string(found) + ", in " +
+                    own.string());
+  } else if (!images_in(other).empty()) {
+    notes.push_back("opened without frames, which are not of the events' view, in " +
+                    other.string());
+  }
+  return {};
+}
+
+/// Where each pixel's events move to; -1 if they leave the image.
+std::vector<std::int32_t> read_rectify_map(const fs::path& path, ImageSize size) {
+  const Hdf5Lock lock;
+  const Hdf5Handle file = open_recording_file(path);
+  const Hdf5Table table(file, "rectify_map", path.string());
+  const auto height = static_cast<hsize_t>(size.height);
+  const auto width = static_cast<hsize_t>(size.width);
+  if (!table.is_float() || table.dims() != Dims{height, width, 2}) {
+    table.refuse(fmt::format("float [{}, {}, 2], the sensor's size", height, width));
+  }
+  std::vector<float> places(2 * size.pixel_count());
+  read_hdf5(table.place(), [&] { table.read({0, 0, 0}, {height, width, 2}, places.data()); });
+  std::vector<std::int32_t> target(size.pixel_count(), -1);
+  for (std::size_t i = 0; i < target.size(); ++i) {
+    const double x = std::floor(places[2 * i] + 0.5), y = std::floor(places[2 * i + 1] + 0.5);
+    if (!std::isfinite(x) || !std::isfinite(y)) {
+      throw InputError(fmt::format("expected finite places, got others, in {} (x = {}, y = {})",
+                                   table.place(), i % width, i / width));
+    }
+    if (x >= 0 && y >= 0 && x < size.width && y < size.height) {
+      target[i] = static_cast<std::int32_t>(y * size.width + x);
+    }
+  }
+  return target;
+}
+
+}  // namespace
+
+ColumnLayout dsec_layout() {
+  return {"events", "ms_to_idx", "t_offset", {"events/height", "events/width"}};
+}
+
+ColumnLayout m3ed_layout(const std::string& camera) {
+  const std::string group = "prophesee/" + camera;
+  return {group, group + "/ms_map_idx", "", {group + "/calib/resolution"}};
+}
+
+std::optional<fs::path> dsec_events_file(const fs::path& path, const std::string& camera) {
+  fs::path file = path / "events" / camera / "events.h5";
+  std::error_code ignored;
+  return fs::is_regular_file(file, ignored) ? std::optional(file) : std::nullopt;
+}
+
+std::vector<fs::path> dsec_companions(const fs::path& events_file,
+                                      const RecordingOptions& options) {
+  std::vector<fs::path> files;
+  if (options.rectify) files.push_back(events_file.parent_path() / "rectify_map.h5");
+  const fs::path times = sequence_of(events_file) / "images" / "timestamps.txt";
+  std::error_code ignored;
+  if (!sequence_of(events_file).empty() && fs::is_regular_file(times, ignored)) {
+    files.push_back(times);
+  }
+  return files;
+}
+
+std::unique_ptr<Recording> open_dsec_recording(const fs::path& path,
+                                               const RecordingOptions& options) {
+  constexpr ImageSize kDsecSize{480, 640};
+  const fs::path file = dsec_events_file(path, options.camera).value_or(path);
+  StoredParts parts = open_columns(file, dsec_layout(), options.sensor.value_or(kDsecSize));
+  const fs::path sequence = sequence_of(fs::absolute(file).lexically_normal());
+  std::vector<fs::path> frames = find_frames(sequence, parts.size, options, parts.notes);
+  if (!frames.empty()) {
+    const fs::path times = sequence / "images" / "timestamps.txt";
+    std::vector<double> times_s = read_timestamps(times);
+    if (times_s.size() != frames.size()) {
+      throw InputError(fmt::format("expected a time for each of {} images, got {}, in {}",
+                                   frames.size(), times_s.size(), times.string()));
+    }
+    parts.frames = std::make_unique<ImageFrames>(std::move(frames), std::move(times_s));
+  }
+  if (options.rectify) {
+    std::vector<std::int32_t> target =
+        read_rectify_map(file.parent_path() / "rectify_map.h5", parts.size);
+    if (const auto outside = std::ranges::count(target, -1)) {
+      parts.notes.push_back(fmt::format(
+          "rectified: events of {} of {} pixels leave the image and are left out, in {}", outside,
+          target.size(), parts.name));
+    }
+    parts.move = [target = std::move(target), width = parts.size.width](Event& event) {
+      const std::int32_t to =
+          target[static_cast<std::size_t>(event.y) * static_cast<std::size_t>(width) +
+                 static_cast<std::size_t>(event.x)];
+      event.x = to % width;
+      event.y = to / width;
+      return to >= 0;
+    };
+  }
+  return make_stored_recording(std::move(parts));
+}
+
+std::unique_ptr<Recording> open_m3ed_recording(const fs::path& path,
+                                               const RecordingOptions& options) {
+  StoredParts parts = open_columns(path, m3ed_layout(options.camera), options.sensor);
+  const Hdf5Lock lock;
+  if (has_object(open_recording_file(path), "ovc")) {
+    parts.notes.push_back("opened without frames, which are another camera's (ovc), in " +
+                          parts.name);
+  }
+  return make_stored_recording(std::move(parts));
+}
+
+}  // namespace eventgan

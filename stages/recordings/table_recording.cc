@@ -1,0 +1,354 @@
+#include "stages/recordings/detail/table_recording.h"
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <charconv>
+#include <cmath>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "manifests/values/faults.h"
+#include "stages/base/archives/detail/numpy_arrays.h"
+#include "stages/base/archives/numpy_arrays.h"
+#include "stages/base/archives/zip_archive.h"
+#include "stages/base/files/input_file.h"
+#include "stages/recordings/detail/stored_recording.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// As StoredEvent has them but for the time, which is first.
+enum Column : std::size_t { kTime, kX, kY, kPolarity, kColumns };
+
+std::array<std::string, kColumns> names_of(const EventFields& columns) {
+  return {columns.t, columns.x, columns.y, columns.p};
+}
+
+using Events = std::vector<StoredEvent>;
+
+/// A number into its place of an event.
+void put(StoredEvent& event, std::size_t column, double value, double ticks_per_s) {
+  switch (column) {
+    case kTime:
+      event.t_s = value / ticks_per_s;
+      return;
+    case kX:
+      event.x = value;
+      return;
+    case kY:
+      event.y = value;
+      return;
+    default:
+      event.polarity = value;
+  }
+}
+
+// ---- NumPy
+
+/// Columns of an array [N, 4] by the names that the options give them.
+std::array<std::size_t, kColumns> places_of(const EventFields& columns, const std::string& name) {
+  const std::array<std::string, kColumns> defaults = names_of(EventFields());
+  const std::array<std::string, kColumns> names = names_of(columns);
+  std::array<std::size_t, kColumns> places{};
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const bool is_number = names[i].size() == 1 && names[i][0] >= '0' && names[i][0] <= '3';
+    if (!is_number && names[i] != defaults[i]) {
+      throw InputError(
+          "expected fields by names, got an array [N, 4] (\"columns\" may have the "
+          "numbers 0 to 3), in " +
+          name);
+    }
+    places[i] = is_number ? static_cast<std::size_t>(names[i][0] - '0') : i;
+    if (std::find(places.begin(), places.begin() + i, places[i]) != places.begin() + i) {
+      throw InputError("expected each of the columns 0 to 3 once, got " + names[i] + " twice, in " +
+                       name);
+    }
+  }
+  return places;
+}
+
+Events from_columns(const std::array<TypedArray, kColumns>& arrays, const EventFields& columns,
+                    const std::string& file) {
+  const std::array<std::string, kColumns> names = names_of(columns);
+  const double ticks_per_s = std::round(1 / columns.tick_s);
+  Events events;
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const TypedArray& array = arrays[i];
+    if (array.shape.size() != 1 || array.is_text() || array.size() != arrays[kTime].size()) {
+      throw InputError("expected numbers [" + std::to_string(arrays[kTime].size()) + "], got " +
+                       (array.is_text() ? "text " : "") + array.shape_text() + ", in " + file +
+                       " (" + names[i] + ")");
+    }
+    events.resize(array.size());
+    for (std::size_t k = 0; k < events.size(); ++k) {
+      put(events[k], i, array.number(k), ticks_per_s);
+    }
+  }
+  return events;
+}
+
+Events read_npy(const fs::path& path, const EventFields& columns) {
+  const std::string name = path.string();
+  const FileBytes file(path);
+  const std::vector<std::byte> bytes = file.read(0, file.size_bytes());
+  std::size_t begin = 0;
+  if (parse_npy_header(bytes, name, begin).fields.empty()) {
+    const std::array<std::size_t, kColumns> places = places_of(columns, name);
+    const TypedArray array = parse_npy(bytes, name);
+    if (array.shape.size() != 2 || array.shape[1] != kColumns || array.is_text()) {
+      throw InputError("expected numbers [N, 4], got " + array.shape_text() + ", in " + name);
+    }
+    const double ticks_per_s = std::round(1 / columns.tick_s);
+    Events events(array.shape[0]);
+    for (std::size_t k = 0; k < events.size(); ++k) {
+      for (std::size_t i = 0; i < kColumns; ++i) {
+        put(events[k], i, array.number(k * kColumns + places[i]), ticks_per_s);
+      }
+    }
+    return events;
+  }
+  std::vector<NamedArray> fields = parse_npy_fields(bytes, name);
+  std::array<TypedArray, kColumns> arrays;
+  const std::array<std::string, kColumns> names = names_of(columns);
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const auto field = std::ranges::find(fields, names[i], &NamedArray::name);
+    if (field == fields.end()) {
+      throw InputError("expected a field \"" + names[i] + "\", got none, in " + name);
+    }
+    arrays[i] = field->values;  // a name may be there for two
+  }
+  return from_columns(arrays, columns, name);
+}
+
+Events read_npz(const fs::path& path, const EventFields& columns) {
+  const ZipArchive archive(path);
+  std::array<TypedArray, kColumns> arrays;
+  const std::array<std::string, kColumns> names = names_of(columns);
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    const std::string member = names[i] + ".npy";
+    if (!archive.contains(member)) {
+      throw InputError("expected an array \"" + names[i] + "\", got none, in " + path.string());
+    }
+    arrays[i] = parse_npy(archive.read(member), path.string() + " (" + names[i] + ")");
+  }
+  return from_columns(arrays, columns, path.string());
+}
+
+// ---- CSV
+
+std::vector<std::string_view> split(std::string_view line) {
+  constexpr std::string_view kBlanks = " \t\r";
+  std::vector<std::string_view> fields;
+  for (std::size_t begin = 0; begin <= line.size();) {
+    const std::size_t end = std::min(line.find(',', begin), line.size());
+    std::string_view field = line.substr(begin, end - begin);
+    field.remove_prefix(std::min(field.find_first_not_of(kBlanks), field.size()));
+    fields.push_back(field.substr(0, field.find_last_not_of(kBlanks) + 1));
+    begin = end + 1;
+  }
+  return fields;
+}
+
+/// The columns' places in a header line; none unless it has all of them.
+std::optional<std::array<std::size_t, kColumns>> find_columns(std::string_view header,
+                                                              const EventFields& columns) {
+  constexpr std::string_view kMark = "\xEF\xBB\xBF";
+  if (header.starts_with(kMark)) header.remove_prefix(kMark.size());
+  const std::vector<std::string_view> fields = split(header);
+  std::array<std::size_t, kColumns> places{};
+  const std::array<std::string, kColumns> names = names_of(columns);
+  for (std::size_t i = 0; i < kColumns; ++i) {
+    if (std::ranges::count(fields, names[i]) != 1) return std::nullopt;
+    places[i] = static_cast<std::size_t>(std::ranges::find(fields, names[i]) - fields.begin());
+  }
+  return places;
+}
+
+Events read_csv(const fs::path& path, const EventFields& columns) {
+  const std::string text = read_text_file(path);
+  const double ticks_per_s = std::round(1 / columns.tick_s);
+  std::optional<std::array<std::size_t, kColumns>> places;
+  std::size_t width = 0;
+  Events events;
+  std::int64_t number = 0;
+  const auto refuse = [&](const std::string& expected, const std::string& got) {
+    throw InputError("expected " + expected + ", got " + got + ", in " + path.string() + " (line " +
+                     std::to_string(number) + ")");
+  };
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    const std::string_view line(text.data() + begin, end - begin);
+    begin = end + 1;
+    ++number;
+    const std::vector<std::string_view> fields = split(line);
+    if (!places) {
+      places = find_columns(line, columns);
+      if (!places)
+        refuse("a header line with " + columns.t + ", " + columns.x + ", " + columns.y + " and " +
+                   columns.p,
+               "another");
+      width = fields.size();
+      continue;
+    }
+    if (fields.size() == 1 && fields[0].empty()) continue;
+    if (fields.size() != width) {
+      refuse(std::to_string(width) + " fields", std::to_string(fields.size()));
+    }
+    StoredEvent& event = events.emplace_back();
+    for (std::size_t i = 0; i < kColumns; ++i) {
+      const std::string_view field = fields[(*places)[i]];
+      double value = 0;
+      const auto [stop, error] = std::from_chars(field.data(), field.data() + field.size(), value);
+      if (error != std::errc() || stop != field.data() + field.size()) {
+        refuse("a number of " + names_of(columns)[i], "another field");
+      }
+      put(event, i, value, ticks_per_s);
+    }
+  }
+  if (!places) {
+    ++number;
+    refuse("a header line", "none");
+  }
+  return events;
+}
+
+Events read_table(const fs::path& path, const EventFields& columns) try {
+  if (path.extension() == ".npy") return read_npy(path, columns);
+  if (path.extension() == ".npz") return read_npz(path, columns);
+  return read_csv(path, columns);
+} catch (const InputError&) {
+  throw;
+} catch (const std::runtime_error& error) {
+  throw InputError(error.what());
+}
+
+/// The tables used last: a source may be of tens of thousands.
+class RecentTables {
+ public:
+  /// Table `number`; what `read` gives if it is not kept.
+  template <class Read>
+  std::shared_ptr<const Events> get(std::int64_t number, Read read) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto known = std::ranges::find(tables_, number, &Table::number);
+      if (known != tables_.end()) {
+        tables_.splice(tables_.begin(), tables_, known);
+        return known->events;
+      }
+    }
+    auto events = std::make_shared<const Events>(read());
+    const std::lock_guard lock(mutex_);
+    // Another thread may have read it meanwhile.
+    const auto known = std::ranges::find(tables_, number, &Table::number);
+    if (known != tables_.end()) return known->events;
+    tables_.push_front({number, events});
+    kept_ += events->size();
+    while (kept_ > kMostEvents && tables_.size() > 1) {
+      kept_ -= tables_.back().events->size();
+      tables_.pop_back();
+    }
+    return events;
+  }
+
+ private:
+  struct Table {
+    std::int64_t number;
+    std::shared_ptr<const Events> events;
+  };
+  static constexpr std::size_t kMostEvents = std::size_t{1} << 22;  // 128 MiB
+
+  std::mutex mutex_;
+  std::list<Table> tables_;
+  std::size_t kept_ = 0;
+};
+
+class TableStore final : public EventStore {
+ public:
+  TableStore(fs::path path, EventFields columns)
+      : path_(std::move(path)), columns_(std::move(columns)), count_(std::ssize(*events())) {}
+
+  std::int64_t count() const override { return count_; }
+
+  std::vector<StoredEvent> read(std::int64_t first, std::int64_t count) const override {
+    const std::shared_ptr<const Events> all = events();
+    if (std::ssize(*all) != count_) {
+      throw InputError("expected " + std::to_string(count_) + " events as before, got " +
+                       std::to_string(all->size()) + ", in " + path_.string());
+    }
+    const auto begin = all->begin() + first;
+    return {begin, begin + count};
+  }
+
+  /// Exactly, so that a search reads the table once and not at each step.
+  std::int64_t near(double time_s) const override {
+    const std::shared_ptr<const Events> all = events();
+    return std::ranges::upper_bound(*all, time_s, {}, &StoredEvent::t_s) - all->begin();
+  }
+
+ private:
+  std::shared_ptr<const Events> events() const {
+    return recent_.get(number_, [&] { return read_table(path_, columns_); });
+  }
+
+  inline static RecentTables recent_;
+  inline static std::atomic<std::int64_t> opened_ = 0;
+
+  fs::path path_;
+  EventFields columns_;
+  std::int64_t number_ = opened_++;
+  std::int64_t count_;
+};
+
+}  // namespace
+
+bool is_event_table(const fs::path& path, const EventFields& columns) try {
+  const std::array<std::string, kColumns> names = names_of(columns);
+  if (path.extension() == ".npz") {
+    const ZipArchive archive(path);
+    return std::ranges::all_of(
+        names, [&](const std::string& name) { return archive.contains(name + ".npy"); });
+  }
+  const bool is_npy = path.extension() == ".npy";
+  if (!is_npy && path.extension() != ".csv") return false;
+  constexpr std::uint64_t kLongestHeader = 1 << 16;
+  const FileBytes file(path);
+  const std::vector<std::byte> bytes = file.read(0, std::min(file.size_bytes(), kLongestHeader));
+  if (is_npy) {
+    std::size_t begin = 0;
+    const NumpyLayout layout = parse_npy_header(bytes, path.string(), begin);
+    if (layout.fields.empty()) return layout.shape.size() == 2 && layout.shape[1] == kColumns;
+    return std::ranges::all_of(names, [&](const std::string& name) {
+      return std::ranges::find(layout.fields, name, &NumpyField::name) != layout.fields.end();
+    });
+  }
+  const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return find_columns(text.substr(0, text.find('\n')), columns).has_value();
+} catch (const std::runtime_error&) {  // who opens it says why
+  return false;
+}
+
+std::unique_ptr<Recording> open_table_recording(const fs::path& path,
+                                                const RecordingOptions& options) {
+  if (!options.sensor) {
+    throw InputError(
+        "expected the sensor's size as \"sensor\" in the manifest, since a table does "
+        "not tell it, got none, in " +
+        path.string());
+  }
+  return make_stored_recording({.name = path.string(),
+                                .size = *options.sensor,
+                                .events = std::make_unique<TableStore>(path, options.columns)});
+}
+
+}  // namespace eventgan

@@ -1,0 +1,313 @@
+"""Labels of one's own from file to shard and out again: the same boxes and ids, of synthetic images and of real ones; and 100,000 images
+of COCO, planned in linear time."""
+
+import csv
+import json
+import os
+import unittest
+import xml.etree.ElementTree as ElementTree
+
+import h5py
+import numpy as np
+import PIL.Image
+import yaml
+
+import program
+from program import SHARED, manifest, pairs, run, text
+from scale_test import MOST_LINKS, Measured, grey_png
+
+PIXELS = 1e-4
+LABELLED = SHARED / "labelled_frames"
+CATEGORIES = {1: "person", 3: "car", 2: "bicyclist", 8: "truck"}
+JOINTS = ["nose", "left_hand", "right_hand"]
+PLAN_LIMIT_BYTES = 1e9
+PLAN_LIMIT_S = 120
+
+
+class OwnLabels(program.InFolder):
+    def job(self, labels, root="images", name="out", **image):
+        """Converts the source; every sample of its shards by id: class and box of each object, and of each person the joints."""
+        source = {"dataset": "frames", "root": str(root), "labels": labels, "pairs": pairs([1])}
+        path = self.write_manifest(manifest([source], image={"preset": "mpii", **image}, generator={"kind": "difference"},
+                                            output={"directory": name, "samples_per_shard": 64, "dtype": "uint8"}), f"{name}.json")
+        out, _ = run("convert", path, "--progress", "none")
+        deep, _ = run("verify", "--deep", self.folder / name)
+        self.samples = {}
+        for shard in sorted((self.folder / name).glob("*-of-*.h5")):
+            with h5py.File(shard) as file:
+                self.read_shard(file)
+        self.assertIn(f"labels of {len(self.samples)} samples compared with their sources", deep)
+        self.assertTrue(self.samples)
+        return out
+
+    def read_shard(self, file):
+        boxes, classes = file["labels/boxes"], file["labels/boxes/class_id"].attrs["class_names"]
+        for i, sample_id in enumerate(file["pairs/sample_id"]):
+            rows = range(*boxes["offsets"][i:i + 2])
+            matrix = file["pairs/source_to_volume"][i]
+            self.samples[text(sample_id)] = {
+                "boxes": [(text(classes[boxes["class_id"][row]]), boxes["xyxy_unclipped"][row], bool(boxes["ignore"][row])) for row in rows],
+                "tracks": [int(boxes["track_id"][row]) for row in rows],
+                "original": bytes(file["labels/original"][i]), "matrix": matrix}
+
+    def assert_boxes(self, expected, tolerance=PIXELS):
+        """`expected`: of each sample the class, left, top, right, bottom in pixels of the image, in the labels' order."""
+        for sample_id, sample in self.samples.items():
+            self.assertEqual([box[0] for box in sample["boxes"]], [box[0] for box in expected[sample_id]], sample_id)
+            scale = np.array([sample["matrix"][0, 0], sample["matrix"][1, 1]] * 2)
+            shift = np.array([sample["matrix"][0, 2], sample["matrix"][1, 2]] * 2) + 0.5 - 0.5 * scale
+            for (_, got, _), (_, *edges) in zip(sample["boxes"], expected[sample_id]):
+                np.testing.assert_allclose(got, np.array(edges) * scale + shift, atol=tolerance)
+
+    def export(self, kind, name="out", *options):
+        run("finalize", self.folder / name)
+        folder = self.folder / f"{name}_{kind}"
+        run("export", "--to", kind, self.folder / name, "--out", folder, *options)
+        return folder
+
+    def make_images(self, count=6, width=64, height=48):
+        """A bright square that moves over noise; the square's edges in each."""
+        generator = np.random.default_rng(3)
+        noise = generator.integers(0, 80, (height, width, 3), np.uint8)
+        (self.folder / "images").mkdir()
+        for i in range(count):
+            image = noise.copy()
+            image[10:20, 5 + 3 * i:15 + 3 * i] = 250
+            PIL.Image.fromarray(image).save(self.folder / "images" / f"{i:06d}.png")
+        return {f"{i:06d}": [5 + 3 * i, 10, 15 + 3 * i, 20] for i in range(count)}
+
+    def coco(self, sizes, boxes, more=lambda i: {}, category=None):
+        """A COCO file: ids are neither dense nor in order. `boxes`: name and class, left, top, right, bottom."""
+        numbers = {name: number for number, name in CATEGORIES.items()}
+        ids = {name: 1_000_003 - 7 * i for i, name in enumerate(sorted(sizes))}
+        images = [{"id": ids[name], "file_name": name, "width": size[0], "height": size[1]} for name, size in sizes.items()]
+        annotations = []
+        for i, (name, label, left, top, right, bottom) in enumerate(boxes):
+            annotations.append({"id": 90_001 + 11 * i, "image_id": ids[name], "category_id": numbers[label],
+                                "bbox": [left, top, right - left, bottom - top], "area": (right - left) * (bottom - top), "iscrowd": 0,
+                                **more(i)})
+        categories = [{"id": number, "name": name, **((category or {}) if name == "person" else {})} for number, name in CATEGORIES.items()]
+        document = {"info": {"year": 2026}, "licenses": [], "images": images, "annotations": annotations, "categories": categories}
+        (self.folder / "instances.json").write_text(json.dumps(document))
+        return document
+
+    def test_coco_comes_out_as_it_went_in(self):
+        squares = self.make_images()
+        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
+        keypoints = [7, 12, 2, 0, 0, 0, 13.5, 19, 1]
+        given = self.coco({f"{name}.png": (64, 48) for name in squares}, boxes,
+                          lambda i: {"iscrowd": int(i == 3), **({"keypoints": keypoints, "num_keypoints": 2} if i % 2 == 0 else {})},
+                          {"keypoints": JOINTS, "skeleton": [[1, 2]]})
+        self.job({"format": "coco", "path": "instances.json"})
+        self.assertEqual(len(self.samples), 5)  # the first has no frame before it
+        self.assert_boxes({name: [(label, *edges) for label in ("person", "car")] for name, edges in squares.items()})
+        for name, sample in self.samples.items():
+            original = json.loads(sample["original"])
+            image, = [entry for entry in given["images"] if entry["file_name"] == f"{name}.png"]
+            self.assertEqual(original, {"image": image, "annotations": [a for a in given["annotations"] if a["image_id"] == image["id"]]})
+        folder = self.export("coco")
+        instances = json.loads((folder / "instances_train.json").read_text())
+        self.assert_same_coco(given, instances)
+        people = json.loads((folder / "person_keypoints_train.json").read_text())
+        originals = {entry["id"]: entry for entry in given["annotations"]}
+        self.assertEqual(people["categories"][0]["keypoints"], JOINTS)
+        self.assertEqual(len(people["annotations"]), 5)
+        for person in people["annotations"]:
+            np.testing.assert_allclose(person["keypoints"], keypoints, atol=PIXELS)
+            self.assertEqual((person["image_id"], person["num_keypoints"]), (originals[person["id"]]["image_id"], 2))
+
+    def assert_same_coco(self, given, exported, scale=1.0, shift=(0, 0)):
+        images = {entry["id"]: entry for entry in given["images"]}
+        originals = {entry["id"]: entry for entry in given["annotations"]}
+        names = {entry["id"]: entry["name"] for entry in given["categories"]}
+        self.assertEqual({entry["id"]: entry["name"] for entry in exported["categories"]
+                          if entry["id"] in {a["category_id"] for a in exported["annotations"]}},
+                         {number: names[number] for number in {a["category_id"] for a in exported["annotations"]}})
+        self.assertEqual(len(exported["images"]), len(self.samples))
+        for image in exported["images"]:
+            self.assertEqual(images[image["id"]]["file_name"].rsplit(".", 1)[0], image["sample_id"])
+        kept = {entry["id"] for entry in exported["images"]}
+        self.assertEqual({entry["id"] for entry in exported["annotations"]},
+                         {entry["id"] for entry in given["annotations"] if entry["image_id"] in kept})
+        for annotation in exported["annotations"]:
+            original = originals[annotation["id"]]
+            for key in ("image_id", "category_id", "iscrowd"):
+                self.assertEqual(annotation[key], original[key])
+            expected = np.array(original["bbox"], float) * scale + np.array([*shift, 0, 0])
+            np.testing.assert_allclose(annotation["bbox"], expected, atol=PIXELS)
+
+    def test_coco_through_a_letterbox(self):
+        squares = self.make_images()
+        given = self.coco({f"{name}.png": (64, 48) for name in squares}, [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
+        self.assert_boxes({name: [("car", *edges)] for name, edges in squares.items()})
+        exported = json.loads((self.export("coco") / "instances_train.json").read_text())
+        matrix = next(iter(self.samples.values()))["matrix"]
+        scale = matrix[0, 0]
+        self.assertEqual(scale, 2)
+        self.assert_same_coco(given, exported, scale, matrix[:, 2] + 0.5 - 0.5 * scale)
+
+    def test_what_is_wrong_is_quarantined_and_counted(self):
+        squares = self.make_images()
+        given = self.coco({**{f"{name}.png": (64, 48) for name in squares}, "gone.png": (64, 48)},
+                          [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        given["annotations"][2]["bbox"] = [70, 10, 5, 5]
+        given["images"][4]["width"] = 48
+        del given["annotations"][5]["category_id"]
+        (self.folder / "instances.json").write_text(json.dumps(given))
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"}, "pairs": pairs([1])}
+        path = self.write_manifest(manifest([source], generator={"kind": "difference"},
+                                            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
+        run("convert", path, "--progress", "none")
+        run("verify", "--deep", self.folder / "out")
+        reasons = {}
+        for record in (self.folder / "out").glob("*-of-*.json"):
+            reasons.update((q["sample_id"], q["reason"]) for q in json.loads(record.read_text())["quarantined"])
+        self.assertEqual(sorted(reasons), ["000002", "000004", "000005", "gone"])
+        self.assertIn("expected a box within the image of 64x48, got one from (70, 10) to (75, 15), in instances.json (annotation 90023)",
+                      reasons["000002"])
+        self.assertIn("expected an image of 48x48", reasons["000004"])
+        self.assertIn("(annotation 90056): $.category_id", reasons["000005"])
+        self.assertIn("expected a frame, got no file, in images/gone.png", reasons["gone"])
+
+    def test_yolo_comes_out_as_it_went_in(self):
+        squares = self.make_images()
+        (self.folder / "labels").mkdir()
+        (self.folder / "data.yaml").write_text("names: {0: car, 1: person}\nkpt_shape: [3, 3]\n")
+        lines = {}
+        for i, (name, (left, top, right, bottom)) in enumerate(squares.items()):
+            box = [(left + right) / 128, (top + bottom) / 96, (right - left) / 64, (bottom - top) / 48]
+            lines[name] = [[i % 2, *box, 0.25, 0.5, 2, 0, 0, 0, 0.125, 0.75, 1]]
+            (self.folder / "labels" / f"{name}.txt").write_text("".join(" ".join(f"{value:.9g}" for value in line) + "\n" for line in lines[name]))
+        self.job({"format": "yolo", "path": "."})
+        self.assert_boxes({name: [(["car", "person"][i % 2], *edges)] for i, (name, edges) in enumerate(squares.items())})
+        folder = self.export("yolo")
+        self.assertEqual(list(dict(enumerate(yaml.safe_load((folder / "data.yaml").read_text())["names"]))), [0, 1])
+        for name in self.samples:
+            got = [[float(value) for value in line.split()] for line in (folder / "labels" / "train" / f"{name}.txt").read_text().splitlines()]
+            np.testing.assert_allclose(np.array(got)[:, :5], np.array(lines[name])[:, :5], atol=PIXELS / 64)
+        for annotation in json.loads((self.export("coco") / "person_keypoints_train.json").read_text())["annotations"]:
+            np.testing.assert_allclose(annotation["keypoints"], [16, 24, 2, 0, 0, 0, 8, 36, 1], atol=PIXELS)
+
+    # ---- Real frames
+
+    def real(self, name):
+        """Sizes and boxes of a set of labelled frames."""
+        folder = LABELLED / name
+        if not folder.is_dir():
+            self.skipTest(f"no {folder}")
+        with open(folder / "frames.csv", newline="") as file:
+            sizes = {row["image"]: (int(row["width"]), int(row["height"])) for row in csv.DictReader(file)}
+        with open(folder / "boxes.csv", newline="") as file:
+            boxes = [(row["image"], row["class"], *(float(row[edge]) for edge in ("x1", "y1", "x2", "y2"))) for row in csv.DictReader(file)]
+        expected = {image.rsplit(".", 1)[0]: [] for image in sizes}
+        for image, *box in boxes:
+            expected[image.rsplit(".", 1)[0]].append(tuple(box))
+        return folder / "images", sizes, boxes, expected
+
+    def test_real_frames_with_coco(self):
+        for name, least in (("davis_tennis", 69), ("camvid", 90)):
+            with self.subTest(name):
+                root, sizes, boxes, expected = self.real(name)
+                given = self.coco(sizes, boxes)
+                self.job({"format": "coco", "path": "instances.json"}, root, name)
+                self.assertGreaterEqual(len(self.samples), least)
+                self.assert_boxes(expected, 1e-3)  # float32 of a thousand pixels
+                self.assert_same_coco(given, json.loads((self.export("coco", name) / "instances_train.json").read_text()))
+
+    def test_real_frames_with_yolo(self):
+        root, sizes, boxes, expected = self.real("sot_person")
+        for image, label, left, top, right, bottom in boxes:
+            width, height = sizes[image]
+            path = self.folder / "labels" / f"{image.rsplit('.', 1)[0]}.txt"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            with open(path, "a") as file:
+                file.write(f"0 {(left + right) / 2 / width:.9f} {(top + bottom) / 2 / height:.9f} {(right - left) / width:.9f} "
+                           f"{(bottom - top) / height:.9f}\n")
+        (self.folder / "labels" / "classes.txt").write_text("person\n")
+        self.job({"format": "yolo", "path": "labels"}, root)
+        self.assert_boxes(expected, 1e-3)
+        folder = self.export("yolo")
+        for sample_id in self.samples:
+            given = np.loadtxt(self.folder / "labels" / f"{sample_id}.txt", ndmin=2)
+            got = np.loadtxt(folder / "labels" / "train" / f"{sample_id.replace('/', '+')}.txt", ndmin=2)
+            np.testing.assert_allclose(got, given, atol=PIXELS / 1000)
+
+    def test_real_frames_with_voc(self):
+        root, sizes, boxes, expected = self.real("davis_tennis")
+        (self.folder / "Annotations").mkdir()
+        for image, (width, height) in sizes.items():
+            annotation = ElementTree.Element("annotation")
+            size = ElementTree.SubElement(annotation, "size")
+            for key, value in (("width", width), ("height", height), ("depth", 3)):
+                ElementTree.SubElement(size, key).text = str(value)
+            for _, label, left, top, right, bottom in (box for box in boxes if box[0] == image):
+                item = ElementTree.SubElement(annotation, "object")
+                ElementTree.SubElement(item, "name").text = label
+                bounds = ElementTree.SubElement(item, "bndbox")
+                for key, value in (("xmin", left + 1), ("ymin", top + 1), ("xmax", right), ("ymax", bottom)):
+                    ElementTree.SubElement(bounds, key).text = f"{value:.0f}"
+            ElementTree.ElementTree(annotation).write(self.folder / "Annotations" / f"{image.rsplit('.', 1)[0]}.xml")
+        self.job({"format": "voc", "path": "Annotations"}, root)
+        self.assert_boxes(expected)
+
+    def test_real_frames_with_a_table(self):
+        root, _, boxes, expected = self.real("camvid")
+        with open(self.folder / "boxes.csv", "w", newline="") as file:
+            writer = csv.writer(file)
+            writer.writerow(["image", "class", "left", "top", "right", "bottom"])
+            writer.writerows(boxes)
+        self.job({"format": "csv", "path": "boxes.csv"}, root)
+        self.assertGreaterEqual(len(self.samples), 90)
+        self.assert_boxes(expected, 1e-3)
+
+    def test_real_frames_with_mot(self):
+        root = self.real("mot17_mini")[0]
+        self.job({"format": "mot", "path": str(root.parent)}, root)
+        self.assertEqual(len(self.samples), 3 + 7)
+        for sample_id, sample in self.samples.items():
+            sequence, frame = sample_id.split("/")
+            table = np.loadtxt(root.parent / sequence / "gt.txt", delimiter=",")
+            table = table[table[:, 0] == int(frame)]
+            corner = table[:, 2:4] - 1
+            np.testing.assert_allclose([box for _, box, _ in sample["boxes"]], np.hstack([corner, corner + table[:, 4:6]]), atol=1e-3)
+            self.assertEqual(sample["tracks"], list(table[:, 1].astype(int)))
+            self.assertEqual([ignore for _, _, ignore in sample["boxes"]],
+                             [bool(row[6] == 0 or row[7] in (2, 7, 8, 12, 13)) for row in table])
+
+    # ---- Scale
+
+    def test_a_hundred_thousand_images_of_coco(self):
+        seconds = {}
+        for count in (10_000, 100_000):
+            folder = self.folder / f"images{count}"
+            folder.mkdir()
+            for i in range(count):
+                original = self.folder / f"{i // MOST_LINKS}.png"
+                if not original.exists():
+                    original.write_bytes(grey_png(i // MOST_LINKS))
+                os.link(original, folder / f"{i:012d}.jpg")
+            polygon = [1.25 + i / 7 for i in range(40)]
+            with open(self.folder / f"{count}.json", "w") as file:
+                file.write('{"images": [')
+                for i in range(count):
+                    file.write(("," if i else "") + json.dumps({"id": 17 * i + 3, "width": 16, "height": 16, "file_name": f"{i:012d}.jpg"}))
+                file.write('], "annotations": [')
+                for i in range(8 * count):
+                    entry = {"id": i, "image_id": 17 * (i * 7919 % count) + 3, "category_id": 1, "iscrowd": 0, "area": 4,
+                             "bbox": [1, 2, 2, 2], "segmentation": [polygon]}
+                    file.write(("," if i else "") + json.dumps(entry))
+                file.write('], "categories": [{"id": 1, "name": "person"}]}')
+            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "coco", "path": f"{count}.json"}, "pairs": pairs([1])}
+            path = self.write_manifest(manifest([source], image={"preset": "mpii", "height": 16, "width": 16}, generator={"kind": "difference"},
+                                                output={"directory": f"out{count}", "samples_per_shard": 250}))
+            done = Measured("plan", "--freeze", "--json", path)
+            self.assertEqual(json.loads(done.out)["samples"], count - 1)
+            self.assertLess(done.peak_bytes, PLAN_LIMIT_BYTES)
+            self.assertLess(done.seconds, PLAN_LIMIT_S)
+            seconds[count] = done.seconds
+        self.assertLess(seconds[100_000], 30 * max(seconds[10_000], 0.3))  # a square would be 100 times
+
+
+if __name__ == "__main__":
+    program.main()

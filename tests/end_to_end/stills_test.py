@@ -1,0 +1,211 @@
+"""Pairs of stills, from photographs to labels in the volume, against NumPy's and PIL's reading of the same."""
+
+import json
+import shutil
+import tarfile
+
+import h5py
+import numpy as np
+import PIL.Image
+
+import program
+from program import SHARED, manifest, run, text
+
+PHOTOS = SHARED / "labelled_frames"
+
+
+def stills(side="before", **motion):
+    return {"from": "stills", "side": side, "motion": motion}
+
+
+def moved_to_labelled(size, motion, label_position):
+    """[3, 3]: from pixels of the moved frame to those of the labelled image, both (width, height); pixel centres are whole."""
+    x, y, degrees, scale = motion
+    angle = np.radians(degrees)
+    middle = (np.array(size) - 1) / 2
+    linear = scale * np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    forward = np.eye(3)
+    forward[:2, :2], forward[:2, 2] = linear, middle - linear @ middle + (x, y)
+    return forward if label_position == 1 else np.linalg.inv(forward)
+
+
+def borders(size, motion, label_position):
+    """What both frames lose on either side: the least that shows nothing from outside, in the image's shape."""
+    there, limit = moved_to_labelled(size, motion, label_position), np.array(size) - 1
+    for n in range(min(size) // 4 + 1):
+        cut = np.floor(n * np.array(size) / min(size) + 0.5)
+        corners = np.array([[x, y, 1] for x in (cut[0], limit[0] - cut[0]) for y in (cut[1], limit[1] - cut[1])])
+        at = corners @ there[:2].T
+        if (at >= -1e-9).all() and (at <= limit + 1e-9).all():
+            return cut
+    raise AssertionError("expected a motion that leaves half of the image")
+
+
+def moved(image, motion, label_position):
+    """The moved frame, by PIL, whose coordinates are edges."""
+    edges = np.eye(3)
+    edges[:2, 2] = 0.5
+    there = edges @ moved_to_labelled(image.size, motion, label_position) @ np.linalg.inv(edges)
+    return image.transform(image.size, PIL.Image.AFFINE, there[:2].ravel(), PIL.Image.BICUBIC)
+
+
+class Stills(program.InFolder):
+    def photos(self, dataset, count, name="photos"):
+        folder = self.folder / name
+        folder.mkdir()
+        for path in sorted((PHOTOS / dataset / "images").iterdir())[:count]:
+            shutil.copy(path, folder)
+        return folder
+
+    def convert(self, job, *options):
+        path = self.write_manifest(job)
+        shutil.rmtree(self.folder / "out", ignore_errors=True)
+        run("convert", path, "--progress", "none", *options)
+        run("finalize", self.folder / "out")
+        run("verify", "--deep", self.folder / "out")
+        return sorted((self.folder / "out").glob("*-of-*.h5"))
+
+    def test_photographs_and_what_moves_in_them(self):
+        self.photos("voc100", 12)
+        for side, position in (("before", 1), ("after", 0)):
+            job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(side)}], generator={"kind": "difference"},
+                           image={"grey": "before_resize", "blur": 0})
+            seen = 0
+            for path in self.convert(job):
+                with h5py.File(path) as shard:
+                    pairs = {name: shard["pairs"][name][:] for name in shard["pairs"]}
+                    for slot in range(len(shard["valid"])):
+                        self.assert_still(pairs, slot, position, shard["events/volume"][slot].astype(float))
+                        seen += 1
+            self.assertEqual(seen, 12)
+
+    def assert_still(self, pairs, slot, position, volume):
+        self.assertEqual(pairs["prev_path"][slot], pairs["next_path"][slot])
+        self.assertEqual(pairs["label_position"][slot], position)
+        self.assertTrue(np.isnan(pairs["gap_s"][slot]))
+        image = PIL.Image.open(self.folder / text(pairs["next_path"][slot])).convert("RGB").convert("L")
+        motion, size = pairs["motion"][slot], image.size
+        self.assertTrue(2 <= np.hypot(*motion[:2]) <= 8 and abs(motion[2]) <= 2 and 0.97 <= motion[3] <= 1.03, motion)
+        cut = borders(size, motion, position)
+        scale = np.array(size) / (np.array(size) - 2 * cut)  # volumes are as large as the images
+        np.testing.assert_allclose(pairs["source_to_volume"][slot],
+                                   np.column_stack([np.diag(scale), (0.5 - cut) * scale - 0.5]), atol=1e-9)
+        # The light that changes, after an independent motion of the image, is what the volume has.
+        box = (*cut, *(np.array(size) - cut))
+        bins = len(volume) // 2
+        change = volume[:bins].sum(0) - volume[bins:].sum(0)
+
+        def likeness(motion):
+            frames = [image, moved(image, motion, position)][::-1 if position == 1 else 1]
+            before, after = (np.log(np.asarray(frame.resize(size, PIL.Image.BILINEAR, box=box), float) + 20) for frame in frames)
+            return np.corrcoef(change.ravel(), (after - before).ravel())[0, 1]
+
+        found = likeness(motion)
+        self.assertGreater(found, 0.8)
+        self.assertLess(likeness((*-motion[:2], *motion[2:])), found - 0.4)  # shifted the other way
+
+    def test_boxes_of_kitti_stay_on_their_cars(self):
+        for folder, name in (("images", "image_2"), ("label_2", "label_2")):
+            shutil.copytree(PHOTOS / "kitti_mini" / folder, self.folder / "kitti" / "training" / name)
+        for fit in ("stretch", "letterbox", "crop"):
+            job = manifest([{"dataset": "kitti_object", "root": "kitti/training", "pairs": stills(translation_px=[4, 9], frames=2)}],
+                           generator={"kind": "difference"}, image={"width": 320, "height": 160, "fit": fit, "preset": "kitti"})
+            for path in self.convert(job):
+                with h5py.File(path) as shard:
+                    boxes, offsets = shard["labels/boxes"], shard["labels/boxes/offsets"][:]
+                    self.assertEqual(set(shard["pairs/gap_frames"][:]), {2})
+                    for slot, motion in enumerate(shard["pairs/motion"][:]):
+                        height, width = shard["pairs/source_size"][slot]
+                        cut = borders((width, height), motion, 1)
+                        s = np.array([320, 160]) / (width, height)
+                        if fit != "stretch":
+                            s[:] = s.min() if fit == "letterbox" else s.max()
+                        scaled = np.floor(s * (width, height) + 0.5)
+                        scale, offset = scaled / ((width, height) - 2 * cut), (np.array([320, 160]) - scaled) // 2
+                        rows = slice(*offsets[slot:slot + 2])
+                        expected = (boxes["xyxy_source"][rows] - np.tile(cut, 2)) * np.tile(scale, 2) + np.tile(offset, 2)
+                        np.testing.assert_allclose(boxes["xyxy_unclipped"][rows], expected, atol=1e-9)
+                        seen = np.maximum(offset, 0), np.minimum(offset + scaled, [320, 160])
+                        inside = np.clip(expected, np.tile(seen[0], 2), np.tile(seen[1], 2))
+                        np.testing.assert_allclose(boxes["xyxy"][rows], inside, atol=1e-9)
+                        empty = (inside[:, 2:] <= inside[:, :2]).any(1)
+                        np.testing.assert_array_equal(boxes["ignore"][rows], boxes["ignore_source"][rows] | empty)
+
+    def test_bytes_depend_on_neither_threads_nor_other_sources(self):
+        self.photos("voc100", 9)
+        source = {"dataset": "frames", "root": "photos", "pairs": stills()}
+        job = manifest([source], image={"width": 96, "height": 64, "fit": "letterbox", "preset": "mpii"})
+        one = [path.read_bytes() for path in self.convert(job, "--threads", "1")]
+        self.assertEqual([path.read_bytes() for path in self.convert(job, "--threads", "4")], one)
+        with h5py.File(self.folder / "out" / "dataset.h5") as view:
+            motions = view["pairs/motion"][:]
+        self.assertEqual(len(np.unique(motions, axis=0)), 9)
+        (self.folder / "sequence").mkdir()
+        first = PIL.Image.open(next((self.folder / "photos").iterdir()))
+        first.save(self.folder / "sequence" / "0.png")
+        first.transpose(PIL.Image.FLIP_LEFT_RIGHT).save(self.folder / "sequence" / "1.png")
+        job["sources"] = [{"dataset": "frames", "root": "sequence", "pairs": program.pairs([1])}, source]
+        self.convert(job)
+        with h5py.File(self.folder / "out" / "dataset.h5") as view:
+            both, paths = view["pairs/motion"][:], view["pairs/prev_path"].asstr()[:]
+        is_still = np.array([path.startswith("photos/") for path in paths])
+        self.assertTrue(0 < is_still.sum() < len(is_still))
+        self.assertTrue(np.isnan(both[~is_still]).all())
+        np.testing.assert_array_equal(both[is_still], motions)
+
+    def test_nothing_moves_where_nothing_may(self):
+        self.photos("pennfudan", 2)
+        job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(translation_px=[0, 0], rotation_deg=0, scale=0)}],
+                       generator={"kind": "difference"})
+        for path in self.convert(job):
+            with h5py.File(path) as shard:
+                self.assertFalse(shard["events/volume"][:].any())
+                np.testing.assert_array_equal(shard["pairs/motion"][:], [[0, 0, 0, 1]] * len(shard["valid"]))
+                np.testing.assert_array_equal(shard["pairs/source_to_volume"][:], [[[1, 0, 0], [0, 1, 0]]] * len(shard["valid"]))
+
+    def test_tiny_odd_and_broken_images(self):
+        folder = self.folder / "photos"
+        folder.mkdir()
+        noise = np.random.default_rng(1)
+        for name, size in (("a16", (16, 16)), ("b", (33, 17)), ("c1", (1, 1)), ("d", (401, 31))):
+            PIL.Image.fromarray(noise.integers(0, 256, (*size[::-1], 3), dtype=np.uint8)).save(folder / f"{name}.png")
+        whole = (folder / "b.png").read_bytes()
+        (folder / "b.png").write_bytes(whole[:-20])
+        job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills(translation_px=[5, 6])}],
+                       errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}, generator={"kind": "esim"})
+        path = self.write_manifest(job)
+        run("convert", path, "--progress", "none")
+        reasons = {sample["sample_id"]: sample["reason"] for record in (self.folder / "out").glob("*-of-*.json")
+                   for sample in json.loads(record.read_text())["quarantined"]}
+        self.assertEqual(sorted(reasons), ["photos/a16", "photos/b", "photos/c1"] if "photos/b" in reasons else ["a16", "b", "c1"])
+        for sample, reason in reasons.items():
+            if not sample.endswith("b"):
+                self.assertIn("half of each side", reason)
+        (folder / "b.png").write_bytes(whole)
+        run("retry", self.folder / "out", "--manifest", path, "--progress", "none")
+        run("verify", "--deep", self.folder / "out")
+
+    def test_other_commands_know_them(self):
+        self.photos("voc100", 3)
+        job = manifest([{"dataset": "frames", "root": "photos", "pairs": stills()}],
+                       image={"width": 96, "height": 64, "fit": "letterbox", "preset": "mpii"})
+        self.assertIn("  stills under a drawn motion: 3\n", run("plan", self.write_manifest(job))[0])
+        shard, = self.convert(job)
+        sample = json.loads(run("inspect", shard, "--sample", "1", "--json")[0])
+        with h5py.File(shard) as file:
+            stored = file["pairs/motion"][1].tolist()
+        self.assertEqual(list(sample["motion"].values()), stored)
+        self.assertIn("of a still: (", run("inspect", shard, "--sample", "1")[0])
+        run("export", self.folder / "out", "--to", "webdataset", "--out", self.folder / "web", "--progress", "none")
+        with tarfile.open(next((self.folder / "web").rglob("*.tar"))) as tar:
+            labels = [json.load(tar.extractfile(name)) for name in tar.getnames() if name.endswith(".json")]
+        self.assertIn(stored, [one["motion"] for one in labels])
+        _, warned = run("preview", self.folder / "out", "--out", self.folder / "preview")
+        self.assertEqual(warned, "")  # both frames could be shown
+        self.assertTrue(list((self.folder / "preview").rglob("*.png")))
+        run("report", self.folder / "out", "--out", self.folder / "report.html")
+        self.assertIn("stills of", (self.folder / "report.html").read_text())
+
+
+if __name__ == "__main__":
+    program.main(needs_shared_data=True)

@@ -1,0 +1,230 @@
+#include "pipeline/planning/draft_manifest.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/faults.h"
+#include "tests/testing/image_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+namespace fs = std::filesystem;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::ThrowsMessage;
+
+class DraftManifest : public ::testing::Test {
+ protected:
+  /// A folder of flat images, of which a sequence could be one.
+  FoundSource images(const fs::path& name, const std::vector<ImageSize>& sizes) {
+    for (std::size_t i = 0; i < sizes.size(); ++i) {
+      testing::write_flat_image(folder_.path() / name / (std::to_string(i) + ".png"), sizes[i], 9);
+    }
+    return found(DatasetKind::kFrames, name);
+  }
+
+  /// A recording with ECD's files: events each hundredth of a second, a frame each tenth.
+  FoundSource recording(const fs::path& name) {
+    const fs::path root = folder_.path() / name;
+    std::string frames, events;
+    for (int i = 0; i < 3; ++i) {
+      testing::write_flat_image(root / ("images/" + std::to_string(i) + ".png"), {16, 24}, 9);
+      frames += "0." + std::to_string(i) + " images/" + std::to_string(i) + ".png\n";
+    }
+    for (int i = 0; i < 20; ++i) events += "0." + std::to_string(10 + i) + " 3 4 1\n";
+    testing::write_file(root / "images.txt", frames);
+    testing::write_file(root / "events.txt", events);
+    return found(DatasetKind::kRecording, name);
+  }
+
+  FoundSource found(DatasetKind dataset, const fs::path& name) const {
+    FoundSource source;
+    source.dataset = dataset;
+    source.title = "what was found";
+    source.root = folder_.path() / name;
+    return source;
+  }
+
+  ManifestDraft draft(const std::vector<FoundSource>& sources) const {
+    return draft_manifest(sources, {folder_.path(), /*is_relative=*/true, "out/job"});
+  }
+  JobManifest read(const ManifestDraft& draft) const {
+    return parse_job_manifest(draft.text, folder_.path(), "the draft");
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+constexpr ImageSize kOneSize{24, 32}, kOtherSize{48, 64}, kDavis{260, 346};
+
+TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
+  const ManifestDraft made = draft({images("walk", {kOneSize, kOneSize, kOneSize})});
+  const JobManifest job = read(made);
+  EXPECT_EQ(job.name, "walk-events");
+  EXPECT_EQ(job.output.directory, "out/job");
+  ASSERT_EQ(job.sources.size(), 1u);
+  EXPECT_EQ(job.sources[0].root, "walk");
+  EXPECT_FALSE(job.sources[0].pairs.stills);
+  EXPECT_THAT(job.sources[0].pairs.gaps, ElementsAre(1));
+  EXPECT_FALSE(job.image.size);
+  EXPECT_TRUE(made.has_samples);
+  EXPECT_THAT(made.findings, ElementsAre("what was found: 3 labelled frames, 0 annotation files",
+                                         HasSubstr("by gap: gap 1: 2, gap 2: 1, gap 3: 0"),
+                                         HasSubstr("set \"frames_per_second\"")));
+}
+
+TEST_F(DraftManifest, OfOneImageProposesStillsWithTheirDefaultsWrittenOut) {
+  const ManifestDraft made = draft({images("one", {kOneSize})});
+  const PairSpec pairs = read(made).sources[0].pairs;
+  ASSERT_TRUE(pairs.stills);
+  const StillsSpec usual;
+  EXPECT_EQ(pairs.stills->translation_px, usual.translation_px);
+  EXPECT_EQ(pairs.stills->rotation_deg, usual.rotation_deg);
+  EXPECT_EQ(pairs.stills->scale, usual.scale);
+  EXPECT_EQ(pairs.stills->frames, usual.frames);
+  EXPECT_THAT(
+      made.text,
+      HasSubstr(
+          R"("motion": { "translation_px": [2, 8], "rotation_deg": 2, "scale": 0.03, "frames": 1 })"));
+  EXPECT_FALSE(read(made).image.size);
+  EXPECT_TRUE(made.has_samples);
+  EXPECT_THAT(made.findings, Contains("what was found: 1 labelled frame, 0 annotation files"));
+}
+
+TEST_F(DraftManifest, OfSeveralSizesIsLetterboxedStills) {
+  const JobManifest job = read(draft({images("mixed", {kOneSize, kOtherSize, kOneSize})}));
+  EXPECT_TRUE(job.sources[0].pairs.stills);
+  EXPECT_EQ(job.image.size, kDavis);
+  EXPECT_EQ(job.image.fit, ImageFit::kLetterbox);
+}
+
+TEST_F(DraftManifest, OfStillsInFoldersOfTheirOwnComparesAllSizes) {
+  images("all/a", {kOneSize});
+  images("all/b", {kOtherSize});
+  const JobManifest job = read(draft({found(DatasetKind::kFrames, "all")}));
+  EXPECT_TRUE(job.sources[0].pairs.stills);
+  EXPECT_EQ(job.image.size, kDavis);
+}
+
+TEST_F(DraftManifest, OfSequencesOfOneSizeEachStaysAtTheirs) {
+  images("all/a", {kOneSize, kOneSize});
+  images("all/b", {kOtherSize, kOtherSize});
+  const JobManifest job = read(draft({found(DatasetKind::kFrames, "all")}));
+  EXPECT_FALSE(job.sources[0].pairs.stills);
+  EXPECT_FALSE(job.image.size);
+}
+
+TEST_F(DraftManifest, NamesLabelsOfOnesOwn) {
+  FoundSource source = images("walk/images", {kOneSize, kOneSize});
+  testing::write_file(folder_ / "walk/boxes.csv",
+                      "image,class,left,top,right,bottom\n0.png,car,1,1,5,5\n");
+  source.labels = {LabelFormat::kCsv, folder_ / "walk/boxes.csv"};
+  // Only what is written: whether such labels can be read is the dataset's affair.
+  const ManifestDraft made = draft({source});
+  const JobManifest job = read(made);
+  ASSERT_TRUE(job.sources[0].labels);
+  EXPECT_EQ(job.sources[0].labels->format, LabelFormat::kCsv);
+  EXPECT_EQ(job.sources[0].labels->path, "walk/boxes.csv");
+  EXPECT_THAT(made.findings, Contains("labels: csv, in " + (folder_ / "walk/boxes.csv").string()));
+}
+
+TEST_F(DraftManifest, OfARecordingTakesItsEvents) {
+  const ManifestDraft made = draft({recording("drive")});
+  const JobManifest job = read(made);
+  EXPECT_EQ(job.generator.kind, GeneratorKind::kEvents);
+  EXPECT_EQ(job.sources[0].dataset, DatasetKind::kRecording);
+  EXPECT_FALSE(job.sources[0].window.duration_s) << "it has frames, which make the windows";
+  EXPECT_THAT(made.text, HasSubstr(R"(// "window_s": 0.05)"));
+  EXPECT_THAT(made.text, Not(HasSubstr(R"("sensor")")));
+  EXPECT_FALSE(job.image.size);
+  EXPECT_TRUE(made.has_samples);
+  EXPECT_THAT(made.findings,
+              ElementsAre(AllOf(HasSubstr("of 1 recording"), Not(HasSubstr("gap")))));
+}
+
+TEST_F(DraftManifest, OfSeveralHasOneSizeAndAPresetWhereTheirsDiffer) {
+  fs::create_directories(folder_ / "kitti/label_2");
+  for (const char* name : {"kitti/image_2/000000.png", "kitti/prev_2/000000_01.png"}) {
+    testing::write_flat_image(folder_ / name, kOneSize, 9);
+  }
+  testing::write_file(folder_ / "kitti/label_2/000000.txt", "");
+  const FoundSource cars = found(DatasetKind::kKittiObject, "kitti");
+  const FoundSource walk = images("walk", {kOneSize, kOneSize});
+  const FoundSource run = images("run", {kOtherSize, kOtherSize});
+
+  const JobManifest both = read(draft({walk, cars}));
+  EXPECT_EQ(both.image.size, kDavis);
+  EXPECT_EQ(both.image.fit, ImageFit::kLetterbox);
+  EXPECT_EQ(both.image.preset, "demo") << "the first one's";
+  EXPECT_THAT(both.sources[0].pairs.gaps, ElementsAre(1));
+  EXPECT_THAT(both.sources[1].pairs.gaps, ElementsAre(1)) << "of 1 and 2 the one that has frames";
+  EXPECT_EQ(read(draft({cars, walk})).image.preset, "kitti");
+  EXPECT_EQ(read(draft({cars})).image.fit, ImageFit::kStretch);
+
+  const ManifestDraft alike = draft({walk, run});
+  EXPECT_FALSE(read(alike).image.size);
+  EXPECT_THAT(alike.text, Not(HasSubstr("preset")));
+  EXPECT_EQ(read(draft({walk, images("still", {kOneSize, kOtherSize})})).image.size, kDavis);
+}
+
+TEST_F(DraftManifest, HasSamplesOnlyIfEachSourceHas) {
+  const FoundSource walk = images("walk", {kOneSize, kOneSize});
+  fs::create_directories(folder_ / "kitti/label_2");
+  fs::create_directories(folder_ / "kitti/image_2");
+  const FoundSource nothing = found(DatasetKind::kKittiObject, "kitti");
+  EXPECT_TRUE(draft({walk}).has_samples);
+  EXPECT_FALSE(draft({nothing}).has_samples);
+  EXPECT_FALSE(draft({walk, nothing}).has_samples);
+}
+
+TEST_F(DraftManifest, RefusesWhatIsNoOneJob) {
+  const FoundSource walk = images("walk", {kOneSize, kOneSize}), drive = recording("drive");
+  EXPECT_THAT(
+      [&] {
+        draft({walk, drive});
+      },
+      ThrowsMessage<UsageError>(AllOf(HasSubstr("got "), HasSubstr("walk (frames) and "),
+                                      HasSubstr("drive (recording)"))));
+  EXPECT_THAT(
+      [&] {
+        draft({walk, walk});
+      },
+      ThrowsMessage<UsageError>(HasSubstr("once, got it twice: ")));
+  fs::create_directory_symlink(folder_ / "walk", folder_ / "link");
+  EXPECT_THAT(
+      [&] {
+        draft({walk, found(DatasetKind::kFrames, "link")});
+      },
+      ThrowsMessage<UsageError>(HasSubstr("once, got it twice: ")));
+  const FoundSource latin = images("l\xe4tin", {kOneSize, kOneSize});
+  EXPECT_THAT([&] { draft({latin}); }, ThrowsMessage<UsageError>(HasSubstr("in UTF-8")));
+}
+
+TEST_F(DraftManifest, IsNamedAfterWhatWasShown) {
+  const auto name = [&](const std::vector<fs::path>& names) {
+    std::vector<FoundSource> sources;
+    for (const fs::path& path : names) {
+      sources.push_back(found(DatasetKind::kFrames, path));
+      fs::create_directories(sources.back().root);
+    }
+    return draft_name(sources);
+  };
+  EXPECT_EQ(name({"run"}), "run-events");
+  EXPECT_EQ(name({"run/images"}), "run-events");
+  EXPECT_EQ(name({"both/a", "both/b"}), "both-events");
+  EXPECT_EQ(name({"both/a", "other/b"}), "a-events");
+  EXPECT_EQ(name({"\xd0\xb2"}), "frames-events");
+  EXPECT_EQ(name({"\xd0\xb2/a", "\xd0\xb2/b"}), "a-events") << "the folder's name does not serve";
+  EXPECT_EQ(name({std::string(80, 'x')}), std::string(50, 'x') + "-events");
+}
+
+}  // namespace
+}  // namespace eventgan

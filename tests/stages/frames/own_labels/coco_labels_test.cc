@@ -1,0 +1,350 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "stages/frames/sequences/frames_dataset.h"
+#include "tests/testing/image_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+constexpr ImageSize kImage{30, 40};
+
+/// A folder with images, and COCO labels beside it.
+class CocoLabels : public ::testing::Test {
+ protected:
+  CocoLabels() {
+    for (const char* name : {"images/000001.png", "images/000002.png", "images/000003.png"}) {
+      testing::write_flat_image(folder_ / name, kImage, 7);
+    }
+  }
+
+  static std::string image(int id, const std::string& name, ImageSize size = kImage) {
+    return nlohmann::json{
+        {"id", id}, {"file_name", name}, {"width", size.width}, {"height", size.height}}
+        .dump();
+  }
+
+  static std::string box(int id, int image_id, const std::string& bbox,
+                         const std::string& more = "") {
+    return "{\"id\": " + std::to_string(id) + ", \"image_id\": " + std::to_string(image_id) +
+           ", \"category_id\": 3, \"bbox\": " + bbox + more + "}";
+  }
+
+  void write(const std::string& images, const std::string& annotations,
+             const std::string& categories = R"({"id": 3, "name": "person"})") {
+    testing::write_file(folder_ / "instances.json",
+                        "{\"info\": {\"year\": [1, {}]}, \"images\": [" + images +
+                            "], \"annotations\": [" + annotations + "], \"categories\": [" +
+                            categories + "]}");
+  }
+
+  std::unique_ptr<Dataset> open(const std::string& root = "images") const {
+    SourceSpec spec;
+    spec.root = root;
+    spec.labels = LabelSpec{LabelFormat::kCoco, "instances.json"};
+    return open_frames_dataset(spec, folder_.path());
+  }
+
+  Annotation annotation(const std::string& key) const {
+    const auto read = open()->annotation(key);
+    return is_fault(read) ? Annotation{std::get<SampleFault>(read).reason, {}, {}}
+                          : std::get<Annotation>(read);
+  }
+
+  std::string fault(const std::string& key = "7") const {
+    const auto read = open()->annotation(key);
+    return is_fault(read) ? std::get<SampleFault>(read).reason : "no fault";
+  }
+
+  void expect_refused(const std::string& why) const {
+    EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr(why)));
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(CocoLabels, OfTheImagesThatTheyName) {
+  // Ids neither sorted nor dense, annotations between each other's, entries with odd spaces.
+  write(image(9, "000003.png") + ",\n" + image(7, "000001.png"),
+        box(1, 7, "[1, 2, 3.5, 4]", R"(, "iscrowd": 1)") + "," + box(2, 9, "[0,0,40,30]") + ", " +
+            box(3, 7, "[ -2, 1e1 , 5,25 ]"));
+  const auto dataset = open();
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("person"));
+  EXPECT_THAT(dataset->label_schema().joint_names, IsEmpty());
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("instances.json"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 of 3 frames have no label in instances.json: no "
+                                            "samples, but paired frames"));
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 2u);
+  EXPECT_EQ(frames[0].sample_id, "000001");
+  EXPECT_EQ(frames[0].label_key, "7");
+  EXPECT_EQ(frames[1].frame.path, "images/000003.png");
+  EXPECT_EQ(dataset->label_place("7"), "instances.json#images/7");
+  // Frame 2 has no label, and is a paired frame.
+  const PairedFrame paired = dataset->paired_frame(frames[1], -1);
+  EXPECT_EQ(paired.state, PairedFrame::State::kPresent);
+  EXPECT_EQ(paired.frame.path, "images/000002.png");
+
+  const Annotation read = annotation("7");
+  ASSERT_EQ(read.boxes.size(), 2u);
+  EXPECT_EQ(read.boxes[0].xyxy, (Rectangle{1, 2, 4.5, 6}));
+  EXPECT_TRUE(read.boxes[0].ignore);
+  EXPECT_EQ(read.boxes[1].xyxy, (Rectangle{-2, 10, 3, 35}));
+  EXPECT_FALSE(read.boxes[1].ignore);
+  EXPECT_THAT(read.persons, IsEmpty());
+  EXPECT_EQ(read.original, "{\"image\": " + image(7, "000001.png") + ", \"annotations\": [" +
+                               box(1, 7, "[1, 2, 3.5, 4]", R"(, "iscrowd": 1)") + ", " +
+                               box(3, 7, "[ -2, 1e1 , 5,25 ]") + "]}");
+  EXPECT_THAT(annotation("9").boxes,
+              ElementsAre(::testing::Field(&Box::xyxy, Rectangle{0, 0, 40, 30})));
+}
+
+TEST_F(CocoLabels, ClassesAreNumberedByAscendingId) {
+  write(image(7, "000001.png"),
+        R"({"id": 1, "image_id": 7, "category_id": 90, "bbox": [1, 1, 2, 2]},
+           {"id": 2, "image_id": 7, "category_id": 2, "bbox": [1, 1, 2, 2]})",
+        R"({"id": 90, "name": "b"}, {"id": 2, "name": "c"}, {"id": 5, "name": "a"})");
+  EXPECT_THAT(open()->label_schema().class_names, ElementsAre("c", "a", "b"));
+  EXPECT_EQ(annotation("7").boxes.at(0).class_id, 2);
+  EXPECT_EQ(annotation("7").boxes.at(1).class_id, 0);
+}
+
+TEST_F(CocoLabels, KeypointsAreMeasuredFromTheImagesEdge) {
+  const std::string person =
+      R"({"id": 3, "name": "person", "keypoints": ["nose", "eye", "ear"], "skeleton": [[1, 2]]})";
+  write(image(7, "000001.png"),
+        box(1, 7, "[1, 2, 30, 20]",
+            R"(, "num_keypoints": 2, "keypoints": [10, 12, 2, 0, 0, 0, 11.5, 13, 1])") +
+            "," +
+            box(2, 7, "[1, 2, 3, 4]", R"(, "num_keypoints": 0, "keypoints": [0,0,0,0,0,0,0,0,0])"),
+        person);
+  EXPECT_THAT(open()->label_schema().joint_names, ElementsAre("nose", "eye", "ear"));
+  const Annotation read = annotation("7");
+  EXPECT_EQ(read.boxes.size(), 2u);
+  ASSERT_EQ(read.persons.size(), 1u) << "nothing is annotated of the second";
+  EXPECT_EQ(read.persons[0].box, (Rectangle{1, 2, 31, 22}));
+  EXPECT_THAT(read.persons[0].joints,
+              ElementsAre(Joint{{9.5, 11.5}, 1}, Joint{kMissingPoint, 0}, Joint{{11, 12.5}, 0}));
+  const auto with = [&](const std::string& keypoints) {
+    write(image(7, "000001.png"), box(1, 7, "[1, 2, 30, 20]", ", \"keypoints\": " + keypoints),
+          person);
+    return fault();
+  };
+  EXPECT_THAT(with("[1, 2, 2]"),
+              AllOf(HasSubstr("instances.json (annotation 1): $.keypoints: expected x, y, v of "
+                              "each of 3 joints, got an array of 3")));
+  EXPECT_THAT(with("[1, 2, 3, 0, 0, 0, 0, 0, 0]"), HasSubstr("$.keypoints[2]: expected"));
+  EXPECT_THAT(with(R"([1, 2, 2, 0, 0, 0, 0, 0, 0], "num_keypoints": 2)"),
+              HasSubstr("$.num_keypoints: expected an integer 1..1, got 2"));
+  write(image(7, "000001.png"), "",
+        person + R"(, {"id": 4, "name": "dog", "keypoints": ["nose", "tail"]})");
+  expect_refused("expected one list of keypoints, got two, of \"dog\" another, in instances.json");
+}
+
+TEST_F(CocoLabels, AnImageMayHaveNoBoxes) {
+  write(image(7, "000001.png"), "");
+  EXPECT_THAT(annotation("7").boxes, IsEmpty());
+  EXPECT_EQ(annotation("7").original,
+            "{\"image\": " + image(7, "000001.png") + ", \"annotations\": []}");
+}
+
+TEST_F(CocoLabels, FileNamesMayBeginWithWhatTheRootEndsIn) {
+  write(image(1, "images/000001.png") + "," + image(2, "./000002.png") + "," +
+            image(3, (folder_ / "images" / "000003.png").string()),
+        "");
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 3u);
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    EXPECT_EQ(dataset->paired_frame(frame, 0).state, PairedFrame::State::kPresent);
+  }
+}
+
+TEST_F(CocoLabels, ABareNameMayBeInAFolder) {
+  testing::write_flat_image(folder_ / "clips/a/x.png", kImage, 7);
+  testing::write_flat_image(folder_ / "clips/b/y.png", kImage, 7);
+  testing::write_flat_image(folder_ / "clips/a/z.png", kImage, 7);
+  testing::write_flat_image(folder_ / "clips/b/z.png", kImage, 7);
+  write(image(1, "x.png") + "," + image(2, "b/y.png") + "," + image(3, "a/z.png"), "");
+  const auto dataset = open("clips");
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].sample_id, "a/x");
+  EXPECT_EQ(frames[1].sample_id, "a/z");
+  EXPECT_EQ(frames[2].sample_id, "b/y");
+  write(image(1, "z.png"), "");
+  EXPECT_THAT([&] { open("clips"); },
+              ThrowsMessage<InputError>(HasSubstr("got 1 bare names that several of its folders "
+                                                  "have: z.png, in instances.json")));
+}
+
+TEST_F(CocoLabels, AnEntryWithoutImageIsASampleWhoseFrameIsMissing) {
+  write(image(1, "000001.png") + "," + image(8, "images/gone.png") + "," + image(9, "000001.jpg"),
+        box(4, 8, "[1, 1, 2, 2]"));
+  const auto dataset = open();
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].sample_id, "000001");
+  EXPECT_EQ(frames[1].sample_id, "000001.jpg") << "the name without extension is taken";
+  EXPECT_EQ(frames[2].sample_id, "gone");
+  for (const int steps : {-1, 0, 1}) {
+    const PairedFrame frame = dataset->paired_frame(frames[2], steps);
+    EXPECT_EQ(frame.state, PairedFrame::State::kMissing);
+    EXPECT_EQ(frame.frame.path, "images/gone.png");
+  }
+}
+
+TEST_F(CocoLabels, TwoEntriesOfOneImageAreAFaultOfIt) {
+  write(image(1, "000001.png") + "," + image(2, "images/000001.png"), "");
+  const auto dataset = open();
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_EQ(dataset->labelled_frames()[0].fault,
+            "expected one label of images/000001.png, got two, in instances.json#images/1 and "
+            "instances.json#images/2");
+}
+
+TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
+  const auto with = [&](const std::string& annotation) {
+    write(image(7, "000001.png") + "," + image(8, "000002.png"), annotation);
+    EXPECT_FALSE(is_fault(open()->annotation("8")));
+    return fault();
+  };
+  EXPECT_THAT(with(box(17, 7, "[1, 2, -3, 4]")),
+              HasSubstr("instances.json (annotation 17): $.bbox[2]: expected a number 0..1e+06, "
+                        "got -3"));
+  EXPECT_THAT(with(box(17, 7, "[1, 2, 3]")), HasSubstr("expected left, top, width, height"));
+  EXPECT_THAT(with(box(17, 7, "[1, null, 3, 4]")), HasSubstr("$.bbox[1]: expected a number"));
+  EXPECT_THAT(with(box(17, 7, "[1e300, 1, 3, 4]")), HasSubstr("$.bbox[0]: expected a number"));
+  EXPECT_THAT(with(box(17, 7, "[1, 2, 3, 4]", R"(, "iscrowd": 2)")), HasSubstr("$.iscrowd"));
+  EXPECT_THAT(with(box(17, 7, "[1, 2, 3, 4]", R"(, "area": -1)")), HasSubstr("$.area"));
+  EXPECT_THAT(with(box(17, 7, "[1, 2, 3, 4]", R"(, "bbox": [1, 2, 3, 4])")),
+              HasSubstr("expected the key once"));
+  EXPECT_EQ(with(box(17, 7, "[40, 2, 3, 4]")),
+            "expected a box within the image of 40x30, got one from (40, 2) to (43, 6), in "
+            "instances.json (annotation 17)");
+  EXPECT_THAT(with(box(17, 7, "[4, 2, 0, 4]")), HasSubstr("expected a box within the image"));
+  EXPECT_THAT(with(R"({"id": 17, "image_id": 7, "category_id": 4, "bbox": [1, 2, 3, 4]})"),
+              HasSubstr("$.category_id: expected the id of a category, got 4"));
+  EXPECT_THAT(with(R"({"image_id": 7, "bbox": [1, 2, 3, 4]})"),
+              HasSubstr("instances.json (annotation): $.category_id"));
+  EXPECT_EQ(with(box(17, 7, "[39.9, 2, 3, 4]")), "no fault") << "some of it is within";
+  EXPECT_THAT(fault("12"), HasSubstr("expected an image of the file, got none"));
+  EXPECT_THAT(fault("x"), HasSubstr("expected an image of the file, got none"));
+}
+
+TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {
+  write(image(7, "000001.png", {40, 30}), box(1, 7, "[1, 2, 3, 4]"));
+  EXPECT_EQ(fault(),
+            "expected an image of 30x40, as instances.json#images/7 says, got 40x30, in "
+            "images/000001.png");
+  write(R"({"id": 7, "file_name": "000001.png", "width": 40})", "");
+  EXPECT_THAT(fault(), HasSubstr("instances.json (image 7): $.height: expected"));
+}
+
+TEST_F(CocoLabels, AFileThatIsNoneIsRefused) {
+  const auto refused = [&](const std::string& text, const std::string& why) {
+    testing::write_file(folder_ / "instances.json", text);
+    expect_refused(why);
+  };
+  refused("", "expected JSON, got a parse error");
+  refused("[]", "expected an object, got a list, in instances.json (byte 1)");
+  refused("7", "expected an object, got a number");
+  refused("{}", "expected a list \"images\", got none, in instances.json");
+  refused(R"({"images": [], "annotations": []})", "expected a list \"categories\", got none");
+  refused(R"({"images": [], "images": []})", "expected the key \"images\" once, got it twice");
+  refused(R"({"images": {}})", "expected a list of objects as \"images\", got an object");
+  refused(R"({"images": [[]]})", "expected a list of objects as \"images\", got a list");
+  refused(R"({"images": [7]})", "expected a list of objects as \"images\", got a number");
+  refused(R"({"images": [{}]})", "expected an entry of \"images\" with id, got none");
+  refused(R"({"images": [{"id": 1}]})", "with file_name, got none");
+  refused(R"({"images": [{"id": "1"}]})", "expected a whole number as \"id\", got text");
+  refused(R"({"images": [{"id": 1, "id": 1}]})", "expected the key \"id\" once");
+  refused(R"({"images": [{"id": 1, "file_name": []}]})", "expected text as \"file_name\"");
+  refused(R"({"annotations": [{"id": 1}]})", "with image_id, got none");
+  refused(R"({"categories": [{"id": 1, "name": "a", "keypoints": [1]}]})",
+          "expected names as keypoints, got a number");
+  refused(R"({"images": [], "annotations": [], "categories": []} x)", "expected JSON");
+  refused(std::string(R"({"images": [], "annotations": [], "categories": []})") + '\0' + "x",
+          "expected JSON, got a NUL");
+  refused(R"({"images": [{"id": 1, "file_name": ")"
+          "\xff"
+          R"("}]})",
+          "expected JSON");
+  refused(R"({"annotations": [{"image_id": 1, "bbox": [NaN, 1, 2, 3]}]})", "expected JSON");
+  refused(R"({"annotations": [{"image_id": 1, "bbox": [1e999, 1, 2, 3]}]})", "expected JSON");
+  std::string whole;
+  write(image(1, "000001.png"), box(1, 1, "[1, 2, 3, 4]"));
+  whole = testing::read_file(folder_ / "instances.json");
+  for (std::size_t length = 0; length + 1 < whole.size(); ++length) {
+    testing::write_file(folder_ / "instances.json", whole.substr(0, length));
+    EXPECT_THROW(open(), InputError) << length;
+  }
+  std::filesystem::remove(folder_ / "instances.json");
+  expect_refused("No such file");
+}
+
+TEST_F(CocoLabels, WhatBelongsToNothingIsCountedAndNamed) {
+  write(image(1, "000001.png") + "," + image(1, "000002.png"), "");
+  expect_refused("expected each image's id once, got 1 more often: 1, in instances.json");
+  std::string annotations;
+  for (int i = 0; i < 25; ++i) annotations += (i > 0 ? "," : "") + box(i, 100 + i, "[1, 2, 3, 4]");
+  write(image(1, "000001.png"), annotations);
+  expect_refused("expected annotations of the file's images, got 25 of other image_ids: 100, 101");
+  expect_refused("118, 119, ..., in instances.json");
+  write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 2, "name": "a"})");
+  expect_refused(
+      "expected each category with a name of its own, without control characters, got 1 others");
+  write(image(1, "000001.png"), "", R"({"id": 1, "name": "a"}, {"id": 1, "name": "b"})");
+  expect_refused("expected each category's id once, got 1 more often: 1");
+}
+
+TEST_F(CocoLabels, NestingAsDeepAsTheFileIsNoTrouble) {
+  const std::string deep(200'000, '[');
+  testing::write_file(folder_ / "instances.json", "{\"info\": " + deep);
+  expect_refused("expected JSON");
+  const std::string closed = std::string(100, '[') + std::string(100, ']');
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 3, 4]", ", \"segmentation\": " + closed));
+  EXPECT_THAT(fault(), HasSubstr("levels of nesting"));
+}
+
+TEST_F(CocoLabels, AFileThatHasChangedIsAFault) {
+  write(image(7, "000001.png"), box(1, 7, "[1, 2, 3, 4]"));
+  const auto dataset = open();
+  write(image(8, "000001.png"), box(1, 8, "[1, 2, 3, 4]"));
+  EXPECT_TRUE(is_fault(dataset->annotation("7")));
+  testing::write_file(folder_ / "instances.json", "{}");
+  EXPECT_TRUE(is_fault(dataset->annotation("7")));
+}
+
+TEST_F(CocoLabels, LabelsBesideTheImagesAreNoLeftOvers) {
+  write("", "");
+  std::filesystem::rename(folder_ / "instances.json", folder_ / "images/_annotations.coco.json");
+  testing::write_file(folder_ / "images/000001.json", "{}");
+  SourceSpec spec;
+  spec.root = "images";
+  spec.labels = LabelSpec{LabelFormat::kCoco, "images/_annotations.coco.json"};
+  EXPECT_THAT([&] { open_frames_dataset(spec, folder_.path()); },
+              ThrowsMessage<InputError>(
+                  HasSubstr("expected labels of the frames in images, got of none of the 3")));
+  testing::write_file(
+      folder_ / "images/_annotations.coco.json",
+      "{\"images\": [" + image(1, "000001.png") + "], \"annotations\": [], \"categories\": []}");
+  EXPECT_THAT(open_frames_dataset(spec, folder_.path())->notes(),
+              ElementsAre(HasSubstr("2 of 3 frames have no label"),
+                          "1 files left out in images: 000001.json"));
+}
+
+}  // namespace
+}  // namespace eventgan

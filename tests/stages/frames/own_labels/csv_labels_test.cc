@@ -1,0 +1,130 @@
+#include "stages/frames/own_labels/detail/csv_labels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::ThrowsMessage;
+
+constexpr char kTableHeader[] = "image,class,left,top,right,bottom,track\n";
+
+auto read_csv(const std::string& rows) {
+  return parse_csv_labels(kTableHeader + rows, "labels.csv");
+}
+
+std::string csv_fault(const std::string& rows) {
+  const auto images = read_csv(rows + "other.png,car,0,0,1,1,\n");
+  EXPECT_FALSE(is_fault(images.at("other.png")));  // of its image alone
+  const auto& image = images.at("a.png");
+  return is_fault(image) ? std::get<SampleFault>(image).reason : "no fault";
+}
+
+TEST(CsvLabels, HaveARowABox) {
+  const auto images = read_csv(
+      "b.png,person,0,0.25,31,57.5,\r\n"
+      "\"x, \"\"y\"\".png\",car,1,2,3,4,7\r\n"
+      "b.png,car,-3,1e1,20,30,0\r\n"
+      "\r\n"
+      "sub/empty.png,,,,,,\r\n"
+      "b.png,\"dog, small\",1,1,2,2,9007199254740993");
+  ASSERT_THAT(images, SizeIs(3));
+  const auto& b = std::get<ImageLabels>(images.at("b.png"));
+  ASSERT_THAT(b.boxes, SizeIs(3));
+  EXPECT_EQ(b.boxes[0].class_name, "person");
+  EXPECT_EQ(b.boxes[0].box, (Box{.xyxy = {0, 0.25, 31, 57.5}}));
+  EXPECT_EQ(b.boxes[1].class_name, "car");
+  EXPECT_EQ(b.boxes[1].box, (Box{.xyxy = {-3, 10, 20, 30}, .track_id = 0}));
+  EXPECT_EQ(b.boxes[2].class_name, "dog, small");
+  EXPECT_EQ(b.boxes[2].box.track_id, 9007199254740993);
+  EXPECT_EQ(b.original,
+            "b.png,person,0,0.25,31,57.5,\r\nb.png,car,-3,1e1,20,30,0\r\n"
+            "b.png,\"dog, small\",1,1,2,2,9007199254740993");
+  EXPECT_EQ(b.size, std::nullopt);
+  EXPECT_EQ(std::get<ImageLabels>(images.at("x, \"y\".png")).boxes.at(0).box,
+            (Box{.xyxy = {1, 2, 3, 4}, .track_id = 7}));
+  const auto& empty = std::get<ImageLabels>(images.at("sub/empty.png"));
+  EXPECT_THAT(empty.boxes, IsEmpty());
+  EXPECT_EQ(empty.original, "sub/empty.png,,,,,,\r\n");
+}
+
+TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
+  const auto images = parse_csv_labels(
+      "\xEF\xBB\xBF"
+      "bottom,right,top,left,class,image\n4,3,2,1,car,a.png\n",
+      "labels.csv");
+  EXPECT_EQ(std::get<ImageLabels>(images.at("a.png")).boxes.at(0).box, (Box{.xyxy = {1, 2, 3, 4}}));
+  EXPECT_THAT(read_csv(""), IsEmpty());
+}
+
+TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
+  const std::string place = ", in labels.csv:2";
+  EXPECT_EQ(csv_fault("a.png,,1,2,3,4,\n"),
+            "expected a class without control characters, got \"\"" + place);
+  EXPECT_EQ(csv_fault("a.png,a\x01,1,2,3,4,\n"),
+            "expected a class without control characters, got \"a\\u0001\"" + place);
+  EXPECT_EQ(csv_fault("a.png,car,1,2,nan,4,\n"),
+            "expected right within 1e+06 pixels, got \"nan\"" + place);
+  EXPECT_EQ(csv_fault("a.png,car,,2,3,4,\n"),
+            "expected left within 1e+06 pixels, got \"\"" + place);
+  EXPECT_EQ(csv_fault("a.png,car,1,2,1e999,4,\n"),
+            "expected right within 1e+06 pixels, got \"1e999\"" + place);
+  EXPECT_EQ(csv_fault("a.png,car,1,-1000001,3,4,\n"),
+            "expected top within 1e+06 pixels, got \"-1000001\"" + place);
+  EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"),
+            "expected left < right and top < bottom, got 3, 2, 3, 4" + place);
+  EXPECT_EQ(csv_fault("a.png,car,1,5,3,4,\n"),
+            "expected left < right and top < bottom, got 1, 5, 3, 4" + place);
+  for (const char* track : {"-1", "1.5", "x", "9223372036854775808"}) {
+    EXPECT_EQ(csv_fault("a.png,car,1,2,3,4," + std::string(track) + "\n"),
+              "expected a whole number from 0 as track, got \"" + std::string(track) + '"' + place);
+  }
+  EXPECT_EQ(csv_fault("a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,5\n"),
+            "expected each track once in an image, got 5 twice, in labels.csv:3");
+  for (const char* rows : {"a.png,car,1,2,3,4,\na.png,,,,,,\n", "a.png,,,,,,\na.png,car,1,2,3,4,\n",
+                           "a.png,,,,,,\na.png,,,,,,\n"}) {
+    EXPECT_EQ(csv_fault(rows),
+              "expected one row alone of an image without boxes, got another of it, "
+              "in labels.csv:3");
+  }
+  // The first fault is told, and what is right beside it does not count.
+  EXPECT_THAT(csv_fault("a.png,car,1,2,3,4,\na.png,car,x,2,3,4,\na.png,car,y,2,3,4,\n"),
+              HasSubstr("\"x\", in labels.csv:3"));
+}
+
+TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
+  const auto refuses = [](const std::string& text, const char* message) {
+    EXPECT_THAT([&] { parse_csv_labels(text, "labels.csv"); },
+                ThrowsMessage<InputError>(HasSubstr(message)))
+        << text;
+  };
+  const std::string header = kTableHeader;
+  refuses("", "expected a header line image,class,left,top,right,bottom, got none, in labels.csv");
+  refuses("image,class,left,top,right\n", "expected a column bottom, got none, in labels.csv:1");
+  refuses("image,class,left,top,right,bottom,score\n", "got \"score\", in labels.csv:1");
+  refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
+  refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
+  refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
+  refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got \"\"");
+  refuses(header + std::string("a\0.png,car,1,2,3,4,\n", 20), "got \"a\\u0000.png\"");
+  refuses(header + "a.png,\"car,1,2,3,4,\n", "got other quotes, in labels.csv:2");
+  refuses(header + "\xff.png,car,1,2,3,4,\n", "expected UTF-8, got other bytes, in labels.csv:2");
+}
+
+TEST(CsvLabels, OfManyImagesEachIsThere) {
+  std::string rows;
+  for (int i = 0; i < 20000; ++i) {
+    rows += std::to_string(i % 10000) + ".png,car,1,2,3,4," + std::to_string(i) + "\n";
+  }
+  const auto images = read_csv(rows);
+  ASSERT_THAT(images, SizeIs(10000));
+  EXPECT_EQ(std::get<ImageLabels>(images.at("77.png")).original,
+            "77.png,car,1,2,3,4,77\n77.png,car,1,2,3,4,10077\n");
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,218 @@
+#include "stages/frames/own_labels/detail/mot_labels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <sstream>
+#include <vector>
+
+#include "tests/testing/shared_data.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+using ::testing::ThrowsMessage;
+
+auto read_mot(const std::string& text) { return parse_mot_labels(text, "gt.txt"); }
+
+/// Of frame 1.
+std::string mot_fault(const std::string& lines) {
+  const auto frames = read_mot(lines + "2,1,1,1,1,1,1\n");
+  EXPECT_FALSE(is_fault(frames.at(2)));  // of its frame alone
+  const auto& frame = frames.at(1);
+  return is_fault(frame) ? std::get<SampleFault>(frame).reason : "no fault";
+}
+
+TEST(MotLabels, CountFrom1) {
+  const auto frames = read_mot(
+      "3,2,1,1,1920,1080,1,1,1\r\n1,5,10.5,20,4,8.25,1,3,0.25\r\n\r\n"
+      "3,4, -9, 2, 30, 40, 0, 1, 0");
+  ASSERT_THAT(frames, SizeIs(2));
+  const auto& third = std::get<ImageLabels>(frames.at(3));
+  EXPECT_EQ(third.original, "3,2,1,1,1920,1080,1,1,1\r\n3,4, -9, 2, 30, 40, 0, 1, 0");
+  EXPECT_EQ(third.size, std::nullopt);
+  ASSERT_THAT(third.boxes, SizeIs(2));
+  EXPECT_EQ(third.boxes[0].class_name, "pedestrian");
+  EXPECT_EQ(third.boxes[0].box, (Box{.xyxy = {0, 0, 1920, 1080}, .track_id = 2}));
+  EXPECT_EQ(third.boxes[1].box, (Box{.xyxy = {-10, 1, 20, 41}, .track_id = 4, .ignore = true}));
+  const auto& first = std::get<ImageLabels>(frames.at(1));
+  EXPECT_EQ(first.boxes.at(0).class_name, "car");
+  EXPECT_EQ(first.boxes.at(0).box, (Box{.xyxy = {9.5, 19, 13.5, 27.25}, .track_id = 5}));
+  EXPECT_THAT(read_mot(""), IsEmpty());
+}
+
+TEST(MotLabels, ClassesOfDistractorsAndCrowdsAreToBeIgnored) {
+  const std::vector<std::pair<std::string, bool>> classes{
+      {"pedestrian", false},    {"person_on_vehicle", true},
+      {"car", false},           {"bicycle", false},
+      {"motorbike", false},     {"non_motorized_vehicle", false},
+      {"static_person", true},  {"distractor", true},
+      {"occluder", false},      {"occluder_on_the_ground", false},
+      {"occluder_full", false}, {"reflection", true},
+      {"crowd", true}};
+  std::string text;
+  for (std::size_t i = 1; i <= classes.size(); ++i) {
+    text += "1," + std::to_string(i) + ",1,1,2,2,1," + std::to_string(i) + ",1\n";
+  }
+  const auto frames = read_mot(text);
+  const auto& boxes = std::get<ImageLabels>(frames.at(1)).boxes;
+  ASSERT_EQ(boxes.size(), classes.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    EXPECT_EQ(boxes[i].class_name, classes[i].first);
+    EXPECT_EQ(boxes[i].box.ignore, classes[i].second) << classes[i].first;
+  }
+}
+
+TEST(MotLabels, Of2015AndShorterOnesAreOfPedestrians) {
+  const auto frames = read_mot(
+      "1,1,1,1,2,2,1,-1,-1,-1\n1,2,1,1,2,2,0,-9.5,3.25,0\n1,3,1,1,2,2,1\n"
+      "1,4,1,1,2,2,1,2\n");
+  const auto& boxes = std::get<ImageLabels>(frames.at(1)).boxes;
+  ASSERT_THAT(boxes, SizeIs(4));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(boxes[i].class_name, "pedestrian");
+    EXPECT_EQ(boxes[i].box.ignore, i == 1);
+  }
+  EXPECT_EQ(boxes[3].class_name, "person_on_vehicle");
+}
+
+TEST(MotLabels, ABadLineSpoilsItsFrameAlone) {
+  EXPECT_EQ(mot_fault("1,1,1,1,1,1\n"), "expected 7 to 10 columns, got 6, in gt.txt:1");
+  EXPECT_EQ(mot_fault("1,1,1,1,1,1,1,1,1,1,1\n"), "expected 7 to 10 columns, got 11, in gt.txt:1");
+  for (const char* id : {"0", "-1", "1.0", "", "9007199254740993"}) {
+    EXPECT_EQ(mot_fault("1," + std::string(id) + ",1,1,1,1,1\n"),
+              "expected an id from 1, got '" + std::string(id) + "', in gt.txt:1");
+  }
+  EXPECT_THAT(mot_fault("1,1,nan,1,1,1,1\n"), HasSubstr("for bb_left, got 'nan'"));
+  EXPECT_THAT(mot_fault("1,1,1,1e7,1,1,1\n"), HasSubstr("for bb_top, got '1e7'"));
+  EXPECT_THAT(mot_fault("1,1,1,1,inf,1,1\n"), HasSubstr("for bb_width, got 'inf'"));
+  EXPECT_THAT(mot_fault("1,1,1,1,1,,1\n"), HasSubstr("for bb_height, got ''"));
+  EXPECT_THAT(mot_fault("1,1,1,1,0,5,1\n"), HasSubstr("above 0, got 0 x 5, in gt.txt:1"));
+  EXPECT_THAT(mot_fault("1,1,1,1,5,-2,1\n"), HasSubstr("above 0, got 5 x -2, in gt.txt:1"));
+  EXPECT_THAT(mot_fault("1,1,1e6,1,1e-300,1,1\n"), HasSubstr("above 0, got 1e-300 x 1"));
+  for (const char* conf : {"-1", "1.5", "nan", "x"}) {
+    EXPECT_THAT(mot_fault("1,1,1,1,1,1," + std::string(conf) + ",1,1\n"),
+                HasSubstr("expected a conf from 0 to 1, got '" + std::string(conf) + "'"));
+  }
+  for (const char* kind : {"0", "14", "-1", "1.0"}) {
+    EXPECT_THAT(mot_fault("1,1,1,1,1,1,1," + std::string(kind) + ",1\n"),
+                HasSubstr("expected a class from 1 to 13, got '" + std::string(kind) + "'"));
+  }
+  EXPECT_THAT(mot_fault("1,1,1,1,1,1,1,1,1.01\n"), HasSubstr("expected a visibility from 0 to 1"));
+  EXPECT_THAT(mot_fault("1,1,1,1,1,1,1,-1,nan,-1\n"), HasSubstr("for x, y and z, got 'nan'"));
+  EXPECT_EQ(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,1,1\n1,7,2,2,2,2,1\n"),
+            "expected each id once in a frame, got 7 twice, in gt.txt:3");
+  EXPECT_THAT(mot_fault("1,7,1,1,1,1,1\n1,8,1,1,1,x,1\n1,9,y,2,2,2,1\n"), HasSubstr(":2"));
+}
+
+TEST(MotLabels, ALineThatDoesNotTellItsFrameIsRefused) {
+  for (const std::string line : {"0,1,1,1,1,1,1", "-1,1,1,1,1,1,1", "1.0,1,1,1,1,1,1", "x", ",,",
+                                 "1000000000,1,1,1,1,1,1", "1 2 3", "99999999999999999999,1"}) {
+    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line + "\n"); },
+                ThrowsMessage<InputError>(HasSubstr("expected a frame number from 1, got '")))
+        << line;
+    EXPECT_THAT([&] { read_mot("1,1,1,1,1,1,1\n" + line); },
+                ThrowsMessage<InputError>(HasSubstr("', in gt.txt:2")))
+        << line;
+  }
+}
+
+constexpr char kSeqinfo[] =
+    "[Sequence]\r\nname=MOT17-02-FRCNN\r\nimDir=img1\r\nframeRate=30\r\nseqLength=600\r\n"
+    "imWidth=1920\r\nimHeight=1080\r\nimExt=.jpg\r\n";
+
+TEST(MotSequences, SayHowFastTheyAre) {
+  for (const std::string& text :
+       {std::string(kSeqinfo),
+        "; a\n#b\n[Other]\nname=x\n\n" + std::string(kSeqinfo) + "\nmore = 1",
+        "\xEF\xBB\xBF" + std::string(kSeqinfo) + "[Next]\nname=y\n"}) {
+    const MotSequence sequence = parse_mot_sequence(text, "seqinfo.ini");
+    EXPECT_EQ(sequence.frames_per_second, 30);
+    EXPECT_EQ(sequence.length, 600);
+    EXPECT_EQ(sequence.size, (ImageSize{1080, 1920}));
+  }
+  EXPECT_EQ(parse_mot_sequence("[Sequence]\nframeRate = 29.97\nseqLength = 1\nimWidth = 1\n"
+                               "imHeight = 2",
+                               "seqinfo.ini")
+                .frames_per_second,
+            29.97);
+}
+
+TEST(MotSequences, AreRefusedWhereAnythingIsInDoubt) {
+  const auto refuses = [](const std::string& from, const std::string& to, const char* message) {
+    std::string text = kSeqinfo;
+    text.replace(text.find(from), from.size(), to);
+    EXPECT_THAT([&] { parse_mot_sequence(text, "seqinfo.ini"); },
+                ThrowsMessage<InputError>(HasSubstr(message)))
+        << text;
+  };
+  refuses("[Sequence]", "[sequence]", "expected [Sequence], got none, in seqinfo.ini");
+  refuses("seqLength=", "seqlength=", "expected a value of seqLength, got none, in seqinfo.ini");
+  refuses("=1920", "=", "expected a value of imWidth, got none, in seqinfo.ini");
+  refuses("imExt=", "name=", "expected each key once, got 'name=.jpg', in seqinfo.ini:8");
+  refuses("imExt=.jpg", "[Sequence]", "expected [Sequence] once, got '[Sequence]'");
+  refuses("imExt=.jpg", "imExt", "expected a line key=value, got 'imExt', in seqinfo.ini:8");
+  for (const char* rate : {"0", "-30", "nan", "inf", "1e7", "30 fps"}) {
+    refuses("=30", "=" + std::string(rate), "for frameRate, in seqinfo.ini:4");
+  }
+  for (const char* length : {"0", "1.5", "10000000000"}) {
+    refuses("=600", "=" + std::string(length), "for seqLength, in seqinfo.ini:5");
+  }
+  refuses("=1920", "=0", "expected a number above 0, got '0' for imWidth, in seqinfo.ini:6");
+  refuses("=1080", "=99999999", "for imHeight, in seqinfo.ini:7");
+}
+
+// Another program's reading of the same files (boxes.csv), which took the corners as they are and
+// so lies one pixel farther right and down.
+TEST(MotLabels, OfMot17AreThoseThatAnotherProgramRead) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto folder = data / "labelled_frames" / "mot17_mini";
+  if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
+  std::istringstream table(testing::read_file(folder / "boxes.csv"));
+  std::map<std::string, std::vector<std::vector<std::string>>> expected;  // by image
+  for (std::string line; std::getline(table, line);) {
+    std::istringstream fields(line);
+    std::vector<std::string> row(8);
+    for (std::string& field : row) std::getline(fields, field, ',');
+    if (row[0] != "image") expected[row[0]].push_back(row);
+  }
+  ASSERT_EQ(expected.size(), 12u);
+  std::size_t compared = 0;
+  for (const char* name : {"MOT17-02-FRCNN", "MOT17-04-FRCNN"}) {
+    const std::string text = testing::read_file(folder / name / "gt.txt");
+    std::size_t bytes = 0;
+    for (const auto& [number, outcome] : parse_mot_labels(text, "gt.txt")) {
+      ASSERT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+      const auto& labels = std::get<ImageLabels>(outcome);
+      bytes += labels.original.size();
+      const std::string image = name + ("/00000" + std::to_string(number)) + ".jpg";
+      const auto& rows = expected.at(image);
+      ASSERT_EQ(labels.boxes.size(), rows.size()) << image;
+      for (const NamedBox& read : labels.boxes) {
+        const auto row = std::find_if(rows.begin(), rows.end(), [&](const auto& one) {
+          return std::stoll(one[6]) == read.box.track_id;
+        });
+        ASSERT_NE(row, rows.end()) << image << ' ' << read.box.track_id;
+        const auto& fields = *row;
+        EXPECT_EQ(read.box.xyxy, (Rectangle{std::stod(fields[2]) - 1, std::stod(fields[3]) - 1,
+                                            std::stod(fields[4]) - 1, std::stod(fields[5]) - 1}));
+        const bool is_pedestrian = fields[7].find("cls=1 ") != std::string::npos;
+        EXPECT_EQ(read.class_name == "pedestrian", is_pedestrian);
+        const bool counts = fields[7].starts_with("conf=1");
+        EXPECT_TRUE(counts || read.box.ignore);
+        EXPECT_FALSE(counts && is_pedestrian && read.box.ignore);
+        ++compared;
+      }
+    }
+    EXPECT_EQ(bytes, text.size());
+  }
+  EXPECT_EQ(compared, 948u);  // lines of both files
+}
+
+}  // namespace
+}  // namespace eventgan

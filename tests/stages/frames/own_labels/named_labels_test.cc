@@ -1,0 +1,279 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "stages/frames/sequences/frames_dataset.h"
+#include "tests/stages/frames/decoding/test_video.h"
+#include "tests/testing/image_file.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+/// Images of 40 x 30 and labels in a folder.
+class NamedLabels : public ::testing::Test {
+ protected:
+  void image(const std::string& name) {
+    testing::write_flat_image(folder_ / name, ImageSize{30, 40}, 9);
+  }
+  void text(const std::string& name, const std::string& content) {
+    testing::write_file(folder_ / name, content);
+  }
+  std::unique_ptr<Dataset> open(LabelFormat format, const std::string& root,
+                                const std::string& path) const {
+    SourceSpec spec;
+    spec.root = root;
+    spec.labels = LabelSpec{format, path};
+    return open_frames_dataset(spec, folder_.path());
+  }
+  static std::string voc(const std::string& name, const std::string& size = "40",
+                         const std::string& more = "") {
+    return "<annotation><size><width>" + size + "</width><height>30</height></size><object><name>" +
+           name +
+           "</name><bndbox><xmin>1</xmin><ymin>2</ymin><xmax>3</xmax><ymax>4</ymax></bndbox>" +
+           more + "</object></annotation>";
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+Annotation read(const Dataset& dataset, const std::string& key) {
+  const auto annotation = dataset.annotation(key);
+  return is_fault(annotation) ? Annotation{std::get<SampleFault>(annotation).reason, {}, {}}
+                              : std::get<Annotation>(annotation);
+}
+
+TEST_F(NamedLabels, VocLiesInAnnotations) {
+  const struct {
+    const char *root, *path, *image, *label;
+  } cases[] = {
+      {"VOC/JPEGImages", "VOC", "VOC/JPEGImages/7.jpg", "VOC/Annotations/7.xml"},
+      {"VOC/JPEGImages", "VOC/Annotations", "VOC/JPEGImages/7.jpg", "VOC/Annotations/7.xml"},
+      {"VOC", "VOC/Annotations", "VOC/JPEGImages/7.jpg", "VOC/Annotations/7.xml"},
+      {"d/images", "d/xml", "d/images/a/7.jpg", "d/xml/a/7.xml"},
+      {"d", "d", "d/7.jpg", "d/7.xml"},
+  };
+  for (const auto& layout : cases) {
+    std::filesystem::remove_all(folder_ / "VOC");
+    std::filesystem::remove_all(folder_ / "d");
+    image(layout.image);
+    text(layout.label, voc("cat", "40", "<difficult>1</difficult>"));
+    const auto dataset = open(LabelFormat::kVoc, layout.root, layout.path);
+    ASSERT_EQ(dataset->labelled_frames().size(), 1u) << layout.label;
+    EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("cat"));
+    EXPECT_THAT(dataset->annotation_files(), ElementsAre(layout.label));
+    const std::string key = dataset->labelled_frames()[0].label_key;
+    EXPECT_EQ(dataset->label_place(key), layout.label);
+    const Annotation annotation = read(*dataset, key);
+    ASSERT_EQ(annotation.boxes.size(), 1u) << annotation.original;
+    EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{0, 1, 3, 4}));
+    EXPECT_TRUE(annotation.boxes[0].ignore);
+    EXPECT_EQ(annotation.original, voc("cat", "40", "<difficult>1</difficult>"));
+  }
+}
+
+TEST_F(NamedLabels, ClassesAreNumberedByName) {
+  for (const char* name : {"a", "b", "c", "d"}) image("i/" + std::string(name) + ".png");
+  text("x/a.xml", voc("dog"));
+  text("x/b.xml", voc("cat"));
+  text("x/c.xml", voc("bird", "41"));
+  text("x/d.xml", "<annotation");
+  text("x/gone.xml", voc("ant"));
+  const auto dataset = open(LabelFormat::kVoc, "i", "x");
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("bird", "cat", "dog"));
+  ASSERT_EQ(dataset->labelled_frames().size(), 5u);
+  EXPECT_EQ(read(*dataset, "a.xml").boxes.at(0).class_id, 2);
+  EXPECT_EQ(read(*dataset, "b.xml").boxes.at(0).class_id, 1);
+  EXPECT_EQ(read(*dataset, "c.xml").original,
+            "expected an image of 41x30, as x/c.xml says, got 40x30, in i/c.png");
+  EXPECT_THAT(read(*dataset, "d.xml").original, HasSubstr("expected XML"));
+  EXPECT_EQ(dataset->labelled_frames()[4].sample_id, "gone");
+  EXPECT_EQ(dataset->paired_frame(dataset->labelled_frames()[4], 0).frame.path, "i/gone.png");
+  text("x/a.xml", voc("eel"));
+  EXPECT_THAT(read(*dataset, "a.xml").original, HasSubstr("got \"eel\", in x/a.xml"));
+}
+
+constexpr const char* kInfo =
+    "[Sequence]\nname=s\nimDir=img1\nframeRate=25\nseqLength=3\nimWidth=40\nimHeight=30\n"
+    "imExt=.png\n";
+
+TEST_F(NamedLabels, MotLiesInTheSequence) {
+  for (const char* name : {"1", "2", "3"}) {
+    image("m/s/img1/00000" + std::string(name) + ".png");
+    image("m/t/img1/00000" + std::string(name) + ".png");
+  }
+  text("m/s/gt/gt.txt",
+       "2,5,1,1,10,10,1,3,1\n2,6,1,1,5,5,0,1,1\n3,5,100,1,5,5,1,1,1\n9,5,1,1,5,5,1\n");
+  text("m/s/seqinfo.ini", kInfo);
+  const auto dataset = open(LabelFormat::kMot, "m", "m");
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("car", "pedestrian"));
+  EXPECT_THAT(dataset->annotation_files(), ElementsAre("m/s/gt/gt.txt", "m/s/seqinfo.ini"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 sequences without gt/gt.txt or gt.txt in m: t",
+                          "4 of 6 frames have no label in m: no samples, but paired frames"));
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 3u);
+  EXPECT_EQ(frames[0].sample_id, "s/000002");
+  EXPECT_EQ(frames[0].sequence, "s");
+  EXPECT_EQ(frames[0].frame.path, "m/s/img1/000002.png");
+  EXPECT_DOUBLE_EQ(frames[0].frame.time_s, 2 / 25.0);
+  EXPECT_EQ(dataset->paired_frame(frames[0], -1).frame.path, "m/s/img1/000001.png");
+  EXPECT_EQ(dataset->label_place(frames[0].label_key), "m/s/gt/gt.txt#2");
+  const Annotation annotation = read(*dataset, frames[0].label_key);
+  ASSERT_EQ(annotation.boxes.size(), 2u);
+  EXPECT_EQ(annotation.boxes[0].xyxy, (Rectangle{0, 0, 10, 10}));
+  EXPECT_EQ(annotation.boxes[0].track_id, 5);
+  EXPECT_EQ(annotation.boxes[1].class_id, 1);
+  EXPECT_TRUE(annotation.boxes[1].ignore);
+  EXPECT_EQ(annotation.original, "2,5,1,1,10,10,1,3,1\n2,6,1,1,5,5,0,1,1\n");
+  EXPECT_EQ(read(*dataset, frames[1].label_key).original,
+            "expected a box within the image of 40x30, got one from (99, 0) to (104, 5), in "
+            "m/s/gt/gt.txt#3");
+  EXPECT_EQ(frames[2].sample_id, "s/000009");
+  EXPECT_EQ(dataset->paired_frame(frames[2], 0).state, PairedFrame::State::kMissing);
+  EXPECT_EQ(dataset->paired_frame(frames[2], 0).frame.path, "m/s/img1/000009.png");
+}
+
+TEST_F(NamedLabels, MotOfOneSequenceMayBeAFile) {
+  image("clip/00000.png");
+  image("clip/00001.png");
+  text("gt/gt.txt", "1,1,1,1,5,5,1\n");
+  auto dataset = open(LabelFormat::kMot, "clip", "gt/gt.txt");
+  EXPECT_THAT(dataset->notes(), ElementsAre("frame 1 of gt/gt.txt is clip/00000.png",
+                                            HasSubstr("1 of 2 frames have no label")));
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_EQ(dataset->labelled_frames()[0].sample_id, "00000");
+  EXPECT_TRUE(std::isnan(dataset->labelled_frames()[0].frame.time_s));
+  EXPECT_EQ(dataset->label_place(dataset->labelled_frames()[0].label_key), "gt/gt.txt#1");
+  EXPECT_EQ(read(*dataset, "#1").boxes.size(), 1u);
+  EXPECT_THAT(read(*dataset, "#2").original, HasSubstr("expected a label, got none"));
+  text("seqinfo.ini", kInfo);
+  dataset = open(LabelFormat::kMot, "clip", ".");
+  EXPECT_EQ(dataset->labelled_frames()[0].label_key, "gt/gt.txt#1");
+  EXPECT_EQ(dataset->labelled_frames()[0].frame.time_s, 0);
+  EXPECT_DOUBLE_EQ(dataset->paired_frame(dataset->labelled_frames()[0], 1).frame.time_s, 1 / 25.);
+  image("two/a/1.png");
+  image("two/b/1.png");
+  EXPECT_THAT([&] { open(LabelFormat::kMot, "two", "gt/gt.txt"); },
+              ThrowsMessage<InputError>(HasSubstr("expected a folder of sequences, since there "
+                                                  "are 2, got a file, in gt/gt.txt")));
+}
+
+TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {
+  for (const char* name : {"000001_c", "000002_c", "000004_c", "000005_c"}) {
+    image("m/s/" + std::string(name) + ".png");
+  }
+  text("m/s/gt.txt", "1,1,1,1,5,5,1\n4,1,1,1,5,5,1\n5,1,1,1,5,5,1\n");
+  const auto refused = [&](const char* reason) {
+    EXPECT_THAT([&] { open(LabelFormat::kMot, "m", "m"); },
+                ThrowsMessage<InputError>(HasSubstr(reason)));
+  };
+  refused("expected numbered images, or all 5 frames of m/s/gt.txt, got 4 without numbers, in m/s");
+  image("m/s/000003_c.png");
+  const auto dataset = open(LabelFormat::kMot, "m", "m");
+  ASSERT_EQ(dataset->labelled_frames().size(), 3u);
+  EXPECT_EQ(dataset->labelled_frames()[1].frame.path, "m/s/000004_c.png");
+  // seqinfo.ini counts frames without labels, too.
+  text("m/s/seqinfo.ini", "[Sequence]\nframeRate=25\nseqLength=6\nimWidth=40\nimHeight=30\n");
+  refused("all 6 frames of m/s/gt.txt, got 5");
+  // Numbers from 0 may have gaps.
+  for (const char* name : {"00", "01", "04"}) image("n/" + std::string(name) + ".png");
+  text("n/gt.txt", "5,1,1,1,5,5,1\n");
+  EXPECT_EQ(open(LabelFormat::kMot, "n", "n")->labelled_frames().at(0).frame.path, "n/04.png");
+  text("n/gone/gt/gt.txt", "1,1,1,1,5,5,1\n");
+  EXPECT_THAT(open(LabelFormat::kMot, "n", "n")->notes(),
+              ::testing::Contains("1 sequences of labels without images left out in n: gone"));
+}
+
+TEST_F(NamedLabels, ATableNamesItsImages) {
+  image("i/a/1.png");
+  image("i/a/2.png");
+  image("i/b/3.png");
+  image("i/b/2.png");
+  const std::string header = "image,class,left,top,right,bottom\n";
+  text("t.csv",
+       header + "a/1.png,cat,0,1,2,3\n3.png,,,,,\ni/b/2.png,ant,41,1,50,3\ngone.png,x,1,1,2,2\n");
+  const auto dataset = open(LabelFormat::kCsv, "i", "t.csv");
+  EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("ant", "cat", "x"));
+  const auto& frames = dataset->labelled_frames();
+  ASSERT_EQ(frames.size(), 4u);
+  EXPECT_EQ(frames[0].sample_id, "a/1");
+  EXPECT_EQ(read(*dataset, frames[0].label_key).boxes.at(0).xyxy, (Rectangle{0, 1, 2, 3}));
+  EXPECT_EQ(read(*dataset, frames[0].label_key).boxes.at(0).class_id, 1);
+  EXPECT_EQ(read(*dataset, frames[0].label_key).original, "a/1.png,cat,0,1,2,3\n");
+  EXPECT_EQ(frames[1].sample_id, "b/2");
+  EXPECT_EQ(read(*dataset, frames[1].label_key).original,
+            "expected a box within the image of 40x30, got one from (41, 1) to (50, 3), in "
+            "t.csv#i/b/2.png");
+  EXPECT_EQ(frames[2].sample_id, "b/3");
+  EXPECT_THAT(read(*dataset, frames[2].label_key).boxes, IsEmpty());
+  EXPECT_EQ(frames[3].sample_id, "gone");
+  text("t.csv", header + "2.png,cat,0,1,2,3\n");
+  EXPECT_THAT([&] { open(LabelFormat::kCsv, "i", "t.csv"); },
+              ThrowsMessage<InputError>(HasSubstr("got 1 bare names")));
+  // Right in the root, and not the image of that name in a folder of it.
+  text("t.csv", header + "i/1.png,cat,0,1,2,3\n");
+  const auto absent = open(LabelFormat::kCsv, "i", "t.csv");
+  ASSERT_EQ(absent->labelled_frames().size(), 1u);
+  EXPECT_EQ(absent->paired_frame(absent->labelled_frames()[0], 0).frame.path, "i/1.png");
+}
+
+TEST_F(NamedLabels, OfVideosTheFrameNumberStandsForTheImage) {
+  text("v/other.json", R"({"1": "beside the video"})");
+  testing::write_counting_video(folder_ / "v/clip.avi", 6);
+  testing::write_counting_video(folder_ / "v/other.avi", 3);
+  text("v/boxes.csv",
+       "image,class,left,top,right,bottom\nclip/2,cat,0,1,2,3\n"
+       "clip/000004.png,dog,0,1,64,48\nother/1,cat,64,0,70,9\nclip/6,cat,1,1,2,2\n");
+  auto dataset = open(LabelFormat::kCsv, "v", "v/boxes.csv");
+  const auto* frames = &dataset->labelled_frames();
+  ASSERT_EQ(frames->size(), 4u);
+  EXPECT_EQ((*frames)[0].sample_id, "clip/000002");
+  EXPECT_EQ((*frames)[0].frame.video_frame, 2);
+  EXPECT_DOUBLE_EQ((*frames)[0].frame.time_s, 2 / 25.0);
+  EXPECT_EQ((*frames)[0].label_key, "clip/2");
+  EXPECT_EQ(dataset->paired_frame((*frames)[0], -1).state, PairedFrame::State::kPresent);
+  EXPECT_EQ(read(*dataset, "clip/2").boxes.at(0).xyxy, (Rectangle{0, 1, 2, 3}));
+  EXPECT_EQ((*frames)[1].sample_id, "clip/000004");
+  EXPECT_EQ(read(*dataset, (*frames)[1].label_key).boxes.at(0).class_id, 1);
+  EXPECT_EQ((*frames)[2].sample_id, "clip/6") << "the video has no such frame";
+  EXPECT_EQ(dataset->paired_frame((*frames)[2], 0).state, PairedFrame::State::kMissing);
+  EXPECT_THAT(read(*dataset, (*frames)[3].label_key).original,
+              HasSubstr("expected a box within the image of 64x48"));
+  EXPECT_THAT(dataset->notes(),
+              ElementsAre("1 files and folders left out in v: other.json",
+                          HasSubstr("6 of 9 frames have no label in v/boxes.csv")));
+
+  text("v/labels/classes.txt", "cat");
+  text("v/labels/clip_000003.txt", "0 0.5 0.5 1 1");
+  text("v/labels/other/1.txt", "0 0.5 0.5 0.5 0.5");
+  dataset = open(LabelFormat::kYolo, "v", "v/labels");
+  frames = &dataset->labelled_frames();
+  ASSERT_EQ(frames->size(), 2u);
+  EXPECT_EQ((*frames)[0].sample_id, "clip/000003");
+  EXPECT_EQ(read(*dataset, (*frames)[0].label_key).boxes.at(0).xyxy, (Rectangle{0, 0, 64, 48}));
+  EXPECT_EQ((*frames)[1].sample_id, "other/000001");
+
+  text("gt.txt", "1,1,1,1,5,5,1\n");
+  dataset = open(LabelFormat::kMot, "v/clip.avi", "gt.txt");
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_EQ(dataset->labelled_frames()[0].sample_id, "clip/000000") << "MOT counts from 1";
+
+  text("coco.json",
+       R"({"images": [{"id": 1, "file_name": "clip/000005.jpg", "width": 64, "height": 48}],
+           "annotations": [], "categories": []})");
+  dataset = open(LabelFormat::kCoco, "v", "coco.json");
+  ASSERT_EQ(dataset->labelled_frames().size(), 1u);
+  EXPECT_EQ(dataset->labelled_frames()[0].sample_id, "clip/000005");
+  EXPECT_FALSE(is_fault(dataset->annotation("1")));
+}
+
+}  // namespace
+}  // namespace eventgan

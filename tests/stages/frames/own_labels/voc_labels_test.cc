@@ -1,0 +1,213 @@
+#include "stages/frames/own_labels/detail/voc_labels.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+#include "tests/testing/shared_data.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::SizeIs;
+
+constexpr char kBox[] =
+    "<bndbox><xmin>1</xmin><ymin>1</ymin><xmax>30</xmax><ymax>20</ymax></bndbox>";
+
+std::string annotation(const std::string& objects) {
+  return "<annotation><size><width>30</width><height>20</height><depth>3</depth></size>" + objects +
+         "</annotation>\n";
+}
+
+std::string object(const std::string& content) { return "<object>" + content + "</object>"; }
+
+ImageLabels read_voc(const std::string& xml) {
+  const auto outcome = parse_voc_labels(xml, "a.xml");
+  EXPECT_FALSE(is_fault(outcome)) << std::get<SampleFault>(outcome).reason;
+  return std::get<ImageLabels>(outcome);
+}
+
+std::string voc_fault(const std::string& xml) {
+  const auto outcome = parse_voc_labels(xml, "a.xml");
+  return is_fault(outcome) ? std::get<SampleFault>(outcome).reason : "no fault";
+}
+
+// As the development kit's own example, 2007_000027.xml, but for the size.
+TEST(VocLabels, CountPixelsFrom1) {
+  const std::string xml = R"(<?xml version="1.0"?>
+<annotation>
+	<folder>VOC2012</folder>
+	<filename>2007_000027.jpg</filename>
+	<source><database>The VOC2007 Database</database></source>
+	<size><width>486</width><height>500</height><depth>3</depth></size>
+	<segmented>0</segmented>
+	<!-- a comment -->
+	<object>
+		<name>person</name>
+		<pose>Unspecified</pose>
+		<truncated>0</truncated>
+		<difficult>0</difficult>
+		<bndbox>
+			<xmin>174</xmin><ymin>101</ymin><xmax>349</xmax><ymax>351</ymax>
+		</bndbox>
+		<part>
+			<name>head</name>
+			<bndbox><xmin>169</xmin><ymin>104</ymin><xmax>209</xmax><ymax>146</ymax></bndbox>
+		</part>
+	</object>
+	<object>
+		<name> traffic &amp; light </name>
+		<occluded>1</occluded><truncated>1</truncated><difficult>1</difficult>
+		<bndbox><xmax>486</xmax><ymax>500.0</ymax><xmin> 1 </xmin><ymin>45.70000076</ymin></bndbox>
+	</object>
+	<object>
+		<name>cat</name>
+		<occluded>0</occluded>
+		<bndbox><xmin>7</xmin><ymin>8</ymin><xmax>7</xmax><ymax>8</ymax></bndbox>
+	</object>
+</annotation>
+)";
+  const ImageLabels labels = read_voc(xml);
+  EXPECT_EQ(labels.original, xml);
+  EXPECT_EQ(labels.size, (ImageSize{500, 486}));
+  ASSERT_THAT(labels.boxes, SizeIs(3));
+  EXPECT_EQ(labels.boxes[0].class_name, "person");
+  EXPECT_EQ(labels.boxes[0].box, (Box{.xyxy = {173, 100, 349, 351}, .truncation = 0}));
+  EXPECT_EQ(labels.boxes[1].class_name, "traffic & light");
+  EXPECT_EQ(labels.boxes[1].box, (Box{.xyxy = {0, 45.70000076 - 1, 486, 500},
+                                      .truncation = 1,
+                                      .occlusion = 1,
+                                      .ignore = true}));
+  EXPECT_EQ(labels.boxes[2].box, (Box{.xyxy = {6, 7, 7, 8}, .occlusion = 0}));  // one pixel
+}
+
+TEST(VocLabels, MayHaveNoObject) {
+  EXPECT_THAT(read_voc(annotation("")).boxes, IsEmpty());
+  EXPECT_EQ(read_voc(annotation(object("<name>a</name>" + std::string(kBox)))).boxes.at(0).box,
+            (Box{.xyxy = {0, 0, 30, 20}}));
+}
+
+TEST(VocLabels, FilesThatAreNotOneAreNamed) {
+  EXPECT_THAT(voc_fault(""), HasSubstr("expected XML, got '"));
+  EXPECT_THAT(voc_fault("image,class\n"), HasSubstr("expected XML, got '"));
+  const std::string whole = annotation(object("<name>a</name>" + std::string(kBox)));
+  for (std::size_t length = 0; length + 2 < whole.size(); ++length) {  // the last is a line's end
+    EXPECT_THAT(voc_fault(whole.substr(0, length)), HasSubstr("expected XML, got '")) << length;
+  }
+  EXPECT_EQ(voc_fault("<html/>"), "expected <annotation> alone, got 'html', in a.xml");
+  EXPECT_EQ(voc_fault(whole + "<more/>"), "expected <annotation> alone, got 'more', in a.xml");
+  EXPECT_EQ(voc_fault("<!DOCTYPE a [<!ENTITY b \"c\">]>" + whole),
+            "expected no DOCTYPE, got one, in a.xml");
+  EXPECT_EQ(voc_fault(whole + std::string(1, '\0')), "expected text, got a NUL in it, in a.xml");
+  std::string wide;  // UTF-16
+  for (const char c : whole) wide += {c, '\0'};
+  EXPECT_EQ(voc_fault("\xff\xfe" + wide), "expected text, got a NUL in it, in a.xml");
+}
+
+TEST(VocLabels, SizesAreOfAnImage) {
+  const auto with_size = [](const std::string& size) {
+    return voc_fault("<annotation>" + size + "</annotation>");
+  };
+  EXPECT_EQ(with_size(""), "expected <size>, got none, in a.xml");
+  EXPECT_EQ(with_size("<size/><size/>"), "expected <size> once, got it twice, in a.xml");
+  EXPECT_EQ(with_size("<size><width>5</width></size>"), "expected <height>, got none, in a.xml");
+  for (const char* width : {"0", "-5", "5.5", "", "nan", "1000001", "99999999999", "5<b/>"}) {
+    EXPECT_THAT(
+        with_size("<size><width>" + std::string(width) + "</width><height>5</height></size>"),
+        HasSubstr("<width>"))
+        << width;
+  }
+}
+
+TEST(VocLabels, ObjectsAreNamedByTheirNumber) {
+  const std::string sound = object("<name>a</name>" + std::string(kBox));
+  const auto second = [&](const std::string& content) {
+    const std::string fault = voc_fault(annotation(sound + object(content)));
+    const std::string place = ", in a.xml (object 2)";
+    EXPECT_TRUE(fault.ends_with(place)) << fault;
+    return fault.substr(0, fault.size() - place.size());
+  };
+  EXPECT_EQ(second(kBox), "expected <name>, got none");
+  EXPECT_EQ(second("<name>a</name>"), "expected <bndbox>, got none");
+  EXPECT_EQ(second("<name>a</name><name>b</name>" + std::string(kBox)),
+            "expected <name> once, got it twice");
+  EXPECT_EQ(second("<name>a</name>" + std::string(kBox) + kBox),
+            "expected <bndbox> once, got it twice");
+  for (const char* name : {"", " ", "&b;", "a&#1;", "\xff"}) {
+    EXPECT_THAT(second("<name>" + std::string(name) + "</name>" + kBox),
+                HasSubstr("expected a name without control characters and unknown entities"))
+        << name;
+  }
+  EXPECT_EQ(second("<name>a<b/></name>" + std::string(kBox)),
+            "expected text alone in <name>, got more");
+  for (const char* flag : {"difficult", "truncated", "occluded"}) {
+    const auto with = [&](const std::string& value) {
+      return second("<name>a</name>" + std::string(kBox) + "<" + flag + ">" + value + "</" + flag +
+                    ">");
+    };
+    for (const char* value : {"2", "-1", "", "yes", "01"}) {
+      EXPECT_EQ(with(value),
+                std::string("expected 0 or 1 for <") + flag + ">, got '" + value + "'");
+    }
+    EXPECT_EQ(with(std::string("1</") + flag + "><" + flag + ">0"),
+              std::string("expected <") + flag + "> once, got it twice");
+  }
+}
+
+TEST(VocLabels, BoxesLieInTheImage) {
+  const auto box = [](const char* xmin, const char* ymin, const char* xmax, const char* ymax) {
+    const std::string written = std::string("<xmin>") + xmin + "</xmin><ymin>" + ymin +
+                                "</ymin><xmax>" + xmax + "</xmax><ymax>" + ymax + "</ymax>";
+    return voc_fault(annotation(object("<name>a</name><bndbox>" + written + "</bndbox>")));
+  };
+  EXPECT_EQ(box("1", "1", "30", "20"), "no fault");
+  EXPECT_EQ(box("0", "1", "30", "20"),
+            "expected a box from 1, 1 to 30, 20, as VOC counts, got 0, 1 to 30, 20, in a.xml "
+            "(object 1)");
+  for (const auto& outside :
+       {box("1", "0.5", "30", "20"), box("1", "1", "31", "20"), box("1", "1", "30", "20.25"),
+        box("9", "1", "8.5", "20"), box("1", "9", "30", "8"), box("-5", "-5", "-1", "-1")}) {
+    EXPECT_THAT(outside, HasSubstr("expected a box from 1, 1 to 30, 20"));
+  }
+  for (const char* number : {"nan", "inf", "-1e7", "1e999", "", "1 2", "0x5", "5,5"}) {
+    EXPECT_THAT(box("1", number, "30", "20"),
+                HasSubstr("expected a number of pixels for <ymin>, got '" + std::string(number)));
+  }
+}
+
+// The boxes lie beside the files in YOLO's form too, made of them by a program that took xmin for
+// an edge: its left and top lie one pixel farther right and down than VOC's.
+TEST(VocLabels, OfPedroAreThoseThatAnotherProgramRead) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto folder = data / "real_labels" / "pedro";
+  if (!exists(folder)) GTEST_SKIP() << "skipped: no " << folder;
+  std::size_t compared = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() != ".xml") continue;
+    const ImageLabels labels = read_voc(testing::read_file(entry.path()));
+    EXPECT_EQ(labels.size, (ImageSize{260, 346}));
+    auto yolo = entry.path();
+    std::ifstream lines(yolo.replace_extension(".txt"));
+    for (const NamedBox& read : labels.boxes) {
+      double number = 0, x = 0, y = 0, width = 0, height = 0;
+      ASSERT_TRUE(lines >> number >> x >> y >> width >> height);
+      EXPECT_EQ(read.class_name, "person");
+      EXPECT_NEAR(read.box.xyxy.left, (x - width / 2) * 346 - 1, 1e-9);
+      EXPECT_NEAR(read.box.xyxy.top, (y - height / 2) * 260 - 1, 1e-9);
+      EXPECT_NEAR(read.box.xyxy.right, (x + width / 2) * 346, 1e-9);
+      EXPECT_NEAR(read.box.xyxy.bottom, (y + height / 2) * 260, 1e-9);
+      EXPECT_GE(read.box.truncation, 0);
+      ++compared;
+    }
+    EXPECT_FALSE(lines >> std::ws && lines.peek() != EOF);
+  }
+  EXPECT_EQ(compared, 9u);
+}
+
+}  // namespace
+}  // namespace eventgan

@@ -1,0 +1,450 @@
+#include "stages/recordings/detail/aedat4_recording.h"
+
+#include <aedat4_generated.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <lz4frame.h>
+#include <zstd.h>
+
+#include <algorithm>
+#include <functional>
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "stages/recordings/recording.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+constexpr int kEventStream = 0;
+constexpr int kFrameStream = 1;
+constexpr int kImuStream = 7;
+constexpr const char* kInfo = R"(<dv version="2.0"><node name="outInfo">
+  <node name="0"><attr key="typeIdentifier" type="string">EVTS</attr>
+    <node name="info"><attr key="sizeX" type="int">4</attr><attr key="sizeY" type="int">3</attr></node></node>
+  <node name="1"><attr key="typeIdentifier" type="string">FRME</attr></node>
+  <node name="7"><attr key="typeIdentifier" type="string">IMUS</attr></node></node></dv>)";
+
+std::string text_of(const flatbuffers::FlatBufferBuilder& builder) {
+  return {reinterpret_cast<const char*>(builder.GetBufferPointer()), builder.GetSize()};
+}
+
+std::string number_bytes(std::int32_t number) {
+  return {reinterpret_cast<const char*>(&number), sizeof(number)};
+}
+
+std::string events_table(const std::vector<aedat4::Event>& events) {
+  flatbuffers::FlatBufferBuilder builder;
+  const auto elements = builder.CreateVectorOfStructs(events);
+  builder.FinishSizePrefixed(aedat4::CreateEvents(builder, elements), "EVTS");
+  return text_of(builder);
+}
+
+struct TestFrame {
+  std::int64_t t_us = 0;
+  std::int64_t begin_us = 0;
+  std::int64_t end_us = 0;
+  int format = 0;
+  int width = 4;
+  int height = 3;
+  int left = 0;
+  std::vector<std::uint8_t> pixels = std::vector<std::uint8_t>(12, 5);
+};
+
+std::string frame_table(const TestFrame& frame) {
+  flatbuffers::FlatBufferBuilder builder;
+  const auto pixels = builder.CreateVector(frame.pixels);
+  builder.FinishSizePrefixed(
+      aedat4::CreateFrame(builder, frame.t_us, 0, 0, frame.begin_us, frame.end_us,
+                          static_cast<std::int8_t>(frame.format),
+                          static_cast<std::int16_t>(frame.width),
+                          static_cast<std::int16_t>(frame.height),
+                          static_cast<std::int16_t>(frame.left), 0, pixels),
+      "FRME");
+  return text_of(builder);
+}
+
+std::string packed(const std::string& text, int compression) {
+  if (compression == 0) return text;
+  std::string result(compression <= 2 ? LZ4F_compressFrameBound(text.size(), nullptr)
+                                      : ZSTD_compressBound(text.size()),
+                     '\0');
+  result.resize(
+      compression <= 2
+          ? LZ4F_compressFrame(result.data(), result.size(), text.data(), text.size(), nullptr)
+          : ZSTD_compress(result.data(), result.size(), text.data(), text.size(), 1));
+  return result;
+}
+
+struct TestPacket {
+  int stream = kEventStream;
+  std::string table;
+  std::int64_t count = 0;  ///< as the table of packets says
+  std::int64_t begin_us = 0;
+  std::int64_t end_us = 0;
+};
+
+TestPacket events_packet(const std::vector<aedat4::Event>& events) {
+  TestPacket packet{kEventStream, events_table(events), std::ssize(events)};
+  if (!events.empty()) {
+    packet.begin_us = events.front().t_us();
+    packet.end_us = events.back().t_us();
+  }
+  return packet;
+}
+
+/// Writes the packets with what belongs around them.
+struct TestFile {
+  std::string info = kInfo;
+  int compression = 0;
+  bool has_table = true;
+  std::vector<TestPacket> packets;
+
+  std::string header(std::int64_t table_byte) const {
+    flatbuffers::FlatBufferBuilder builder;
+    builder.ForceDefaults(true);  // so that it is as long with a table as without
+    const auto text = builder.CreateString(info);
+    builder.FinishSizePrefixed(aedat4::CreateHeader(builder, compression, table_byte, text),
+                               "IOHE");
+    return "#!AER-DAT4.0\r\n" + text_of(builder);
+  }
+
+  std::string bytes() const {
+    std::string result = header(-1);
+    flatbuffers::FlatBufferBuilder builder;
+    std::vector<flatbuffers::Offset<aedat4::PacketEntry>> entries;
+    for (const TestPacket& packet : packets) {
+      const std::string content = packed(packet.table, compression);
+      const aedat4::Packet place(packet.stream, static_cast<std::int32_t>(content.size()));
+      result += number_bytes(packet.stream) + number_bytes(place.size_bytes());
+      entries.push_back(aedat4::CreatePacketEntry(builder, std::ssize(result), &place, packet.count,
+                                                  packet.begin_us, packet.end_us));
+      result += content;
+    }
+    if (!has_table) return result;
+    const std::string start = header(std::ssize(result));
+    result.replace(0, start.size(), start);
+    builder.FinishSizePrefixed(aedat4::CreatePacketTable(builder, builder.CreateVector(entries)),
+                               "FTAB");
+    return result + packed(text_of(builder), compression);
+  }
+};
+
+class Aedat4Test : public ::testing::Test {
+ protected:
+  std::unique_ptr<Recording> open(const std::string& bytes) {
+    testing::write_file(path_, bytes);
+    return open_recording(path_, RecordingFormat::kAedat4);
+  }
+  std::unique_ptr<Recording> open(const TestFile& file) { return open(file.bytes()); }
+
+  void expect_refused(const std::string& bytes, const std::string& reason) {
+    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(reason)));
+    EXPECT_THAT([&] { open(bytes); }, ThrowsMessage<InputError>(HasSubstr(path_.string())));
+  }
+
+  /// Three packets of events, the second empty, two frames, and one of a stream that is not read.
+  static TestFile small() {
+    TestFile file;
+    file.packets = {
+        events_packet({{1'000'000, 0, 0, 1}, {1'000'001, 3, 2, 0}}),
+        {kFrameStream, frame_table({.t_us = 1'000'001}), 1},
+        {kImuStream, "anything", 1},
+        events_packet({}),
+        {kFrameStream, frame_table({.t_us = 7, .begin_us = 1'000'003, .end_us = 1'000'006}), 1},
+        events_packet({{1'000'001, 1, 1, 1}, {1'000'004, 2, 1, 0}, {1'000'009, 2, 2, 1}})};
+    return file;
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "recording.aedat4";
+};
+
+TEST_F(Aedat4Test, ReadsWhatEachCompressionHolds) {
+  for (const int compression : {0, 1, 2, 3, 4}) {
+    TestFile file = small();
+    file.compression = compression;
+    const auto recording = open(file);
+    EXPECT_EQ(recording->size(), (ImageSize{3, 4}));
+    ASSERT_EQ(recording->frame_count(), 2);
+    EXPECT_EQ(recording->frame_time_s(0), 1.000001);
+    EXPECT_EQ(recording->frame_time_s(1), 1.000004);  // of 1.000003 to 1.000006: rounded down
+    EXPECT_EQ(recording->frame(1), (GreyImage{{3, 4}, std::vector<std::uint8_t>(12, 5)}));
+    EXPECT_THAT(recording->events_in(0, 2),
+                ElementsAre(Event{0, 0, 1.0, true}, Event{3, 2, 1.000001, false},
+                            Event{1, 1, 1.000001, true}, Event{2, 1, 1.000004, false},
+                            Event{2, 2, 1.000009, true}));
+    EXPECT_THAT(recording->events_between(0, 1), ElementsAre(Event{2, 1, 1.000004, false}));
+    EXPECT_THAT(recording->events_around(1.000001, 1, 1),
+                ElementsAre(Event{1, 1, 1.000001, true}, Event{2, 1, 1.000004, false}));
+    EXPECT_THAT(recording->notes(), IsEmpty());
+    EXPECT_EQ(find_recording_format(path_), RecordingFormat::kAedat4);
+  }
+}
+
+TEST_F(Aedat4Test, ReadsAFileWithoutFrames) {
+  TestFile file = small();
+  std::erase_if(file.packets,
+                [](const TestPacket& packet) { return packet.stream != kEventStream; });
+  EXPECT_EQ(open(file)->frame_count(), 0);
+  file.packets.clear();
+  EXPECT_EQ(open(file)->event_span(), std::nullopt);
+}
+
+// Grey as ITU-R BT.601 weighs: 0.114 * 10 + 0.587 * 100 + 0.299 * 200 = 119.64.
+TEST_F(Aedat4Test, MakesColourGrey) {
+  for (const int channels : {3, 4}) {
+    TestFrame frame{.t_us = 5, .format = channels == 3 ? 16 : 24, .pixels = {}};
+    for (int i = 0; i < 12; ++i) {
+      frame.pixels.insert(frame.pixels.end(), {10, 100, 200});
+      if (channels == 4) frame.pixels.push_back(77);
+    }
+    TestFile file;
+    file.packets = {{kFrameStream, frame_table(frame), 1}};
+    const auto recording = open(file);
+    EXPECT_EQ(recording->frame(0).pixels, std::vector<std::uint8_t>(12, 120));
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("frames in colour are made grey")));
+  }
+}
+
+TEST_F(Aedat4Test, ReadsWhatAnUnpluggedCameraLeft) {
+  TestFile file = small();
+  file.has_table = false;
+  const std::string whole = file.bytes();
+  EXPECT_THAT(open(whole)->notes(), ElementsAre(HasSubstr("no table of packets")));
+  EXPECT_EQ(open(whole)->events_in(0, 2).size(), 5u);
+  // The last packet takes 8 bytes and 104 of its table: cut off in the one, in the other.
+  const std::size_t last = 8 + file.packets.back().table.size();
+  for (const std::size_t missing : {std::size_t{1}, last - 8, last - 1}) {
+    const auto recording = open(whole.substr(0, whole.size() - missing));
+    EXPECT_EQ(recording->events_in(0, 2).size(), 2u);
+    EXPECT_THAT(recording->notes(), ElementsAre(HasSubstr("no table"),
+                                                HasSubstr("got " + std::to_string(last - missing) +
+                                                          ", in " + path_.string())));
+  }
+  EXPECT_THAT(open(whole.substr(0, whole.size() - last))->notes(),
+              ElementsAre(HasSubstr("no table")));
+}
+
+TEST_F(Aedat4Test, TakesATableOfOlderWriters) {
+  TestFile file = small();
+  for (TestPacket& packet : file.packets) packet.count = packet.begin_us = packet.end_us = 0;
+  EXPECT_EQ(open(file)->events_in(0, 2).size(), 5u);
+}
+
+// Older writers align numbers counted from behind the length in front.
+TEST_F(Aedat4Test, ReadsTablesOfBothAlignments) {
+  TestFile file = small();
+  file.has_table = false;
+  const std::string packets = file.bytes().substr(file.header(-1).size());
+  flatbuffers::FlatBufferBuilder builder;
+  builder.ForceDefaults(true);
+  const auto text = builder.CreateString(file.info);
+  builder.Finish(aedat4::CreateHeader(builder, 0, -1, text), "IOHE");
+  const std::string table =
+      number_bytes(static_cast<std::int32_t>(builder.GetSize())) + text_of(builder);
+  flatbuffers::Verifier in_front(reinterpret_cast<const std::uint8_t*>(table.data()), table.size());
+  EXPECT_FALSE(in_front.VerifySizePrefixedBuffer<aedat4::Header>("IOHE"));
+  EXPECT_EQ(open("#!AER-DAT4.0\r\n" + table + packets)->events_in(0, 2).size(), 5u);
+}
+
+TEST_F(Aedat4Test, RefusesATableThatSaysOtherwise) {
+  const std::function<void(TestFile&)> changes[] = {
+      [](TestFile& file) { file.packets[0].count = 3; },
+      [](TestFile& file) { file.packets[1].count = 2; },
+      [](TestFile& file) { file.packets[3].count = 1; },
+      [](TestFile& file) { file.packets[0].begin_us -= 1; },
+      [](TestFile& file) { file.packets[5].end_us += 1; }};
+  for (const auto& change : changes) {
+    TestFile file = small();
+    change(file);
+    expect_refused(file.bytes(), "in the table as it is");
+  }
+  TestFile file = small();
+  expect_refused(file.bytes() + "rest", "expected a sound table FTAB");
+  file.compression = 1;
+  expect_refused(file.bytes() + "rest", "got 4 bytes behind its end");
+}
+
+TEST_F(Aedat4Test, RefusesTimesThatFallOrCannotBe) {
+  TestFile file = small();
+  file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {999'999, 0, 0, 1}});
+  expect_refused(file.bytes(),
+                 "expected times that never fall, got 999999 µs after 1000000 µs, in " +
+                     path_.string() + " (event 1)");
+  file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {1'000'002, 0, 0, 1}});
+  expect_refused(file.bytes(),
+                 "got 1000001 µs after 1000002 µs, in " + path_.string() + " (event 2)");
+  for (const std::int64_t time_us :
+       {std::int64_t{-1}, std::int64_t{1} << 52, std::numeric_limits<std::int64_t>::max()}) {
+    file.packets[0] = events_packet({{time_us, 0, 0, 1}});
+    expect_refused(file.bytes(), "expected a time of 0..4503599627370495 µs, got");
+  }
+  file = small();
+  std::swap(file.packets[1], file.packets[4]);
+  expect_refused(file.bytes(), "(frame 1)");
+  file = small();
+  file.packets[4].table = frame_table({.begin_us = 9, .end_us = 8});
+  expect_refused(file.bytes(), "expected an exposure that ends at 9 µs or later, got 8");
+}
+
+TEST_F(Aedat4Test, RefusesEventsBesideTheSensorAndOddPolarities) {
+  TestFile file;
+  file.packets = {events_packet({{5, 4, 0, 1}})};
+  const auto beside = open(file);
+  EXPECT_THAT([&] { beside->events_in(0, 1); },
+              ThrowsMessage<InputError>(HasSubstr("an image of 4x3, got x = 4, y = 0")));
+  file.packets = {events_packet({{5, 0, -1, 1}})};
+  const auto above = open(file);
+  EXPECT_THAT([&] { above->events_in(0, 1); }, ThrowsMessage<InputError>(HasSubstr("y = -1")));
+  file.packets = {events_packet({{5, 0, 0, 2}})};
+  const auto odd = open(file);
+  EXPECT_THAT([&] { odd->events_in(0, 1); },
+              ThrowsMessage<InputError>(HasSubstr("got 2, in " + path_.string() + " (event 0)")));
+}
+
+TEST_F(Aedat4Test, RefusesFramesThatDoNotFit) {
+  const std::pair<TestFrame, const char*> frames[] = {
+      {{.t_us = 1, .width = 3}, "expected a frame of 4x3 at 0, 0, got 3x3 at 0, 0"},
+      {{.t_us = 1, .left = 1}, "got 4x3 at 1, 0"},
+      {{.t_us = 1, .height = -3}, "got 4x-3"},
+      {{.t_us = 1, .format = 16}, "expected 36 bytes of pixels, got 12"},
+      {{.t_us = 1, .format = 2}, "expected pixels of OpenCV's type 0, 16 or 24, got 2"},
+      {{.t_us = 1, .pixels = {}}, "expected 12 bytes of pixels, got 0"}};
+  for (const auto& [frame, reason] : frames) {
+    TestFile file;
+    file.packets = {{kFrameStream, frame_table(frame), 1}};
+    expect_refused(file.bytes(), reason);
+  }
+}
+
+TEST_F(Aedat4Test, RefusesOtherHeaders) {
+  expect_refused("", "expected \"#!AER-DAT4.0\"");
+  expect_refused("#!AER-DAT4.0\r\n\1", "expected \"#!AER-DAT4.0\"");
+  expect_refused("#!AER-DAT3.1\r\n      ", "expected \"#!AER-DAT4.0\"");
+  expect_refused("#!AER-DAT4.0\r\n\xff\xff\xff\xff", "got a file of 18 bytes");
+  expect_refused(std::string("#!AER-DAT4.0\r\n\4\0\0\0text", 22), "expected a sound table IOHE");
+  TestFile file = small();
+  file.compression = 5;
+  expect_refused(file.header(-1), "expected a compression 0..4, got 5");
+  file.compression = 0;
+  expect_refused(file.header(1), "expected a table of packets at a byte");
+  expect_refused(file.header(1 << 30), "expected a table of packets at a byte");
+  const std::pair<const char*, const char*> infos[] = {
+      {"<dv", "expected XML of the streams"},
+      {"<dv/>", "expected a stream of events (EVTS), got none"},
+      {R"(<dv><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr></node></node></dv>)",
+       "in 1..8192, got 0x0"},
+      {R"(<dv><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr></node>
+          <node name="4"><attr key="typeIdentifier">EVTS</attr></node></node></dv>)",
+       "expected one stream of EVTS, got several (0 and 4)"},
+      {R"(<dv><node name="outInfo"><node name="0"/><node name="0"/></node></dv>)",
+       "expected streams of different numbers"}};
+  for (const auto& [info, reason] : infos) {
+    file.info = info;
+    expect_refused(file.header(-1), reason);
+  }
+}
+
+TEST_F(Aedat4Test, RefusesBrokenPackets) {
+  TestFile file;
+  file.packets = {events_packet({{1, 0, 0, 1}})};
+  file.packets[0].stream = 3;
+  expect_refused(file.bytes(), "of stream 3");
+  file.packets[0].stream = kFrameStream;
+  expect_refused(file.bytes(), "expected a sound table FRME");
+  file = small();
+  const std::string whole = file.bytes();
+  // With a table it is no matter of an unplugged camera.
+  std::string longer = whole;
+  const std::size_t size_at = file.header(-1).size() + 4;
+  longer.replace(size_at, 4, number_bytes(1 << 28));
+  expect_refused(longer, "expected a packet of 268435464 bytes, got");
+  longer.replace(size_at, 4, number_bytes(-1));
+  expect_refused(longer, "got -1 bytes of stream 0");
+  longer.replace(size_at, 4, number_bytes(0));
+  expect_refused(longer, "got 0 bytes of stream 0");
+  for (const int compression : {1, 3}) {
+    file.compression = compression;
+    std::string damaged = file.bytes();
+    damaged[file.header(-1).size() + 8] ^= 1;
+    expect_refused(damaged, compression == 1 ? "expected an LZ4 frame" : "expected a Zstandard");
+  }
+  // A frame that ends before it is whole, as the packet says its size.
+  file.compression = 0;
+  const std::string content = packed(file.packets[0].table, 1);
+  file.packets = {{kEventStream, content.substr(0, content.size() - 5)}};
+  file.has_table = false;
+  std::string cut = file.bytes();
+  file.compression = 1;
+  cut.replace(0, file.header(-1).size(), file.header(-1));
+  expect_refused(cut, "expected a whole packed frame, got one that is cut off");
+}
+
+// 257 MiB of zeros in some kilobytes: what comes out is bounded, whatever the packet claims.
+TEST_F(Aedat4Test, RefusesABomb) {
+  TestFile file;
+  file.compression = 3;
+  file.packets = {{kEventStream, std::string(std::size_t{257} << 20, '\0')}};
+  file.has_table = false;
+  EXPECT_THAT([&] { open(file); },
+              ThrowsMessage<InputError>(HasSubstr("at most 268435456 bytes unpacked, got more")));
+}
+
+// Files with holes: nothing is read of what is larger than any table.
+TEST_F(Aedat4Test, RefusesTablesTooLarge) {
+  testing::write_file(path_, "#!AER-DAT4.0\r\n" + number_bytes(1 << 29));
+  std::filesystem::resize_file(path_, std::uintmax_t{1} << 30);
+  EXPECT_THAT([&] { open_aedat4(path_); },
+              ThrowsMessage<InputError>(HasSubstr("at most 268435456 bytes, got 536870916")));
+  TestFile file;
+  file.has_table = false;
+  const std::string start = file.bytes() + number_bytes(kEventStream) + number_bytes(1 << 29);
+  testing::write_file(path_, start);
+  std::filesystem::resize_file(path_, start.size() + (1 << 29));
+  EXPECT_THAT([&] { open_aedat4(path_); },
+              ThrowsMessage<InputError>(HasSubstr("at most 268435456 bytes, got 536870912")));
+}
+
+// The converted file was made of it by another program.
+TEST_F(Aedat4Test, ReadsADavis346AsItsConversionIs) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto recording = open_recording(data / "davis/davis346.aedat4", RecordingFormat::kAedat4);
+  const auto converted =
+      open_recording(data / "davis/davis346_eventgan_layout.hdf5", RecordingFormat::kEventgan);
+  EXPECT_EQ(recording->size(), (ImageSize{260, 346}));
+  ASSERT_EQ(recording->frame_count(), 3);
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(recording->frame_time_s(i), converted->frame_time_s(i));
+    EXPECT_EQ(recording->frame(i), converted->frame(i));
+  }
+  const std::vector<Event> events = recording->events_in(0, 2e9);
+  EXPECT_EQ(events.size(), 117'667u);
+  EXPECT_EQ(events, converted->events_in(0, 2e9));
+  EXPECT_EQ(recording->events_between(0, 2), converted->events_between(0, 2));
+  EXPECT_THAT(recording->notes(), IsEmpty());
+}
+
+TEST_F(Aedat4Test, ReadsFilesOfTwoCameras) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto fixtures = data / "real_labels/fixtures";
+  const auto davis = open_recording(fixtures / "davis346.aedat4", RecordingFormat::kAedat4);
+  EXPECT_EQ(davis->frame_count(), 4);
+  EXPECT_EQ(davis->events_in(0, 2e9).size(), 6676u);
+  const auto explorer = open_recording(fixtures / "dvxplorer.aedat4", RecordingFormat::kAedat4);
+  EXPECT_EQ(explorer->size(), (ImageSize{240, 320}));
+  EXPECT_EQ(explorer->frame_count(), 0);
+  EXPECT_EQ(explorer->events_in(0, 2e9).size(), 111'954u);
+  EXPECT_EQ(find_recording_format(fixtures / "dvxplorer.aedat4"), RecordingFormat::kAedat4);
+}
+
+}  // namespace
+}  // namespace eventgan

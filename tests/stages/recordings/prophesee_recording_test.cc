@@ -1,0 +1,340 @@
+#include "stages/recordings/detail/prophesee_recording.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <string>
+
+#include "manifests/values/faults.h"
+#include "stages/base/archives/zip_archive.h"
+#include "stages/recordings/recording.h"
+#include "tests/testing/shared_data.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::ThrowsMessage;
+
+const std::string kDatHeader = std::string(
+    "% Data file containing CD events\n% Version 2\n% Width 8\n% Height 6\n\x0c\x08", 68);
+const std::string kEvt2Header = "% evt 2.0\n% geometry 8x6\n% end\n";
+const std::string kEvt3Header = "% evt 3.0\n% format EVT3;height=6;width=40\n% end\n";
+
+template <class Word>
+std::string words(const std::vector<Word>& values) {
+  return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Word)};
+}
+
+std::uint64_t dat(std::uint32_t time_us, std::uint64_t x, std::uint64_t y, std::uint64_t on) {
+  return time_us | (x | y << 14 | on << 28) << 32;
+}
+std::uint32_t evt2(std::uint32_t low, std::uint32_t x, std::uint32_t y, std::uint32_t on) {
+  return on << 28 | low << 22 | x << 11 | y;
+}
+std::uint32_t evt2_high(std::uint32_t high) { return 8u << 28 | high; }
+std::uint16_t evt3(int type, int value, bool on = false) {
+  return static_cast<std::uint16_t>(type << 12 | int{on} << 11 | value);
+}
+constexpr int kY = 0, kX = 2, kBase = 3, kVector12 = 4, kVector8 = 5, kLow = 6, kHigh = 8;
+
+class PropheseeTest : public ::testing::Test {
+ protected:
+  std::unique_ptr<Recording> open(const std::string& bytes,
+                                  std::optional<ImageSize> sensor = std::nullopt) {
+    testing::write_file(path_, bytes);
+    RecordingOptions options;
+    options.sensor = sensor;
+    return open_recording(path_, RecordingFormat::kProphesee, options);
+  }
+
+  std::vector<Event> events_of(const std::string& bytes) { return open(bytes)->events_in(-1, 1e6); }
+
+  void expect_refused(const std::string& bytes, const std::string& reason) {
+    EXPECT_THAT([&] { events_of(bytes); }, ThrowsMessage<InputError>(HasSubstr(reason)));
+    EXPECT_THAT([&] { events_of(bytes); }, ThrowsMessage<InputError>(HasSubstr(path_.string())));
+  }
+
+  testing::TemporaryFolder folder_;
+  std::filesystem::path path_ = folder_ / "recording";
+};
+
+TEST_F(PropheseeTest, ReadsDat) {
+  const auto recording =
+      open(kDatHeader + words<std::uint64_t>({dat(0, 7, 5, 1), dat(3, 0, 0, 0)}));
+  EXPECT_EQ(recording->size(), (ImageSize{6, 8}));
+  EXPECT_EQ(recording->frame_count(), 0);
+  EXPECT_THAT(recording->events_in(-1, 1),
+              ElementsAre(Event{7, 5, 0, true}, Event{0, 0, 3e-6, false}));
+  EXPECT_THAT(recording->events_in(0, 1), ElementsAre(Event{0, 0, 3e-6, false}));
+  EXPECT_THAT(events_of(kDatHeader), IsEmpty());
+}
+
+// 2^32 µs are 4294.967296 s.
+TEST_F(PropheseeTest, GoesOnWhereDatWraps) {
+  EXPECT_THAT(
+      events_of(kDatHeader + words<std::uint64_t>({dat(0xffffffff, 1, 1, 1), dat(0, 1, 1, 1)})),
+      ElementsAre(Event{1, 1, 4294.967295, true}, Event{1, 1, 4294.967296, true}));
+  expect_refused(kDatHeader + words<std::uint64_t>({dat(10, 1, 1, 1), dat(9, 1, 1, 1)}),
+                 "expected a time that goes on or wraps, got 9 after 10 of 4294967296, in " +
+                     path_.string() + " (byte 76)");
+}
+
+TEST_F(PropheseeTest, ReadsEvt2) {
+  const auto recording = open(
+      kEvt2Header + words<std::uint32_t>({evt2_high(3), evt2(5, 7, 5, 1), 0xa0000000, 0xe0000000,
+                                          0xf0000000, evt2_high(4), evt2(0, 2, 3, 0)}));
+  // 3 * 64 + 5 = 197 and 4 * 64 = 256 µs.
+  EXPECT_THAT(recording->events_in(0, 1),
+              ElementsAre(Event{7, 5, 197e-6, true}, Event{2, 3, 256e-6, false}));
+  EXPECT_THAT(recording->notes(), IsEmpty());
+}
+
+// 2^34 µs are 17179.869184 s.
+TEST_F(PropheseeTest, GoesOnWhereEvt2Wraps) {
+  EXPECT_THAT(events_of(kEvt2Header + words<std::uint32_t>({evt2_high(0xfffffff), evt2(63, 1, 1, 1),
+                                                            evt2_high(0), evt2(1, 1, 1, 1)})),
+              ElementsAre(Event{1, 1, 17179.869183, true}, Event{1, 1, 17179.869185, true}));
+  expect_refused(kEvt2Header + words<std::uint32_t>({evt2_high(9), evt2_high(8)}),
+                 "got 8 after 9 of 268435456");
+  expect_refused(
+      kEvt2Header + words<std::uint32_t>({evt2_high(9), evt2(3, 1, 1, 1), evt2(2, 1, 1, 1)}),
+      "expected times that never fall, got 578 µs after 579 µs");
+}
+
+TEST_F(PropheseeTest, CountsEventsBeforeTheFirstTime) {
+  const auto evt2_file =
+      open(kEvt2Header + words<std::uint32_t>({evt2(5, 7, 5, 1), evt2_high(3), evt2(5, 7, 5, 1)}));
+  EXPECT_EQ(evt2_file->events_in(0, 1).size(), 1u);
+  EXPECT_THAT(evt2_file->notes(), ElementsAre(HasSubstr("left out: 1, in ")));
+  // One without a time, one without a row, three of a vector without a first pixel.
+  const auto evt3_file =
+      open(kEvt3Header + words<std::uint16_t>({evt3(kX, 1), evt3(kHigh, 1), evt3(kX, 1),
+                                               evt3(kVector12, 7), evt3(kY, 2), evt3(kX, 1)}));
+  EXPECT_THAT(evt3_file->events_in(0, 1), ElementsAre(Event{1, 2, 4096e-6, false}));
+  EXPECT_THAT(evt3_file->notes(), ElementsAre(HasSubstr("left out: 5, in ")));
+}
+
+TEST_F(PropheseeTest, ReadsEvt3) {
+  const auto recording = open(
+      kEvt3Header + words<std::uint16_t>(
+                        {evt3(kHigh, 1), evt3(kLow, 10), evt3(kY, 5), evt3(kX, 39, true),
+                         // Bits 0, 11; then 8 further, bit 7; then a single one.
+                         evt3(kBase, 3, true), evt3(kVector12, 0x801), evt3(kVector8, 0xf80),
+                         evt3(kX, 1), evt3(kVector8, 1),
+                         // Of a trigger; then said again, and a new time.
+                         evt3(kLow, 20), evt3(0xa, 1), evt3(kHigh, 1), evt3(kLow, 12), evt3(0xe, 1),
+                         evt3(0xf, 1), evt3(7, 1), evt3(kX, 2), evt3(kHigh, 2), evt3(kX, 3)}));
+  EXPECT_EQ(recording->size(), (ImageSize{6, 40}));
+  EXPECT_THAT(recording->events_in(0, 1),
+              ElementsAre(Event{39, 5, 4106e-6, true}, Event{3, 5, 4106e-6, true},
+                          Event{14, 5, 4106e-6, true}, Event{22, 5, 4106e-6, true},
+                          Event{1, 5, 4106e-6, false}, Event{23, 5, 4106e-6, true},
+                          Event{2, 5, 4108e-6, false}, Event{3, 5, 8192e-6, false}));
+}
+
+// 2^24 µs are 16.777216 s.
+TEST_F(PropheseeTest, GoesOnWhereEvt3Wraps) {
+  EXPECT_THAT(
+      events_of(kEvt3Header +
+                words<std::uint16_t>({evt3(kHigh, 4095), evt3(kLow, 4095), evt3(kY, 0), evt3(kX, 1),
+                                      evt3(kHigh, 0), evt3(kX, 1), evt3(kHigh, 3000),
+                                      evt3(kHigh, 4000), evt3(kHigh, 1), evt3(kX, 1)})),
+      ElementsAre(Event{1, 0, 16.777215, false}, Event{1, 0, 16.777216, false},
+                  Event{1, 0, 33.558528, false}));
+  for (const int fallen : {3839, 256}) {
+    expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 3840), evt3(kHigh, fallen)}),
+                   "expected a time that goes on or wraps, got " + std::to_string(fallen));
+  }
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 3839), evt3(kHigh, 0)}),
+                 "got 0 after 3839 of 4096");
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kLow, 9), evt3(kY, 0),
+                                                     evt3(kX, 1), evt3(kLow, 8), evt3(kX, 1)}),
+                 "got 4104 µs after 4105 µs");
+}
+
+TEST_F(PropheseeTest, RefusesWordsThatAreNone) {
+  const auto byte = [&](std::size_t at) {
+    return ", in " + path_.string() + " (byte " + std::to_string(at) + ")";
+  };
+  expect_refused(kEvt2Header + words<std::uint32_t>({evt2_high(1), 0x20000000}),
+                 "expected a word of EVT 2.0, got one of type 2" + byte(kEvt2Header.size() + 4));
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(1, 0)}),
+                 "expected a word of EVT 3.0, got one of type 1" + byte(kEvt3Header.size()));
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kY, 0), evt3(kY, 0, true)}),
+                 "expected events of one camera");
+  expect_refused(kEvt3Header + "x",
+                 "expected whole words of 2 bytes, got 1 more" + byte(kEvt3Header.size()));
+  expect_refused(kEvt2Header + "123", "expected whole words of 4 bytes, got 3 more");
+  expect_refused(kDatHeader + "12345678901", "expected whole words of 8 bytes, got 3 more");
+}
+
+TEST_F(PropheseeTest, RefusesEventsBesideTheSensor) {
+  expect_refused(kDatHeader + words<std::uint64_t>({dat(0, 7, 5, 1), dat(0, 8, 5, 1)}),
+                 "an image of 8x6, got x = 8, y = 5, in " + path_.string() + " (event 1)");
+  expect_refused(kDatHeader + words<std::uint64_t>({dat(0, 7, 5, 2)}), "expected polarities");
+  expect_refused(kEvt3Header + words<std::uint16_t>({evt3(kHigh, 1), evt3(kY, 0), evt3(kBase, 38),
+                                                     evt3(kVector8, 4)}),
+                 "got x = 40");
+}
+
+TEST_F(PropheseeTest, ReadsHeaders) {
+  const std::string word = words<std::uint32_t>({evt2_high(1)});
+  EXPECT_EQ(open("% evt 2.0\r\n% width 640\n% height 480\n" + word)->size(), (ImageSize{480, 640}));
+  EXPECT_EQ(open("% format EVT2;width=9;endianness=little;height=8\n" + word)->size(),
+            (ImageSize{8, 9}));
+  EXPECT_EQ(open("% evt 2.0\n" + word, ImageSize{7, 3})->size(), (ImageSize{7, 3}));
+  EXPECT_EQ(open(kEvt2Header + word, ImageSize{6, 8})->size(), (ImageSize{6, 8}));
+  EXPECT_THAT(
+      [&] {
+        open(kEvt2Header + word, ImageSize{8, 6});
+      },
+      ThrowsMessage<InputError>(HasSubstr("\"sensor\" to be 8x6, as the header says, got 6x8")));
+  EXPECT_EQ(find_recording_format(path_), RecordingFormat::kProphesee);
+  testing::write_file(path_, "% text\n");
+  EXPECT_EQ(find_recording_format(path_), std::nullopt);
+  // The end of the header is what the words begin behind, also if they begin as a line would.
+  EXPECT_THAT(open("% evt 3.0\n% geometry 40x6\n% end\n% ")->notes(),
+              ElementsAre(HasSubstr("left out: 1")));
+}
+
+TEST_F(PropheseeTest, RefusesHeaders) {
+  expect_refused("", "expected a header");
+  expect_refused("% text\n", "expected a header");
+  expect_refused("% evt 2.0", "expected a line of text, got no end of it");
+  expect_refused("% evt 2.0\n", R"("sensor": {"width": ..., "height": ...}, in )" + path_.string());
+  expect_refused("% evt 2.1\n",
+                 "expected evt 2.0 or 3.0, got another, in " + path_.string() + " (byte 0)");
+  expect_refused("% evt 2.0\n% format EVT3;height=1;width=1\n", "expected lines that agree");
+  expect_refused("% format EVT21;height=1;width=1\n", "expected a format EVT2 or EVT3");
+  expect_refused("% evt 2.0\n% endianness big\n", "little-endian");
+  expect_refused("% format EVT2;endianness=big\n", "little-endian");
+  for (const char* geometry : {"8", "8x", "x6", "0x6", "8193x6", "8x6x", "-8x6", "99999999999x6"}) {
+    expect_refused(std::string("% evt 2.0\n% geometry ") + geometry + "\n",
+                   "expected pixels 1..8192");
+  }
+  expect_refused("% Data file containing CD events\n% Version 1\n" + std::string("\x0c\x08", 2),
+                 "% Version 2");
+  expect_refused("% Data file containing CD events\n" + std::string("\x0c\x08", 2), "% Version 2");
+  expect_refused(kDatHeader.substr(0, 67), "expected events of type 0 or 12 of 8 bytes");
+  std::string other = kDatHeader;
+  other[66] = '\x0e';
+  expect_refused(other, "expected events of type 0 or 12 of 8 bytes");
+}
+
+// More events than between two places where decoding can begin: any part is as of the whole.
+TEST_F(PropheseeTest, ReadsPartsOfALongRecording) {
+  std::mt19937 random(5);
+  std::vector<std::uint16_t> stored;
+  std::vector<Event> expected;
+  std::int64_t time_us = 4'000 * 4096;  // wraps on the way
+  std::int64_t high = -1;
+  int y = -1;
+  while (expected.size() < 200'000) {
+    time_us += random() % 40;
+    if (time_us >> 12 != high)
+      stored.push_back(evt3(kHigh, static_cast<int>((high = time_us >> 12) & 4095)));
+    stored.push_back(evt3(kLow, static_cast<int>(time_us & 4095)));
+    if (random() % 3 == 0 || y < 0) stored.push_back(evt3(kY, y = static_cast<int>(random() % 6)));
+    const bool on = random() % 2 == 0;
+    const int x = static_cast<int>(random() % 28);
+    const double time_s = static_cast<double>(time_us) / 1e6;
+    if (random() % 2 == 0) {
+      stored.push_back(evt3(kX, x, on));
+      expected.push_back({x, y, time_s, on});
+    } else {
+      const int valid = static_cast<int>(random() % 4096);
+      stored.insert(stored.end(), {evt3(kBase, x, on), evt3(kVector12, 0)});
+      stored.back() = static_cast<std::uint16_t>(kVector12 << 12 | valid);
+      for (int i = 0; i < 12; ++i) {
+        if (valid >> i & 1) expected.push_back({x + i, y, time_s, on});
+      }
+    }
+  }
+  const auto recording = open(kEvt3Header + words(stored));
+  EXPECT_EQ(recording->events_in(0, 1e6), expected);
+  EXPECT_GT(expected.back().t_s, 16.8);
+  const StoredParts parts = open_prophesee(path_, std::nullopt);
+  ASSERT_EQ(parts.events->count(), std::ssize(expected));
+  for (int i = 0; i < 30; ++i) {
+    const std::int64_t first = static_cast<std::int64_t>(random() % expected.size());
+    const std::int64_t count = std::min<std::int64_t>(static_cast<std::int64_t>(random() % 3000),
+                                                      std::ssize(expected) - first);
+    const std::vector<StoredEvent> part = parts.events->read(first, count);
+    ASSERT_EQ(std::ssize(part), count);
+    for (std::int64_t j = 0; j < count; ++j) {
+      const Event& event = expected[static_cast<std::size_t>(first + j)];
+      const StoredEvent& stored_event = part[static_cast<std::size_t>(j)];
+      ASSERT_EQ(stored_event.t_s, event.t_s);
+      ASSERT_EQ(stored_event.x, event.x);
+    }
+  }
+}
+
+TEST_F(PropheseeTest, ReadsCamerasFiles) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto fixtures = data / "real_labels/fixtures";
+  RecordingOptions vga;
+  vga.sensor = ImageSize{480, 640};
+  const auto evt2_file = open_recording(fixtures / "evt2.raw", RecordingFormat::kProphesee, vga);
+  const std::vector<Event> events = evt2_file->events_in(0, 1e6);
+  ASSERT_EQ(events.size(), 539'481u);
+  EXPECT_EQ(events.front(), (Event{237, 121, 1.317888, true}));
+  EXPECT_EQ(events.back(), (Event{210, 142, 1.367888, true}));
+  EXPECT_THAT(evt2_file->notes(), IsEmpty());
+  RecordingOptions ncars;
+  ncars.sensor = ImageSize{100, 120};
+  const auto dat_file = open_recording(fixtures / "ncars.dat", RecordingFormat::kProphesee, ncars);
+  EXPECT_EQ(dat_file->events_in(-1, 1e6).size(), 2009u);
+  EXPECT_EQ((*dat_file->event_span())[1], 0.099952);
+  for (const char* name : {"evt2.raw", "evt3.raw", "ncars.dat"}) {
+    EXPECT_EQ(find_recording_format(fixtures / name), RecordingFormat::kProphesee);
+  }
+}
+
+// As another program has decoded it. Its times lie 4096 µs later for each of eleven words of the
+// lower part that step back, whatever the upper part says: nine of them are of a signal of 1 kHz
+// and not of an event, two are where the upper part goes on too. The upper part is said every
+// 16 µs, 551 times, so that the recording is of 8.8 ms, as here, not of the other's 54 ms.
+TEST_F(PropheseeTest, ReadsEvt3AsAnotherProgram) {
+  EVENTGAN_SHARED_DATA_OR_SKIP(data);
+  const auto fixtures = data / "real_labels/fixtures";
+  RecordingOptions options;
+  options.sensor = ImageSize{720, 1280};
+  const auto recording =
+      open_recording(fixtures / "evt3.raw", RecordingFormat::kProphesee, options);
+  const std::vector<Event> events = recording->events_in(0, 1e6);
+  EXPECT_NEAR(events.back().t_s - events.front().t_s, 550 * 16e-6, 16e-6);
+  const std::vector<std::byte> npy = ZipArchive(fixtures / "evt3_decoded.npz").read("arr_0.npy");
+  struct Row {
+    std::int64_t t_us;
+    std::int16_t x, y;
+    std::uint8_t on;
+  };
+  std::uint16_t header_bytes = 0;
+  std::memcpy(&header_bytes, npy.data() + 8, 2);
+  const std::size_t first = 10 + header_bytes;
+  ASSERT_EQ((npy.size() - first) / sizeof(Row), events.size());
+  std::int64_t later_us = 0;
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    Row row;
+    std::memcpy(&row, npy.data() + first + i * sizeof(Row), sizeof(row));
+    ASSERT_EQ((Event{row.x, row.y, events[i].t_s, row.on == 1}), events[i]) << i;
+    const std::int64_t difference_us = row.t_us - std::llround(events[i].t_s * 1e6);
+    ASSERT_EQ(difference_us % 4096, 0) << i;
+    ASSERT_GE(difference_us, later_us) << i;
+    later_us = difference_us;
+  }
+  EXPECT_EQ(later_us, 11 * 4096);
+}
+
+}  // namespace
+}  // namespace eventgan
