@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""What a trainer's reader costs: samples with labels from `eventgan_shards` against the same volumes alone from h5py."""
+"""What a trainer's reader costs: samples with labels from `eventgan` against the same volumes alone from h5py."""
 
 import dataclasses
 import json
@@ -16,7 +16,7 @@ from measuring.report import Section, Table, number
 from measuring.spread import spread
 
 sys.path.insert(0, str(SOURCE / "manifests" / "python"))
-from eventgan_shards import Shards  # noqa: E402
+from eventgan import Shards  # noqa: E402
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +77,7 @@ def seconds(samples, order):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    table = Table(["volumes, order", "h5py, volume alone, ms", "eventgan_shards, volume and labels, ms", "times h5py's"])
+    table = Table(["volumes, order", "h5py, volume alone, ms", "eventgan, volume and labels, ms", "times h5py's"])
     for dtype in settings.dtypes:
         paths = demo_shards(bench, settings, dtype)
         orders = {"in order": None, "shuffled": np.random.default_rng(7)}

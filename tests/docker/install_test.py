@@ -88,7 +88,7 @@ class Install(unittest.TestCase):
         self.assertIn("MIT License", (self.prefix / "share" / "doc" / "eventgan" / "copyright").read_text())
 
     def test_python_reads_shards_with_the_installed_package(self):
-        where = run("/usr/bin/python3", "-B", "-c", "import eventgan_shards; print(eventgan_shards.__file__)", cwd="/",
+        where = run("/usr/bin/python3", "-B", "-c", "import eventgan; print(eventgan.__file__)", cwd="/",
                     env={"PYTHONPATH": str(self.prefix / "lib" / "python3" / "dist-packages")})
         self.assertTrue(where.startswith(str(self.prefix)))
 
@@ -138,7 +138,7 @@ class Packages(unittest.TestCase):
         self.assertEqual(contents["eventgan-torch"], {"usr/libexec/eventgan/eventgan-torch"})
         self.assertLessEqual({"usr/bin/eventgan", "usr/libexec/eventgan/eventgan-video"}, contents["eventgan"])
         self.assertIn("usr/share/man/man1/eventgan.1.gz", contents["eventgan"])
-        self.assertIn("usr/lib/python3/dist-packages/eventgan_shards/__init__.py", contents["eventgan"])
+        self.assertIn("usr/lib/python3/dist-packages/eventgan/__init__.py", contents["eventgan"])
         self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])
 
     def test_dependencies_are_the_libraries_packages(self):

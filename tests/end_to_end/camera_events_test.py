@@ -92,7 +92,7 @@ class Recordings(program.InFolder):
 
     def test_the_papers_columns_come_out_of_the_scores(self):
         run("convert", self.manifest())
-        from eventgan_shards import evaluate
+        from eventgan import evaluate
         found = [{"image_id": "drive/0000000010.100000", "category_id": "car", "bbox": [2, 3, 10, 10], "score": 0.9},
                  {"image_id": "drive/0000000010.100000", "category_id": "car", "bbox": [0, 15, 9, 9], "score": 0.8},
                  {"image_id": "drive/0000000010.300000", "category_id": "car", "bbox": [5, 5, 15, 15], "score": 0.7}]

@@ -88,7 +88,7 @@ def unknown_words(words):
             kind = "testPresets" if name == "ctest" else "buildPresets" if "--build" in rest else "configurePresets"
             presets = json.loads((SOURCE / "CMakePresets.json").read_text())[kind]
             return {rest[rest.index("--preset") + 1]} - {preset["name"] for preset in presets if not preset.get("hidden")}
-        if word == "-m" and rest and rest[0].startswith("eventgan_shards."):
+        if word == "-m" and rest and rest[0].startswith("eventgan."):
             return unknown_options(rest, "-m", *rest[:2])
         for script in (word, f"manifests/python/examples/{word}"):
             if name.endswith(".py") and (SOURCE / script).is_file():
@@ -108,7 +108,7 @@ class Documentation(unittest.TestCase):
                     self.assertEqual([word for word in words if OWN_PATH.fullmatch(word) and not any(SOURCE.glob(word))], [])
                     seen.update(() if unknown is None else words)
         self.assertLessEqual({"plan", "convert", "status", "retry", "finalize", "verify", "docker/bootstrap.sh", "ctest", "submit.sh",
-                              "eventgan_shards.evaluate", "train_pose.py"}, {pathlib.PurePath(word).name for word in seen} | seen)
+                              "eventgan.evaluate", "train_pose.py"}, {pathlib.PurePath(word).name for word in seen} | seen)
 
     def test_shell_blocks_parse(self):
         shell = [(page, block) for page in PAGES for block in blocks_of(page) if any(unknown_words(words) is not None for words in commands_of(block))]
@@ -147,7 +147,7 @@ class Documentation(unittest.TestCase):
         with tempfile.TemporaryDirectory(prefix="eventgan-") as folder:
             for command in (["make-demo", "demo", "--scenes", "10"], ["convert", "demo/manifest.json", "--output", "out", "--progress", "none"], ["finalize", "out"]):
                 subprocess.run([program.PROGRAM, *command], cwd=folder, check=True, capture_output=True)
-            ids = subprocess.run([sys.executable, "-c", "from eventgan_shards import Shards; print(Shards('out').column('sample_id')[0])"],
+            ids = subprocess.run([sys.executable, "-c", "from eventgan import Shards; print(Shards('out').column('sample_id')[0])"],
                                  cwd=folder, env=PYTHON_PATH, check=True, capture_output=True)
             with open(os.path.join(folder, "wanted.txt"), "wb") as file:
                 file.write(ids.stdout)

@@ -38,8 +38,8 @@ def pytorch():
         import torch
     except ImportError:
         return None, None
-    import eventgan_shards.torch
-    return torch, eventgan_shards.torch
+    import eventgan.torch
+    return torch, eventgan.torch
 
 
 def write_persons(root, count=12):

@@ -22,7 +22,7 @@ from program import run
 from small_job import small_job
 
 sys.path.insert(0, str(program.SOURCE / "manifests" / "python"))
-import eventgan_shards  # noqa: E402
+import eventgan  # noqa: E402
 
 SHARDS = 8  # 3 of cars, 3 of the same cars as "val", 2 of people
 CARS, PEOPLE = "kitti_object-24x32", "mpii_list-24x32"
@@ -155,7 +155,7 @@ class Finalize(unittest.TestCase):
         self.assertEqual(len(json.loads(said)["missing"]), SHARDS - 2)
         self.assertFalse(self.description(self.out)["complete"])
         self.assertEqual(len(self.description(self.out)["missing"]), SHARDS - 2)
-        self.assertEqual(len(eventgan_shards.Shards(self.out, partial=True)), 4)
+        self.assertEqual(len(eventgan.Shards(self.out, partial=True)), 4)
         convert(self.out)
         run("finalize", self.out)
         same_folder(self.out, done)
@@ -188,7 +188,7 @@ class Finalize(unittest.TestCase):
         run("finalize", self.out, "--manifest", lenient)
         quarantined = self.description(self.out)["quarantined"]
         self.assertEqual([sample["sample_id"] for sample in quarantined], ["000001"])
-        samples = eventgan_shards.Shards(self.out)
+        samples = eventgan.Shards(self.out)
         self.assertNotIn("000001", [sample["pair"]["sample_id"] for sample in samples])
         self.assertEqual(len(samples), 4)
 
@@ -233,21 +233,21 @@ class Reading(unittest.TestCase):
         self.assertEqual(self.in_python(code.format(56), files=64).split(), ["True", "False"])
 
     def test_the_reader_takes_the_plan_s_order_and_splits(self):
-        samples = eventgan_shards.Shards(self.out)
+        samples = eventgan.Shards(self.out)
         listed = [shard["name"] for shard in json.loads((self.out / "dataset.json").read_text())["shards"]]
         self.assertEqual([path.name for path in samples.paths], listed)
         self.assertEqual(len(samples), 14)
-        val = eventgan_shards.Shards(self.out, split="val")
+        val = eventgan.Shards(self.out, split="val")
         self.assertEqual([sample["pair"]["sample_id"] for sample in val], [f"{k:06d}" for k in range(5)])
         with self.assertRaisesRegex(ValueError, "split of train, val, got 'test'"):
-            eventgan_shards.Shards(self.out, split="test")
+            eventgan.Shards(self.out, split="test")
 
     def test_the_reader_opens_few_files_and_none_before_it_reads(self):
         said = self.in_python(f"""
             import sys, os
             sys.path.insert(0, {str(program.SOURCE / "manifests" / "python")!r})
-            import eventgan_shards
-            samples = eventgan_shards.Shards(".", split="train", open_files=2)
+            import eventgan
+            samples = eventgan.Shards(".", split="train", open_files=2)
             print(len(samples._files._open))
             print(sum(bool(sample["volume"].any()) for sample in samples), len(samples._files._open))
         """, files=32)
@@ -255,11 +255,11 @@ class Reading(unittest.TestCase):
 
     def test_splits_without_a_description(self):
         (self.out / "dataset.json").unlink()
-        self.assertEqual(len(eventgan_shards.Shards(self.out, split="val")), 5)
-        self.assertEqual(len(eventgan_shards.Shards(self.out)), 14)
+        self.assertEqual(len(eventgan.Shards(self.out, split="val")), 5)
+        self.assertEqual(len(eventgan.Shards(self.out)), 14)
 
     def test_the_view_stands_for_its_folder(self):
-        self.assertEqual(len(eventgan_shards.Shards(self.out / "dataset.h5")), 14)
+        self.assertEqual(len(eventgan.Shards(self.out / "dataset.h5")), 14)
 
     def test_the_reader_refuses_shards_that_were_not_described(self):
         name = shards_in(self.out)[0]
@@ -269,17 +269,17 @@ class Reading(unittest.TestCase):
                        lambda: (self.out / name).unlink()):
             change()
             with self.assertRaisesRegex(ValueError, name):
-                eventgan_shards.Shards(self.out)
+                eventgan.Shards(self.out)
 
     def test_the_reader_needs_no_commit_records_once_there_is_a_description(self):
         for name in shards_in(self.out):
             (self.out / name).with_suffix(".json").unlink()
-        self.assertEqual(len(eventgan_shards.Shards(self.out)), 14)
+        self.assertEqual(len(eventgan.Shards(self.out)), 14)
 
     def test_other_descriptions_are_refused(self):
         (self.out / "dataset.json").write_text('{"format": "eventgan-dataset", "version": 2}')
         with self.assertRaisesRegex(ValueError, "expected eventgan-dataset 1, got eventgan-dataset 2"):
-            eventgan_shards.Shards(self.out)
+            eventgan.Shards(self.out)
 
 
 if __name__ == "__main__":

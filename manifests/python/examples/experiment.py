@@ -29,8 +29,8 @@ from typing import Any
 
 import numpy as np
 import training
-from eventgan_shards import Shards, read_description
-from eventgan_shards.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
+from eventgan import Shards, read_description
+from eventgan.evaluate import PAPER_COLUMNS, Samples, evaluate_detections, evaluate_poses, table
 
 EXAMPLES = pathlib.Path(__file__).resolve().parent
 SIZE = {"width": 346, "height": 260}

@@ -12,9 +12,9 @@ import functools
 import numpy as np
 import torch
 import training
-from eventgan_shards import Shards, drawing
-from eventgan_shards.pose_scores import pose_scores, read_persons
-from eventgan_shards.torch import PoseAugmentation, PoseDataset, exchange_first_convolution
+from eventgan import Shards, drawing
+from eventgan.pose_scores import pose_scores, read_persons
+from eventgan.torch import PoseAugmentation, PoseDataset, exchange_first_convolution
 
 
 def read_args() -> argparse.Namespace:

@@ -14,8 +14,8 @@ import numpy as np
 import torch
 import torchvision
 import training
-from eventgan_shards import drawing
-from eventgan_shards.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
+from eventgan import drawing
+from eventgan.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
 from torch.utils.data import Dataset
 
 

@@ -15,8 +15,8 @@ import cv2
 import numpy as np
 import torch
 import training
-from eventgan_shards import Shards
-from eventgan_shards.torch import DetectionDataset, EventAugmentation, collate_yolo, exchange_first_convolution, fitted, move_boxes
+from eventgan import Shards
+from eventgan.torch import DetectionDataset, EventAugmentation, collate_yolo, exchange_first_convolution, fitted, move_boxes
 
 
 def read_args() -> argparse.Namespace:

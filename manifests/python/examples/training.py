@@ -24,9 +24,9 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan_shards import Sample, Shards, drawing, read_description  # noqa: E402
-from eventgan_shards.detection_scores import Detections, GroundTruth, detection_scores  # noqa: E402
-from eventgan_shards.torch import inverse, move_boxes  # noqa: E402
+from eventgan import Sample, Shards, drawing, read_description  # noqa: E402
+from eventgan.detection_scores import Detections, GroundTruth, detection_scores  # noqa: E402
+from eventgan.torch import inverse, move_boxes  # noqa: E402
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
@@ -338,7 +338,7 @@ def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.T
 
 
 def write_predictions(args: argparse.Namespace, entries: Iterable[dict]) -> None:
-    """predictions.json, which `python3 -m eventgan_shards.evaluate` reads."""
+    """predictions.json, which `python3 -m eventgan.evaluate` reads."""
     with torch.no_grad():
         text = json.dumps(list(entries)) + "\n"
     _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))

@@ -1,4 +1,4 @@
-"""eventgan_shards.evaluate: scores worked out by hand, against plain loops of the published rules, and against the trainers' own."""
+"""eventgan.evaluate: scores worked out by hand, against plain loops of the published rules, and against the trainers' own."""
 
 import inspect
 import json
@@ -14,11 +14,11 @@ import numpy as np
 import pytest
 from conftest import NAME, SECOND, SOURCE
 
-from eventgan_shards import Shards
-from eventgan_shards.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, average_precisions, detection_scores,
+from eventgan import Shards
+from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, average_precisions, detection_scores,
                                               kitti_average_precision, match_as_coco, match_as_voc, non_maximum_suppression)
-from eventgan_shards.evaluate import Samples, evaluate_detections, evaluate_poses
-from eventgan_shards.pose_scores import Persons, head_lengths, pose_scores
+from eventgan.evaluate import Samples, evaluate_detections, evaluate_poses
+from eventgan.pose_scores import Persons, head_lengths, pose_scores
 
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 CAR, VAN, DONT_CARE = 0, 1, -1
@@ -604,7 +604,7 @@ def test_poses_of_a_folder(folder, tmp_path):
 
 
 def evaluate(*arguments, expect=0):
-    done = subprocess.run([sys.executable, "-m", "eventgan_shards.evaluate", *map(str, arguments)], capture_output=True, text=True,
+    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", *map(str, arguments)], capture_output=True, text=True,
                           env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")})
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr

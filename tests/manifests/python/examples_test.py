@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from conftest import SOURCE
 
-from eventgan_shards import Shards
+from eventgan import Shards
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("torchvision")
@@ -63,7 +63,7 @@ def need_trainer(name, *modules):
 
 
 def evaluate(what, out, data, *more):
-    done = subprocess.run([sys.executable, "-m", "eventgan_shards.evaluate", what, out / "predictions.json", "--truth", data, "--json", *more],
+    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", what, out / "predictions.json", "--truth", data, "--json", *more],
                           capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(EXAMPLES.parent)})
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -12,6 +12,6 @@ def test_pip_installs_the_package(tmp_path):
     subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-index", "--no-deps", "--no-build-isolation",
                     "--target", tmp_path / "site", source], check=True)
     answer = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path / 'site')!r}); "
-                             "import eventgan_shards; print(eventgan_shards.__file__)"], check=True, capture_output=True, text=True)
+                             "import eventgan; print(eventgan.__file__)"], check=True, capture_output=True, text=True)
     assert answer.stdout.startswith(str(tmp_path / "site"))
-    assert (tmp_path / "site" / "eventgan_shards" / "py.typed").exists()
+    assert (tmp_path / "site" / "eventgan" / "py.typed").exists()

@@ -1,4 +1,4 @@
-"""eventgan_shards.Shards: reading, selecting, dividing, in workers of all kinds."""
+"""eventgan.Shards: reading, selecting, dividing, in workers of all kinds."""
 
 import json
 import multiprocessing
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from conftest import NAME, SECOND
 
-from eventgan_shards import InvalidSample, Shards
+from eventgan import InvalidSample, Shards
 
 
 def ids_of(shards):

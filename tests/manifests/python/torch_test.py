@@ -1,4 +1,4 @@
-"""eventgan_shards.torch: volumes, boxes and joints that stay together whatever is done to them."""
+"""eventgan.torch: volumes, boxes and joints that stay together whatever is done to them."""
 
 import dataclasses
 import os
@@ -13,8 +13,8 @@ from conftest import NAME, SOURCE
 torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader  # noqa: E402
 
-from eventgan_shards import Shards  # noqa: E402
-from eventgan_shards.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,  # noqa: E402
+from eventgan import Shards  # noqa: E402
+from eventgan.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,  # noqa: E402
                                    PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
                                    flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
@@ -385,7 +385,7 @@ def test_heatmaps():
 def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
     monkeypatch.syspath_prepend(str(TRAINERS / "pose_resnet" / "lib"))
     transforms = pytest.importorskip("utils.transforms")
-    from eventgan_shards.torch import _crop
+    from eventgan.torch import _crop
     joints_dataset = pytest.importorskip("dataset.JointsDataset")
     for center, scale, rotation, (width, height) in (((100, 80), 0.7, 0, (256, 256)), ((31.5, 47.25), 1.3, -40, (192, 256)), ((0, 0), 2.0, 75, (256, 192))):
         expected = transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation, [width, height])

@@ -1,8 +1,8 @@
 """PyTorch datasets of event volumes: boxes to detect, persons to find joints of.
 
     from torch.utils.data import DataLoader
-    from eventgan_shards import Shards
-    from eventgan_shards.torch import DetectionDataset, collate_yolo
+    from eventgan import Shards
+    from eventgan.torch import DetectionDataset, collate_yolo
 
     cars = DetectionDataset(Shards("out", split="train"), classes=["Car", "Pedestrian"])
     for imgs, targets, ids in DataLoader(cars, batch_size=8, shuffle=True, num_workers=4, collate_fn=collate_yolo):

@@ -1,7 +1,7 @@
 """Scores of what a network finds in shards: boxes as PASCAL VOC, COCO and KITTI count them, joints as the EventGAN paper and MPII do.
 
-    python3 -m eventgan_shards.evaluate detections found.json --truth out --split val
-    python3 -m eventgan_shards.evaluate poses found.json --truth out --split val --dataset mpii --pictures pictures
+    python3 -m eventgan.evaluate detections found.json --truth out --split val
+    python3 -m eventgan.evaluate poses found.json --truth out --split val --dataset mpii --pictures pictures
 
 The predictions are a list in JSON:
 
@@ -310,7 +310,7 @@ def _without_nan(value: Any) -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python3 -m eventgan_shards.evaluate", description="Scores the predictions of a network against the labels of shards.")
+    parser = argparse.ArgumentParser(prog="python3 -m eventgan.evaluate", description="Scores the predictions of a network against the labels of shards.")
     parser.add_argument("what", choices=["detections", "poses"])
     parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with image_id, person, joints")
     parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one shard")

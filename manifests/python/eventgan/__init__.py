@@ -1,0 +1,50 @@
+"""Event-camera training data from frames: volumes of two images, and shards of volumes with their labels.
+
+    import eventgan
+
+    generator = eventgan.Generator("shipped:8", precision="bfloat16")
+    volume = generator(previous, following)                 # float32 [2B, H, W], >= 0, of two images [H, W] or [H, W, 3]
+    events = eventgan.sample_events(volume, seed=0)         # structured array t, x, y, p
+
+    for sample in eventgan.Shards("out", split="train"):    # what `eventgan convert` wrote: a folder, a shard, or a list of shards
+        sample["volume"], sample["boxes"]["xyxy"], sample["persons"]["joints"]
+
+`eventgan.torch` has PyTorch's datasets, `eventgan.evaluate` scores what a network finds. Each name is loaded when it is first used: `Shards` needs
+h5py, `Generator` the compiled module, `show` matplotlib. manifests/guides/python.md shows all of it at work.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from . import evaluate, shards, torch
+    from .drawing import show
+    from .generator import Generator, sample_events
+    from .program import ProgramError, convert, init, open
+    from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
+
+_MODULE_OF = {
+    "Generator": "generator", "sample_events": "generator",
+    "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards", "read_description": "shards",
+    "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
+    "show": "drawing",
+}
+_MODULES = ("evaluate", "shards", "torch")
+
+__all__ = [*_MODULE_OF, *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return importlib.import_module("." + name, __name__)
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(importlib.import_module("." + _MODULE_OF[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

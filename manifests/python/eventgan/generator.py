@@ -1,0 +1,165 @@
+"""Volumes of two images, by the engine of the program `eventgan`: bit for bit those of its shards."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import warnings
+from collections.abc import Mapping
+from typing import Any, Union
+
+import numpy as np
+import numpy.typing as npt
+
+try:
+    from . import _engine
+except ImportError as error:
+    raise ImportError("expected the compiled module eventgan._engine, got none: install the Debian package python3-eventgan, or build it with "
+                      "pip install ./manifests/python in a checkout (manifests/guides/python.md)") from error
+
+PathLike = Union[str, os.PathLike]
+_GENERATOR_KEYS = ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor",
+                   "duration_s", "max_displacement_px")
+_IMAGE_KEYS = ("fit", "preset", "grey", "blur")
+_VOLUME_KEYS = ("bins", "normalize")
+
+
+class Generator:
+    """Makes the event volume of two images, as `eventgan convert` does with the same settings: bit for bit what is in its shards of float32.
+
+    Images are uint8, or floating-point numbers from 0 to 1, which are rounded to the 256 levels of an image file; [H, W] grey or [H, W, 3] red,
+    green, blue (of OpenCV's, which are blue, green, red, pass `image[..., ::-1]`). NumPy arrays, and what NumPy takes for one: a PyTorch
+    tensor on the CPU, a PIL image.
+
+    An object may be used by several threads at once, goes to workers that are forked or spawned, and has no threads of its own: a
+    call computes on the thread that calls, without Python's lock.
+
+    Parameters
+    ----------
+    weights : str or path, default "shipped"
+        A .safetensors file, "shipped" or "shipped:WIDTH" (weights that come with the package), or "untrained:WIDTH".
+    kind : {"network", "esim", "difference"}
+        The EventGAN network, or a model of a sensor to compare it with, which needs no weights.
+    precision : {"float32", "bfloat16", "int8"}
+        In which numbers the network is computed. int8 needs weights that are calibrated (`eventgan calibrate`).
+    size : (int, int), optional
+        Height and width of the volumes. None: those of the images.
+    fit : {"stretch", "letterbox", "crop"}
+        How an image of another shape comes to that size.
+    preset : {"demo", "kitti", "mpii"}
+        Preprocessing as in the EventGAN authors' scripts: "demo" makes grey after resizing, "mpii" before, "kitti" too and
+        blurs (3x3). Or give both of the next two.
+    grey : {"before_resize", "after_resize"}, optional
+    blur : int, optional
+        Side of the Gaussian kernel in pixels, odd; 0: none.
+    scope : {"whole", "motion", "labels", "labels_only"}
+        Which part of a volume is computed; the rest is zeros. "labels" and "labels_only" need the labels: see `sample`.
+    normalize : {"none", "eta98"}
+        Whether a volume is divided by its 98th percentile and clipped.
+    seed : int, default 0
+        Of the models' random numbers, and of untrained weights.
+    **settings
+        Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
+        sensor (a dictionary), duration_s, max_displacement_px, bins. manifest.schema.json has their meanings and ranges.
+
+    Raises
+    ------
+    ValueError
+        A setting is none, or the processor or the weights cannot do it; every fault is named.
+    FileNotFoundError
+        There is no such file of weights.
+
+    Examples
+    --------
+    >>> generator = eventgan.Generator("shipped:8", precision="bfloat16", size=(256, 320), fit="letterbox")
+    >>> volume = generator(previous, following)
+    >>> volume.shape
+    (18, 256, 320)
+    """
+
+    def __init__(self, weights: PathLike | None = None, *, kind: str | None = None, precision: str | None = None,
+                 size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None, grey: str | None = None,
+                 blur: int | None = None, scope: str | None = None, normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
+        raise NotImplementedError
+
+    bins: int                    # per polarity: a volume has 2 bins channels
+    description: str             # engine, precision and the libraries that change bytes, as in a plan's fingerprint
+    weights_hash: str            # SHA-256 of the weights file
+    training_gaps: tuple[int, int] | None  # the gaps, in frames, that the network has seen in training: first, last; None: not known
+
+    def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike) -> np.ndarray:
+        """The volume of two images of one size.
+
+        Parameters
+        ----------
+        previous, following : array_like, [H, W] or [H, W, 3]
+            uint8, or floating-point numbers from 0 to 1.
+
+        Returns
+        -------
+        numpy.ndarray
+            float32 [2B, H, W], >= 0: B bins of positive polarity in time order, then B of negative polarity. Dimensionless.
+
+        Raises
+        ------
+        ValueError
+            An image is not one, or the two differ in size.
+        """
+        raise NotImplementedError
+
+    def many(self, previous: npt.ArrayLike, following: npt.ArrayLike, threads: int = 1) -> np.ndarray:
+        """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], on as many threads, which end with the call."""
+        raise NotImplementedError
+
+    def sample(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, boxes: npt.ArrayLike | None = None,
+               joints: npt.ArrayLike | None = None, gap: int = 1) -> dict[str, Any]:
+        """The volume with what a shard has beside it.
+
+        Parameters
+        ----------
+        boxes : array_like, [n, 4], optional
+            Left, top, right, bottom in pixels of the image, by edges: a whole image is 0, 0, W, H.
+        joints : array_like, [P, J, 2], optional
+            x, y in pixels of the image, whose centres are whole numbers; NaN: not annotated.
+        gap : int, default 1
+            How many frames the images are apart; only for the flag that says that the network has not seen such a gap.
+
+        Returns
+        -------
+        dict
+            volume : float32 [2B, H, W]
+            statistics : dict, as in `Shards`: nonzero_fraction, sum_positive, ..., flags, eta98, and `tiles` where scope computes a part
+            source_to_volume : float64 [2, 3], the map of points (pixel centres are whole numbers)
+            boxes : dict with xyxy, clipped to the volume, and xyxy_unclipped, if boxes were given; row for row
+            joints : float64 [P, J, 2] in volume pixels, if joints were given
+        """
+        raise NotImplementedError
+
+    def prepare(self, image: npt.ArrayLike) -> np.ndarray:
+        """uint8 [H, W]: what the network sees of an image, grey, resized, blurred, in the place that it has in the volume."""
+        raise NotImplementedError
+
+    def source_to_volume(self, height: int, width: int) -> np.ndarray:
+        """float64 [2, 3]: where points of an image of that size come to lie in the volume."""
+        raise NotImplementedError
+
+
+def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int = 0, counts: str = "poisson") -> np.ndarray:
+    """Events of which the volume could have been made, as `eventgan export --to events` draws them.
+
+    Parameters
+    ----------
+    volume : array_like, float32 [2B, H, W], finite, >= 0
+    duration_s : float
+        Time between the two images, seconds.
+    seed : int
+    counts : {"poisson", "rounded"}
+        How many events a value becomes: a draw with that mean, or the nearest whole number.
+
+    Returns
+    -------
+    numpy.ndarray
+        Structured, in time order: t (float64, seconds from 0 to duration_s), x and y (int32, pixels), p (int8, 1 positive, 0 negative).
+    """
+    raise NotImplementedError
