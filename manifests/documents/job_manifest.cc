@@ -564,11 +564,39 @@ JobManifest read_document(const StrictValue& document) {
   return manifest;
 }
 
+JobManifest read_pair_document(const StrictValue& document) {
+  JobManifest manifest;
+  StrictObject object = document.object();
+  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
+  manifest.image.preset = kDemo.name;
+  manifest.image.grey = kDemo.grey;
+  if (const auto image = object.find("image")) {
+    manifest.image = read_image(*image, {SourceSpec()});
+  }
+  if (const auto generator = object.find("generator")) {
+    manifest.generator = read_generator(*generator);
+    if (manifest.generator.kind == GeneratorKind::kEvents) {
+      generator->object().at("kind").fault("a generator that makes events of frames");
+    }
+    if (manifest.generator.device != Device::kCpu || manifest.generator.engine == Engine::kTorch) {
+      generator->fault("the engine \"onednn\" on the device \"cpu\"");
+    }
+  }
+  if (const auto volume = object.find("volume")) manifest.volume = read_volume(*volume);
+  object.finish();
+  return manifest;
+}
+
 }  // namespace
 
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
   return parse_manifest<JobManifest>(text, directory, name, read_document);
+}
+
+JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,
+                                const std::string& name) {
+  return parse_manifest<JobManifest>(text, directory, name, read_pair_document);
 }
 
 JobManifest read_job_manifest(const std::filesystem::path& file) {

@@ -16,4 +16,10 @@ JobManifest read_job_manifest(const std::filesystem::path& file);
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name);
 
+/// What of a manifest makes a volume of two images: `seed`, `image`, `generator` (on the processor,
+/// not "events") and `volume`. Each may be missing; images without a preset are prepared as those
+/// of dataset "frames". Throws as above.
+JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,
+                                const std::string& name);
+
 }  // namespace eventgan

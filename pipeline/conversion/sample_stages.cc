@@ -7,11 +7,11 @@
 #include <string>
 #include <utility>
 
+#include "pipeline/conversion/pair_volume.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/frames/decoding/frame_decoder.h"
-#include "stages/generator/wanted_tiles.h"
 #include "stages/labels/label_mapping.h"
 
 namespace eventgan {
@@ -199,17 +199,10 @@ void SampleStages::generate(SampleMessage& message) const try {
     return;
   }
   message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
-  const ScopeSpec& scope = manifest_.generator.scope;
-  if (scope.scope == Scope::kWhole) {
-    message.notes = generator_.generate(prepared.input, prepared.content, message.volume);
-  } else {
-    const TileMask wanted =
-        wanted_tiles(scope, prepared.input, prepared.content, prepared.content_y,
-                     prepared.content_x, message.sample.labels);
-    message.sample.tiles =
-        tiles_of_volume(wanted, prepared.content_y, prepared.content_x, prepared.placement.volume);
-    message.notes = generator_.generate_tiles(prepared.input, wanted, message.volume);
-  }
+  GeneratedPart part = generate_volume(generator_, manifest_.generator.scope, prepared,
+                                       message.sample.labels, message.volume);
+  message.notes = part.notes;
+  message.sample.tiles = std::move(part.tiles);
   free_memory(message.prepared.input);
 } catch (const std::exception&) {
   name_sample(message, "generate the volume of");
@@ -219,8 +212,9 @@ void SampleStages::finish(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kFinish);
   const PreparedPair& prepared = message.prepared;
-  const VolumeShape shape{generator_.bins(), prepared.placement.volume};
-  const std::optional<VolumeStatistics> found = volume_statistics(message.volume, shape);
+  const std::optional<VolumeStatistics> found =
+      finish_volume(generator_, message.notes, message.planned().pair.gap_frames,
+                    manifest_.volume.normalize, prepared, message.volume);
   if (!found) {
     const std::size_t bad = first_unsound_value(message.volume);
     message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
@@ -229,18 +223,14 @@ void SampleStages::finish(SampleMessage& message) const try {
     return;
   }
   VolumeStatistics& statistics = message.sample.statistics = *found;
-  const std::optional<GapRange> trained = generator_.training_gaps();
-  if (trained && !trained->contains(message.planned().pair.gap_frames)) {
-    statistics.flags |= kFlagExtrapolated;
-  }
-  if (message.notes.saturated_share > kMostSaturated) statistics.flags |= kFlagBeyondCalibration;
-  float largest = statistics.max;
-  if (manifest_.volume.normalize == Normalization::kEta98) {
-    normalize(message.volume, statistics.eta98);
-    if (largest > 0) largest = 1;
-  }
-  EncodedVolume encoded = codec_.encode(
-      message.volume, {shape, prepared.content, prepared.content_x, prepared.content_y}, largest);
+  const bool reaches_one =
+      manifest_.volume.normalize == Normalization::kEta98 && statistics.max > 0;
+  EncodedVolume encoded = codec_.encode(message.volume,
+                                        {{generator_.bins(), prepared.placement.volume},
+                                         prepared.content,
+                                         prepared.content_x,
+                                         prepared.content_y},
+                                        reaches_one ? 1 : statistics.max);
   if (encoded.saturated) statistics.flags |= kFlagSaturated;
   if (encoded.vanished) statistics.flags |= kFlagVanished;
   message.sample.scale = encoded.scale;

@@ -5,6 +5,8 @@
 #include <functional>
 #include <stdexcept>
 
+#include "stages/generator/generator.h"
+
 namespace eventgan {
 
 std::vector<QuantizedTensor> quantized_tensors(int base_channels) {
@@ -29,10 +31,6 @@ std::vector<QuantizedTensor> quantized_tensors(int base_channels) {
 }
 
 namespace {
-
-bool all_finite(const std::vector<float>& values) {
-  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
-}
 
 bool none_negative(const std::vector<float>& values) {
   return std::ranges::all_of(values, [](float value) { return value >= 0; });

@@ -1,6 +1,7 @@
 #include "stages/generator/generator.h"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -16,6 +17,10 @@ GenerationNotes Generator::generate_tiles(std::span<const float> frames, const T
   const GenerationNotes notes = generate(frames, wanted.size, volume);
   clear_unwanted(wanted, volume);
   return notes;
+}
+
+bool all_finite(std::span<const float> values) {
+  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
 }
 
 void clear_unwanted(const TileMask& wanted, std::span<float> volume) {

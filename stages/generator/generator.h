@@ -73,6 +73,9 @@ class Generator {
   virtual std::string description() const = 0;
 };
 
+/// Whether none of the values is NaN or infinite.
+bool all_finite(std::span<const float> values);
+
 /// Sets what is not wanted of a volume [channel, y, x] to zero.
 void clear_unwanted(const TileMask& wanted, std::span<float> volume);
 

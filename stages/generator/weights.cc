@@ -15,11 +15,6 @@ std::string shape_text(const Convolution& convolution) {
          ", " + std::to_string(convolution.kernel) + "]";
 }
 
-bool all_finite(const std::vector<float>& values) {
-  return std::all_of(values.begin(), values.end(),
-                     [](float value) { return std::isfinite(value); });
-}
-
 }  // namespace
 
 std::vector<Convolution> network_layout(int base_channels, int bins) {

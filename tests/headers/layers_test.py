@@ -25,7 +25,7 @@ FLOORS = [
     ["pipeline/generators", "pipeline/simulation", "pipeline/training", "pipeline/realism",
      "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],
-    ["pipeline/commands"],
+    ["pipeline/commands", "pipeline/python"],
     ["pipeline/main.cc", "pipeline/without_torch.cc", "pipeline/without_videos.cc"],
 ]
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
@@ -57,7 +57,7 @@ class Layers(unittest.TestCase):
         for room in FLOOR:
             if (SOURCE / room).is_dir():
                 text = (SOURCE / room / "CMakeLists.txt").read_text()
-                self.assertEqual(len(re.findall(r"^eventgan_library\(", text, re.MULTILINE)), 1, room)
+                self.assertEqual(len(re.findall(r"^(?:eventgan_library|pybind11_add_module)\(", text, re.MULTILINE)), 1, room)
 
 
 if __name__ == "__main__":

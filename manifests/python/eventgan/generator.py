@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import operator
 import os
-import pathlib
+import re
 import warnings
 from collections.abc import Mapping
 from typing import Any, Union
@@ -19,10 +21,12 @@ except ImportError as error:
                       "pip install ./manifests/python in a checkout (manifests/guides/python.md)") from error
 
 PathLike = Union[str, os.PathLike]
-_GENERATOR_KEYS = ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor",
-                   "duration_s", "max_displacement_px")
-_IMAGE_KEYS = ("fit", "preset", "grey", "blur")
-_VOLUME_KEYS = ("bins", "normalize")
+_PLACES = {  # of settings in a manifest
+    "image": ("fit", "preset", "grey", "blur"),
+    "generator": ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor",
+                  "duration_s", "max_displacement_px"),
+    "volume": ("bins", "normalize"),
+}
 
 
 class Generator:
@@ -81,12 +85,57 @@ class Generator:
     def __init__(self, weights: PathLike | None = None, *, kind: str | None = None, precision: str | None = None,
                  size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None, grey: str | None = None,
                  blur: int | None = None, scope: str | None = None, normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
-        raise NotImplementedError
+        given = dict(kind=kind, weights=_weights(weights), precision=precision, fit=fit, preset=preset, grey=grey, blur=blur, scope=scope,
+                     normalize=normalize, **settings)
+        known = [key for keys in _PLACES.values() for key in keys]
+        unknown = [key for key in given if key not in known]
+        if unknown:
+            raise ValueError(f"expected settings of {', '.join(known)}, got {', '.join(unknown)}")
+        manifest: dict[str, Any] = {
+            place: {key: given[key] for key in keys if given.get(key) is not None} for place, keys in _PLACES.items()}
+        if size is not None:
+            height, width = size
+            manifest["image"].update(height=height, width=width)
+        manifest["seed"] = seed
+        self._set_up(_json(manifest))
+        for text in self._engine.warnings:
+            warnings.warn(text, stacklevel=2)
 
-    bins: int                    # per polarity: a volume has 2 bins channels
-    description: str             # engine, precision and the libraries that change bytes, as in a plan's fingerprint
-    weights_hash: str            # SHA-256 of the weights file
-    training_gaps: tuple[int, int] | None  # the gaps, in frames, that the network has seen in training: first, last; None: not known
+    def _set_up(self, settings: str) -> None:
+        self._settings = settings
+        weights = json.loads(settings)["generator"].get("weights", "")
+        if os.path.isabs(weights) and not os.path.exists(weights):
+            raise FileNotFoundError(errno.ENOENT, "expected a file of weights, got none", weights)
+        self._engine = _engine.Generator(settings)
+
+    def __getstate__(self) -> str:
+        return self._settings
+
+    def __setstate__(self, settings: str) -> None:
+        self._set_up(settings)
+
+    def __repr__(self) -> str:
+        return f"<eventgan.Generator {self._settings}: {self.description}>"
+
+    @property
+    def bins(self) -> int:
+        """Bins per polarity: a volume has twice as many channels."""
+        return self._engine.bins
+
+    @property
+    def description(self) -> str:
+        """Engine, precision and the libraries that change bytes, as in a plan's fingerprint."""
+        return self._engine.description
+
+    @property
+    def weights_hash(self) -> str:
+        """SHA-256 of the weights file, hexadecimal; of a model, of its description."""
+        return self._engine.weights_hash
+
+    @property
+    def training_gaps(self) -> tuple[int, int] | None:
+        """The first and the last gap, in frames, that the network has seen in training; None: not known."""
+        return self._engine.training_gaps
 
     def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike) -> np.ndarray:
         """The volume of two images of one size.
@@ -106,11 +155,11 @@ class Generator:
         ValueError
             An image is not one, or the two differ in size.
         """
-        raise NotImplementedError
+        return self._engine.call(_array(previous, "previous"), _array(following, "following"))
 
     def many(self, previous: npt.ArrayLike, following: npt.ArrayLike, threads: int = 1) -> np.ndarray:
         """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], on as many threads, which end with the call."""
-        raise NotImplementedError
+        return self._engine.many(_array(previous, "previous"), _array(following, "following"), _whole(threads, "threads"))
 
     def sample(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, boxes: npt.ArrayLike | None = None,
                joints: npt.ArrayLike | None = None, gap: int = 1) -> dict[str, Any]:
@@ -134,15 +183,16 @@ class Generator:
             boxes : dict with xyxy, clipped to the volume, and xyxy_unclipped, if boxes were given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given
         """
-        raise NotImplementedError
+        return self._engine.sample(_array(previous, "previous"), _array(following, "following"), _numbers(boxes, "boxes"),
+                                   _numbers(joints, "joints"), _whole(gap, "gap"))
 
     def prepare(self, image: npt.ArrayLike) -> np.ndarray:
         """uint8 [H, W]: what the network sees of an image, grey, resized, blurred, in the place that it has in the volume."""
-        raise NotImplementedError
+        return self._engine.prepare(_array(image, "image"))
 
     def source_to_volume(self, height: int, width: int) -> np.ndarray:
         """float64 [2, 3]: where points of an image of that size come to lie in the volume."""
-        raise NotImplementedError
+        return self._engine.source_to_volume(_whole(height, "height"), _whole(width, "width"))
 
 
 def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int = 0, counts: str = "poisson") -> np.ndarray:
@@ -162,4 +212,46 @@ def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int =
     numpy.ndarray
         Structured, in time order: t (float64, seconds from 0 to duration_s), x and y (int32, pixels), p (int8, 1 positive, 0 negative).
     """
-    raise NotImplementedError
+    if counts not in ("poisson", "rounded"):
+        raise ValueError(f"expected counts to be of poisson, rounded, got {counts!r}")
+    return _engine.sample_events(_numbers(volume, "volume", np.float32), float(duration_s), _whole(seed, "seed", least=0), counts == "rounded")
+
+
+def _weights(given: PathLike | None) -> str | None:
+    """A name as it is; a file by its whole path, so that a worker that is spawned elsewhere finds it, too."""
+    if given is None or isinstance(given, str) and re.fullmatch("(shipped|untrained)(:.*)?", given):
+        return given
+    return os.path.abspath(os.fspath(given))
+
+
+def _json(manifest: Mapping[str, Any]) -> str:
+    try:
+        return json.dumps(manifest, default=lambda value: value.item() if isinstance(value, np.generic) else str(value))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"expected settings that JSON can hold, got {error}") from error
+
+
+def _whole(value: Any, name: str, least: int = 1) -> int:
+    try:
+        number = operator.index(value)
+    except TypeError:
+        number = None
+    if number is None or not least <= number < 2**31:
+        raise ValueError(f"expected {name} to be a whole number from {least} on, got {value!r}")
+    return number
+
+
+def _array(image: npt.ArrayLike, name: str) -> np.ndarray:
+    try:
+        return np.asarray(image)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ValueError(f"expected an image as an array, got {type(image).__name__} for {name}: {error}") from error
+
+
+def _numbers(values: npt.ArrayLike | None, name: str, dtype: npt.DTypeLike = np.float64) -> np.ndarray | None:
+    if values is None:
+        return None
+    try:
+        return np.ascontiguousarray(values, dtype)
+    except (TypeError, ValueError, RuntimeError) as error:
+        raise ValueError(f"expected numbers, got {type(values).__name__} for {name}: {error}") from error

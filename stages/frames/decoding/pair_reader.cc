@@ -128,31 +128,13 @@ void PairReader::expect(const FramePair& pair) const {
   }
 }
 
-namespace {
-
-PreparedPair input_of(const PreparedFrame& previous, const PreparedFrame& next) {
-  PreparedPair prepared;
-  prepared.placement = previous.placement;
-  const VisiblePart part = visible_part(prepared.placement);
-  prepared.content = part.size;
-  prepared.content_x = part.volume_x;
-  prepared.content_y = part.volume_y;
-  prepared.input.resize(2 * part.size.pixel_count());
-  const std::span<float> input = prepared.input;
-  to_input(previous.grey, input.first(previous.grey.size()));
-  to_input(next.grey, input.last(next.grey.size()));
-  return prepared;
-}
-
-}  // namespace
-
 Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation orientation,
                                        std::int64_t still_stride) const {
   if (pair.motion) {
     const auto outcome = still(pair, orientation, still_stride);
     if (is_fault(outcome)) return std::get<SampleFault>(outcome);
     const auto& [previous, next] = std::get<0>(outcome);
-    return input_of(previous, next);
+    return prepare_pair(previous, next);
   }
   const auto outcome = frames(pair, orientation);
   if (is_fault(outcome)) return std::get<SampleFault>(outcome);
@@ -167,7 +149,7 @@ Outcome<PreparedPair> PairReader::read(const FramePair& pair, ImageOrientation o
                        to_string(before.placement.source) + " in " + pair.previous.path + " and " +
                        to_string(after.placement.source) + ", in " + pair.next.path};
   }
-  return input_of(before, after);
+  return prepare_pair(before, after);
 }
 
 }  // namespace eventgan

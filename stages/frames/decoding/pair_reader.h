@@ -55,18 +55,6 @@ class SharedImages {
   std::unordered_map<std::string_view, std::list<Image>::iterator> by_name_;
 };
 
-/// Two frames, ready for the generator.
-struct PreparedPair {
-  /// [frame, y, x] float32, C order; frame 0 = previous, 1 = next; x = (u/255 - 0.5) * 2 in [-1,
-  /// 1]. Only the visible part of the image: with letterbox the borders are left out (no scene
-  /// there, no work, no events), with crop what is cut away.
-  std::vector<float> input;
-  ImageSize content;  ///< size of each frame in `input`
-  int content_x = 0;  ///< where `input`'s top left pixel lies in the volume
-  int content_y = 0;
-  Placement placement;
-};
-
 /// Decodes frame pairs from images and videos, as FrameDecoder does, and prepares them as `spec`
 /// says (prepare_frame). Pairs near each other in the plan share frames: the prepared frames used
 /// last are kept, so that each is decoded once. A file that changes meanwhile may be seen as it

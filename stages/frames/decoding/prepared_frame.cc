@@ -25,14 +25,19 @@ VisiblePart visible_part(const Placement& placement) {
 
 namespace {
 
-cv::Mat as_grey(const cv::Mat& colour) {
+using Channels = ImageView::Channels;
+
+cv::Mat as_grey(const cv::Mat& image, Channels channels) {
+  if (channels == Channels::kGrey) return image;
   cv::Mat grey;
-  cv::cvtColor(colour, grey, cv::COLOR_BGR2GRAY);
+  cv::cvtColor(image, grey, channels == Channels::kBgr ? cv::COLOR_BGR2GRAY : cv::COLOR_RGB2GRAY);
   return grey;
 }
 
-cv::Mat matrix_of(const ColourView& frame) {
-  return {frame.size.height, frame.size.width, CV_8UC3, const_cast<std::uint8_t*>(frame.bgr)};
+cv::Mat matrix_of(const ImageView& image) {
+  return {image.size.height, image.size.width,
+          image.channels == Channels::kGrey ? CV_8UC1 : CV_8UC3,
+          const_cast<std::uint8_t*>(image.pixels)};
 }
 
 /// What is resized: of the image what `placement` leaves of it.
@@ -41,13 +46,25 @@ cv::Mat without_borders(const cv::Mat& image, const Placement& placement) {
   return image(cv::Rect(placement.border_x, placement.border_y, cut.width, cut.height));
 }
 
-/// Resized, grey and blurred, uncut; `image` is grey already if that comes first.
-cv::Mat scaled_grey(const cv::Mat& image, const Placement& placement, const ImageSpec& spec) {
+/// An image of these channels as it is to be resized.
+struct Resizable {
+  cv::Mat image;
+  Channels channels;
+};
+
+Resizable grey_if_first(const ImageView& frame, const ImageSpec& spec) {
+  const cv::Mat image = matrix_of(frame);
+  if (spec.grey == GreyOrder::kAfterResize) return {image, frame.channels};
+  return {as_grey(image, frame.channels), Channels::kGrey};
+}
+
+/// Resized, grey and blurred, uncut.
+cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const ImageSpec& spec) {
   const ImageSize scaled = placement.scaled;
   cv::Mat resized;
-  cv::resize(without_borders(image, placement), resized, cv::Size(scaled.width, scaled.height), 0,
-             0, cv::INTER_LINEAR);
-  if (spec.grey == GreyOrder::kAfterResize) resized = as_grey(resized);
+  cv::resize(without_borders(whole.image, placement), resized,
+             cv::Size(scaled.width, scaled.height), 0, 0, cv::INTER_LINEAR);
+  resized = as_grey(resized, whole.channels);
   if (spec.blur == 0) return resized;
   cv::Mat blurred;
   cv::GaussianBlur(resized, blurred, cv::Size(spec.blur, spec.blur), 0);
@@ -99,18 +116,13 @@ auto unless_refused(Prepare prepare) {
   }
 }
 
-PreparedFrame prepare(const cv::Mat& image, const Placement& placement, const ImageSpec& spec) {
+PreparedFrame prepare(const Resizable& image, const Placement& placement, const ImageSpec& spec) {
   return {cut(scaled_grey(image, placement, spec), visible_part(placement)), placement};
-}
-
-cv::Mat grey_if_first(const ColourView& frame, const ImageSpec& spec) {
-  const cv::Mat image = matrix_of(frame);
-  return spec.grey == GreyOrder::kBeforeResize ? as_grey(image) : image;
 }
 
 }  // namespace
 
-PreparedFrame prepare_frame(const ColourView& frame, const ImageSpec& spec) {
+PreparedFrame prepare_frame(const ImageView& frame, const ImageSpec& spec) {
   return unless_refused([&] {
     const Placement placement = place(frame.size, spec);
     return prepare(grey_if_first(frame, spec), placement, spec);
@@ -121,9 +133,10 @@ std::array<PreparedFrame, 2> prepare_still(const ColourView& image, const FrameP
                                            const ImageSpec& spec) {
   return unless_refused([&] {
     const Placement placement = place(image.size, spec, pair);
-    const cv::Mat still = grey_if_first(image, spec);
-    std::array<PreparedFrame, 2> frames = {prepare(moved(still, pair), placement, spec),
-                                           prepare(still, placement, spec)};
+    const Resizable still = grey_if_first(image, spec);
+    std::array<PreparedFrame, 2> frames = {
+        prepare({moved(still.image, pair), still.channels}, placement, spec),
+        prepare(still, placement, spec)};
     if (pair.label_position == 0) std::swap(frames[0], frames[1]);
     return frames;
   });
@@ -139,6 +152,20 @@ ColourFrame move_still(const ColourFrame& image, const FramePair& pair) {
 void to_input(std::span<const std::uint8_t> grey, std::span<float> input) {
   std::ranges::transform(grey, input.begin(),
                          [](std::uint8_t level) { return kInputOfGrey[level]; });
+}
+
+PreparedPair prepare_pair(const PreparedFrame& previous, const PreparedFrame& next) {
+  PreparedPair prepared;
+  prepared.placement = previous.placement;
+  const VisiblePart part = visible_part(prepared.placement);
+  prepared.content = part.size;
+  prepared.content_x = part.volume_x;
+  prepared.content_y = part.volume_y;
+  prepared.input.resize(2 * part.size.pixel_count());
+  const std::span<float> input = prepared.input;
+  to_input(previous.grey, input.first(previous.grey.size()));
+  to_input(next.grey, input.last(next.grey.size()));
+  return prepared;
 }
 
 std::vector<std::uint8_t> place_colour(const ColourFrame& frame, const Placement& placement) {

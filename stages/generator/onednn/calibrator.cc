@@ -110,7 +110,7 @@ Calibrator::~Calibrator() = default;
 void Calibrator::add(std::span<const float> frames, ImageSize size) {
   std::vector<float> volume(VolumeShape{network_->layers.bins(), size}.value_count());
   check_generator_spans(frames, size, volume, network_->layers.bins());
-  if (!std::ranges::all_of(frames, [](float value) { return std::isfinite(value); })) {
+  if (!all_finite(frames)) {
     throw std::runtime_error("expected finite values of the frames, got NaN or infinity");
   }
   CalibrationSums pair = empty_calibration_sums(base_channels_);
@@ -118,7 +118,7 @@ void Calibrator::add(std::span<const float> frames, ImageSize size) {
   const auto add_observed = [&](const std::string& name, std::span<const float> values) {
     add_tensor(*std::ranges::find(pair.tensors, name, &TensorSums::name), values);
   };
-  use_one_openmp_thread();
+  const OneOpenMpThread one_thread;
   const FlushSubnormals flush;
   try {
     const auto plan = network_->plans.plan(size);

@@ -73,10 +73,6 @@ TensorNames tensor_names(int base_channels) {
   return names;
 }
 
-bool all_finite(const std::vector<float>& values) {
-  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
-}
-
 /// No sum of inputs of at most `largest_input` may be infinite either: of two infinities of other
 /// signs comes NaN, which 8 bits hold as 0.
 void check_finite(const LayerNumbers& layer, double largest_input) {

@@ -22,13 +22,11 @@ std::string numbered(const char* name, int number) {
 
 }  // namespace
 
-void use_one_openmp_thread() {
-  thread_local const bool done = [] {
-    omp_set_num_threads(1);
-    return true;
-  }();
-  static_cast<void>(done);
+OneOpenMpThread::OneOpenMpThread() : threads_before_(omp_get_max_threads()) {
+  omp_set_num_threads(1);
 }
+
+OneOpenMpThread::~OneOpenMpThread() { omp_set_num_threads(threads_before_); }
 
 NetworkPlan::NetworkPlan(NetworkLayers& layers, ImageSize size)
     : engine_(layers.engine()),

@@ -42,10 +42,6 @@ OnednnSupport onednn_support(Precision precision) {
 
 namespace {
 
-bool all_finite(std::span<const float> values) {
-  return std::ranges::all_of(values, [](float value) { return std::isfinite(value); });
-}
-
 std::string version_text() {
   const dnnl_version_t* version = dnnl_version();
   return std::to_string(version->major) + "." + std::to_string(version->minor) + "." +
@@ -133,7 +129,7 @@ class OnednnGenerator final : public Generator {
  private:
   template <class Work>
   GenerationNotes compute(ImageSize size, Work&& work) const {
-    use_one_openmp_thread();
+    const OneOpenMpThread one_thread;
     const FlushSubnormals flush;
     try {
       return {.saturated_share = work().share()};

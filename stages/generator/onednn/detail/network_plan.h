@@ -22,9 +22,19 @@
 
 namespace eventgan {
 
-/// Lets the calling thread compute with one intra-operation thread from then on: oneDNN takes as
-/// many as OpenMP gives it, and how it splits the work must not depend on the machine.
-void use_one_openmp_thread();
+/// The calling thread computes with one intra-operation thread while this lives: oneDNN takes as
+/// many as OpenMP gives it, and how it splits the work must not depend on the machine. Others that
+/// compute on the thread (PyTorch, of a caller in Python) find their own number again.
+class OneOpenMpThread {
+ public:
+  OneOpenMpThread();
+  ~OneOpenMpThread();
+  OneOpenMpThread(const OneOpenMpThread&) = delete;
+  OneOpenMpThread& operator=(const OneOpenMpThread&) = delete;
+
+ private:
+  int threads_before_;
+};
 
 /// Sees a tensor of quantized_tensors() (calibration.h), [y, x, channel] float32, behind its
 /// activation. Valid during the call.

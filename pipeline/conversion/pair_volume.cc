@@ -1,0 +1,34 @@
+#include "pipeline/conversion/pair_volume.h"
+
+#include "stages/events/volume_statistics.h"
+#include "stages/generator/wanted_tiles.h"
+
+namespace eventgan {
+
+GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
+                              const PreparedPair& pair, const VolumeLabels& labels,
+                              std::span<float> volume) {
+  if (scope.scope == Scope::kWhole) {
+    return {generator.generate(pair.input, pair.content, volume), {}};
+  }
+  const TileMask wanted =
+      wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
+  return {generator.generate_tiles(pair.input, wanted, volume),
+          tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
+}
+
+std::optional<VolumeStatistics> finish_volume(const Generator& generator,
+                                              const GenerationNotes& notes, int gap_frames,
+                                              Normalization normalization, const PreparedPair& pair,
+                                              std::span<float> volume) {
+  std::optional<VolumeStatistics> statistics =
+      volume_statistics(volume, {generator.bins(), pair.placement.volume});
+  if (!statistics) return statistics;
+  const std::optional<GapRange> trained = generator.training_gaps();
+  if (trained && !trained->contains(gap_frames)) statistics->flags |= kFlagExtrapolated;
+  if (notes.saturated_share > kMostSaturated) statistics->flags |= kFlagBeyondCalibration;
+  if (normalization == Normalization::kEta98) normalize(volume, statistics->eta98);
+  return statistics;
+}
+
+}  // namespace eventgan

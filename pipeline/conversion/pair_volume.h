@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "manifests/values/job.h"
+#include "manifests/values/labels.h"
+#include "stages/frames/decoding/prepared_frame.h"
+#include "stages/generator/generator.h"
+
+namespace eventgan {
+
+// What is done to every pair, whoever asks for its volume: a conversion, or a caller in Python.
+
+/// What generate_volume tells beside the values.
+struct GeneratedPart {
+  GenerationNotes notes;
+  /// [row, column] of the whole volume's tiles, 1 or 0: those that the scope wants. Empty: all is
+  /// generated.
+  std::vector<std::uint8_t> tiles;
+};
+
+/// Generates what `scope` wants of a pair's volume, zeros elsewhere. `volume`: [2 bins, y, x] of
+/// pair.content, overwritten whole. `labels` are in pixels of the whole volume. Throws as
+/// Generator::generate. Thread safe.
+GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
+                              const PreparedPair& pair, const VolumeLabels& labels,
+                              std::span<float> volume);
+
+/// Statistics of the generated values [2 bins, y, x] of the pair's content, with kFlagExtrapolated
+/// for a gap that the generator has not seen and kFlagBeyondCalibration; then normalises the values
+/// in place if asked, after which statistics.max is still that of the values as generated. Nothing
+/// if a value is not finite or below zero (volume_statistics). Thread safe.
+std::optional<VolumeStatistics> finish_volume(const Generator& generator,
+                                              const GenerationNotes& notes, int gap_frames,
+                                              Normalization normalize, const PreparedPair& pair,
+                                              std::span<float> volume);
+
+}  // namespace eventgan

@@ -1,0 +1,659 @@
+// eventgan._engine: the engine for Python. manifests/python/eventgan/generator.py is what users
+// see.
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <span>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "manifests/documents/job_manifest.h"
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/weights.h"
+#include "pipeline/conversion/pair_volume.h"
+#include "pipeline/generators/load_generator.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/memory.h"
+#include "stages/events/volume_statistics.h"
+#include "stages/exports/sampled_events.h"
+#include "stages/frames/decoding/prepared_frame.h"
+#include "stages/generator/onednn/buffers.h"
+#include "stages/labels/label_mapping.h"
+
+namespace py = pybind11;
+
+namespace eventgan {
+namespace {
+
+// ---- Images
+
+/// "(260, 861, 3)".
+std::string shape_text(const py::array& array) {
+  std::string text = "(";
+  for (py::ssize_t axis = 0; axis < array.ndim(); ++axis) {
+    text += (axis > 0 ? ", " : "") + std::to_string(array.shape(axis));
+  }
+  return text + ")";
+}
+
+/// An image in the memory of an array, whose owner must be held meanwhile; readable without
+/// Python's lock.
+struct Pixels {
+  enum class Type { kUint8, kFloat32, kFloat64 };
+
+  const std::byte* data = nullptr;
+  Type type = Type::kUint8;
+  ImageSize size;
+  int channels = 1;                      ///< 1 or 3, red, green, blue
+  std::array<py::ssize_t, 3> strides{};  ///< bytes from row to row, column to column, channel
+
+  bool is_packed_uint8() const {
+    return type == Type::kUint8 && (channels == 1 || strides[2] == 1) && strides[1] == channels &&
+           strides[0] == py::ssize_t{channels} * size.width;
+  }
+};
+
+/// A number of an image, 0..255; nothing if it is not in 0..1 or not a number.
+template <class T>
+std::optional<std::uint8_t> level_of(const std::byte* at) {
+  T value;
+  std::memcpy(&value, at, sizeof(value));  // may lie anywhere
+  if constexpr (std::is_same_v<T, std::uint8_t>) {
+    return value;
+  } else {
+    if (!(value >= 0 && value <= 1)) return std::nullopt;
+    return static_cast<std::uint8_t>(std::lround(value * 255));
+  }
+}
+
+template <class T>
+std::vector<std::uint8_t> packed(const Pixels& pixels, const char* name) {
+  std::vector<std::uint8_t> levels(pixels.size.pixel_count() *
+                                   static_cast<std::size_t>(pixels.channels));
+  auto level = levels.begin();
+  for (int y = 0; y < pixels.size.height; ++y) {
+    const std::byte* row = pixels.data + y * pixels.strides[0];
+    for (int x = 0; x < pixels.size.width; ++x, row += pixels.strides[1]) {
+      for (int channel = 0; channel < pixels.channels; ++channel) {
+        const std::byte* at = row + channel * pixels.strides[2];
+        const auto found = level_of<T>(at);
+        if (!found) {
+          T value;
+          std::memcpy(&value, at, sizeof(value));
+          throw UsageError("expected floating-point numbers from 0 to 1, got " +
+                           std::to_string(static_cast<double>(value)) + " at row " +
+                           std::to_string(y) + ", column " + std::to_string(x) + " of " + name);
+        }
+        *level++ = *found;
+      }
+    }
+  }
+  return levels;
+}
+
+/// What prepare_frame makes of it.
+PreparedFrame prepared(const Pixels& pixels, const ImageSpec& spec, const char* name) {
+  const auto channels =
+      pixels.channels == 1 ? ImageView::Channels::kGrey : ImageView::Channels::kRgb;
+  std::vector<std::uint8_t> copy;
+  const auto* levels = reinterpret_cast<const std::uint8_t*>(pixels.data);
+  if (!pixels.is_packed_uint8()) {
+    switch (pixels.type) {
+      case Pixels::Type::kUint8:
+        copy = packed<std::uint8_t>(pixels, name);
+        break;
+      case Pixels::Type::kFloat32:
+        copy = packed<float>(pixels, name);
+        break;
+      case Pixels::Type::kFloat64:
+        copy = packed<double>(pixels, name);
+        break;
+    }
+    levels = copy.data();
+  }
+  try {
+    return prepare_frame({pixels.size, levels, channels}, spec);
+  } catch (const std::runtime_error& error) {
+    throw UsageError(std::string(error.what()) + ", in " + name);
+  }
+}
+
+/// Images in an array: [H, W] and [H, W, 3], or a batch of N, [N, H, W] and [N, H, W, 3].
+class Images {
+ public:
+  /// Converts types that Pixels does not know.
+  Images(py::array given, const char* name, bool is_batch) : array_(std::move(given)), name_(name) {
+    const py::ssize_t first = is_batch ? 1 : 0;
+    const py::ssize_t axes = array_.ndim() - first;
+    if ((axes != 2 && axes != 3) || (axes == 3 && array_.shape(first + 2) != 3)) {
+      throw UsageError(std::string("expected an array ") +
+                       (is_batch ? "[N, H, W] or [N, H, W, 3]" : "[H, W] or [H, W, 3]") +
+                       ", got one of shape " + shape_text(array_) + " for " + name);
+    }
+    const py::ssize_t height = array_.shape(first);
+    const py::ssize_t width = array_.shape(first + 1);
+    constexpr auto kMost = static_cast<py::ssize_t>(kMaxImagePixels);
+    if (height < 1 || width < 1 || height > kMost || width > kMost || height * width > kMost) {
+      throw UsageError("expected images of 1 to " + std::to_string(kMaxImagePixels) +
+                       " pixels, got shape " + shape_text(array_) + " for " + name);
+    }
+    const py::dtype type = array_.dtype();
+    if (type.kind() != 'f' && !(type.kind() == 'u' && type.itemsize() == 1)) {
+      throw UsageError("expected uint8, or floating-point numbers from 0 to 1, got " +
+                       py::str(py::handle(type)).cast<std::string>() + " for " + name);
+    }
+    const bool is_float32 = type.is(py::dtype::of<float>());
+    if (type.kind() == 'f' && !is_float32 && !type.is(py::dtype::of<double>())) {
+      array_ = array_.attr("astype")("float64");
+    }
+    first_.type = type.kind() == 'u' ? Pixels::Type::kUint8
+                  : is_float32       ? Pixels::Type::kFloat32
+                                     : Pixels::Type::kFloat64;
+    first_.data = static_cast<const std::byte*>(array_.data());
+    first_.size = {static_cast<int>(height), static_cast<int>(width)};
+    first_.channels = axes == 3 ? 3 : 1;
+    for (py::ssize_t axis = 0; axis < axes; ++axis) {
+      first_.strides[static_cast<std::size_t>(axis)] = array_.strides(first + axis);
+    }
+    if (is_batch) {
+      count_ = static_cast<std::size_t>(array_.shape(0));
+      stride_ = array_.strides(0);
+    }
+  }
+
+  std::size_t count() const { return count_; }
+  ImageSize size() const { return first_.size; }
+  const char* name() const { return name_; }
+  std::string shape() const { return shape_text(array_); }
+
+  Pixels at(std::size_t index) const {
+    Pixels pixels = first_;
+    pixels.data += static_cast<py::ssize_t>(index) * stride_;
+    return pixels;
+  }
+
+ private:
+  py::array array_;
+  const char* name_;
+  Pixels first_;
+  std::size_t count_ = 1;
+  py::ssize_t stride_ = 0;
+};
+
+/// Two images of a pair, or as many of each.
+struct Pair {
+  Images previous;
+  Images following;
+
+  Pair(const py::array& first, const py::array& second, bool is_batch)
+      : previous(first, "previous", is_batch), following(second, "following", is_batch) {
+    if (previous.size() != following.size() || previous.count() != following.count()) {
+      throw UsageError("expected images of one size, got shapes " + previous.shape() + " and " +
+                       following.shape() + " for previous and following");
+    }
+  }
+};
+
+// ---- Volumes
+
+/// Memory of the volumes that were let go, for the next ones: faulting in a new one costs as much
+/// as a part of the network. Thread safe.
+class SpareMemory {
+ public:
+  PageBuffer take(std::size_t size_bytes) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto fitting = std::ranges::find(spare_, size_bytes, &PageBuffer::size_bytes);
+      if (fitting != spare_.end()) {
+        PageBuffer buffer = std::move(*fitting);
+        spare_.erase(fitting);
+        return buffer;
+      }
+      spare_.clear();  // images of another size
+    }
+    return PageBuffer(size_bytes);
+  }
+
+  void give_back(PageBuffer buffer) {
+    const std::lock_guard lock(mutex_);
+    if (spare_.size() < kMostSpare) spare_.push_back(std::move(buffer));
+  }
+
+ private:
+  /// One that a caller lets go only when it has the next, and one more.
+  static constexpr std::size_t kMostSpare = 2;
+
+  std::mutex mutex_;
+  std::vector<PageBuffer> spare_;
+};
+
+/// float32 [2 bins, H, W] whose memory goes back when nobody has the array any more.
+class VolumeArray {
+ public:
+  VolumeArray(const std::shared_ptr<SpareMemory>& memory, const VolumeShape& shape)
+      : shape_(shape),
+        owner_(new Owner{memory, memory->take(shape.value_count() * sizeof(float))}) {}
+
+  std::span<float> values() const {
+    return {reinterpret_cast<float*>(owner_->buffer.data()), shape_.value_count()};
+  }
+
+  py::array to_python() && {
+    float* first = values().data();
+    const py::capsule capsule(owner_.release(), [](void* owner) {
+      const std::unique_ptr<Owner> released(static_cast<Owner*>(owner));
+      released->memory->give_back(std::move(released->buffer));
+    });
+    return py::array_t<float>({shape_.channels(), shape_.size.height, shape_.size.width}, first,
+                              capsule);
+  }
+
+ private:
+  struct Owner {
+    std::shared_ptr<SpareMemory> memory;
+    PageBuffer buffer;
+  };
+
+  VolumeShape shape_;
+  std::unique_ptr<Owner> owner_;
+};
+
+/// Lays values [channel, y, x] of the pair's content into the whole volume, zeros around them.
+void lay_into(std::span<const float> content, const PreparedPair& pair, std::span<float> volume) {
+  const ImageSize whole = pair.placement.volume;
+  std::ranges::fill(volume, 0.0f);
+  const auto width = static_cast<std::size_t>(pair.content.width);
+  const std::size_t channels = volume.size() / whole.pixel_count();
+  for (std::size_t channel = 0; channel < channels; ++channel) {
+    for (int y = 0; y < pair.content.height; ++y) {
+      const std::size_t row =
+          channel * static_cast<std::size_t>(pair.content.height) + static_cast<std::size_t>(y);
+      const std::size_t place = (channel * static_cast<std::size_t>(whole.height) +
+                                 static_cast<std::size_t>(pair.content_y + y)) *
+                                    static_cast<std::size_t>(whole.width) +
+                                static_cast<std::size_t>(pair.content_x);
+      std::ranges::copy(content.subspan(row * width, width), volume.data() + place);
+    }
+  }
+}
+
+/// What a caller knows of the image's labels.
+struct Labels {
+  Annotation annotation;
+  bool has_boxes = false;
+  bool has_joints = false;
+};
+
+/// A pair's volume but for its values.
+struct MadeVolume {
+  GeneratedPart part;
+  VolumeStatistics statistics;
+  Placement placement;
+  VolumeLabels labels;
+};
+
+class PairGenerator {
+ public:
+  explicit PairGenerator(const std::string& settings)
+      : job_(parse_pair_manifest(settings, {}, "eventgan.Generator")),
+        loaded_(load_generator(job_)) {}
+
+  int bins() const { return generator().bins(); }
+  std::string description() const { return generator().description(); }
+  const std::string& weights_hash() const { return loaded_.weights_hash; }
+  const std::vector<std::string>& warnings() const { return loaded_.warnings; }
+  std::optional<std::pair<int, int>> training_gaps() const {
+    const std::optional<GapRange> gaps = generator().training_gaps();
+    return gaps ? std::optional(std::pair(gaps->first, gaps->last)) : std::nullopt;
+  }
+
+  py::array call(const py::array& previous, const py::array& following) const {
+    const Pair pair(previous, following, false);
+    VolumeArray volume(memory_, shape_of(pair.previous.size(), 1));
+    {
+      const py::gil_scoped_release release;
+      make(pair, 0, nullptr, 1, volume.values());
+    }
+    return std::move(volume).to_python();
+  }
+
+  py::array many(const py::array& previous, const py::array& following, int threads) const {
+    if (threads < 1 || threads > 1024) {
+      throw UsageError("expected 1 to 1024 threads, got " + std::to_string(threads));
+    }
+    const Pair pairs(previous, following, true);
+    const VolumeShape shape = shape_of(pairs.previous.size(), pairs.previous.count());
+    py::array_t<float> volumes({static_cast<py::ssize_t>(pairs.previous.count()),
+                                py::ssize_t{shape.channels()}, py::ssize_t{shape.size.height},
+                                py::ssize_t{shape.size.width}});
+    const std::span<float> values(volumes.mutable_data(),
+                                  pairs.previous.count() * shape.value_count());
+    const py::gil_scoped_release release;
+    make_all(pairs, threads, [&](std::size_t i) {
+      return values.subspan(i * shape.value_count(), shape.value_count());
+    });
+    return volumes;
+  }
+
+  py::dict sample(const py::array& previous, const py::array& following,
+                  const std::optional<py::array_t<double, py::array::c_style>>& boxes,
+                  const std::optional<py::array_t<double, py::array::c_style>>& joints,
+                  int gap) const;
+
+  py::array prepare(const py::array& image) const {
+    const Images images(image, "image", false);
+    const VolumeShape shape = shape_of(images.size(), 1);
+    py::array_t<std::uint8_t> whole({shape.size.height, shape.size.width});
+    const PreparedFrame frame = prepared(images.at(0), job_.image, images.name());
+    const VisiblePart part = visible_part(frame.placement);
+    std::fill_n(whole.mutable_data(), whole.size(), std::uint8_t{0});
+    for (int y = 0; y < part.size.height; ++y) {
+      std::copy_n(frame.grey.data() + static_cast<std::ptrdiff_t>(y) * part.size.width,
+                  part.size.width, whole.mutable_data(part.volume_y + y, part.volume_x));
+    }
+    return whole;
+  }
+
+  py::array source_to_volume(int height, int width) const {
+    if (height < 1 || width < 1) {
+      throw UsageError("expected an image's height and width, got " + std::to_string(height) +
+                       " and " + std::to_string(width));
+    }
+    return matrix(place({height, width}, job_.image));
+  }
+
+ private:
+  const Generator& generator() const { return *loaded_.generator; }
+
+  /// Throws std::bad_alloc if `volumes` of them, and what makes them, are beyond the memory: asking
+  /// for it could end the process.
+  VolumeShape shape_of(ImageSize source, std::size_t volumes) const {
+    const VolumeShape shape{generator().bins(), place(source, job_.image).volume};
+    const double bytes = static_cast<double>(shape.value_count()) * sizeof(float) *
+                             (static_cast<double>(volumes) + 1) +
+                         static_cast<double>(generator().working_bytes(shape.size));
+    if (bytes > static_cast<double>(memory_bytes_)) throw std::bad_alloc();
+    return shape;
+  }
+
+  MadeVolume make(const Pair& pairs, std::size_t index, const Labels* labels, int gap,
+                  std::span<float> volume) const {
+    const PreparedPair pair =
+        prepare_pair(prepared(pairs.previous.at(index), job_.image, pairs.previous.name()),
+                     prepared(pairs.following.at(index), job_.image, pairs.following.name()));
+    MadeVolume made;
+    made.placement = pair.placement;
+    if (labels) {
+      Outcome<VolumeLabels> mapped = map_labels(labels->annotation, pair.placement, "the labels");
+      if (is_fault(mapped)) throw UsageError(std::get<SampleFault>(mapped).reason);
+      made.labels = std::move(std::get<VolumeLabels>(mapped));
+    }
+    std::vector<float> content;
+    std::span<float> values = volume;
+    if (pair.content != pair.placement.volume) {
+      content.resize(VolumeShape{bins(), pair.content}.value_count());
+      values = content;
+    }
+    made.part = generate_volume(generator(), job_.generator.scope, pair, made.labels, values);
+    const auto statistics =
+        finish_volume(generator(), made.part.notes, gap, job_.volume.normalize, pair, values);
+    if (!statistics) {
+      throw std::runtime_error("expected finite values >= 0, got " +
+                               std::to_string(values[first_unsound_value(values)]) +
+                               " in the generated volume");
+    }
+    made.statistics = *statistics;
+    if (values.data() != volume.data()) lay_into(values, pair, volume);
+    return made;
+  }
+
+  /// Makes every pair's volume on so many threads, this one among them. Without Python's lock.
+  template <class VolumeOf>
+  void make_all(const Pair& pairs, int threads, VolumeOf volume_of) const {
+    const std::size_t count = pairs.previous.count();
+    std::atomic<std::size_t> next = 0;
+    std::mutex fault_mutex;
+    std::exception_ptr fault;
+    const auto work = [&](bool is_callers) {
+      try {
+        for (std::size_t i = next++; i < count; i = next++) {
+          make(pairs, i, nullptr, 1, volume_of(i));
+          if (is_callers) {
+            const py::gil_scoped_acquire acquire;
+            if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+          }
+        }
+      } catch (...) {
+        const std::lock_guard lock(fault_mutex);
+        if (!fault) fault = std::current_exception();
+        next = count;
+      }
+    };
+    {
+      std::vector<std::jthread> others;
+      for (int i = 1; i < threads && static_cast<std::size_t>(i) < count; ++i) {
+        others.emplace_back(work, false);
+      }
+      work(true);
+    }
+    if (fault) std::rethrow_exception(fault);
+  }
+
+  static py::array matrix(const Placement& placement) {
+    const std::array<double, 6> map = placement.source_to_volume();
+    return py::array_t<double>({2, 3}, map.data());
+  }
+
+  JobManifest job_;
+  LoadedGenerator loaded_;
+  std::size_t memory_bytes_ = memory_limit_bytes();
+  std::shared_ptr<SpareMemory> memory_ = std::make_shared<SpareMemory>();
+};
+
+// ---- Labels and statistics
+
+using Doubles = py::array_t<double, py::array::c_style>;
+
+Labels labels_of(const std::optional<Doubles>& boxes, const std::optional<Doubles>& joints) {
+  Labels labels;
+  if (boxes) {
+    labels.has_boxes = true;
+    if (boxes->ndim() != 2 || boxes->shape(1) != 4) {
+      throw UsageError("expected boxes [n, 4], got shape " + shape_text(*boxes));
+    }
+    for (py::ssize_t i = 0; i < boxes->shape(0); ++i) {
+      Box box;
+      box.xyxy = {boxes->at(i, 0), boxes->at(i, 1), boxes->at(i, 2), boxes->at(i, 3)};
+      labels.annotation.boxes.push_back(box);
+    }
+  }
+  if (joints) {
+    labels.has_joints = true;
+    if (joints->ndim() != 3 || joints->shape(2) != 2) {
+      throw UsageError("expected joints [P, J, 2], got shape " + shape_text(*joints));
+    }
+    for (py::ssize_t i = 0; i < joints->shape(0); ++i) {
+      Person person;
+      for (py::ssize_t j = 0; j < joints->shape(1); ++j) {
+        const Point at{joints->at(i, j, 0), joints->at(i, j, 1)};
+        person.joints.push_back({std::isnan(at.x) || std::isnan(at.y) ? kMissingPoint : at, -1});
+      }
+      labels.annotation.persons.push_back(std::move(person));
+    }
+  }
+  return labels;
+}
+
+py::array rectangles(const std::vector<VolumeBox>& boxes, Rectangle VolumeBox::*which) {
+  py::array_t<double> rows({static_cast<py::ssize_t>(boxes.size()), py::ssize_t{4}});
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const Rectangle& box = boxes[i].*which;
+    const std::array<double, 4> row{box.left, box.top, box.right, box.bottom};
+    std::ranges::copy(row, rows.mutable_data(static_cast<py::ssize_t>(i), 0));
+  }
+  return rows;
+}
+
+py::dict PairGenerator::sample(const py::array& previous, const py::array& following,
+                               const std::optional<Doubles>& boxes,
+                               const std::optional<Doubles>& joints, int gap) const {
+  const Pair pair(previous, following, false);
+  const Labels labels = labels_of(boxes, joints);
+  const VolumeShape shape = shape_of(pair.previous.size(), 1);
+  VolumeArray volume(memory_, shape);
+  MadeVolume made;
+  {
+    const py::gil_scoped_release release;
+    made = make(pair, 0, &labels, gap, volume.values());
+  }
+  py::dict statistics;
+  const VolumeStatistics& found = made.statistics;
+  statistics["nonzero_fraction"] = found.nonzero_fraction;
+  statistics["max"] = found.max;
+  statistics["sum_positive"] = found.sum_positive;
+  statistics["sum_negative"] = found.sum_negative;
+  statistics["flags"] = found.flags;
+  statistics["eta98"] = found.eta98;
+  if (!made.part.tiles.empty()) {
+    const int side = job_.generator.scope.tile_px;
+    const py::ssize_t columns = (shape.size.width + side - 1) / side;
+    const auto tiles = static_cast<py::ssize_t>(made.part.tiles.size());
+    statistics["tiles"] =
+        py::array_t<std::uint8_t>({tiles / columns, columns}, made.part.tiles.data());
+  }
+  py::dict sample;
+  sample["volume"] = std::move(volume).to_python();
+  sample["statistics"] = statistics;
+  sample["source_to_volume"] = matrix(made.placement);
+  if (labels.has_boxes) {
+    py::dict rows;
+    rows["xyxy"] = rectangles(made.labels.boxes, &VolumeBox::clipped);
+    rows["xyxy_unclipped"] = rectangles(made.labels.boxes, &VolumeBox::unclipped);
+    sample["boxes"] = rows;
+  }
+  if (labels.has_joints) {
+    py::array_t<double> points({joints->shape(0), joints->shape(1), py::ssize_t{2}});
+    double* to = points.mutable_data();
+    for (const VolumePerson& person : made.labels.persons) {
+      for (const Point& point : person.joints) {
+        const bool is_missing = point == kMissingPoint;
+        *to++ = is_missing ? std::nan("") : point.x;
+        *to++ = is_missing ? std::nan("") : point.y;
+      }
+    }
+    sample["joints"] = points;
+  }
+  return sample;
+}
+
+// ---- Events
+
+struct EventRow {
+  double t;
+  std::int32_t x;
+  std::int32_t y;
+  std::int8_t p;
+};
+
+py::array events_of(const py::array_t<float, py::array::c_style>& volume, double duration_s,
+                    std::uint64_t seed, EventCounts counts) {
+  if (volume.ndim() != 3 || volume.shape(0) < 2 || volume.shape(0) % 2 != 0) {
+    throw UsageError("expected a volume [2B, H, W], got shape " + shape_text(volume));
+  }
+  if (!(duration_s > 0) || !std::isfinite(duration_s)) {
+    throw UsageError("expected a duration above 0 s, got " + std::to_string(duration_s));
+  }
+  const std::span<const float> values(volume.data(), static_cast<std::size_t>(volume.size()));
+  const VolumeShape shape{static_cast<int>(volume.shape(0) / 2),
+                          {static_cast<int>(volume.shape(1)), static_cast<int>(volume.shape(2))}};
+  std::vector<Event> events;
+  {
+    const py::gil_scoped_release release;
+    const std::size_t unsound = first_unsound_value(values);
+    if (unsound < values.size()) {
+      throw UsageError("expected finite values >= 0, got " + std::to_string(values[unsound]));
+    }
+    events = sample_events(values, shape, duration_s, counts, CounterRandom(seed));
+  }
+  py::array_t<EventRow> rows(static_cast<py::ssize_t>(events.size()));
+  std::ranges::transform(events, rows.mutable_data(), [](const Event& event) {
+    return EventRow{event.t_s, event.x, event.y, static_cast<std::int8_t>(event.positive)};
+  });
+  return rows;
+}
+
+}  // namespace
+
+PYBIND11_MODULE(_engine, module) {
+  PYBIND11_NUMPY_DTYPE(EventRow, t, x, y, p);
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const UsageError& error) {
+      PyErr_SetString(PyExc_ValueError, error_text(error).c_str());
+    } catch (const InputError& error) {
+      PyErr_SetString(PyExc_ValueError, error_text(error).c_str());
+    } catch (const std::runtime_error& error) {
+      PyErr_SetString(PyExc_RuntimeError, error_text(error).c_str());
+    }
+  });
+  using py::arg;
+  py::class_<PairGenerator>(module, "Generator")
+      .def(py::init<const std::string&>(), arg("settings"))
+      .def_property_readonly("bins", &PairGenerator::bins)
+      .def_property_readonly("description", &PairGenerator::description)
+      .def_property_readonly("weights_hash", &PairGenerator::weights_hash)
+      .def_property_readonly("warnings",
+                             [](const PairGenerator& generator) {
+                               py::list texts;
+                               for (const std::string& text : generator.warnings()) {
+                                 texts.append(text);
+                               }
+                               return texts;
+                             })
+      .def_property_readonly("training_gaps",
+                             [](const PairGenerator& generator) -> py::object {
+                               const auto gaps = generator.training_gaps();
+                               if (!gaps) return py::none();
+                               return py::make_tuple(gaps->first, gaps->second);
+                             })
+      .def("call", &PairGenerator::call, arg("previous"), arg("following"))
+      .def("many", &PairGenerator::many, arg("previous"), arg("following"), arg("threads"))
+      .def(
+          "sample",
+          [](const PairGenerator& generator, const py::array& previous, const py::array& following,
+             const py::object& boxes, const py::object& joints, int gap) {
+            const auto doubles = [](const py::object& given) {
+              return given.is_none() ? std::nullopt : std::optional(given.cast<Doubles>());
+            };
+            return generator.sample(previous, following, doubles(boxes), doubles(joints), gap);
+          },
+          arg("previous"), arg("following"), arg("boxes"), arg("joints"), arg("gap"))
+      .def("prepare", &PairGenerator::prepare, arg("image"))
+      .def("source_to_volume", &PairGenerator::source_to_volume, arg("height"), arg("width"));
+  module.def(
+      "sample_events",
+      [](const py::array_t<float, py::array::c_style>& volume, double duration_s,
+         std::uint64_t seed, bool rounded) {
+        return events_of(volume, duration_s, seed,
+                         rounded ? EventCounts::kRounded : EventCounts::kPoisson);
+      },
+      arg("volume"), arg("duration_s"), arg("seed"), arg("rounded"));
+}
+
+}  // namespace eventgan
