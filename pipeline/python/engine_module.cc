@@ -533,6 +533,9 @@ py::dict PairGenerator::sample(const py::array& previous, const py::array& follo
     const int side = job_.generator.scope.tile_px;
     const py::ssize_t columns = (shape.size.width + side - 1) / side;
     const auto tiles = static_cast<py::ssize_t>(made.part.tiles.size());
+    const auto generated = static_cast<double>(std::ranges::count(made.part.tiles, 1));
+    statistics["generated_fraction"] =
+        static_cast<float>(generated / static_cast<double>(made.part.tiles.size()));
     statistics["tiles"] =
         py::array_t<std::uint8_t>({tiles / columns, columns}, made.part.tiles.data());
   }

@@ -8,7 +8,7 @@ import operator
 import os
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
 import numpy as np
@@ -94,8 +94,9 @@ class Generator:
         manifest: dict[str, Any] = {
             place: {key: given[key] for key in keys if given.get(key) is not None} for place, keys in _PLACES.items()}
         if size is not None:
-            height, width = size
-            manifest["image"].update(height=height, width=width)
+            if not isinstance(size, Sequence) or len(size) != 2:
+                raise ValueError(f"expected a size of height and width, got {size!r}")
+            manifest["image"].update(zip(("height", "width"), size))
         manifest["seed"] = seed
         self._set_up(_json(manifest))
         for text in self._engine.warnings:
@@ -178,7 +179,8 @@ class Generator:
         -------
         dict
             volume : float32 [2B, H, W]
-            statistics : dict, as in `Shards`: nonzero_fraction, sum_positive, ..., flags, eta98, and `tiles` where scope computes a part
+            statistics : dict, as in `Shards`: nonzero_fraction, max, sum_positive, sum_negative, flags, eta98; where scope computes a part,
+                generated_fraction and tiles
             source_to_volume : float64 [2, 3], the map of points (pixel centres are whole numbers)
             boxes : dict with xyxy, clipped to the volume, and xyxy_unclipped, if boxes were given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given
@@ -221,6 +223,8 @@ def _weights(given: PathLike | None) -> str | None:
     """A name as it is; a file by its whole path, so that a worker that is spawned elsewhere finds it, too."""
     if given is None or isinstance(given, str) and re.fullmatch("(shipped|untrained)(:.*)?", given):
         return given
+    if not isinstance(given, (str, os.PathLike)):
+        raise ValueError(f"expected weights by their name or file, got {given!r}")
     return os.path.abspath(os.fspath(given))
 
 

@@ -16,6 +16,7 @@
 namespace eventgan {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::kSoundManifest;
@@ -266,6 +267,45 @@ TEST(ManifestFile, IsReadWithItsTextAndFolder) {
   const JobManifest manifest = read_job_manifest(folder / "m.json");
   EXPECT_EQ(manifest.text, text);
   EXPECT_EQ(manifest.directory, folder.path());
+}
+
+TEST(PairManifest, HasTheDefaultsOfFrames) {
+  const JobManifest manifest = parse_pair_manifest("{}", "/data", "pair");
+  EXPECT_EQ(manifest.image.preset, "demo");
+  EXPECT_EQ(manifest.image.grey, GreyOrder::kAfterResize);
+  EXPECT_EQ(manifest.image.blur, 0);
+  EXPECT_EQ(manifest.image.size, std::nullopt);
+  EXPECT_EQ(manifest.generator.weights, "shipped");
+  EXPECT_EQ(manifest.directory, "/data");
+  const JobManifest named =
+      parse_pair_manifest(R"({"image": {"width": 32, "height": 16}})", "", "");
+  EXPECT_EQ(named.image.preset, manifest.image.preset);
+  EXPECT_EQ(named.image.grey, manifest.image.grey);
+}
+
+TEST(PairManifest, TakesWhatMakesAVolumeAndNothingElse) {
+  const JobManifest manifest = parse_pair_manifest(
+      R"({"seed": 4, "image": {"preset": "kitti"}, "volume": {"bins": 5, "normalize": "eta98"},
+          "generator": {"kind": "difference", "sensor": {"leak_rate_hz": 1}}})",
+      "", "pair");
+  EXPECT_EQ(manifest.seed, 4u);
+  EXPECT_EQ(manifest.image.blur, 3);
+  EXPECT_EQ(manifest.volume.bins, 5);
+  EXPECT_EQ(manifest.generator.sensor.leak_rate_hz, 1);
+  const auto faults_of_pair = [](const std::string& text) {
+    return [text] { parse_pair_manifest(text, "", "pair"); };
+  };
+  EXPECT_THAT(
+      faults_of_pair(R"({"name": "x", "volume": {"bins": 0}})"),
+      ThrowsMessage<UsageError>(AllOf(HasSubstr("pair: $.volume.bins: expected"),
+                                      HasSubstr("pair: $.name: expected one of the keys"))));
+  EXPECT_THAT(faults_of_pair(R"({"generator": {"kind": "events"}})"),
+              ThrowsMessage<UsageError>(HasSubstr("$.generator.kind: expected a generator")));
+  for (const char* generator : {R"({"engine": "torch"})", R"({"device": "cuda"})"}) {
+    EXPECT_THAT(
+        faults_of_pair(R"({"generator": )" + std::string(generator) + "}"),
+        ThrowsMessage<UsageError>(HasSubstr("$.generator: expected the engine \"onednn\"")));
+  }
 }
 
 TEST(ManifestFile, ThatCannotBeReadIsMissingInput) {

@@ -1,5 +1,6 @@
 """The example shards of tests/stages/shards, for the tests of this folder."""
 
+import os
 import pathlib
 import shutil
 import sys
@@ -7,7 +8,7 @@ import sys
 import pytest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [str(SOURCE / "manifests" / "python"), str(SOURCE / "tests" / "stages" / "shards")]
+sys.path[:0] = [*os.environ.get("PYTHONPATH", str(SOURCE / "manifests" / "python")).split(os.pathsep), str(SOURCE / "tests" / "stages" / "shards")]
 
 from example_shards import NAME, ExampleShards  # noqa: E402
 

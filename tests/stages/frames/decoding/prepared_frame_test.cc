@@ -98,6 +98,42 @@ TEST(PreparedFrame, AnotherSpecPreparesTheSameFrameOtherwise) {
   EXPECT_EQ(prepare_frame(view_of(image), spec).grey.size(), 16u * 17);
 }
 
+/// Random levels, [y, x, channel].
+std::vector<std::uint8_t> random_levels(ImageSize size, int channels) {
+  cv::Mat image(size.height, size.width, CV_8UC(channels));
+  cv::RNG(7).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return {image.datastart, image.dataend};
+}
+
+TEST(PreparedFrame, GreyIsWhatThreeEqualChannelsGive) {
+  constexpr ImageSize kSize{37, 53};
+  const std::vector<std::uint8_t> grey = random_levels(kSize, 1);
+  std::vector<std::uint8_t> colour;
+  for (const std::uint8_t level : grey) colour.insert(colour.end(), 3, level);
+  for (const auto order : {GreyOrder::kBeforeResize, GreyOrder::kAfterResize}) {
+    ImageSpec spec;
+    spec.size = ImageSize{24, 40};
+    spec.grey = order;
+    spec.blur = 5;
+    EXPECT_EQ(prepare_frame({kSize, grey.data(), ImageView::Channels::kGrey}, spec).grey,
+              prepare_frame({kSize, colour.data()}, spec).grey);
+  }
+}
+
+TEST(PreparedFrame, TheOrderOfChannelsChangesNothingButTheirOrder) {
+  constexpr ImageSize kSize{19, 30};
+  const std::vector<std::uint8_t> bgr = random_levels(kSize, 3);
+  std::vector<std::uint8_t> rgb = bgr;
+  for (std::size_t i = 0; i < rgb.size(); i += 3) std::swap(rgb[i], rgb[i + 2]);
+  for (const auto order : {GreyOrder::kBeforeResize, GreyOrder::kAfterResize}) {
+    ImageSpec spec;
+    spec.size = ImageSize{25, 16};
+    spec.grey = order;
+    EXPECT_EQ(prepare_frame({kSize, rgb.data(), ImageView::Channels::kRgb}, spec).grey,
+              prepare_frame({kSize, bgr.data()}, spec).grey);
+  }
+}
+
 TEST(PreparedFrame, WhatCannotBePlacedIsRefused) {
   // Cropped, 1 x 2^26 pixels would have to grow to 64 x 2^32.
   ImageSpec spec;
