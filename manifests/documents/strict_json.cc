@@ -65,7 +65,7 @@ double StrictValue::number(double lowest, double highest) const {
 }
 
 bool StrictValue::boolean() const {
-  if (node_ != nullptr && node_->is_boolean()) return node_->get<bool>();
+  if (is_boolean()) return node_->get<bool>();
   fault("true or false");
   return false;
 }

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
@@ -20,14 +22,14 @@ namespace fs = std::filesystem;
 
 /// Where labels came to the folder since, its images may be found in another place below it.
 bool is_of(const JobManifest& manifest, const FoundSource& found, const fs::path& given) {
-  if (manifest.sources.size() != 1) return false;
-  const SourceSpec& source = manifest.sources.front();
-  const fs::path root = resolve(manifest, source.root).lexically_normal();
-  const fs::path below = root.lexically_relative(fs::absolute(given).lexically_normal());
-  const bool is_within = !below.empty() && *below.begin() != "..";
-  std::error_code unknown;
-  return source.dataset == found.dataset &&
-         (is_within || root == found.root || fs::equivalent(root, found.root, unknown));
+  return std::ranges::all_of(manifest.sources, [&](const SourceSpec& source) {
+    const fs::path root = resolve(manifest, source.root).lexically_normal();
+    const fs::path below = root.lexically_relative(fs::absolute(given).lexically_normal());
+    const bool is_within = !below.empty() && *below.begin() != "..";
+    std::error_code unknown;
+    return source.dataset == found.dataset &&
+           (is_within || root == found.root || fs::equivalent(root, found.root, unknown));
+  });
 }
 
 JobManifest read_kept(const fs::path& file, const FoundSource& found, const fs::path& given) {
@@ -52,8 +54,9 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
     if (!job.output.has_filename()) job.output = job.output.parent_path();  // "out/"
     return job;
   }
-  const FoundSource found = find_source(given);
-  job.output = output.value_or(fs::path("out") / draft_name({found}));
+  const std::vector<FoundSource> sources = find_sources(given);
+  const FoundSource& found = sources.front();
+  job.output = output.value_or(fs::path("out") / draft_name(sources));
   const fs::path file = job.output / "manifest.json";
   // In this order: another worker may keep the manifest and freeze the plan meanwhile.
   const bool has_plan = fs::exists(fs::symlink_status(job.output / "plan.json"));
@@ -73,7 +76,7 @@ GivenJob read_given_job(const fs::path& given, const std::optional<fs::path>& ou
         job.output.string() + " (--output names another folder)");
   }
   const fs::path folder = fs::absolute(file).parent_path();
-  ManifestDraft draft = draft_manifest({found}, {folder, /*is_relative=*/false, "."});
+  ManifestDraft draft = draft_manifest(sources, {folder, /*is_relative=*/false, "."});
   if (!draft.has_samples) {
     throw InputError(fmt::format(
         "expected {}, got none, in {} ({}; eventgan init writes a manifest to complete)",

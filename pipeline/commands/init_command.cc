@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -41,7 +42,7 @@ std::optional<DatasetKind> dataset_word(const std::vector<std::string>& where) {
       "a manifest for it)");
 }
 
-std::vector<FoundSource> find_sources(const std::vector<std::string>& where) {
+std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
   const auto dataset = dataset_word(where);
   std::vector<FoundSource> found;
   for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
@@ -54,7 +55,7 @@ std::vector<FoundSource> find_sources(const std::vector<std::string>& where) {
       throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
                                    fmt::join(words, ", "), where[i]));
     }
-    found.push_back(find_source(where[i], dataset));
+    std::ranges::move(find_sources(where[i], dataset), std::back_inserter(found));
   }
   return found;
 }
@@ -69,7 +70,7 @@ int run(const InitArguments& arguments) {
   const fs::path out = arguments.out;
   if (!out.has_filename()) throw UsageError("--out: expected a file, got " + out.string());
   if (fs::exists(fs::symlink_status(out))) refuse_to_overwrite(arguments);
-  const std::vector<FoundSource> found = find_sources(arguments.where);
+  const std::vector<FoundSource> found = find_all(arguments.where);
   const ManifestDraft draft = draft_manifest(
       found, {fs::absolute(out).lexically_normal().parent_path(),
               std::ranges::none_of(arguments.where,

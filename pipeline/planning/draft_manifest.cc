@@ -81,7 +81,7 @@ Habits habits_of(DatasetKind dataset) {
               "No width and height: volumes are as large as the sensor.",
               ""};
     case DatasetKind::kDhp19:
-      break;  // find_source does not know it
+      break;  // find_sources does not know it
   }
   throw std::logic_error("habits_of: not a kind of dataset");
 }
@@ -415,6 +415,7 @@ class Draft {
 
   std::string source_keys(const FoundSource& found) const {
     std::string keys = key("root", found.root);
+    if (!found.split.empty()) keys += fmt::format("      \"split\": \"{}\",\n", found.split);
     if (!found.layout.empty()) {
       keys += fmt::format("      \"layout\": \"{}\",\n", found.layout);
     }

@@ -223,9 +223,13 @@ void ShardLayout::append(Group& group, PlannedSample sample) {
 }
 
 void ShardLayout::append_unknown(PlannedSample sample) {
+  const auto is_alike = [&](const PlannedSample& other) {
+    const FrameRef &frame = sample.pair.next, &others = other.pair.next;
+    const bool are_absent = frame.index < 0 && others.index < 0;
+    return frame.path == others.path || (are_absent && sample.sequence == other.sequence);
+  };
   const auto takes = [&](const PlannedShard& shard) {
-    return shard.samples.size() < samples_per_shard_ &&
-           shard.samples.back().pair.next.path == sample.pair.next.path;
+    return shard.samples.size() < samples_per_shard_ && is_alike(shard.samples.back());
   };
   if (unknown_.empty() || !takes(unknown_.back())) {
     unknown_.push_back({"", source_, {}, {}, /*size_unknown=*/true});

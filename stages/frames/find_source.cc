@@ -21,25 +21,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool has_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
-
-bool has_file(const fs::path& path) {
-  std::error_code error;
-  return fs::is_regular_file(path, error);
-}
-
-/// What is in a folder; nothing if it cannot be listed, since it is somebody else's then.
-FolderListing look_into(const fs::path& folder) {
-  try {
-    return has_folder(folder) ? list_folder(folder) : FolderListing();
-  } catch (const InputError&) {
-    return {};
-  }
-}
-
 constexpr std::array kRecordingTitles{
     Word<RecordingFormat>{"recording of an event camera (MVSEC)", RecordingFormat::kMvsec},
     Word<RecordingFormat>{"recording of an event camera (EventGAN)", RecordingFormat::kEventgan},
@@ -268,7 +249,7 @@ constexpr std::array kLayouts{
                   complete_mpii_list},
     DatasetLayout{DatasetKind::kRecording, "", "recording of an event camera", is_recording,
                   complete_recording},
-    DatasetLayout{DatasetKind::kFrames, "", "images or videos", is_frames, find_own_labels}};
+    DatasetLayout{DatasetKind::kFrames, "", "images or videos", is_frames}};
 
 struct Place {
   const DatasetLayout* layout;
@@ -330,7 +311,7 @@ void note_dataset_above(FoundSource& found) {
 
 }  // namespace
 
-FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset) {
+std::vector<FoundSource> find_sources(const fs::path& path, std::optional<DatasetKind> dataset) {
   fs::path root = fs::absolute(path).lexically_normal();
   if (!root.has_filename()) root = root.parent_path();  // "kitti/"
   std::error_code error;
@@ -356,8 +337,10 @@ FoundSource find_source(const fs::path& path, std::optional<DatasetKind> dataset
   found.title = place->layout->title;
   found.root = place->root;
   place->layout->complete(found);
-  if (found.dataset == DatasetKind::kFrames) note_dataset_above(found);
-  return found;
+  if (found.dataset != DatasetKind::kFrames) return {std::move(found)};
+  std::vector<FoundSource> sources = find_own_labels(std::move(found));
+  note_dataset_above(sources.front());
+  return sources;
 }
 
 bool may_be_source(const fs::path& path) {

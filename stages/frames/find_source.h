@@ -23,6 +23,7 @@ struct FoundSource {
   /// For a person: "KITTI object", "recording of an event camera (AEDAT4)".
   std::string_view title;
   std::filesystem::path root;
+  std::string_view split = {};  ///< frames: "val" or "test" where its folder says so; empty: train
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;
   std::optional<FoundLabels> labels;  ///< frames
   EventFields columns;                ///< recording: a table's, by what its columns are called
@@ -39,12 +40,13 @@ struct FoundSource {
 /// Any folder of images or videos is `frames`, so that this is asked last. Of one with labels of
 /// one's own the root becomes the folder of images that they are of (FOLDER/images,
 /// FOLDER/JPEGImages, FOLDER/train2017), and `labels` is set; those that were found and do not
-/// count are remarks. Throws InputError if there is nothing at `path`, no such dataset, or more
-/// than one.
-FoundSource find_source(const std::filesystem::path& path,
-                        std::optional<DatasetKind> dataset = std::nullopt);
+/// count are remarks. Where train and val or test have folders of images with labels of their own
+/// (FOLDER/images/val, FOLDER/valid/images), each is a source; else there is one. Throws InputError
+/// if there is nothing at `path`, no such dataset, or more than one.
+std::vector<FoundSource> find_sources(const std::filesystem::path& path,
+                                      std::optional<DatasetKind> dataset = std::nullopt);
 
-/// Whether find_source may find something at `path`: a folder, or a file that is a dataset by its
+/// Whether find_sources may find something at `path`: a folder, or a file that is a dataset by its
 /// name, such as a video; also a video's name where nothing is.
 bool may_be_source(const std::filesystem::path& path);
 

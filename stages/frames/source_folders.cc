@@ -33,8 +33,26 @@ FolderListing list_folder(const std::filesystem::path& folder) {
   return listing;
 }
 
+bool has_folder(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_directory(path, error);
+}
+
+bool has_file(const std::filesystem::path& path) {
+  std::error_code error;
+  return std::filesystem::is_regular_file(path, error);
+}
+
+FolderListing look_into(const std::filesystem::path& folder) {
+  try {
+    return has_folder(folder) ? list_folder(folder) : FolderListing();
+  } catch (const InputError&) {
+    return {};
+  }
+}
+
 SourceRoot::SourceRoot(std::string_view written, const std::filesystem::path& base)
-    : written_(written), on_disk_(base / written) {
+    : written_(written), base_(base) {
   while (written_.size() > 1 && written_.back() == '/') written_.pop_back();
 }
 
@@ -46,7 +64,19 @@ std::string SourceRoot::written(std::string_view relative) const {
 }
 
 std::filesystem::path SourceRoot::on_disk(std::string_view relative) const {
-  return relative.empty() ? on_disk_ : on_disk_ / relative;
+  return base_ / written(relative);
+}
+
+SourceRoot SourceRoot::above(std::string_view relative) const {
+  const std::filesystem::path path(written(relative));
+  const std::filesystem::path name = path.filename();
+  const bool is_named = !name.empty() && name != "." && name != "..";
+  return {(is_named ? path.parent_path() : path / "..").generic_string(), base_};
+}
+
+std::string SourceRoot::name() const {
+  const auto path = std::filesystem::absolute(on_disk("")).lexically_normal();
+  return (path.has_filename() ? path : path.parent_path()).filename().string();  // "gt/"
 }
 
 void SourceRoot::require_folder(std::string_view relative) const {

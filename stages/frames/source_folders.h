@@ -22,6 +22,13 @@ std::string counted(const std::vector<std::string>& names, const std::string& wh
 /// Lists a folder, once; nothing if it is absent. Throws InputError if it cannot be listed.
 FolderListing list_folder(const std::filesystem::path& folder);
 
+/// Whether there is a folder, or a regular file, as far as anybody may see.
+bool has_folder(const std::filesystem::path& path);
+bool has_file(const std::filesystem::path& path);
+
+/// As list_folder; nothing of what is no folder or cannot be listed, since it is somebody else's.
+FolderListing look_into(const std::filesystem::path& folder);
+
 /// A source's root folder under both its names: as the manifest writes it, for records and
 /// messages, and where it lies on disk. Relative paths have forward slashes. A value.
 class SourceRoot {
@@ -31,6 +38,12 @@ class SourceRoot {
   /// As FrameRef::path writes it; the root itself for "".
   std::string written(std::string_view relative) const;
   std::filesystem::path on_disk(std::string_view relative) const;
+
+  /// The folder that the root, or what is of that name below it, is in: of "labels" the manifest's
+  /// own, of "." or ".." the one above it on disk.
+  SourceRoot above(std::string_view relative = "") const;
+  /// The name on disk, whatever the manifest writes: "gt" of "." in a manifest in .../gt.
+  std::string name() const;
 
   /// Throws InputError if there is no such folder.
   void require_folder(std::string_view relative) const;
@@ -50,7 +63,7 @@ class SourceRoot {
 
  private:
   std::string written_;
-  std::filesystem::path on_disk_;
+  std::filesystem::path base_;
 };
 
 }  // namespace eventgan

@@ -47,10 +47,10 @@ class ColumnStore final : public EventStore {
   ColumnStore(Hdf5Handle file, const ColumnLayout& layout, const std::string& name)
       : name_(name),
         file_(std::move(file)),
-        x_(open_whole_numbers(file_, layout.events + "/x", name)),
-        y_(open_whole_numbers(file_, layout.events + "/y", name)),
-        t_(open_whole_numbers(file_, layout.events + "/t", name)),
-        p_(open_whole_numbers(file_, layout.events + "/p", name)) {
+        x_(open_whole_numbers(file_, layout.column("x"), name)),
+        y_(open_whole_numbers(file_, layout.column("y"), name)),
+        t_(open_whole_numbers(file_, layout.column("t"), name)),
+        p_(open_whole_numbers(file_, layout.column("p"), name)) {
     for (const Hdf5Table* column : {&x_, &y_, &p_}) {
       if (column->dims() == t_.dims()) continue;
       column->refuse("as many numbers as " + layout.events + "/t, " + std::to_string(count()));

@@ -3,9 +3,11 @@
 #include <limits>
 #include <optional>
 #include <stdexcept>
+#include <string>
 #include <vector>
 
 #include "stages/base/hdf5/detail/hdf5_output_file.h"
+#include "stages/recordings/detail/event_columns.h"
 #include "stages/recordings/detail/growing_dataset.h"
 
 namespace eventgan {
@@ -19,7 +21,7 @@ void require(bool condition, const char* rule) {
 }
 
 template <class Number>
-GrowingDataset<Number> column(hid_t file, const char* path) {
+GrowingDataset<Number> column(hid_t file, const std::string& path) {
   return {file, path, {}, {kEventsPerChunk}, kEventsPerChunk};
 }
 
@@ -50,18 +52,19 @@ struct EventColumnsWriter::File {
       : hdf5(target), layout(whose), size(of), offset_us(offset) {}
 
   void create() {
-    create_group(hdf5.id(), "events").close("events");
-    x = column<std::uint16_t>(hdf5.id(), "events/x");
-    y = column<std::uint16_t>(hdf5.id(), "events/y");
-    p = column<std::uint8_t>(hdf5.id(), "events/p");
+    const ColumnLayout names = dsec_layout();
+    create_group(hdf5.id(), names.events).close(names.events);
+    x = column<std::uint16_t>(hdf5.id(), names.column("x"));
+    y = column<std::uint16_t>(hdf5.id(), names.column("y"));
+    p = column<std::uint8_t>(hdf5.id(), names.column("p"));
     if (layout == ColumnFile::kDsec) {
-      t_after_offset = column<std::uint32_t>(hdf5.id(), "events/t");
-      ms_to_idx = column<std::uint64_t>(hdf5.id(), "ms_to_idx");
-      write_number(hdf5.id(), "t_offset", offset_us);
+      t_after_offset = column<std::uint32_t>(hdf5.id(), names.column("t"));
+      ms_to_idx = column<std::uint64_t>(hdf5.id(), names.ms_index);
+      write_number(hdf5.id(), names.t_offset, offset_us);
     } else {
-      t = column<std::int64_t>(hdf5.id(), "events/t");
-      write_number(hdf5.id(), "events/height", size.height);
-      write_number(hdf5.id(), "events/width", size.width);
+      t = column<std::int64_t>(hdf5.id(), names.column("t"));
+      write_number(hdf5.id(), names.size.at(0), size.height);
+      write_number(hdf5.id(), names.size.at(1), size.width);
     }
   }
 

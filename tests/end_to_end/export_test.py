@@ -10,10 +10,8 @@ import signal
 import subprocess
 import sys
 import tarfile
-import tempfile
 import textwrap
 import time
-import unittest
 
 import h5py
 import numpy as np
@@ -21,9 +19,11 @@ import PIL.Image
 import scipy.io
 import yaml
 
+import exported_demo as demo
 import failing_files
 import program
 import small_job
+from exported_demo import BROKEN, Export, name_of, of
 from folders import content, same_folder
 from program import run, text
 
@@ -35,69 +35,8 @@ PAIR_UNKNOWN = {"prev_video_frame": -1, "next_video_frame": -1}
 LABEL_UNKNOWN = {"truncation": -1, "occlusion": -1, "alpha": -10, "box3d": [-1, -1, -1, -1000, -1000, -1000, -10], "track_id": -1,
                  "difficulty": -1, "visible": -1, **{name + source: -1 for source in ("", "_source")
                                                      for name in ("joints", "center", "head_box")}, "scale": -1, "scale_volume": -1}
-BROKEN = "000003"  # of KITTI: quarantined
 
-
-def setUpModule():
-    global folder, finalized, samples
-    folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-export-"))
-    demo = folder / "demo"
-    run("make-demo", demo)
-    image = demo / "kitti" / "training" / "image_2" / f"{BROKEN}.png"
-    image.write_bytes(image.read_bytes()[:-50])
-    kitti = {"dataset": "kitti_object", "root": "kitti/training", "pairs": program.pairs([1, 2, 3])}
-    sources = [kitti, {**kitti, "split": "val"},
-               {"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2, 4], side="around")},
-               {"dataset": "human36m", "root": "h36m", "layout": "fetch", "pairs": program.pairs([1, 2], side="after")}]
-    manifest = program.manifest(
-        sources, image={"width": 173, "height": 130, "fit": "letterbox", "preset": "mpii"},
-        generator={"kind": "difference"}, volume={"bins": 9, "normalize": "none"},
-        errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1})
-    (demo / "manifest.json").write_text(json.dumps(manifest))
-    finalized = demo / "out"
-    run("convert", demo / "manifest.json", "--progress", "none")
-    run("finalize", finalized)
-    samples = read_samples(finalized)
-
-
-def tearDownModule():
-    shutil.rmtree(folder)
-
-
-def read_samples(out):
-    """Each sample of the shards that is not quarantined: its columns, by (split, dataset, sample id)."""
-    found = {}
-    for name in [shard["name"] for shard in json.loads((out / "dataset.json").read_text())["shards"]]:
-        with h5py.File(out / name) as shard:
-            classes = [text(name) for name in shard["labels/boxes/class_id"].attrs["class_names"]]
-            joints = [text(name) for name in shard["labels/poses"].attrs["joint_names"]]
-            aliases = [text(name) for name in shard["labels/poses"].attrs.get("joint_aliases", joints)]
-            for i in np.flatnonzero(shard["valid"][:]):
-                sample = {"shard": name, "slot": i, "volume": shard["events/volume"][i], "classes": classes,
-                          "joints": [j for j, alias in enumerate(aliases) if alias], "joint_names": [a for a in aliases if a]}
-                for kind in ("boxes", "poses"):
-                    group = shard["labels"][kind]
-                    rows = slice(*group["offsets"][i:i + 2])
-                    sample[kind] = {key: group[key][rows] for key in group if key != "offsets"}
-                for column in ("source_to_volume", "gap_s", "label_index"):
-                    sample[column] = shard["pairs"][column][i]
-                sample["pairs"] = {key: column[i] for key, column in shard["pairs"].items()}
-                sample["pairs"].update((key, shard["labels"][key][i]) for key in ("projection", "projection_source")
-                                       if key in shard["labels"])
-                key = (text(shard.attrs["split"]), text(shard.attrs["dataset"]), text(shard["pairs/sample_id"][i]))
-                found[key] = sample
-    return found
-
-
-def of(split=None, dataset=None):
-    return {key: sample for key, sample in samples.items()
-            if split in (None, key[0]) and dataset in (None, key[1])}
-
-
-def name_of(key):
-    """What a sample's files are called; train has several sources."""
-    split, dataset, sample_id = key
-    return (f"{dataset}+" if split == "train" else "") + sample_id.replace("/", "+")
+setUpModule, tearDownModule = demo.set_up, demo.tear_down
 
 
 def edges_to_source(sample, boxes):
@@ -126,71 +65,9 @@ def events_volume(rows, shape, gap):
     return volume
 
 
-# Prophesee's boxes, as RVT's utils/evaluation/prophesee/io/box_loading.py has them.
-BBOX_DTYPE = np.dtype({"names": ["t", "x", "y", "w", "h", "class_id", "track_id", "class_confidence"],
-                       "formats": ["<i8", "<f4", "<f4", "<f4", "<f4", "<u4", "<u4", "<f4"],
-                       "offsets": [0, 8, 12, 16, 20, 24, 28, 32], "itemsize": 40})
-# DSEC-Det's, as the text of its label.py has them.
-TRACKS_DTYPE = np.dtype([("t", "<u8"), ("x", "<f8"), ("y", "<f8"), ("h", "<f8"), ("w", "<f8"), ("class_id", "u1"),
-                         ("class_confidence", "<f8"), ("track_id", "<u8")])
-
-
-def read_windows(path):
-    """Begin, end, label in microseconds, number of events, and id of each sample of a recording."""
-    lines = [line.split(" ", 4) for line in path.read_text().splitlines()]
-    return [(*map(int, fields[:4]), fields[4]) for fields in lines]
-
-
-def slice_dsec(file, begin_us, end_us):
-    """The events t, x, y, p of a window, as DSEC's EventSlicer finds them."""
-    ms_to_idx, offset = file["ms_to_idx"][:].astype(np.int64), int(file["t_offset"][()])
-    begin_us, end_us = begin_us - offset, end_us - offset
-    first, last = ms_to_idx[begin_us // 1000], ms_to_idx[-(-end_us // 1000)]  # beyond them EventSlicer has no window
-    t = file["events/t"][first:last].astype(np.int64)
-    inside = slice(first + np.searchsorted(t, begin_us), first + np.searchsorted(t, end_us))
-    return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
-
-
-class RvtSequence:
-    """What RVT's SequenceBase and ObjectLabelFactory make of a sequence; their assertions stay."""
-
-    def __init__(self, path, representation, size):
-        folder = path / "event_representations_v2" / representation
-        with np.load(path / "labels_v2" / "labels.npz") as data:
-            self.labels, self.label_idx = data["labels"], data["objframe_idx_2_label_idx"]
-        self.repr_idx = np.load(folder / "objframe_idx_2_repr_idx.npy")
-        self.repr_times = np.load(folder / "timestamps_us.npy")
-        self.frame_times = np.load(path / "labels_v2" / "timestamps_us.npy")
-        with h5py.File(folder / "event_representations.h5") as file:
-            assert file["data"].chunks == (1, *file["data"].shape[1:])
-            self.data = file["data"][:]
-        assert len(self.label_idx) == len(np.unique(self.labels["t"])) == len(self.repr_idx) == len(self.frame_times)
-        x, y, w, h = (self.labels[name].astype("float32") for name in "xywh")
-        for begin, extent, side in ((x, w, size[1]), (y, h, size[0])):
-            assert (np.clip(begin + extent, 0, side - 1) - np.clip(begin, 0, side - 1) > 0).all()
-
-    def frame(self, k):
-        """Boxes, and the representation they are of."""
-        end = self.label_idx[k + 1] if k + 1 < len(self.label_idx) else len(self.labels)
-        assert end > self.label_idx[k]
-        return self.labels[self.label_idx[k]:end], self.repr_idx[k]
-
-
 def split_for(to):
     """A small one: of persons there is but train."""
     return "train" if to == "mpii" else "val"
-
-
-class Export(unittest.TestCase):
-    def setUp(self):
-        self.out = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "export"
-
-    def export(self, to, *arguments, out=None, source=None, expect=0):
-        return run("export", source or finalized, "--to", to, "--out", out or self.out, "--progress", "none", *arguments,
-                   expect=expect)
-
-    def described(self, out=None):
-        return json.loads(((out or self.out) / "export.json").read_text())
 
 
 class Formats(Export):
@@ -198,7 +75,7 @@ class Formats(Export):
         out, _ = self.export("webdataset")
         described = self.described()
         self.assertEqual({(entry["split"], entry["sample_id"], entry["name"]) for entry in described["samples"]},
-                         {(key[0], key[2], name_of(key)) for key in samples})
+                         {(key[0], key[2], name_of(key)) for key in demo.samples})
         self.assertEqual([entry["sample_id"] for entry in described["quarantined"]], [BROKEN, BROKEN])
         self.assertIn(f"{BROKEN}.png", described["quarantined"][0]["reason"])
         self.assertIn("2 quarantined", out)
@@ -278,7 +155,7 @@ class Formats(Export):
         self.assertFalse((alone / "pose").exists())
 
     def test_yolo_classes_and_ignored(self):
-        classes = folder / "classes.json"
+        classes = demo.folder / "classes.json"
         classes.write_text(json.dumps({"Car": 0, "Van": 0, "Pedestrian": 1, "Truck": None}))
         out, _ = self.export("yolo", "--classes", classes, "--ignored", "keep", "--split", "val")
         data = yaml.safe_load((self.out / "data.yaml").read_text())
@@ -362,18 +239,18 @@ class Formats(Export):
     def test_coco_categories_of_persons_are_the_same_in_all_splits(self):
         sources = [{"dataset": "mpii", "root": "mpii", "pairs": program.pairs([2], side="around"), "split": "val"},
                    {"dataset": "human36m", "root": "h36m", "layout": "fetch", "pairs": program.pairs([1], side="after")}]
-        manifest = folder / "demo" / "persons.json"
+        manifest = demo.folder / "demo" / "persons.json"
         manifest.write_text(json.dumps(program.manifest(sources, generator={"kind": "difference"}, output={"directory": "persons", "samples_per_shard": 8})))
         run("convert", manifest, "--progress", "none")
-        run("finalize", folder / "demo" / "persons")
-        self.export("coco", source=folder / "demo" / "persons")
+        run("finalize", demo.folder / "demo" / "persons")
+        self.export("coco", source=demo.folder / "demo" / "persons")
         found = {split: json.loads((self.out / f"person_keypoints_{split}.json").read_text()) for split in ("val", "train")}
         self.assertEqual(found["val"]["categories"], found["train"]["categories"])
         self.assertEqual([len(category["keypoints"]) for category in found["val"]["categories"]], [16, 17])
         for split, category in (("val", 1), ("train", 2)):
             self.assertEqual({one["category_id"] for one in found[split]["annotations"]}, {category})
         alone = self.out.parent / "alone"
-        self.export("coco", "--split", "train", source=folder / "demo" / "persons", out=alone)
+        self.export("coco", "--split", "train", source=demo.folder / "demo" / "persons", out=alone)
         self.assertEqual((alone / "person_keypoints_train.json").read_bytes(),
                          (self.out / "person_keypoints_train.json").read_bytes())
 
@@ -484,7 +361,7 @@ class Formats(Export):
         self.export("webdataset")
         seen = 0
         for path in sorted(self.out.glob("*.tar")):
-            shard = (finalized / path.name).with_suffix(".h5")
+            shard = (demo.finalized / path.name).with_suffix(".h5")
             # Deflate without HDF5's shuffling is a little worse.
             self.assertLess(path.stat().st_size, 1.6 * shard.stat().st_size + 20000)
             with tarfile.open(path) as tar:
@@ -494,7 +371,7 @@ class Formats(Export):
             self.assertEqual(len({name.split(".")[0] for name in files}) * 2, len(files))  # webdataset's keys
             for name in [name for name in files if name.endswith(".json")]:
                 labels = json.loads(files[name])
-                sample = samples[labels["split"], labels["dataset"], labels["sample_id"]]
+                sample = demo.samples[labels["split"], labels["dataset"], labels["sample_id"]]
                 self.assertEqual(name, name_of((labels["split"], labels["dataset"], labels["sample_id"])) + ".json")
                 with np.load(io.BytesIO(files[name.replace(".json", ".npz")])) as arrays:
                     np.testing.assert_array_equal(arrays["volume"], sample["volume"])
@@ -511,7 +388,7 @@ class Formats(Export):
                     found = np.array([joint or [-1, -1] for joint in person["joints"]])
                     np.testing.assert_allclose(found, joints)
                 seen += 1
-        self.assertEqual(seen, len(samples))
+        self.assertEqual(seen, len(demo.samples))
 
     def test_webdataset_has_a_dataset_card(self):
         self.export("webdataset")
@@ -533,7 +410,7 @@ class Formats(Export):
                              {what.replace("_", "\\_"): count for what, count in boxes.items() if count})
         self.assertIn(["kitti\\_object", "val", str(len(of("val"))), "1"], rows)
         self.assertIn("To be filled in", body)
-        plan = json.loads((finalized / "dataset.json").read_text())["plan_hash"]
+        plan = json.loads((demo.finalized / "dataset.json").read_text())["plan_hash"]
         self.assertIn(["SHA-256 of the plan", plan], rows)
         manifest = json.loads(body.split("```\n")[1])
         self.assertEqual(manifest["seed"], 7)
@@ -581,252 +458,6 @@ class Formats(Export):
             expected += sample["volume"].sum(dtype=float)
             got += events_volume(rows, sample["volume"].shape, sample["gap_s"]).sum()
         self.assertLess(abs(got - expected), 5 * np.sqrt(expected))
-
-
-class Recordings(Export):
-    """Exports of whole recordings: DSEC's and RVT's."""
-
-    @classmethod
-    def setUpClass(cls):
-        """A KITTI tracking sequence of 12 frames of 0.1 s each, and one of 3 frames: windows of 1 to 3 frames, all of them."""
-        cls.drive = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "drive"
-        random = np.random.default_rng(11)
-        (cls.drive / "label_02").mkdir(parents=True)
-        for name, count in (("0000", 12), ("bbox", 3)):
-            lines = []
-            for k in range(count):
-                small_job.save_image(cls.drive / "image_02" / name / f"{k:06d}.png", random)
-                boxes = [(5, "Car", 2 + k, 3, 12 + k, 9), (-1, "DontCare", 0, 0, 4, 4)] if k != 4 else []
-                if k % 2:
-                    boxes += [(7, "Pedestrian", 25, 10, 40, 30), (9, "Car", 31.25, 2, 32, 9)]  # cut, and within the last pixel
-                lines += [f"{k} {track} {kind} 0 0 -10 {left} {top} {right} {bottom} -1 -1 -1 -1000 -1000 -1000 -10"
-                          for track, kind, left, top, right, bottom in boxes if name == "0000"]
-            (cls.drive / "label_02" / f"{name}.txt").write_text("".join(line + "\n" for line in lines))
-        (cls.drive / "image_02" / "0000" / "000008.png").write_bytes(b"broken")
-        manifest = cls.drive.parent / "manifest.json"
-        source = {"dataset": "kitti_tracking", "root": str(cls.drive), "pairs": program.pairs([1, 2, 3], choose="all")}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT)))
-        cls.source = manifest.parent / "out"
-        run("convert", manifest, "--progress", "none")
-        run("finalize", cls.source)
-        cls.samples = {key[2]: sample for key, sample in read_samples(cls.source).items()}
-
-    def check_volume(self, columns, window, sample):
-        """Events of a window against the sample's volume: whole numbers of events, times cut to a microsecond."""
-        begin, end = window[:2]
-        t, x, y, p = columns
-        self.assertEqual(len(t), window[3])
-        self.assertTrue((np.diff(t) >= 0).all() and (begin <= t).all() and (t < end).all())
-        again, bins = np.zeros(sample["volume"].shape), len(sample["volume"]) // 2
-        star = (bins - 1) * (t - begin) / (end - begin)
-        low = np.minimum(star.astype(int), bins - 2)
-        for bin_, share in ((low, 1 - (star - low)), (low + 1, star - low)):
-            np.add.at(again, (np.where(p > 0, 0, bins) + bin_, y, x), share)
-        expected = np.floor(sample["volume"].astype(float) + 0.5)
-        np.testing.assert_allclose(again, expected, atol=2e-5 + 9e-6 * expected.max() * 8 / ((end - begin) * 1e-6))
-
-    def check_boxes(self, found, sample, time):
-        boxes = sample["boxes"]
-        kept = np.flatnonzero(boxes["ignore"] == 0)
-        self.assertEqual(set(found["t"]) - {time}, set())
-        xyxy = np.stack([found["x"], found["y"], found["x"] + found["w"], found["y"] + found["h"]], axis=1)
-        np.testing.assert_allclose(xyxy, boxes["xyxy"][kept], atol=1e-4)
-        np.testing.assert_array_equal(found["class_confidence"], 1)
-        names = [name for name in sample["classes"] if name != "DontCare"]
-        self.assertEqual([names[i] for i in found["class_id"]], [sample["classes"][i] for i in boxes["class_id"][kept]])
-        return kept
-
-    def check_dsec(self, known):
-        """Every recording of the export; the ids of its samples."""
-        seen = []
-        for path in sorted((self.out / "dsec").glob("*/*")):
-            windows = read_windows(path / "windows.txt")
-            times = np.genfromtxt(path / "images" / "timestamps.txt", dtype="int64")
-            self.assertEqual(list(times), sorted({time for window in windows for time in window[:3]}))
-            with h5py.File(path / "events" / "left" / "events.h5") as file:
-                self.assertEqual([file[name].dtype for name in ("events/x", "events/y", "events/t", "events/p", "ms_to_idx", "t_offset")],
-                                 ["u2", "u2", "u4", "u1", "u8", "i8"])
-                t, index = file["events/t"][:], file["ms_to_idx"][:]
-                np.testing.assert_array_equal(index, np.searchsorted(t, np.arange(len(index)) * 1000))
-                self.assertEqual(file["t_offset"][()], windows[0][0])
-                self.assertEqual(sum(window[3] for window in windows), len(t))
-                for before, after in zip(windows, windows[1:]):
-                    self.assertLessEqual(before[1], after[0])
-                    self.assertLess(before[2], after[2])
-                for window in windows:
-                    self.check_volume(slice_dsec(file, *window[:2]), window, known[path.parent.name, window[4]])
-            tracks = path / "object_detections" / "left" / "tracks.npy"
-            if tracks.exists():
-                rows = np.load(tracks)
-                self.assertEqual(rows.dtype, TRACKS_DTYPE)
-                for window in windows:
-                    self.check_boxes(rows[rows["t"] == window[2]], known[path.parent.name, window[4]], window[2])
-            seen += [(path.parent.name, window[4]) for window in windows]
-        self.assertEqual(len(seen), len(set(seen)))
-        return seen
-
-    def test_dsec(self):
-        self.export("dsec", "--counts", "rounded")
-        known = {(key[0], key[2]): sample for key, sample in samples.items()}
-        self.assertEqual(sorted(self.check_dsec(known)), sorted(known))
-        folders = {path.name for path in (self.out / "dsec" / "train").iterdir()}
-        self.assertIn("kitti_object+000000", folders)
-        self.assertIn("human36m+S1+Walking-1+54138969", folders)
-        for path in (self.out / "dsec" / "train").glob("human36m*"):
-            self.assertFalse((path / "object_detections").exists())
-        # Human3.6M's times are known: a frame takes 20 ms there.
-        of_video = [window for path in (self.out / "dsec" / "train").glob("human36m*") for window in read_windows(path / "windows.txt")]
-        for begin, end, label, _, sample_id in of_video:
-            sample = known["train", sample_id]
-            self.assertEqual([begin, end], [round(sample["pairs"][name] * 1e6) for name in ("prev_time_s", "next_time_s")])
-        names = json.loads((self.out / "label_map_dictionary.json").read_text())
-        self.assertEqual(names["0"], "Car")
-
-    def test_overlapping_windows_are_different_recordings(self):
-        self.export("dsec", "--counts", "rounded", source=self.source)
-        known = {("train", sample_id): sample for sample_id, sample in self.samples.items()}
-        self.assertEqual(sorted(self.check_dsec(known)), sorted(known))
-        recordings = {path.name: read_windows(path / "windows.txt") for path in (self.out / "dsec" / "train").iterdir()}
-        self.assertEqual({name.split("~")[0] for name in recordings}, {"0000", "bbox"})
-        for name, windows in recordings.items():
-            for begin, end, label, _, sample_id in windows:
-                pairs = self.samples[sample_id]["pairs"]
-                self.assertEqual((begin, end, label), tuple(int(pairs[key]) * 10 ** 5 for key in ("prev_index", "next_index", "label_index")))
-        # There are no more recordings than windows at one time.
-        most = max(sum(begin < time < end for name, windows in recordings.items() if name.startswith("0000")
-                       for begin, end, *_ in windows)
-                   for time in np.arange(0.5, 12) * 1e5)
-        self.assertEqual(sum(name.startswith("0000") for name in recordings), most)
-        tracks = np.concatenate([np.load(path) for path in self.out.rglob("tracks.npy")])
-        self.assertEqual(set(tracks["track_id"]), {5, 7, 9})
-        left_out = self.described()["left_out"]
-        self.assertEqual(left_out["boxes to ignore"], sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
-        self.assertEqual(len(self.described()["quarantined"]), 6)
-
-    def test_frames_without_times_are_a_second_each(self):
-        root = self.out.parent / "frames"
-        for k in (3, 4, 5, 6):
-            small_job.save_image(root / "a b" / f"{k:04d}.png", np.random.default_rng(k))
-        manifest = self.out.parent / "manifest.json"
-        manifest.write_text(json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
-                                                        generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        self.export("dsec", source=manifest.parent / "out")
-        recording, = (self.out / "dsec" / "train").iterdir()
-        self.assertEqual(recording.name, "a%20b")
-        windows = read_windows(recording / "windows.txt")
-        found = read_samples(manifest.parent / "out")
-        self.assertEqual({window[4]: window[:2] for window in windows},
-                         {key[2]: tuple(int(sample["pairs"][name]) * 10 ** 6 for name in ("prev_index", "next_index"))
-                          for key, sample in found.items()})
-        self.assertGreater(len(windows), 1)
-        self.assertFalse((recording / "object_detections").exists())
-
-    def test_a_folder_of_images_is_one_sequence(self):
-        root = self.out.parent / "clip"
-        for k in range(4):
-            small_job.save_image(root / f"{k:04d}.png", np.random.default_rng(k))
-        manifest = self.out.parent / "manifest.json"
-        source = {"dataset": "frames", "root": str(root), "frames_per_second": 20, "pairs": program.pairs([1])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        self.export("dsec", source=manifest.parent / "out")
-        recording, = (self.out / "dsec" / "train").iterdir()
-        self.assertEqual(recording.name, "frames")
-        self.assertEqual([window[:2] for window in read_windows(recording / "windows.txt")],
-                         [(50000 * k, 50000 * (k + 1)) for k in range(3)])
-
-    def test_rvt(self):
-        for source, known in ((self.source, {("train", key): sample for key, sample in self.samples.items()}),
-                              (None, {(key[0], key[2]): sample for key, sample in of(dataset="kitti_object").items()})):
-            with self.subTest(source=source):
-                self.out = pathlib.Path(tempfile.mkdtemp(dir=folder)) / "export"
-                self.export("rvt", "--counts", "rounded", source=source)
-                self.check_rvt(known)
-
-    def check_rvt(self, known):
-        seen, in_frame, unlabelled = [], 0, 0
-        for path in sorted((self.out / "raw").glob("*/*_windows.txt")):
-            split, name, windows = path.parent.name, path.name.removesuffix("_windows.txt"), read_windows(path)
-            of_it = [known[split, window[4]] for window in windows]
-            seen += [(split, window[4]) for window in windows]
-            self.assertEqual(windows[0][0], 0)
-            with h5py.File(path.with_name(f"{name}_td.h5")) as file:
-                size = file["events/height"][()].item(), file["events/width"][()].item()
-                self.assertEqual(size, of_it[0]["volume"].shape[1:])
-                columns = [file[f"events/{column}"][:].astype("int64") for column in "txyp"]
-                for window, sample in zip(windows, of_it):
-                    first, last = np.searchsorted(columns[0], window[:2])
-                    self.check_volume([column[first:last] for column in columns], window, sample)
-            counts = [(sample["boxes"]["ignore"] == 0).sum() for sample in of_it]
-            boxes = path.with_name(f"{name}_bbox.npy")
-            self.assertEqual(boxes.exists(), sum(counts) > 0)
-            if not boxes.exists():
-                unlabelled += len(windows)
-                self.assertFalse((self.out / "preprocessed" / split / name).exists())
-                continue
-            # The names that RVT's preprocessing finds the events and the sequence by.
-            self.assertEqual(boxes.stem.split("bbox")[0] + "td.h5", f"{name}_td.h5")
-            rows = np.load(boxes)
-            self.assertEqual(rows.dtype, BBOX_DTYPE)
-            self.assertEqual(len(rows), sum(counts))
-            for window, sample in zip(windows, of_it):
-                self.check_boxes(rows[rows["t"] == window[2]], sample, window[2])
-            sequence = RvtSequence(self.out / "preprocessed" / split / name, "eventgan_nbins=9", size)
-            self.assertEqual(sequence.labels.dtype, BBOX_DTYPE)
-            self.assertEqual(list(sequence.repr_times), [window[1] for window in windows])
-            for volume, sample in zip(sequence.data, of_it):
-                np.testing.assert_array_equal(volume, np.concatenate([sample["volume"][9:], sample["volume"][:9]]))
-            for k, time in enumerate(sequence.frame_times):
-                labels, place = sequence.frame(k)
-                self.assertEqual(windows[place][2], time)
-                xyxy = of_it[place]["boxes"]["xyxy"][of_it[place]["boxes"]["ignore"] == 0]
-                xyxy = xyxy[(xyxy[:, 0] < size[1] - 1) & (xyxy[:, 1] < size[0] - 1)]
-                np.testing.assert_allclose(np.stack([labels[key] for key in "xywh"], axis=1),
-                                           np.hstack([xyxy[:, :2], xyxy[:, 2:] - xyxy[:, :2]]), atol=1e-4)
-                in_frame += len(labels)
-        self.assertEqual(sorted(seen), sorted(known))
-        left_out = self.described()["left_out"]
-        kept = sum((sample["boxes"]["ignore"] == 0).sum() for sample in known.values())
-        self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0), kept - in_frame)
-        self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
-
-    def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
-        manifest = self.out.parent / "manifest.json"
-        source = {"dataset": "kitti_tracking", "root": str(self.drive), "pairs": program.pairs([2])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT,
-                                                        image={"width": 304, "height": 240, "preset": "mpii"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        self.export("rvt", source=manifest.parent / "out")
-        self.assertEqual({path.name.split("_")[0] for path in (self.out / "raw" / "train").glob("*_td.dat.h5")} - {"0000", "0000~2"},
-                         {"%62box"})
-
-    def test_a_class_map_and_no_events(self):
-        classes = folder / "dsec.json"
-        classes.write_text(json.dumps({"Pedestrian": 0, "Car": 2}))
-        black = self.out.parent / "black"
-        shutil.copytree(self.drive, black)
-        for path in (black / "image_02").rglob("*.png"):
-            PIL.Image.new("L", (small_job.WIDTH, small_job.HEIGHT)).save(path)
-        manifest = self.out.parent / "manifest.json"
-        source = {"dataset": "kitti_tracking", "root": str(black), "pairs": program.pairs([1])}
-        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
-        run("convert", manifest, "--progress", "none")
-        run("finalize", manifest.parent / "out")
-        for to in ("dsec", "rvt"):
-            self.export(to, "--classes", classes, source=manifest.parent / "out", out=self.out / to)
-            self.assertEqual(json.loads((self.out / to / "label_map_dictionary.json").read_text()), {"0": "Pedestrian", "2": "Car"})
-        with h5py.File(self.out / "dsec/dsec/train/0000/events/left/events.h5") as file:
-            self.assertEqual(file["events/t"].shape, (0,))
-            np.testing.assert_array_equal(file["ms_to_idx"][:], np.zeros(1101))
-        tracks = np.load(self.out / "dsec/dsec/train/0000/object_detections/left/tracks.npy")
-        self.assertEqual(set(tracks["class_id"]), {0, 2})
-        classes.write_text(json.dumps({"Car": 256}))
-        _, err = self.export("dsec", "--classes", classes, source=manifest.parent / "out", expect=64)
-        self.assertIn("at most 255", err)
 
 
 class Trainers(Export):
@@ -948,7 +579,7 @@ class AgainAndAgain(Export):
         for to in FORMATS:
             expected = self.out / to
             self.export(to, "--split", split_for(to), out=expected)
-            arguments = ["export", finalized, "--to", to, "--split", split_for(to), "--progress", "none"]
+            arguments = ["export", demo.finalized, "--to", to, "--split", split_for(to), "--progress", "none"]
             for number in (1, 3, 5):  # davis has six, the last one the receipt of export.json
                 with self.subTest(to=to, number=number):
                     out = self.out.parent / f"{to}-{number}"
@@ -967,7 +598,7 @@ class AgainAndAgain(Export):
             with self.subTest(rule=rule):
                 out = self.out.parent / rule.replace(" ", "-")
                 out.mkdir()
-                done = failing_files.run(out, rule, "export", finalized, "--to", "yolo", "--out", out, "--progress", "none")
+                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--out", out, "--progress", "none")
                 self.assertEqual(done.code, -9)
                 (out / "a.txt").write_text("mine")
                 self.export("coco", "--split", "val", "--overwrite", out=out, expect=64)
@@ -975,7 +606,7 @@ class AgainAndAgain(Export):
                 (out / "a.txt").unlink()
                 self.export("coco", "--split", "val", "--overwrite", out=out)
                 same_folder(out, expected)
-                done = failing_files.run(out, rule, "export", finalized, "--to", "yolo", "--overwrite", "--out", out)
+                done = failing_files.run(out, rule, "export", demo.finalized, "--to", "yolo", "--overwrite", "--out", out)
                 self.assertEqual(done.code, -9)
                 self.export("yolo", "--split", "train", "--overwrite", out=out)
 
@@ -983,7 +614,7 @@ class AgainAndAgain(Export):
         expected = self.out / "expected"
         self.export("coco", out=expected)
         out = self.out / "stopped"
-        running = subprocess.Popen([program.PROGRAM, "export", finalized, "--to", "coco", "--out", out, "--threads", "1",
+        running = subprocess.Popen([program.PROGRAM, "export", demo.finalized, "--to", "coco", "--out", out, "--threads", "1",
                                     "--progress", "none"], stderr=subprocess.PIPE, text=True)
         while running.poll() is None and not list(out.glob("volumes/*/*.npy")):
             time.sleep(0.001)
@@ -1003,7 +634,7 @@ class AgainAndAgain(Export):
                 self.export(to, "--split", split_for(to), out=expected)
                 out = self.out.parent / f"{to}-full"
                 out.mkdir()
-                arguments = ["export", finalized, "--to", to, "--split", split_for(to), "--progress", "none", "--out", out]
+                arguments = ["export", demo.finalized, "--to", to, "--split", split_for(to), "--progress", "none", "--out", out]
                 done = failing_files.run(out, "ENOSPC write 5+", *arguments)
                 self.assertEqual(done.code, 1)
                 self.assertIn("No space left on device", done.err)
@@ -1015,7 +646,7 @@ class AgainAndAgain(Export):
 
     def test_a_shard_that_changed_is_exported_again(self):
         source = self.out.parent / "source"
-        shutil.copytree(finalized, source)
+        shutil.copytree(demo.finalized, source)
         self.export("yolo", "--split", "val", source=source)
         receipts = sorted((self.out / ".export").glob("*-of-*.json"))
         receipts[0].write_text(receipts[0].read_text().replace('"input":"', '"input":"0'))
@@ -1042,7 +673,7 @@ class ForeignNames(Export):
     def refused(self, *named, to="coco", arguments=()):
         """The export must fail and change nothing; what is in its message."""
         before, outside = content(self.out), content(self.elsewhere)
-        done = subprocess.run([program.PROGRAM, "export", finalized, "--to", to, "--split", "val", "--out", self.out, "--progress", "none", *arguments],
+        done = subprocess.run([program.PROGRAM, "export", demo.finalized, "--to", to, "--split", "val", "--out", self.out, "--progress", "none", *arguments],
                               capture_output=True, text=True, timeout=100)
         self.assertEqual(done.returncode, 1, done.stderr)
         for part in named:
@@ -1110,11 +741,11 @@ class ForeignNames(Export):
 
     def test_sources_of_the_description_are_those_of_the_plan(self):
         source = self.out.parent / "source"
-        shutil.copytree(finalized, source)
+        shutil.copytree(demo.finalized, source)
         for key in ("split", "dataset"):
             for value in ("../../elsewhere/x", str(self.elsewhere), "val" if key == "split" else "mpii", None):
                 with self.subTest(key=key, value=value):
-                    description = json.loads((finalized / "dataset.json").read_text())
+                    description = json.loads((demo.finalized / "dataset.json").read_text())
                     description["sources"][0][key] = value
                     (source / "dataset.json").write_text(json.dumps(description))
                     _, err = self.export("yolo", source=source, expect=66)
@@ -1130,18 +761,18 @@ class ForeignNames(Export):
 class BadInput(Export):
     def test_a_folder_that_is_not_finalized(self):
         source = self.out.parent / "source"
-        shutil.copytree(finalized, source)
+        shutil.copytree(demo.finalized, source)
         (source / "dataset.json").unlink()
         _, err = self.export("yolo", source=source, expect=66)
         self.assertIn("dataset.json", err)
-        self.export("yolo", source=folder / "none", expect=66)
+        self.export("yolo", source=demo.folder / "none", expect=66)
         self.assertFalse(self.out.exists())
 
     def test_a_shard_that_is_missing_or_another_one(self):
         for change in ("remove", "bytes", "record", "plan"):
             with self.subTest(change=change):
                 source = self.out.parent / change
-                shutil.copytree(finalized, source)
+                shutil.copytree(demo.finalized, source)
                 shard = sorted(source.glob("*-val-*.h5"))[0]
                 record = shard.with_suffix(".json")
                 if change == "remove":
@@ -1164,17 +795,17 @@ class BadInput(Export):
 
     def test_a_partial_folder_says_so(self):
         source = self.out.parent / "source"
-        shutil.copytree(finalized, source)
+        shutil.copytree(demo.finalized, source)
         gone = sorted(source.glob("*-val-*.h5"))[0]
         gone.unlink()
         run("finalize", source, "--partial")
         out, _ = self.export("webdataset", source=source)
         self.assertIn("PARTIAL", out)
         self.assertEqual(self.described()["missing_shards"], [gone.name])
-        shutil.copy(finalized / gone.name, gone)
+        shutil.copy(demo.finalized / gone.name, gone)
         run("finalize", source)
         self.export("webdataset", source=source)
-        self.assertEqual(len(self.described()["samples"]), len(samples))
+        self.assertEqual(len(self.described()["samples"]), len(demo.samples))
 
     def test_wrong_usage(self):
         _, err = self.export("yolo", "--split", "test", expect=64)
@@ -1189,7 +820,7 @@ class BadInput(Export):
         self.assertFalse(self.out.exists())
 
     def test_a_wrong_class_map(self):
-        classes = folder / "wrong.json"
+        classes = demo.folder / "wrong.json"
         for content_, what in [('{"Car": 0, "Cat": 1}', "DontCare"), ('{"Car": 1}', "no 0"), ('{"Car": "a"}', "whole number"),
                                ('{"DontCare": 0, "Car": 1}', "--ignored keep"),
                                ('[1]', "class names"), ('{"Car": 0', "JSON"), ('{"Car": null}', "one class")]:
@@ -1197,7 +828,7 @@ class BadInput(Export):
                 classes.write_text(content_)
                 _, err = self.export("yolo", "--classes", classes, expect=64)
                 self.assertIn(what, err)
-        self.export("yolo", "--classes", folder / "none.json", expect=66)
+        self.export("yolo", "--classes", demo.folder / "none.json", expect=66)
 
     def test_an_export_of_another_job_is_never_replaced(self):
         self.export("yolo", "--split", "val")

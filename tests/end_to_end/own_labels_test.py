@@ -4,9 +4,12 @@ of COCO, planned in linear time."""
 import csv
 import json
 import os
+import subprocess
+import sys
 import unittest
 import xml.etree.ElementTree as ElementTree
 
+import cv2
 import h5py
 import numpy as np
 import PIL.Image
@@ -170,6 +173,89 @@ class OwnLabels(program.InFolder):
         self.assertIn("(annotation 90056): $.category_id", reasons["000005"])
         self.assertIn("expected a frame, got no file, in images/gone.png", reasons["gone"])
 
+    def rows(self, folder):
+        """Of every sample all that its shard has in its row, the volume included."""
+        found = {}
+        for shard in sorted(folder.glob("*-of-*.h5")):
+            with h5py.File(shard) as file:
+                groups = {name: file[name] for name in ("events", "pairs")}
+                columns = {f"{name}/{key}": item for name, group in groups.items() for key, item in group.items() if isinstance(item, h5py.Dataset)}
+                columns["original"] = file["labels/original"]
+                for i, sample_id in enumerate(file["pairs/sample_id"]):
+                    found[text(sample_id)] = {key: item[i].tobytes() if isinstance(item[i], (np.generic, np.ndarray)) else item[i]
+                                              for key, item in columns.items() if len(item) == len(file["pairs/sample_id"])}
+        return found
+
+    def test_retry_redoes_what_was_mended_and_nothing_else(self):
+        squares = self.make_images(8)
+        images = {name: self.folder / "images" / f"{name}.png" for name in squares}
+        self.coco({f"{name}.png": (64, 48) for name in squares}, [(f"{name}.png", "car", *edges) for name, edges in squares.items()])
+        whole = {name: path.read_bytes() for name, path in images.items()}
+        images["000003"].write_bytes(whole["000003"][:100])
+        images["000007"].unlink()  # the labels name it
+        source = {"dataset": "frames", "root": "images", "labels": {"format": "coco", "path": "instances.json"}, "pairs": pairs([1])}
+        path = self.write_manifest(manifest([source], generator={"kind": "difference"},
+                                            errors={"policy": "quarantine", "max_count": 9, "max_fraction": 1}))
+        out = self.folder / "out"
+        run("convert", path, "--progress", "none")
+        spoiled = {"000003", "000004", "000007"}
+        self.assertEqual({q["sample_id"] for record in out.glob("*-of-*.json") for q in json.loads(record.read_text())["quarantined"]}, spoiled)
+        before = self.rows(out)
+        for name, path_of_image in images.items():
+            path_of_image.write_bytes(whole[name])
+        done, _ = run("retry", out, "--progress", "json")
+        report = json.loads(done.splitlines()[-1])
+        self.assertEqual((report["tried"], report["mended"], report["quarantined"]), (3, 3, 0))
+        deep, _ = run("verify", "--deep", out)
+        self.assertIn("7 samples, 0 of them quarantined", deep)
+        self.assertIn("labels of 7 samples compared with their sources", deep)
+        after = self.rows(out)
+        self.assertLess({"events/volume", "original", "pairs/source_to_volume"}, after["000001"].keys())
+        run("convert", path, "--output", self.folder / "fresh", "--progress", "none")
+        self.assertEqual(after, self.rows(self.folder / "fresh"))
+        self.assertEqual({name for name in after if after[name] != before[name]}, spoiled)
+
+    def test_a_folder_of_splits_becomes_a_source_for_each(self):
+        squares = self.make_images(8)
+        drive = self.folder / "drive"
+        for i, (name, (left, top, right, bottom)) in enumerate(squares.items()):
+            split = "train" if i < 5 else "val"
+            for kind in ("images", "labels"):
+                (drive / kind / split).mkdir(parents=True, exist_ok=True)
+            (self.folder / "images" / f"{name}.png").rename(drive / "images" / split / f"{name}.png")
+            (drive / "labels" / split / f"{name}.txt").write_text(f"0 {(left + right) / 128} {(top + bottom) / 96} {(right - left) / 64} "
+                                                                  f"{(bottom - top) / 48}\n")
+        (drive / "data.yaml").write_text("names: [car]\n")
+        out, _ = run("init", drive, "--out", self.folder / "drive.json")
+        self.assertNotIn("warning", out)
+        planned = json.loads(run("plan", "--json", self.folder / "drive.json")[0])
+        self.assertEqual([(source["split"], source["labelled_frames"]) for source in planned["sources"]], [("train", 5), ("val", 3)])
+        for _ in range(2):  # the second time by the manifest that was kept
+            run("convert", drive, "--output", self.folder / "out", "--progress", "none")
+        deep, _ = run("verify", "--deep", self.folder / "out")
+        self.assertIn("labels of 6 samples compared with their sources", deep)
+        self.assertEqual({shard.name.split("-")[-4] for shard in (self.folder / "out").glob("*-of-*.h5")}, {"train", "val"})
+
+    def test_the_labels_themselves_score_1(self):
+        squares = self.make_images()
+        boxes = [(f"{name}.png", label, *edges) for name, edges in squares.items() for label in ("person", "car")]
+        self.coco({f"{name}.png": (64, 48) for name in squares}, boxes, lambda i: {"iscrowd": i == 3})
+        self.job({"format": "coco", "path": "instances.json"}, width=128, height=112, fit="letterbox")
+        found = [{"image_id": name, "category_id": label, "bbox": [left, top, right - left, bottom - top], "score": 0.9}
+                 for name, sample in self.samples.items() for label, (left, top, right, bottom), ignore in sample["boxes"] if not ignore]
+        self.assertEqual(len(found), 9)  # 5 samples of 2 boxes, one of them a crowd
+        self.assertEqual(self.average_precisions(found), {"car": "1.000", "person": "1.000", "all": "1.000"})
+        wrong = [{**one, "bbox": [0, 100, 9, 9]} if one["category_id"] == "car" else one for one in found]
+        self.assertEqual(self.average_precisions(wrong)["car"], "0.000")
+
+    def average_precisions(self, found):
+        """COCO's AP@[.5:.95] of each class, as eventgan.evaluate prints it."""
+        (self.folder / "found.json").write_text(json.dumps([{**one, "bbox": [float(edge) for edge in one["bbox"]]} for one in found]))
+        done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", "detections", self.folder / "found.json", "--truth", self.folder / "out"],
+                              capture_output=True, text=True, check=True, env={**os.environ, "PYTHONPATH": str(program.SOURCE / "manifests" / "python")})
+        lines = [line.split() for line in done.stdout.partition("average precision ")[2].splitlines()[1:]]
+        return {line[0]: line[-1] for line in lines if line}
+
     def test_yolo_comes_out_as_it_went_in(self):
         squares = self.make_images()
         (self.folder / "labels").mkdir()
@@ -276,6 +362,43 @@ class OwnLabels(program.InFolder):
                              [bool(row[6] == 0 or row[7] in (2, 7, 8, 12, 13)) for row in table])
 
     # ---- Scale
+
+    def assert_linear(self, seconds):
+        """`seconds` by the number of inputs, of two numbers of which one is eight times the other: a square would be 64 times as long."""
+        few, many = sorted(seconds)
+        self.assertEqual(many, 8 * few)
+        self.assertLess(seconds[many], 20 * max(seconds[few], 0.3))
+
+    def test_init_of_thousands_of_sequences(self):
+        seconds = {}
+        (self.folder / "0.png").write_bytes(grey_png(0))
+        for count in (500, 4000):
+            for i in range(count):
+                sequence = self.folder / str(count) / f"{i:05d}"
+                sequence.mkdir(parents=True)
+                os.link(self.folder / "0.png", sequence / "0.png")
+                os.link(self.folder / "0.png", sequence / "1.png")
+            seconds[count] = Measured("init", self.folder / str(count), "--out", self.folder / f"{count}.json").seconds
+        self.assert_linear(seconds)
+
+    def test_thousands_of_label_texts_beside_a_video(self):
+        seconds = {}
+        for count in (2000, 16000):
+            folder = self.folder / str(count)
+            folder.mkdir()
+            (folder / "classes.txt").write_text("car\n")
+            writer = cv2.VideoWriter(str(folder / "clip.avi"), cv2.VideoWriter_fourcc(*"MJPG"), 25, (64, 48))
+            for _ in range(3):
+                writer.write(np.zeros((48, 64, 3), np.uint8))
+            writer.release()
+            for i in range(count):
+                (folder / f"clip_{i:06d}.txt").write_text("0 0.5 0.5 0.25 0.25\n")
+            source = {"dataset": "frames", "root": folder.name, "labels": {"format": "yolo", "path": folder.name}, "pairs": pairs([1])}
+            path = self.write_manifest(manifest([source], generator={"kind": "difference"}), f"{count}.json")
+            done = Measured("plan", "--json", path)
+            self.assertEqual(json.loads(done.out)["pairs"], count - 1)  # most of frames that the video does not have
+            seconds[count] = done.seconds
+        self.assert_linear(seconds)
 
     def test_a_hundred_thousand_images_of_coco(self):
         seconds = {}

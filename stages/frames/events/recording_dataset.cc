@@ -174,9 +174,19 @@ class RecordingDataset final : public Dataset {
     // The key has the time of the label, or of the frame that it was taken to.
     const auto& labels = recorded.labels.annotations;
     const auto label = labels.lower_bound(time_s - kSameTime_s);
-    if (label != labels.end() && label->first <= time_s + kSameTime_s) return label->second;
-    return SampleFault{"expected labels of " + std::to_string(time_s) + " s, got none, in " +
-                       recorded.label_file};
+    if (label == labels.end() || label->first > time_s + kSameTime_s) {
+      return SampleFault{"expected labels of " + std::to_string(time_s) + " s, got none, in " +
+                         recorded.label_file};
+    }
+    for (const Box& box : label->second.boxes) {  // detectors' losses know none without an area
+      const double width = box.xyxy.right - box.xyxy.left;
+      const double height = box.xyxy.bottom - box.xyxy.top;
+      if (width > 0 && height > 0) continue;
+      return SampleFault{
+          fmt::format("expected boxes of a width and height above 0, got {:g} x {:g}, in {}", width,
+                      height, label_place(label_key))};
+    }
+    return label->second;
   } catch (const InputError& error) {
     return SampleFault{error.what()};
   }

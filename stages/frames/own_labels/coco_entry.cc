@@ -55,6 +55,11 @@ Rectangle read_bbox(const StrictValue& value) {
           top + sides[3].number(0, kFarthest_px)};
 }
 
+/// COCO has 0 or 1; many tools write false or true.
+bool read_flag(const StrictValue& value) {
+  return value.is_boolean() ? value.boolean() : value.integer(0, 1) == 1;
+}
+
 /// Whether a joint of the annotation is annotated.
 bool read_keypoints(StrictObject& object, std::size_t joints, Person& person) {
   const auto keypoints = object.find("keypoints");
@@ -127,7 +132,7 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
     }
   }
   box.xyxy = read_bbox(object.at("bbox"));
-  if (const auto crowd = object.find("iscrowd")) box.ignore = crowd->integer(0, 1) == 1;
+  if (const auto crowd = object.find("iscrowd")) box.ignore = read_flag(*crowd);
   if (const auto area = object.find("area")) area->number(0, kFarthest_px * kFarthest_px);
   Person person;
   const bool is_person = read_keypoints(object, schema.joint_names.size(), person);

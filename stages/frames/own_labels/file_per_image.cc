@@ -1,7 +1,6 @@
 #include "stages/frames/own_labels/detail/file_per_image.h"
 
 #include <algorithm>
-#include <system_error>
 #include <utility>
 
 #include "stages/frames/own_labels/detail/frame_names.h"
@@ -17,11 +16,6 @@ std::string joined(const std::string& folder, const std::string& name) {
 }
 
 fs::path normal(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
-
-bool is_folder(const fs::path& path) {
-  std::error_code error;
-  return fs::is_directory(path, error);
-}
 
 }  // namespace
 
@@ -65,10 +59,10 @@ std::string FilePerImage::folder_of(const std::string& images) const {
     if (!path.has_filename()) path = path.parent_path();  // "data/"
     const std::string below = replaced.lexically_relative(path).generic_string();
     const bool is_below = !below.empty() && below != ".." && !below.starts_with("../");
-    if (is_below && is_folder(replaced)) return below == "." ? "" : below;
+    if (is_below && has_folder(replaced)) return below == "." ? "" : below;
   }
   std::string in_labels = joined(std::string(names_.label_folder), images);
-  return is_folder(root_.on_disk(in_labels)) ? in_labels : images;
+  return has_folder(root_.on_disk(in_labels)) ? in_labels : images;
 }
 
 void FilePerImage::find_of_images() {
@@ -113,7 +107,7 @@ void FilePerImage::note_unused(const std::string& folder, const std::set<std::st
 void FilePerImage::find_of_videos() {
   const FrameNames names(source());
   const std::string label_folder(names_.label_folder);
-  const std::string folder = is_folder(root_.on_disk(label_folder)) ? label_folder : "";
+  const std::string folder = has_folder(root_.on_disk(label_folder)) ? label_folder : "";
   const auto take = [&](const std::string& key, const std::string& frame_name) {
     annotation_files_.push_back(root_.written(key));
     const std::size_t frame = names.find(frame_name).frame;

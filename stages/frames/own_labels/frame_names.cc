@@ -70,6 +70,10 @@ bool overlaps(const Rectangle& box, ImageSize image) {
 }
 
 std::string outside_text(const Rectangle& box, ImageSize image) {
+  if (!(box.right > box.left && box.bottom > box.top)) {
+    return fmt::format("expected a box of a width and height above 0, got {:g} x {:g}",
+                       box.right - box.left, box.bottom - box.top);
+  }
   return fmt::format("expected a box within the image of {}, got one from ({}, {}) to ({}, {})",
                      to_string(image), box.left, box.top, box.right, box.bottom);
 }

@@ -204,17 +204,12 @@ class MotLabels : public ReadLabels {
 
   /// seqinfo.ini in the folder of gt.txt, or above it where that is named gt.
   std::optional<MotSequence> read_info(const std::string& file) {
-    fs::path folder = root_.on_disk(file).parent_path();
-    fs::path written = fs::path(root_.written(file)).parent_path();
-    if (folder.filename() == "gt") {
-      folder = folder.parent_path();
-      written = written.parent_path();
-    }
-    std::error_code error;
-    if (!fs::exists(folder / "seqinfo.ini", error)) return std::nullopt;
-    const std::string path = (written / "seqinfo.ini").generic_string();
+    SourceRoot folder = root_.above(file);
+    if (folder.name() == "gt") folder = folder.above();
+    if (!folder.has_file("seqinfo.ini")) return std::nullopt;
+    const std::string path = folder.written("seqinfo.ini");
     annotation_files_.push_back(path);
-    return parse_mot_sequence(SourceRoot("", folder).read_or_throw("seqinfo.ini"), path);
+    return parse_mot_sequence(folder.read_or_throw("seqinfo.ini"), path);
   }
 
   /// Throws InputError if images whose names tell no number, and which are counted in their order

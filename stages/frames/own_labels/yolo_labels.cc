@@ -15,7 +15,7 @@ class YoloLabels : public FilePerImage {
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : FilePerImage(spec, base, std::move(labelled),
                      {".txt", {"images"}, "labels", kClassesFile}) {
-    read_classes(base);
+    read_classes();
     std::ranges::sort(annotation_files_);
   }
 
@@ -29,10 +29,8 @@ class YoloLabels : public FilePerImage {
   }
 
  private:
-  void read_classes(const std::filesystem::path& base) {
-    const std::string folder = root().written("");
-    const SourceRoot above(std::filesystem::path(folder).parent_path().generic_string(), base);
-    for (const SourceRoot& place : {root(), above}) {
+  void read_classes() {
+    for (const SourceRoot& place : {root(), root().above()}) {
       for (const std::string_view name : {std::string_view("data.yaml"), kClassesFile}) {
         if (!place.has_file(name)) continue;
         const std::string text = place.read_or_throw(name);
@@ -45,7 +43,7 @@ class YoloLabels : public FilePerImage {
       }
     }
     throw InputError("expected data.yaml or classes.txt with the classes' names, got neither, in " +
-                     folder + " and the folder above it");
+                     root().written("") + " and the folder above it");
   }
 
   YoloSchema classes_;

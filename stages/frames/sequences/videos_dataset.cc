@@ -179,12 +179,14 @@ class VideosDataset final : public Dataset {
   }
 
   void note_left_out(const SourceRoot& folder, std::vector<std::string> names) {
+    std::ranges::sort(annotation_files_);
+    const auto is_label = [&](const std::string& path) {
+      const auto below = std::ranges::lower_bound(annotation_files_, path + "/");
+      return std::ranges::binary_search(annotation_files_, path) ||
+             (below != annotation_files_.end() && below->starts_with(path + "/"));
+    };
     std::erase_if(names, [&](const std::string& name) {
-      const std::string path = folder.written(name);
-      const auto is_in = [&](const std::string& file) {
-        return file == path || file.starts_with(path + "/");
-      };
-      return name.starts_with('.') || (labels_ && std::ranges::any_of(annotation_files_, is_in));
+      return name.starts_with('.') || (labels_ && is_label(folder.written(name)));
     });
     if (names.empty()) return;
     std::ranges::sort(names);

@@ -17,10 +17,12 @@ struct ColumnLayout {
   std::string ms_index;  ///< whole numbers [ms]: the first event at or after each ms; may be absent
   std::string t_offset;  ///< µs, added to t; may be absent
   std::vector<std::string> size;  ///< of the sensor: [width, height], or height and width
+
+  std::string column(const std::string& name) const { return events + "/" + name; }
 };
 
-/// DSEC's. Files of RVT and Prophesee (NAME_td.h5) are read as well, which have no index and no
-/// offset, but height and width.
+/// DSEC's, as EventColumnsWriter writes it, too. Files of RVT and Prophesee (NAME_td.h5) are read
+/// as well, which have no index and no offset, but height and width.
 ColumnLayout dsec_layout();
 
 /// M3ED's, of one camera: "left" or "right".

@@ -26,7 +26,7 @@ std::vector<PlannedShard> lay_out(const std::vector<Source>& sources, int sample
     layout.begin_source(static_cast<int>(i), sources[i].split);
     for (std::size_t k = 0; k < sources[i].sizes.size(); ++k) {
       const std::string id = "s" + std::to_string(k);
-      layout.add({id, "", "", {{"0.png"}, {id + ".png"}}, ""}, sources[i].sizes[k]);
+      layout.add({id, "", "", {{"0.png", 0}, {id + ".png", 1}}, ""}, sources[i].sizes[k]);
     }
   }
   return layout.finish();
@@ -96,13 +96,37 @@ TEST(ShardLayout, SamplesOfOneUnreadableVideoShareShards) {
   ShardLayout layout("job", 2);
   layout.begin_source(0, "train");
   for (const char* video : {"a.mp4", "a.mp4", "a.mp4", "b.mp4"}) {
-    layout.add({video, "", "", {{video}, {video}}, ""}, {});
+    layout.add({video, "", "", {{video, 0}, {video, 1}}, ""}, {});
   }
   const auto shards = layout.finish();
   ASSERT_EQ(shards.size(), 3u);
   EXPECT_THAT(ids(shards[0]), ::testing::ElementsAre("a.mp4", "a.mp4"));
   EXPECT_THAT(ids(shards[1]), ::testing::ElementsAre("a.mp4"));
   EXPECT_THAT(ids(shards[2]), ::testing::ElementsAre("b.mp4"));
+}
+
+TEST(ShardLayout, SamplesOfASequenceWithoutAnyImageShareShards) {
+  ShardLayout layout("job", 2);
+  layout.begin_source(0, "train");
+  const auto add = [&](const char* id, const char* sequence, std::int64_t index, ImageSize size) {
+    const FrameRef frame{std::string(id) + ".png", index};
+    layout.add({id, sequence, "", {frame, frame}, ""}, size);
+  };
+  for (const char* id : {"a1", "a2", "a3"}) add(id, "a", -1, {});
+  add("b1", "b", -1, {});
+  add("b2", "b", 2, {});  // an image that cannot be read
+  add("b3", "b", 3, {});
+  add("b4", "b", 4, kSmall);
+  add("b5", "b", -1, {});
+  const auto shards = layout.finish();
+  std::vector<std::vector<std::string>> samples;
+  for (const PlannedShard& shard : shards) samples.push_back(ids(shard));
+  EXPECT_EQ(samples, (std::vector<std::vector<std::string>>{
+                         {"b4"}, {"a1", "a2"}, {"a3"}, {"b1"}, {"b2"}, {"b3"}, {"b5"}}));
+  for (std::size_t i = 1; i < shards.size(); ++i) {
+    EXPECT_TRUE(shards[i].size_unknown);
+    EXPECT_EQ(shards[i].volume_size, kSmall);
+  }
 }
 
 TEST(ShardLayout, OfNothingIsNothing) {
@@ -174,6 +198,26 @@ TEST_F(MakePlan, SaysWhichSamplesHaveNoKnownSizeAndFindsItOnceTheyAreMended) {
   complete_plan(manifest_, datasets, plan);
   EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 10}));
   EXPECT_EQ(plan.shards[0].volume_size, (ImageSize{4, 6}));
+}
+
+TEST_F(MakePlan, LabelsWithoutImagesShareShards) {
+  std::string table = "image,class,left,top,right,bottom\nf_01.png,car,1,1,3,3\n";
+  for (int i = 0; i < 5; ++i) table += "gone_" + std::to_string(i) + ".png,car,1,1,3,3\n";
+  testing::write_file(folder_ / "boxes.csv", table);
+  manifest_.sources[0].labels = LabelSpec{LabelFormat::kCsv, "boxes.csv"};
+  auto [plan, by_gap, datasets, warnings] = make_plan(manifest_, "w", "e");
+  ASSERT_EQ(plan.shards.size(), 4u);  // f_01's, and 5 samples by 2
+  EXPECT_EQ(plan.sources[0].faults, 5);
+  EXPECT_THAT(ids(plan.shards[1]), ::testing::ElementsAre("gone_0", "gone_1"));
+  EXPECT_TRUE(plan.shards[1].size_unknown);
+  // Once they are there, with the image before the first, all is as it would be planned anew.
+  for (const char* name : {"gone_0.png", "gone_1.png"}) {
+    testing::write_flat_image(folder_ / "clip" / name, {8, 10}, 100);
+  }
+  complete_plan(manifest_, make_plan(manifest_, "w", "e").datasets, plan);
+  EXPECT_EQ(plan.shards[1].volume_size, (ImageSize{8, 10}));
+  EXPECT_EQ(plan.shards[1].samples.at(1).fault, "");
+  EXPECT_EQ(plan.shards[2].volume_size, (ImageSize{4, 6})) << "the guess stays";
 }
 
 TEST_F(MakePlan, AMissingFrameThatWasAddedBecomesWhatItWouldBePlannedAsToday) {

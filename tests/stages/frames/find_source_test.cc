@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+
 #include "manifests/values/faults.h"
 #include "tests/testing/npy_bytes.h"
 #include "tests/testing/temporary_folder.h"
@@ -26,7 +28,7 @@ class FindSource : public ::testing::Test {
     testing::write_file(folder_.path() / name, text);
   }
   FoundSource find(const fs::path& name, std::optional<DatasetKind> dataset = std::nullopt) {
-    return find_source(folder_.path() / name, dataset);
+    return find_sources(folder_.path() / name, dataset).front();
   }
   fs::path at(const fs::path& name) const { return folder_.path() / name; }
 
@@ -284,23 +286,71 @@ TEST_F(FindSource, LabelsThatAreLeftOutAreRemarks) {
 }
 
 TEST_F(FindSource, ImagesThatAreLeftOutAreWarnings) {
-  for (const char* split : {"train", "valid"}) {
-    write(std::string("a/") + split + "/images/1.jpg");
-    write(std::string("a/") + split + "/labels/1.txt");
-  }
+  write("a/train/images/1.jpg");
+  write("a/train/labels/1.txt");
+  write("a/valid/images/1.jpg");
   write("a/data.yaml");
   write("a/other/2.png");
-  FoundSource found = find("a");
-  EXPECT_EQ(found.root, at("a/train/images"));
-  EXPECT_THAT(found.remarks, Contains("warning: 2 folders of images left out: other, valid"));
+  const auto sources = find_sources(at("a"));
+  ASSERT_EQ(sources.size(), 1u);
+  EXPECT_EQ(sources[0].root, at("a/train/images"));
+  EXPECT_THAT(sources[0].remarks, Contains("warning: 2 folders of images left out: other, valid"));
   EXPECT_THAT(find("a/train").remarks, IsEmpty());
-  for (const char* split : {"train", "val"}) {
-    write(std::string("b/images/") + split + "/1.jpg");
-    write(std::string("b/labels/") + split + "/1.txt");
-  }
-  write("b/data.yaml");
+  // One file has the labels of both.
+  write("b/train/1.jpg");
+  write("b/val/1.jpg");
+  write("b/boxes.csv",
+        "image,class,left,top,right,bottom\ntrain/1.jpg,a,0,0,1,1\nval/1.jpg,a,0,0,1,1\n");
+  EXPECT_EQ(find_sources(at("b")).size(), 1u);
+  EXPECT_EQ(find("b").root, at("b"));
   EXPECT_THAT(find("b").remarks,
               ::testing::ElementsAre(HasSubstr("warning: images of val are in split train, too")));
+}
+
+TEST_F(FindSource, SplitsWithLabelsOfTheirOwnAreSources) {
+  const auto splits = [&](const fs::path& name) {
+    std::vector<std::array<std::string, 3>> found;
+    for (const FoundSource& source : find_sources(at(name))) {
+      found.push_back({std::string(source.split),
+                       source.root.lexically_relative(at(name)).generic_string(),
+                       source.labels->path.lexically_relative(at(name)).generic_string()});
+    }
+    return found;
+  };
+  using Splits = std::vector<std::array<std::string, 3>>;
+  for (const char* split : {"valid", "train", "test"}) {
+    write("roboflow/" + std::string(split) + "/images/1.jpg");
+    write("roboflow/" + std::string(split) + "/labels/1.txt");
+    write("yolo/images/" + std::string(split) + "/1.jpg");
+    if (split != std::string("test")) write("yolo/labels/" + std::string(split) + "/1.txt");
+    write("voc/" + std::string(split) + "/1.jpg");
+    write("voc/" + std::string(split) + "/1.xml");
+  }
+  write("roboflow/data.yaml");
+  EXPECT_EQ(splits("roboflow"), (Splits{{"", "train/images", "."},
+                                        {"val", "valid/images", "."},
+                                        {"test", "test/images", "."}}));
+  EXPECT_THAT(find("roboflow").remarks, IsEmpty());
+  write("yolo/data.yaml");
+  EXPECT_EQ(splits("yolo"), (Splits{{"", "images/train", "."}, {"val", "images/valid", "."}}));
+  EXPECT_THAT(find("yolo").remarks,
+              ::testing::ElementsAre("warning: 1 folders of images left out: images/test"));
+  EXPECT_EQ(splits("yolo/images").size(), 2u);
+  EXPECT_EQ(splits("voc"),
+            (Splits{{"", "train", "train"}, {"val", "valid", "valid"}, {"test", "test", "test"}}));
+  for (const char* split : {"train2017", "val2017"}) {
+    write("coco/" + std::string(split) + "/1.jpg");
+    write("coco/annotations/instances_" + std::string(split) + ".json",
+          R"({"annotations": [], "images": []})");
+  }
+  EXPECT_EQ(splits("coco"), (Splits{{"", "train2017", "annotations/instances_train2017.json"},
+                                    {"val", "val2017", "annotations/instances_val2017.json"}}));
+  // Other images of the folder would be lost.
+  write("yolo/images/more/1.jpg");
+  write("yolo/labels/more/1.txt");
+  EXPECT_EQ(splits("yolo"), (Splits{{"", "images", "."}}));
+  // A folder that was asked for is its split alone.
+  EXPECT_EQ(splits("voc/valid"), (Splits{{"", ".", "."}}));
 }
 
 TEST_F(FindSource, KnowsRecordingsOfEventCameras) {

@@ -167,6 +167,19 @@ TEST_F(RecordingDatasetTest, TimesOutsideTheRecordingAreFaults) {
   EXPECT_THAT(events(*dataset, 1), ElementsAre(all_[0]));
 }
 
+TEST_F(RecordingDatasetTest, BoxesWithoutAnAreaAreTheFaultOfTheirSample) {
+  label("1.25,1,1,2,2,car,\n1.5,0,0,1,1,car,\n1.5,1,0,1,2,car,dont_care\n1.75,2,3,1,4,car,\n");
+  const auto dataset = open();
+  const auto fault = [&](std::size_t i) {
+    const auto read = dataset->annotation(dataset->labelled_frames().at(i).label_key);
+    return is_fault(read) ? std::get<SampleFault>(read).reason : "no fault";
+  };
+  EXPECT_EQ(fault(0), "no fault");
+  EXPECT_EQ(fault(1),
+            "expected boxes of a width and height above 0, got 0 x 2, in drive.csv (1.500000 s)");
+  EXPECT_THAT(fault(2), HasSubstr("got -1 x 1, in drive.csv (1.750000 s)"));
+}
+
 /// The small recording with its frames so many seconds later.
 std::map<std::string, testing::Hdf5Dataset> frames_later(double seconds) {
   auto datasets = testing::small_mvsec();

@@ -234,7 +234,10 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
   EXPECT_EQ(with(box(17, 7, "[40, 2, 3, 4]")),
             "expected a box within the image of 40x30, got one from (40, 2) to (43, 6), in "
             "instances.json (annotation 17)");
-  EXPECT_THAT(with(box(17, 7, "[4, 2, 0, 4]")), HasSubstr("expected a box within the image"));
+  EXPECT_EQ(with(box(17, 7, "[4, 2, 0, 4]")),
+            "expected a box of a width and height above 0, got 0 x 4, in instances.json "
+            "(annotation 17)");
+  EXPECT_THAT(with(box(17, 7, "[4, 2, 3.5, 0]")), HasSubstr("got 3.5 x 0, in"));
   EXPECT_THAT(with(R"({"id": 17, "image_id": 7, "category_id": 4, "bbox": [1, 2, 3, 4]})"),
               HasSubstr("$.category_id: expected the id of a category, got 4"));
   EXPECT_THAT(with(R"({"image_id": 7, "bbox": [1, 2, 3, 4]})"),
@@ -242,6 +245,21 @@ TEST_F(CocoLabels, ABadEntryIsAFaultOfItsImage) {
   EXPECT_EQ(with(box(17, 7, "[39.9, 2, 3, 4]")), "no fault") << "some of it is within";
   EXPECT_THAT(fault("12"), HasSubstr("expected an image of the file, got none"));
   EXPECT_THAT(fault("x"), HasSubstr("expected an image of the file, got none"));
+}
+
+TEST_F(CocoLabels, CrowdsAreToldByANumberOrABoolean) {
+  for (const auto& [crowd, ignore] :
+       {std::pair("0", false), {"1", true}, {"false", false}, {"true", true}}) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
+    EXPECT_EQ(fault(), "no fault") << crowd;
+    EXPECT_EQ(annotation("7").boxes.at(0).ignore, ignore) << crowd;
+  }
+  for (const char* crowd : {"\"true\"", "null", "2", "0.5"}) {
+    write(image(7, "000001.png"),
+          box(1, 7, "[1, 2, 3, 4]", std::string(", \"iscrowd\": ") + crowd));
+    EXPECT_THAT(fault(), HasSubstr("(annotation 1): $.iscrowd: expected")) << crowd;
+  }
 }
 
 TEST_F(CocoLabels, AnotherSizeOfTheImageIsAFault) {

@@ -26,12 +26,13 @@ class NamedLabels : public ::testing::Test {
   void text(const std::string& name, const std::string& content) {
     testing::write_file(folder_ / name, content);
   }
+  /// As a manifest in that folder would.
   std::unique_ptr<Dataset> open(LabelFormat format, const std::string& root,
-                                const std::string& path) const {
+                                const std::string& path, const std::string& manifest = "") const {
     SourceSpec spec;
     spec.root = root;
     spec.labels = LabelSpec{format, path};
-    return open_frames_dataset(spec, folder_.path());
+    return open_frames_dataset(spec, folder_ / manifest);
   }
   static std::string voc(const std::string& name, const std::string& size = "40",
                          const std::string& more = "") {
@@ -164,6 +165,31 @@ TEST_F(NamedLabels, MotOfOneSequenceMayBeAFile) {
   EXPECT_THAT([&] { open(LabelFormat::kMot, "two", "gt/gt.txt"); },
               ThrowsMessage<InputError>(HasSubstr("expected a folder of sequences, since there "
                                                   "are 2, got a file, in gt/gt.txt")));
+}
+
+TEST_F(NamedLabels, TheSequencesFileIsAboveGtWhateverThePathIs) {
+  for (const char* name : {"1", "2", "3"}) image("s/img1/00000" + std::string(name) + ".png");
+  text("s/gt/gt.txt", "2,1,1,1,5,5,1\n");
+  text("s/gt/deep/x", "");
+  text("s/seqinfo.ini", kInfo);
+  const struct {
+    const char *manifest, *root, *path, *info;
+  } cases[] = {
+      {"s/gt", "../img1", "gt.txt", "../seqinfo.ini"},
+      {"s/gt", "../img1", ".", "./../seqinfo.ini"},
+      {"s/gt/deep", "../../img1", "..", "../../seqinfo.ini"},
+      {"s/gt/deep", "../../img1", "../gt.txt", "../../seqinfo.ini"},
+      {"s/img1", "", "..", "../seqinfo.ini"},
+      {"s", "img1", "gt/gt.txt", "seqinfo.ini"},
+      {"", "s/img1", "s", "s/seqinfo.ini"},
+  };
+  for (const auto& layout : cases) {
+    const auto dataset = open(LabelFormat::kMot, layout.root, layout.path, layout.manifest);
+    ASSERT_EQ(dataset->labelled_frames().size(), 1u) << layout.path;
+    EXPECT_DOUBLE_EQ(dataset->labelled_frames()[0].frame.time_s, 2 / 25.) << layout.path;
+    EXPECT_THAT(dataset->annotation_files(), ::testing::Contains(layout.info)) << layout.path;
+    EXPECT_TRUE(std::filesystem::exists(folder_ / layout.manifest / layout.info)) << layout.info;
+  }
 }
 
 TEST_F(NamedLabels, MotOfImagesWithoutNumbersNeedsAllOfThem) {

@@ -51,8 +51,7 @@ TEST(YoloText, AnythingElseIsAFaultOfItsLine) {
   EXPECT_EQ(fault_of("0 0.5 0,5 0.1 0.1"), "expected a number, got '0,5', in a.txt:1");
   EXPECT_EQ(fault_of("0 1e999 0.5 0.1 0.1"), "expected a number, got '1e999', in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0 0.1"),
-            "expected a box within the image of 40x30, got one from (20, 13.5) to (20, 16.5), in "
-            "a.txt:1");
+            "expected a box of a width and height above 0, got 0 x 3, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1"), "expected 5 columns, got 4, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.5 0.5 0.1 0.1 0.9"), "expected 5 columns, got 6, in a.txt:1");
   EXPECT_EQ(fault_of("0 0.1 0.1 0.2 0.1 0.2 0.2"),
@@ -147,11 +146,13 @@ class YoloLabels : public ::testing::Test {
   void text(const std::string& name, const std::string& content = "0 0.5 0.5 0.5 0.5") {
     testing::write_file(folder_ / name, content);
   }
-  std::unique_ptr<Dataset> open(const std::string& root, const std::string& path) const {
+  /// As a manifest in that folder would.
+  std::unique_ptr<Dataset> open(const std::string& root, const std::string& path,
+                                const std::string& manifest = "") const {
     SourceSpec spec;
     spec.root = root;
     spec.labels = LabelSpec{LabelFormat::kYolo, path};
-    return open_frames_dataset(spec, folder_.path());
+    return open_frames_dataset(spec, folder_ / manifest);
   }
 
   testing::TemporaryFolder folder_;
@@ -210,6 +211,30 @@ TEST_F(YoloLabels, WhatIsOnOneSideAloneIsNotLost) {
               ElementsAre("1 folders of labels without images left out in d/labels: old",
                           "1 of 3 frames have no label in d/labels: no samples, but paired "
                           "frames"));
+}
+
+TEST_F(YoloLabels, ClassesAreInTheFolderAboveWhateverThePathIs) {
+  image("d/images/1.png");
+  text("d/labels/1.txt");
+  text("d/labels/deep/x", "");
+  text("d/data.yaml", "names: [cat]");
+  const struct {
+    const char *manifest, *root, *path, *classes;
+  } cases[] = {
+      {"d/labels", "../images", ".", "./../data.yaml"},
+      {"d/labels", "../images", "./", "./../data.yaml"},
+      {"d/labels", "../images", "deep/..", "deep/../../data.yaml"},
+      {"d/labels/deep", "../../images", "..", "../../data.yaml"},
+      {"d/images", "", "../labels", "../data.yaml"},
+      {"d", "images", "labels", "data.yaml"},
+  };
+  for (const auto& layout : cases) {
+    const auto dataset = open(layout.root, layout.path, layout.manifest);
+    EXPECT_THAT(dataset->label_schema().class_names, ElementsAre("cat")) << layout.path;
+    EXPECT_EQ(dataset->labelled_frames().size(), 1u) << layout.path;
+    EXPECT_THAT(dataset->annotation_files(), ::testing::Contains(layout.classes)) << layout.path;
+    EXPECT_TRUE(std::filesystem::exists(folder_ / layout.manifest / layout.classes));
+  }
 }
 
 TEST_F(YoloLabels, NeedTheClassesNames) {

@@ -1,0 +1,315 @@
+"""Exports of whole recordings, DSEC's and RVT's, read as these read them: with numpy and h5py."""
+
+import json
+import pathlib
+import shutil
+import tempfile
+
+import h5py
+import numpy as np
+import PIL.Image
+
+import exported_demo as demo
+import program
+import small_job
+from exported_demo import Export, of, read_samples
+from program import run
+
+setUpModule, tearDownModule = demo.set_up, demo.tear_down
+
+# Prophesee's boxes, as RVT's utils/evaluation/prophesee/io/box_loading.py has them.
+BBOX_DTYPE = np.dtype({"names": ["t", "x", "y", "w", "h", "class_id", "track_id", "class_confidence"],
+                       "formats": ["<i8", "<f4", "<f4", "<f4", "<f4", "<u4", "<u4", "<f4"],
+                       "offsets": [0, 8, 12, 16, 20, 24, 28, 32], "itemsize": 40})
+# DSEC-Det's, as the text of its label.py has them.
+TRACKS_DTYPE = np.dtype([("t", "<u8"), ("x", "<f8"), ("y", "<f8"), ("h", "<f8"), ("w", "<f8"), ("class_id", "u1"),
+                         ("class_confidence", "<f8"), ("track_id", "<u8")])
+
+
+def read_windows(path):
+    """Begin, end, label in microseconds, number of events, and id of each sample of a recording."""
+    lines = [line.split(" ", 4) for line in path.read_text().splitlines()]
+    return [(*map(int, fields[:4]), fields[4]) for fields in lines]
+
+
+def slice_dsec(file, begin_us, end_us):
+    """The events t, x, y, p of a window, as DSEC's EventSlicer finds them."""
+    ms_to_idx, offset = file["ms_to_idx"][:].astype(np.int64), int(file["t_offset"][()])
+    begin_us, end_us = begin_us - offset, end_us - offset
+    first, last = ms_to_idx[begin_us // 1000], ms_to_idx[-(-end_us // 1000)]  # beyond them EventSlicer has no window
+    t = file["events/t"][first:last].astype(np.int64)
+    inside = slice(first + np.searchsorted(t, begin_us), first + np.searchsorted(t, end_us))
+    return [file[f"events/{name}"][inside].astype(np.int64) + (offset if name == "t" else 0) for name in "txyp"]
+
+
+class RvtSequence:
+    """What RVT's SequenceBase and ObjectLabelFactory make of a sequence; their assertions stay."""
+
+    def __init__(self, path, representation, size):
+        folder = path / "event_representations_v2" / representation
+        with np.load(path / "labels_v2" / "labels.npz") as data:
+            self.labels, self.label_idx = data["labels"], data["objframe_idx_2_label_idx"]
+        self.repr_idx = np.load(folder / "objframe_idx_2_repr_idx.npy")
+        self.repr_times = np.load(folder / "timestamps_us.npy")
+        self.frame_times = np.load(path / "labels_v2" / "timestamps_us.npy")
+        with h5py.File(folder / "event_representations.h5") as file:
+            assert file["data"].chunks == (1, *file["data"].shape[1:])
+            self.data = file["data"][:]
+        assert len(self.label_idx) == len(np.unique(self.labels["t"])) == len(self.repr_idx) == len(self.frame_times)
+        x, y, w, h = (self.labels[name].astype("float32") for name in "xywh")
+        for begin, extent, side in ((x, w, size[1]), (y, h, size[0])):
+            assert (np.clip(begin + extent, 0, side - 1) - np.clip(begin, 0, side - 1) > 0).all()
+
+    def frame(self, k):
+        """Boxes, and the representation they are of."""
+        end = self.label_idx[k + 1] if k + 1 < len(self.label_idx) else len(self.labels)
+        assert end > self.label_idx[k]
+        return self.labels[self.label_idx[k]:end], self.repr_idx[k]
+
+
+class Recordings(Export):
+    @classmethod
+    def setUpClass(cls):
+        """A KITTI tracking sequence of 12 frames of 0.1 s each, and one of 3 frames: windows of 1 to 3 frames, all of them."""
+        cls.drive = pathlib.Path(tempfile.mkdtemp(dir=demo.folder)) / "drive"
+        random = np.random.default_rng(11)
+        (cls.drive / "label_02").mkdir(parents=True)
+        for name, count in (("0000", 12), ("bbox", 3)):
+            lines = []
+            for k in range(count):
+                small_job.save_image(cls.drive / "image_02" / name / f"{k:06d}.png", random)
+                boxes = [(5, "Car", 2 + k, 3, 12 + k, 9), (-1, "DontCare", 0, 0, 4, 4)] if k != 4 else []
+                if k % 2:
+                    boxes += [(7, "Pedestrian", 25, 10, 40, 30), (9, "Car", 31.25, 2, 32, 9)]  # cut, and within the last pixel
+                lines += [f"{k} {track} {kind} 0 0 -10 {left} {top} {right} {bottom} -1 -1 -1 -1000 -1000 -1000 -10"
+                          for track, kind, left, top, right, bottom in boxes if name == "0000"]
+            (cls.drive / "label_02" / f"{name}.txt").write_text("".join(line + "\n" for line in lines))
+        (cls.drive / "image_02" / "0000" / "000008.png").write_bytes(b"broken")
+        manifest = cls.drive.parent / "manifest.json"
+        source = {"dataset": "kitti_tracking", "root": str(cls.drive), "pairs": program.pairs([1, 2, 3], choose="all")}
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT)))
+        cls.source = manifest.parent / "out"
+        run("convert", manifest, "--progress", "none")
+        run("finalize", cls.source)
+        cls.samples = {key[2]: sample for key, sample in read_samples(cls.source).items()}
+
+    def check_volume(self, columns, window, sample):
+        """Events of a window against the sample's volume: whole numbers of events, times cut to a microsecond."""
+        begin, end = window[:2]
+        t, x, y, p = columns
+        self.assertEqual(len(t), window[3])
+        self.assertTrue((np.diff(t) >= 0).all() and (begin <= t).all() and (t < end).all())
+        again, bins = np.zeros(sample["volume"].shape), len(sample["volume"]) // 2
+        star = (bins - 1) * (t - begin) / (end - begin)
+        low = np.minimum(star.astype(int), bins - 2)
+        for bin_, share in ((low, 1 - (star - low)), (low + 1, star - low)):
+            np.add.at(again, (np.where(p > 0, 0, bins) + bin_, y, x), share)
+        expected = np.floor(sample["volume"].astype(float) + 0.5)
+        np.testing.assert_allclose(again, expected, atol=2e-5 + 9e-6 * expected.max() * 8 / ((end - begin) * 1e-6))
+
+    def check_boxes(self, found, sample, time):
+        boxes = sample["boxes"]
+        kept = np.flatnonzero(boxes["ignore"] == 0)
+        self.assertEqual(set(found["t"]) - {time}, set())
+        xyxy = np.stack([found["x"], found["y"], found["x"] + found["w"], found["y"] + found["h"]], axis=1)
+        np.testing.assert_allclose(xyxy, boxes["xyxy"][kept], atol=1e-4)
+        np.testing.assert_array_equal(found["class_confidence"], 1)
+        names = [name for name in sample["classes"] if name != "DontCare"]
+        self.assertEqual([names[i] for i in found["class_id"]], [sample["classes"][i] for i in boxes["class_id"][kept]])
+        return kept
+
+    def check_dsec(self, known):
+        """Every recording of the export; the ids of its samples."""
+        seen = []
+        for path in sorted((self.out / "dsec").glob("*/*")):
+            windows = read_windows(path / "windows.txt")
+            times = np.genfromtxt(path / "images" / "timestamps.txt", dtype="int64")
+            self.assertEqual(list(times), sorted({time for window in windows for time in window[:3]}))
+            with h5py.File(path / "events" / "left" / "events.h5") as file:
+                self.assertEqual([file[name].dtype for name in ("events/x", "events/y", "events/t", "events/p", "ms_to_idx", "t_offset")],
+                                 ["u2", "u2", "u4", "u1", "u8", "i8"])
+                t, index = file["events/t"][:], file["ms_to_idx"][:]
+                np.testing.assert_array_equal(index, np.searchsorted(t, np.arange(len(index)) * 1000))
+                self.assertEqual(file["t_offset"][()], windows[0][0])
+                self.assertEqual(sum(window[3] for window in windows), len(t))
+                for before, after in zip(windows, windows[1:]):
+                    self.assertLessEqual(before[1], after[0])
+                    self.assertLess(before[2], after[2])
+                for window in windows:
+                    self.check_volume(slice_dsec(file, *window[:2]), window, known[path.parent.name, window[4]])
+            tracks = path / "object_detections" / "left" / "tracks.npy"
+            if tracks.exists():
+                rows = np.load(tracks)
+                self.assertEqual(rows.dtype, TRACKS_DTYPE)
+                for window in windows:
+                    self.check_boxes(rows[rows["t"] == window[2]], known[path.parent.name, window[4]], window[2])
+            seen += [(path.parent.name, window[4]) for window in windows]
+        self.assertEqual(len(seen), len(set(seen)))
+        return seen
+
+    def test_dsec(self):
+        self.export("dsec", "--counts", "rounded")
+        known = {(key[0], key[2]): sample for key, sample in demo.samples.items()}
+        self.assertEqual(sorted(self.check_dsec(known)), sorted(known))
+        folders = {path.name for path in (self.out / "dsec" / "train").iterdir()}
+        self.assertIn("kitti_object+000000", folders)
+        self.assertIn("human36m+S1+Walking-1+54138969", folders)
+        for path in (self.out / "dsec" / "train").glob("human36m*"):
+            self.assertFalse((path / "object_detections").exists())
+        # Human3.6M's times are known: a frame takes 20 ms there.
+        of_video = [window for path in (self.out / "dsec" / "train").glob("human36m*") for window in read_windows(path / "windows.txt")]
+        for begin, end, label, _, sample_id in of_video:
+            sample = known["train", sample_id]
+            self.assertEqual([begin, end], [round(sample["pairs"][name] * 1e6) for name in ("prev_time_s", "next_time_s")])
+        names = json.loads((self.out / "label_map_dictionary.json").read_text())
+        self.assertEqual(names["0"], "Car")
+
+    def test_overlapping_windows_are_different_recordings(self):
+        self.export("dsec", "--counts", "rounded", source=self.source)
+        known = {("train", sample_id): sample for sample_id, sample in self.samples.items()}
+        self.assertEqual(sorted(self.check_dsec(known)), sorted(known))
+        recordings = {path.name: read_windows(path / "windows.txt") for path in (self.out / "dsec" / "train").iterdir()}
+        self.assertEqual({name.split("~")[0] for name in recordings}, {"0000", "bbox"})
+        for name, windows in recordings.items():
+            for begin, end, label, _, sample_id in windows:
+                pairs = self.samples[sample_id]["pairs"]
+                self.assertEqual((begin, end, label), tuple(int(pairs[key]) * 10 ** 5 for key in ("prev_index", "next_index", "label_index")))
+        # There are no more recordings than windows at one time.
+        most = max(sum(begin < time < end for name, windows in recordings.items() if name.startswith("0000")
+                       for begin, end, *_ in windows)
+                   for time in np.arange(0.5, 12) * 1e5)
+        self.assertEqual(sum(name.startswith("0000") for name in recordings), most)
+        tracks = np.concatenate([np.load(path) for path in self.out.rglob("tracks.npy")])
+        self.assertEqual(set(tracks["track_id"]), {5, 7, 9})
+        left_out = self.described()["left_out"]
+        self.assertEqual(left_out["boxes to ignore"], sum((s["boxes"]["ignore"] == 1).sum() for s in self.samples.values()))
+        self.assertEqual(len(self.described()["quarantined"]), 6)
+
+    def test_frames_without_times_are_a_second_each(self):
+        root = self.out.parent / "frames"
+        for k in (3, 4, 5, 6):
+            small_job.save_image(root / "a b" / f"{k:04d}.png", np.random.default_rng(k))
+        manifest = self.out.parent / "manifest.json"
+        manifest.write_text(json.dumps(program.manifest([{"dataset": "frames", "root": str(root), "pairs": program.pairs([1])}],
+                                                        generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        self.export("dsec", source=manifest.parent / "out")
+        recording, = (self.out / "dsec" / "train").iterdir()
+        self.assertEqual(recording.name, "a%20b")
+        windows = read_windows(recording / "windows.txt")
+        found = read_samples(manifest.parent / "out")
+        self.assertEqual({window[4]: window[:2] for window in windows},
+                         {key[2]: tuple(int(sample["pairs"][name]) * 10 ** 6 for name in ("prev_index", "next_index"))
+                          for key, sample in found.items()})
+        self.assertGreater(len(windows), 1)
+        self.assertFalse((recording / "object_detections").exists())
+
+    def test_a_folder_of_images_is_one_sequence(self):
+        root = self.out.parent / "clip"
+        for k in range(4):
+            small_job.save_image(root / f"{k:04d}.png", np.random.default_rng(k))
+        manifest = self.out.parent / "manifest.json"
+        source = {"dataset": "frames", "root": str(root), "frames_per_second": 20, "pairs": program.pairs([1])}
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        self.export("dsec", source=manifest.parent / "out")
+        recording, = (self.out / "dsec" / "train").iterdir()
+        self.assertEqual(recording.name, "frames")
+        self.assertEqual([window[:2] for window in read_windows(recording / "windows.txt")],
+                         [(50000 * k, 50000 * (k + 1)) for k in range(3)])
+
+    def test_rvt(self):
+        for source, known in ((self.source, {("train", key): sample for key, sample in self.samples.items()}),
+                              (None, {(key[0], key[2]): sample for key, sample in of(dataset="kitti_object").items()})):
+            with self.subTest(source=source):
+                self.out = pathlib.Path(tempfile.mkdtemp(dir=demo.folder)) / "export"
+                self.export("rvt", "--counts", "rounded", source=source)
+                self.check_rvt(known)
+
+    def check_rvt(self, known):
+        seen, in_frame, unlabelled = [], 0, 0
+        for path in sorted((self.out / "raw").glob("*/*_windows.txt")):
+            split, name, windows = path.parent.name, path.name.removesuffix("_windows.txt"), read_windows(path)
+            of_it = [known[split, window[4]] for window in windows]
+            seen += [(split, window[4]) for window in windows]
+            self.assertEqual(windows[0][0], 0)
+            with h5py.File(path.with_name(f"{name}_td.h5")) as file:
+                size = file["events/height"][()].item(), file["events/width"][()].item()
+                self.assertEqual(size, of_it[0]["volume"].shape[1:])
+                columns = [file[f"events/{column}"][:].astype("int64") for column in "txyp"]
+                for window, sample in zip(windows, of_it):
+                    first, last = np.searchsorted(columns[0], window[:2])
+                    self.check_volume([column[first:last] for column in columns], window, sample)
+            counts = [(sample["boxes"]["ignore"] == 0).sum() for sample in of_it]
+            boxes = path.with_name(f"{name}_bbox.npy")
+            self.assertEqual(boxes.exists(), sum(counts) > 0)
+            if not boxes.exists():
+                unlabelled += len(windows)
+                self.assertFalse((self.out / "preprocessed" / split / name).exists())
+                continue
+            # The names that RVT's preprocessing finds the events and the sequence by.
+            self.assertEqual(boxes.stem.split("bbox")[0] + "td.h5", f"{name}_td.h5")
+            rows = np.load(boxes)
+            self.assertEqual(rows.dtype, BBOX_DTYPE)
+            self.assertEqual(len(rows), sum(counts))
+            for window, sample in zip(windows, of_it):
+                self.check_boxes(rows[rows["t"] == window[2]], sample, window[2])
+            sequence = RvtSequence(self.out / "preprocessed" / split / name, "eventgan_nbins=9", size)
+            self.assertEqual(sequence.labels.dtype, BBOX_DTYPE)
+            self.assertEqual(list(sequence.repr_times), [window[1] for window in windows])
+            for volume, sample in zip(sequence.data, of_it):
+                np.testing.assert_array_equal(volume, np.concatenate([sample["volume"][9:], sample["volume"][:9]]))
+            for k, time in enumerate(sequence.frame_times):
+                labels, place = sequence.frame(k)
+                self.assertEqual(windows[place][2], time)
+                xyxy = of_it[place]["boxes"]["xyxy"][of_it[place]["boxes"]["ignore"] == 0]
+                xyxy = xyxy[(xyxy[:, 0] < size[1] - 1) & (xyxy[:, 1] < size[0] - 1)]
+                np.testing.assert_allclose(np.stack([labels[key] for key in "xywh"], axis=1),
+                                           np.hstack([xyxy[:, :2], xyxy[:, 2:] - xyxy[:, :2]]), atol=1e-4)
+                in_frame += len(labels)
+        self.assertEqual(sorted(seen), sorted(known))
+        left_out = self.described()["left_out"]
+        kept = sum((sample["boxes"]["ignore"] == 0).sum() for sample in known.values())
+        self.assertEqual(left_out.get("boxes within the last pixel, where RVT's frame ends (in raw alone)", 0), kept - in_frame)
+        self.assertEqual(left_out.get("samples of recordings without boxes (in raw alone)", 0), unlabelled)
+
+    def test_rvt_names_files_of_gen1_as_its_preprocessing_does_and_leaves_no_bbox_in_a_name(self):
+        manifest = self.out.parent / "manifest.json"
+        source = {"dataset": "kitti_tracking", "root": str(self.drive), "pairs": program.pairs([2])}
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"}, errors=small_job.LENIENT,
+                                                        image={"width": 304, "height": 240, "preset": "mpii"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        self.export("rvt", source=manifest.parent / "out")
+        self.assertEqual({path.name.split("_")[0] for path in (self.out / "raw" / "train").glob("*_td.dat.h5")} - {"0000", "0000~2"},
+                         {"%62box"})
+
+    def test_a_class_map_and_no_events(self):
+        classes = demo.folder / "dsec.json"
+        classes.write_text(json.dumps({"Pedestrian": 0, "Car": 2}))
+        black = self.out.parent / "black"
+        shutil.copytree(self.drive, black)
+        for path in (black / "image_02").rglob("*.png"):
+            PIL.Image.new("L", (small_job.WIDTH, small_job.HEIGHT)).save(path)
+        manifest = self.out.parent / "manifest.json"
+        source = {"dataset": "kitti_tracking", "root": str(black), "pairs": program.pairs([1])}
+        manifest.write_text(json.dumps(program.manifest([source], generator={"kind": "difference"})))
+        run("convert", manifest, "--progress", "none")
+        run("finalize", manifest.parent / "out")
+        for to in ("dsec", "rvt"):
+            self.export(to, "--classes", classes, source=manifest.parent / "out", out=self.out / to)
+            self.assertEqual(json.loads((self.out / to / "label_map_dictionary.json").read_text()), {"0": "Pedestrian", "2": "Car"})
+        with h5py.File(self.out / "dsec/dsec/train/0000/events/left/events.h5") as file:
+            self.assertEqual(file["events/t"].shape, (0,))
+            np.testing.assert_array_equal(file["ms_to_idx"][:], np.zeros(1101))
+        tracks = np.load(self.out / "dsec/dsec/train/0000/object_detections/left/tracks.npy")
+        self.assertEqual(set(tracks["class_id"]), {0, 2})
+        classes.write_text(json.dumps({"Car": 256}))
+        _, err = self.export("dsec", "--classes", classes, source=manifest.parent / "out", expect=64)
+        self.assertIn("at most 255", err)
+
+
+if __name__ == "__main__":
+    program.main()
