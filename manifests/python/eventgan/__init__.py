@@ -20,8 +20,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from . import evaluate, shards, torch
-    from .drawing import show
     from .generator import Generator, sample_events
+    from .plotting import show
     from .program import ProgramError, convert, init, open
     from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
 
@@ -29,7 +29,7 @@ _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",
     "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards", "read_description": "shards",
     "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
-    "show": "drawing",
+    "show": "plotting",
 }
 _MODULES = ("evaluate", "shards", "torch")
 

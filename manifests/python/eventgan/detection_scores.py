@@ -24,45 +24,114 @@ KITTI_POINTS = 41
 
 
 class Detections(NamedTuple):
-    """Boxes that were found: n rows, the highest score first, equal ones as they were given. Make it by `of`."""
+    """Boxes that were found: n rows, the highest score first, equal ones as they were given. Make it by `of`.
 
-    image: np.ndarray  # int [n], which image
-    label: np.ndarray  # int [n], which class
-    xyxy: np.ndarray  # [n, 4] left, top, right, bottom
-    score: np.ndarray  # [n]
+    Attributes
+    ----------
+    image : numpy.ndarray, int [n]
+        Which image.
+    label : numpy.ndarray, int [n]
+        Which class.
+    xyxy : numpy.ndarray, float [n, 4]
+        Left, top, right, bottom in pixels, by edges.
+    score : numpy.ndarray, float [n]
+    """
+
+    image: np.ndarray
+    label: np.ndarray
+    xyxy: np.ndarray
+    score: np.ndarray
 
     @staticmethod
     def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]], score: Iterable[float]) -> Detections:
+        """Detections of rows in any order.
+
+        Parameters
+        ----------
+        image, label : iterable of int, [n]
+        xyxy : iterable, [n, 4]
+            Left, top, right, bottom in pixels, by edges.
+        score : iterable of float, [n]
+
+        Returns
+        -------
+        Detections
+        """
         score = np.asarray(score, float)
         order = np.argsort(-score, kind="stable")
         return Detections(np.asarray(image, int)[order], np.asarray(label, int)[order], np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
 
     def rows(self, chosen: np.ndarray) -> Detections:
+        """Those `chosen`, bool [n] or rows that keep the order.
+
+        Parameters
+        ----------
+        chosen : numpy.ndarray
+
+        Returns
+        -------
+        Detections
+        """
         return Detections(*(column[chosen] for column in self))
 
 
 class GroundTruth(NamedTuple):
-    """Boxes that are there: m rows."""
+    """Boxes that are there: m rows.
 
-    image: np.ndarray  # int [m]
-    label: np.ndarray  # int [m]; -1 for DontCare, which is of no class
-    xyxy: np.ndarray  # [m, 4]
-    ignore: np.ndarray  # bool [m]; what is found there, of this class (-1: of any), neither helps nor hurts
-    difficulty: np.ndarray  # int [m]: 0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 not known or none of them
+    Attributes
+    ----------
+    image : numpy.ndarray, int [m]
+    label : numpy.ndarray, int [m]
+        -1 for DontCare, which is of no class.
+    xyxy : numpy.ndarray, float [m, 4]
+        Left, top, right, bottom in pixels, by edges.
+    ignore : numpy.ndarray, bool [m]
+        What is found there, of this class (-1: of any), neither helps nor hurts.
+    difficulty : numpy.ndarray, int [m]
+        0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 not known or none of them.
+    """
+
+    image: np.ndarray
+    label: np.ndarray
+    xyxy: np.ndarray
+    ignore: np.ndarray
+    difficulty: np.ndarray
 
 
 class Overlaps(NamedTuple):
-    """Pairs of boxes of one image that overlap."""
+    """Pairs of boxes of one image that overlap.
 
-    first: np.ndarray  # int [k], rows of the first list
-    second: np.ndarray  # int [k], rows of the second
-    iou: np.ndarray  # [k] the intersection as a share of the union
-    share: np.ndarray  # [k] and as one of the first box
+    Attributes
+    ----------
+    first, second : numpy.ndarray, int [k]
+        Rows of the first and of the second list.
+    iou, share : numpy.ndarray, float [k]
+        The intersection as a share of the union, and as one of the first box.
+    """
+
+    first: np.ndarray
+    second: np.ndarray
+    iou: np.ndarray
+    share: np.ndarray
 
 
 def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray, iou: float = 0.0) -> Overlaps:
-    """All pairs of a box of the first list, [n] and [n, 4], with one of the second, [m] and [m, 4], whose IoU is at least `iou`, in order of the first
-    and then the second. Boxes are compared with those alone that lie beside them: of the same image, their left edges near enough."""
+    """All pairs of a box of the first list with one of the second whose IoU is at least `iou`, in order of the first and then the second.
+
+    Boxes are compared with those alone that lie beside them: of the same image, their left edges near enough.
+
+    Parameters
+    ----------
+    image : numpy.ndarray, int [n]
+    xyxy : numpy.ndarray, float [n, 4]
+    other_image : numpy.ndarray, int [m]
+    other_xyxy : numpy.ndarray, float [m, 4]
+    iou : float, default 0
+
+    Returns
+    -------
+    Overlaps
+    """
     lefts, widths = np.sort(other_xyxy[:, 0]), xyxy[:, 2] - xyxy[:, 0]
     widest = (other_xyxy[:, 2] - other_xyxy[:, 0]).max(initial=0)
     reach = np.minimum(widths / iou, widest) if iou else widest  # none that is wider has that IoU
@@ -92,7 +161,17 @@ def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, ot
 
 
 def turns(group: np.ndarray) -> np.ndarray:
-    """int [n]: how many rows before have the same `group` [n]."""
+    """How many rows before have the same group.
+
+    Parameters
+    ----------
+    group : numpy.ndarray, int [n]
+
+    Returns
+    -------
+    numpy.ndarray
+        int [n].
+    """
     order = np.argsort(group, kind="stable")
     turn = np.empty(len(group), int)
     turn[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
@@ -100,14 +179,35 @@ def turns(group: np.ndarray) -> np.ndarray:
 
 
 def rounds(turn: np.ndarray) -> list[np.ndarray]:
-    """Rows of equal `turn` [k], the lowest first; equal ones stay in order."""
+    """Rows of equal turn, the lowest first; equal ones stay in order.
+
+    Parameters
+    ----------
+    turn : numpy.ndarray, int [k]
+
+    Returns
+    -------
+    list of numpy.ndarray
+        int, rows.
+    """
     order = np.argsort(turn, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(turn[order])) + 1)
 
 
 def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
-    """bool [n]: what non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU
-    with it is above `iou`."""
+    """What non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU with it is
+    above `iou`.
+
+    Parameters
+    ----------
+    found : Detections
+    iou : float
+
+    Returns
+    -------
+    numpy.ndarray
+        bool [n].
+    """
     left = np.ones(len(found.score), bool)
     for rows in rounds(_group(found)):
         low, high = found.xyxy[rows, :2], found.xyxy[rows, 2:]
@@ -127,9 +227,23 @@ def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
 
 
 def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: np.ndarray, others: int) -> np.ndarray:
-    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none. They choose in their `turn` [n], rows of one image
-    one after the other; each takes, of the pairs (first, second) [k] in their order, the first that is `allowed` [k, T] and whose second is
-    still free. Pairs are never of two images."""
+    """Which of the `others` each of n rows gets in T trials.
+
+    Rows choose in their `turn`, those of one image one after the other; each takes, of the pairs (first, second) in their order, the first that
+    is `allowed` and whose second is still free. Pairs are never of two images.
+
+    Parameters
+    ----------
+    first, second : numpy.ndarray, int [k]
+    allowed : numpy.ndarray, bool [k, T]
+    turn : numpy.ndarray, int [n]
+    others : int
+
+    Returns
+    -------
+    numpy.ndarray
+        int [n, T], -1 for none.
+    """
     trials = allowed.shape[1]
     choice, free = np.full((len(turn), trials), -1), np.ones((others, trials), bool)
     order = np.argsort(first, kind="stable")
@@ -146,11 +260,24 @@ def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: n
 
 
 def match_as_voc(found: Detections, truth: GroundTruth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """int [n], the row of the true box that each detection matches, -1 for none; bool [n], whether it counts.
+    """Matches as PASCAL VOC's development kit does.
 
-    As PASCAL VOC's development kit: a detection matches the true box of its class with which its IoU is greatest, if that is at least
-    `iou` and no box of a higher score has it; a second one on the same is wrong. What matches none and lies with a share of at least
-    `iou` of its area in a box to be ignored, of its class or of none, does not count.
+    A detection matches the true box of its class with which its IoU is greatest, if that is at least `iou` and no box of a higher score has
+    it; a second one on the same is wrong. What matches none and lies with a share of at least `iou` of its area in a box to be ignored, of
+    its class or of none, does not count.
+
+    Parameters
+    ----------
+    found : Detections
+    truth : GroundTruth
+    iou : float, default 0.5
+
+    Returns
+    -------
+    matched : numpy.ndarray
+        int [n], the row of the true box that each detection matches, -1 for none.
+    counts : numpy.ndarray
+        bool [n], whether it counts.
     """
     pairs = overlapping(found.image, found.xyxy, truth.image, truth.xyxy, iou)
     same = np.flatnonzero(_same_class(found, truth, pairs))
@@ -163,9 +290,23 @@ def match_as_voc(found: Detections, truth: GroundTruth, iou: float = 0.5) -> tup
 
 
 def match_as_coco(found: Detections, truth: GroundTruth) -> tuple[np.ndarray, np.ndarray]:
-    """bool [n, 10], whether each found box is right, and whether it counts, at each of COCO's IoUs (pycocotools' evaluateImg): from the
-    highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are crowds, of
-    their class, or of all if they are of none. Beyond the 100 best of a class and sample none counts."""
+    """Matches at each of COCO's IoUs, as pycocotools' evaluateImg does.
+
+    From the highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are
+    crowds, of their class, or of all if they are of none. Beyond the 100 best of a class and sample none counts.
+
+    Parameters
+    ----------
+    found : Detections
+    truth : GroundTruth
+
+    Returns
+    -------
+    right : numpy.ndarray
+        bool [n, 10], whether each found box is right.
+    counts : numpy.ndarray
+        bool [n, 10], whether it counts.
+    """
     turn = turns(_group(found))
     rows = np.flatnonzero(turn < COCO_MOST)
     pairs = overlapping(found.image[rows], found.xyxy[rows], truth.image, truth.xyxy, COCO_IOUS[0])
@@ -196,18 +337,39 @@ def _ignored_share(found: Detections, truth: GroundTruth) -> np.ndarray:
     return share
 
 
-def curve(right: np.ndarray, truths: int) -> tuple[np.ndarray, np.ndarray]:
-    """Recall and precision [n] after each of n found boxes, `right` [n] in the order of their scores, of `truths` boxes to be found."""
+def curve(right: np.ndarray, truths: float) -> tuple[np.ndarray, np.ndarray]:
+    """Recall and precision after each found box.
+
+    Parameters
+    ----------
+    right : numpy.ndarray, bool [n]
+        Which found boxes are right, in the order of their scores.
+    truths : int
+        Boxes to be found.
+
+    Returns
+    -------
+    recall, precision : numpy.ndarray
+        float [n].
+    """
     hits = np.cumsum(right)
     return hits / max(truths, 1), hits / np.arange(1, len(hits) + 1)
 
 
-def average_precisions(right: np.ndarray, truths: int) -> dict[str, float]:
-    """The area under the curve in three ways, from the highest precision at each recall or above (`right` and `truths` as in `curve`):
+def average_precisions(right: np.ndarray, truths: float) -> dict[str, float]:
+    """The area under the curve in three ways, from the highest precision at each recall or above.
 
-    ap_voc        the whole area (PASCAL VOC from 2010 on)
-    ap_voc_11     mean at the recalls 0, 0.1, ... 1 (PASCAL VOC 2007)
-    ap_coco_101   mean at the recalls 0, 0.01, ... 1 (COCO)
+    Parameters
+    ----------
+    right, truths
+        As of `curve`.
+
+    Returns
+    -------
+    dict
+        ap_voc : the whole area (PASCAL VOC from 2010 on)
+        ap_voc_11 : mean at the recalls 0, 0.1, ... 1 (PASCAL VOC 2007)
+        ap_coco_101 : mean at the recalls 0, 0.01, ... 1 (COCO)
     """
     if not truths:
         return dict.fromkeys(("ap_voc", "ap_voc_11", "ap_coco_101"), math.nan)
@@ -223,16 +385,30 @@ def average_precisions(right: np.ndarray, truths: int) -> dict[str, float]:
 
 def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str, int], iou: float = 0.5,
                      sure: np.ndarray | None = None) -> dict[str, dict[str, float]]:
-    """By the name of each of `classes` (names with labels), and of "all":
+    """Scores of each class, and of "all".
 
-    truths, easy, hard        how many boxes count, and how many of these have difficulty 0, and 1 or 2
-    found, right              how many of the predictions that are `sure` [n] (None: all) count, and how many of these are right (`match_as_voc`)
-    precision, recall, f1     of all these predictions; recall_easy, recall_hard: shares of those true boxes
-    ap_voc, ap_voc_11, ap_coco_101   of all predictions, sure or not: see `average_precisions`, all with VOC's matching at `iou`
-    ap_coco                   of all, too, COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
+    "all" counts all classes together, and has the mean of the classes' average precisions, without those that have no box to find. Found
+    boxes of other classes are left out, and so are true ones, unless they are to be ignored.
 
-    "all" counts all classes together, and has the mean of the classes' average precisions, without those that have no box to find.
-    Found boxes of other classes are left out, and so are true ones, unless they are to be ignored.
+    Parameters
+    ----------
+    found : Detections
+    truth : GroundTruth
+    classes : mapping of str to int
+        Names with labels.
+    iou : float, default 0.5
+        Of VOC's matching.
+    sure : numpy.ndarray, bool [n], optional
+        Which predictions precision, recall and F1 are of. None: all.
+
+    Returns
+    -------
+    dict of dict
+        truths, easy, hard : how many boxes count, and how many of these have difficulty 0, and 1 or 2
+        found, right : how many of the predictions that are `sure` count, and how many of these are right (`match_as_voc`)
+        precision, recall, f1 : of all these predictions; recall_easy, recall_hard: shares of those true boxes
+        ap_voc, ap_voc_11, ap_coco_101 : of all predictions, sure or not: see `average_precisions`, all with VOC's matching at `iou`
+        ap_coco : of all, too, COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
     """
     ours = np.isin(found.label, list(classes.values()))
     chosen, found = found.rows(ours if sure is None else ours & sure), found.rows(ours)
@@ -263,10 +439,30 @@ def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str
 
 
 def kitti_average_precision(found: Detections, truth: GroundTruth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
-    """KITTI's average precision, of 40 recalls, of class `name` at `level`, as its development kit (evaluate_object.cpp) counts it: IoU
-    above 0.7 for cars and 0.5 for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found boxes
-    lower than the level's least `height` [n], in source pixels, never count (of whatever class, they may take a true box); those that lie
-    in DontCare do not, either. NaN if the level has no box."""
+    """KITTI's average precision, of 40 recalls, of a class at a level, as its development kit (evaluate_object.cpp) counts it.
+
+    IoU is above 0.7 for cars and 0.5 for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found
+    boxes lower than the level's least height never count (of whatever class, they may take a true box); those that lie in DontCare do
+    not, either.
+
+    Parameters
+    ----------
+    found : Detections
+    truth : GroundTruth
+    classes : mapping of str to int
+        Names with labels.
+    name : str
+        The class, of KITTI_CLASSES.
+    level : str
+        Of KITTI_LEVELS.
+    height : numpy.ndarray, float [n]
+        Of the found boxes, in source pixels.
+
+    Returns
+    -------
+    float
+        NaN if the level has no box.
+    """
     least, neighbour = KITTI_CLASSES[name]
     rank = list(KITTI_LEVELS).index(level)
     of_class, small = truth.label == classes[name], height < KITTI_LEVELS[level]
@@ -314,7 +510,19 @@ def _kitti_thresholds(scores: np.ndarray, truths: int) -> np.ndarray:
 
 
 def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> GroundTruth:
-    """The boxes of all samples; `image` is the sample's index, `label` the class's number."""
+    """The boxes of all samples.
+
+    Parameters
+    ----------
+    shards : Shards
+    numbers : mapping of str to int
+        The label of each class, by name.
+
+    Returns
+    -------
+    GroundTruth
+        `image` is the sample's index, `label` the class's number.
+    """
     numbers = {**numbers, DONT_CARE: -1}
     nothing = np.empty(0, int)
     parts = [(nothing, nothing, np.empty((0, 4)), nothing.astype(bool), nothing)]
@@ -327,10 +535,30 @@ def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> GroundTruth:
 
 
 def ratio(part: float, whole: float) -> float:
+    """NaN if the whole is 0.
+
+    Parameters
+    ----------
+    part, whole : float
+
+    Returns
+    -------
+    float
+    """
     return float(part / whole) if whole else math.nan
 
 
 def mean(values: Sequence[float]) -> float:
+    """Of what is not NaN; NaN if all is.
+
+    Parameters
+    ----------
+    values : sequence of float
+
+    Returns
+    -------
+    float
+    """
     known = np.asarray(values, float)
     known = known[~np.isnan(known)]
     return float(known.mean()) if len(known) else math.nan

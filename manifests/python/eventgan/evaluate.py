@@ -41,7 +41,24 @@ PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall
 
 
 def read_predictions(path: PathLike, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """The file's list. What is not one, or lacks keys, is a ValueError."""
+    """A file's list of predictions.
+
+    Parameters
+    ----------
+    path : str or path
+        Of a JSON file.
+    keys : sequence of str
+        What every entry has.
+
+    Returns
+    -------
+    list of dict
+
+    Raises
+    ------
+    ValueError
+        It is no list of objects with these keys.
+    """
     try:
         entries = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -77,7 +94,26 @@ def _are_numbers(value: Any, shape: tuple[int, ...]) -> bool:
 
 
 def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int, ...], path: PathLike) -> np.ndarray:
-    """float [n, *shape]: the finite numbers that each entry has under `key`."""
+    """The finite numbers that each entry has under a key.
+
+    Parameters
+    ----------
+    entries : sequence of dict
+    key : str
+    shape : tuple of int
+    path : str or path
+        Where they come from, for the error.
+
+    Returns
+    -------
+    numpy.ndarray
+        float [n, *shape].
+
+    Raises
+    ------
+    ValueError
+        An entry has others.
+    """
     values = np.empty((len(entries), *shape))
     for number, entry in enumerate(entries):
         try:
@@ -96,7 +132,17 @@ def _places(shards: Shards) -> list[tuple[str, int]]:
 
 
 class Samples:
-    """The samples that are scored, and what predictions call them."""
+    """The samples that are scored, and what predictions call them.
+
+    Parameters
+    ----------
+    truth : str or path
+        Folder of shards, or one shard.
+    split, dataset : str, optional
+        Only samples of this split, of this kind of source.
+    ids : str or path, optional
+        Only the samples listed in this file.
+    """
 
     def __init__(self, truth: PathLike, split: str | None, dataset: str | None, ids: PathLike | None) -> None:
         where = {"dataset": dataset} if dataset else None
@@ -109,8 +155,24 @@ class Samples:
         self._twice = {name for name, count in collections.Counter(names).items() if count > 1}
 
     def of(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """int [n]: the index of each entry's sample in `shards`, -1 for one of the split that is not scored. A number is a place in the split,
-        whatever is scored of it. An id that there is not, or that two scored samples have, is a ValueError."""
+        """The samples of entries, by their `image_id`.
+
+        Parameters
+        ----------
+        entries : sequence of dict
+        path : str or path
+            Where they come from, for the error.
+
+        Returns
+        -------
+        numpy.ndarray
+            int [n], the index in `shards`, -1 for one of the split that is not scored. A number is a place in the split, whatever is scored of it.
+
+        Raises
+        ------
+        ValueError
+            There is no such id, or two scored samples have it.
+        """
         found = np.empty(len(entries), int)
         for number, entry in enumerate(entries):
             name = entry["image_id"]
@@ -131,9 +193,27 @@ class Samples:
         return sorted({open_shard(path).attrs["split"] for path in self._of_split.paths})
 
     def labels(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """int [n]: the place in `classes` of each entry's category. One that there is not is a ValueError."""
+        """The classes of entries, by their `category_id`.
+
+        Parameters
+        ----------
+        entries : sequence of dict
+        path : str or path
+            Where they come from, for the error.
+
+        Returns
+        -------
+        numpy.ndarray
+            int [n], the place in `classes`.
+
+        Raises
+        ------
+        ValueError
+            There is no such category.
+        """
         numbered = [name for name in self.classes if name != DONT_CARE]
-        labels = {**{i + 1: self.classes.index(name) for i, name in enumerate(numbered)}, **{name: self.classes.index(name) for name in numbered}}
+        labels: dict[Any, int] = {i + 1: self.classes.index(name) for i, name in enumerate(numbered)}
+        labels |= {name: self.classes.index(name) for name in numbered}
         given = [entry["category_id"] for entry in entries]
         unknown = [i for i, name in enumerate(given) if not (_is_whole(name) or isinstance(name, str)) or name not in labels]
         if unknown:
@@ -144,12 +224,31 @@ class Samples:
 
 def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
                         iou: float = 0.5) -> tuple[dict[str, Any], Detections, GroundTruth]:
-    """What `detections` prints, as a dictionary, with the boxes that it is of.
+    """What `detections` prints, with the boxes that it is of. Samples of sources without boxes are left out.
 
-    classes: those to score (None: all that have a box to find or a prediction)
-    confidence, nms: precision, recall and F1 are, as in the paper, of predictions of at least this score that non-maximum suppression at this IoU
-        leaves (1: none); the average precisions are of all predictions
-    Samples of sources without boxes are left out; that all are is a ValueError, and so are predictions that do not hold what they should.
+    Parameters
+    ----------
+    predictions : str or path
+        A JSON file (see above).
+    samples : Samples
+    classes : sequence of str, optional
+        Those to score. None: all that have a box to find or a prediction.
+    confidence, nms : float, default 0.2
+        Precision, recall and F1 are, as in the paper, of predictions of at least this score that non-maximum suppression at this IoU
+        leaves (1: none); the average precisions are of all predictions.
+    iou : float, default 0.5
+        The least at which a detection matches a box.
+
+    Returns
+    -------
+    result : dict
+    found : Detections
+    truth : GroundTruth
+
+    Raises
+    ------
+    ValueError
+        No sample has boxes, or the predictions do not hold what they should.
     """
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
     unknown = [name for name in classes or () if name not in numbers]
@@ -197,7 +296,29 @@ def _of_kitti(shards: Shards, found: Detections, truth: GroundTruth, numbers: Ma
 
 
 def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False) -> tuple[dict[str, Any], np.ndarray, Persons]:
-    """What `poses` prints, as a dictionary, with the joints found [P, J, 2] in volume pixels (NaN: not found) and the persons that are there."""
+    """What `poses` prints, with the joints that it is of.
+
+    Parameters
+    ----------
+    predictions : str or path
+        A JSON file (see above).
+    samples : Samples
+    hidden : bool, default False
+        Whether hidden joints count.
+
+    Returns
+    -------
+    result : dict
+    found : numpy.ndarray
+        float [P, J, 2] in volume pixels; NaN: not found.
+    persons : Persons
+        Those that are there.
+
+    Raises
+    ------
+    ValueError
+        No sample has joints, or the predictions do not hold what they should.
+    """
     shards = samples.shards
     persons = read_persons(shards)
     if not persons.names:
@@ -225,7 +346,22 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
 
 
 def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str], digits: int = 3) -> str:
-    """A line of headings (the values of `columns`), then one for each row with its values under the keys of `columns`; NaN is "-"."""
+    """A line of headings, then one for each row; NaN is "-".
+
+    Parameters
+    ----------
+    title : str
+        Above the rows' names.
+    rows : mapping of str to mapping
+        By the row's name its values, by column.
+    columns : mapping of str to str
+        The columns, and their headings.
+    digits : int, default 3
+
+    Returns
+    -------
+    str
+    """
     cells = [[title, *columns.values()]]
     for name, row in rows.items():
         cells.append([name, *(_text(row[key], digits) for key in columns)])
@@ -238,6 +374,16 @@ def _text(value: float | str, digits: int) -> str:
 
 
 def detection_tables(result: Mapping[str, Any]) -> str:
+    """The result of `evaluate_detections` as text.
+
+    Parameters
+    ----------
+    result : dict
+
+    Returns
+    -------
+    str
+    """
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
     first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} ground-truth boxes, "
              f"{counts['ignored']} ignored; average precisions use all {counts['predictions']} predictions; precision, recall and F1 use "
@@ -253,6 +399,16 @@ def detection_tables(result: Mapping[str, Any]) -> str:
 
 
 def pose_tables(result: Mapping[str, Any]) -> str:
+    """The result of `evaluate_poses` as text.
+
+    Parameters
+    ----------
+    result : dict
+
+    Returns
+    -------
+    str
+    """
     counts = result["counts"]
     hidden = f"{counts['hidden']} hidden ones also scored" if result["settings"]["hidden"] else f"{counts['hidden']} hidden"
     first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {hidden}; "
@@ -263,8 +419,16 @@ def pose_tables(result: Mapping[str, Any]) -> str:
 
 
 def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections, truth: GroundTruth) -> None:
-    """Precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue, true green, to be
-    ignored red."""
+    """Writes pictures: precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue,
+    true green, to be ignored red. Needs OpenCV.
+
+    Parameters
+    ----------
+    folder : str
+    samples : Samples
+    result, found, truth
+        Of `evaluate_detections`.
+    """
     from . import drawing  # OpenCV, which nothing else here needs
 
     names = {samples.classes.index(name): name for name in result["classes"] if name != "all"}
@@ -285,7 +449,15 @@ def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], fo
 
 
 def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: np.ndarray, persons: Persons) -> None:
-    """Some of the samples, evenly spread: joints found blue, true green, annotated and not scored red."""
+    """Writes pictures of some of the samples, evenly spread: joints found blue, true green, annotated and not scored red. Needs OpenCV.
+
+    Parameters
+    ----------
+    folder : str
+    samples : Samples
+    result, found, persons
+        Of `evaluate_poses`.
+    """
     from . import drawing
 
     scored = persons.scored(result["settings"]["hidden"])
@@ -310,6 +482,13 @@ def _without_nan(value: Any) -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
+    """The command line.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        None: those of the process.
+    """
     parser = argparse.ArgumentParser(prog="python3 -m eventgan.evaluate", description="Scores the predictions of a network against the labels of shards.")
     parser.add_argument("what", choices=["detections", "poses"])
     parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with image_id, person, joints")

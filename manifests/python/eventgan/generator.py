@@ -168,6 +168,8 @@ class Generator:
 
         Parameters
         ----------
+        previous, following : array_like, [H, W] or [H, W, 3]
+            As of a call.
         boxes : array_like, [n, 4], optional
             Left, top, right, bottom in pixels of the image, by edges: a whole image is 0, 0, W, H.
         joints : array_like, [P, J, 2], optional

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections
 import copy
+import html
 import json
 import os
 import pathlib
@@ -35,30 +36,45 @@ class Shards(Sequence):
 
     shards[i] is a sample (see `sample`), shards[i:j] or shards[[i, j, ...]] a Shards of those alone.
 
-    paths: a folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
-        shards that its dataset.json lists, in the order of the plan: a shard that is gone or another one by now is a
-        ValueError, and so is a name that is no shard's. Of any other folder all shards that are done, so those with a commit record, by name. No shard at all is a ValueError.
-    partial: True takes what is done of a folder that is not whole; without it a shard that dataset.json or plan.json misses,
-        one without commit record, and a commit record without its shard are a ValueError.
-    split: only the shards of this split ("train"...).
-    ids: only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards. The id of
-        a frame ("000001") stands for all its samples ("000001@before1"...).
-    where: only samples whose value is one of those given, by column: {"gap": 1, "class": ["Car", "Van"]}. `class` means
-        a box of that class that is not to be ignored, `gap` is gap_frames; any other key is a column of /pairs:
-        sequence, subject, action, camera, dataset... (see `column`).
-    A split, an id or a value that no sample (of the split) has is a ValueError: nothing is silently missing. So is a class
-        that has a name but no box that counts. Values that exist, but in no sample together, give an empty sequence.
-    invalid: what to do about quarantined samples. "skip": they are not part of the sequence. "raise": they are, and
-        reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False. Those that `ids` names are
-        skipped with a warning.
-    fields: what a sample holds; of FIELDS. What is not asked for is not read.
-    decode: False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be
-        decoded elsewhere: value = stored number x scale.
-    open_files: how many shards stay open at a time (about half a megabyte each).
-
     The labels of a shard are read once, when they are first needed, and kept. Files are opened again in every process:
     an object can go to workers that are forked or spawned. Slices share the files of what they were cut from: one thread at
     a time for all of them.
+
+    Parameters
+    ----------
+    paths : str, path or iterable of them
+        A folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
+        shards that its dataset.json lists, in the order of the plan. Of any other folder all shards that are done, so those with a commit
+        record, by name.
+    split : str, optional
+        Only the shards of this split ("train"...).
+    ids : str, path or iterable of str, optional
+        Only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards. The id of
+        a frame ("000001") stands for all its samples ("000001@before1"...).
+    where : dict, optional
+        Only samples whose value is one of those given, by column: {"gap": 1, "class": ["Car", "Van"]}. `class` means
+        a box of that class that is not to be ignored, `gap` is gap_frames; any other key is a column of /pairs:
+        sequence, subject, action, camera, dataset... (see `column`). Values that exist, but in no sample together, give an empty sequence.
+    invalid : {"skip", "raise", "keep"}
+        What to do about quarantined samples. "skip": they are not part of the sequence. "raise": they are, and
+        reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False. Those that `ids` names are
+        skipped with a warning.
+    fields : iterable of str
+        What a sample holds; of FIELDS. What is not asked for is not read.
+    decode : bool, default True
+        False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be
+        decoded elsewhere: value = stored number x scale.
+    open_files : int, default 128
+        How many shards stay open at a time (about half a megabyte each).
+    partial : bool, default False
+        True takes what is done of a folder that is not whole.
+
+    Raises
+    ------
+    ValueError
+        There is no shard at all; one that dataset.json describes is gone, another one by now, or has a name that is no shard's. Without
+        `partial`: dataset.json or plan.json misses a shard, one has no commit record, or a commit record has no shard. A split, an id or a
+        value that no sample (of the split) has: nothing is silently missing; so with a class that has a name but no box that counts.
     """
 
     def __init__(self, paths: PathLike | Iterable[PathLike], *, split: str | None = None,
@@ -83,6 +99,7 @@ class Shards(Sequence):
             self._described_as += f", split {split}"
         self.paths = [shard.path for shard in shards]
         valid = [self._files[shard.path].column("valid") if shard.valid is None else shard.valid for shard in shards]
+        self._quarantined = sum(np.count_nonzero(np.equal(each, 0)) for each in valid)
         self._shard = np.repeat(np.arange(len(valid), dtype=np.int32), [len(each) for each in valid])
         self._slot = np.concatenate([np.arange(len(each), dtype=np.int32) for each in valid])
         sound = np.concatenate(valid).astype(bool) | (invalid != "skip")
@@ -115,32 +132,67 @@ class Shards(Sequence):
         self._files.close()
 
     def changed(self, volume_of: Callable[[Sample], np.ndarray]) -> Shards:
-        """The same samples with other volumes: each is what `volume_of` makes of its sample, which has the decoded `volume` and `pair`.
-        A camera's three times as bright:
+        """The same samples with other volumes. A camera's three times as bright:
 
             Shards("camera").changed(lambda sample: np.minimum(3 * sample["volume"], 1))
 
-        Statistics stay those of the stored volumes, quarantined samples stay as they are. To go to workers that are spawned, `volume_of`
-        must be a function of a module."""
+        Statistics stay those of the stored volumes, quarantined samples stay as they are.
+
+        Parameters
+        ----------
+        volume_of : callable
+            Makes a volume, float32 [2B, H, W], of a sample, which has the decoded `volume` and `pair`. To go to workers that are spawned, it must
+            be a function of a module.
+
+        Returns
+        -------
+        Shards
+        """
         changed = copy.copy(self)
         changed._changes = (*self._changes, volume_of)
         return changed
 
     def labels(self, index: int) -> Sample:
-        """Sample `index` without its volume, which is not touched."""
+        """Sample `index` without its volume, which is not touched.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        dict
+            As of `sample`.
+        """
         return self.sample(index, self._fields - {"volume"})
 
     def sample(self, index: int, fields: Iterable[str] | None = None) -> Sample:
-        """One sample, a dictionary of the fields asked for (None: the constructor's); keys are shard_format.md's names:
+        """One sample; keys are shard_format.md's names.
 
-        volume        float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
-        pair          everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if there
-        statistics    everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as
-                      int64, since PyTorch has no uint32
-        boxes         arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
-        persons       arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
-        original      bytes, the annotation as the dataset holds it
-        and always    valid, bool; shard, slot: where it comes from
+        Parameters
+        ----------
+        index : int
+        fields : iterable of str, optional
+            Which fields, of FIELDS. None: the constructor's.
+
+        Returns
+        -------
+        dict
+            volume : float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
+            pair : everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if there
+            statistics : everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as
+                int64, since PyTorch has no uint32
+            boxes : arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
+            persons : arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
+            original : bytes, the annotation as the dataset holds it
+            valid, shard, slot : always there: bool; where it comes from
+
+        Raises
+        ------
+        IndexError
+            There is no such sample.
+        InvalidSample
+            It is quarantined, and `invalid` is "raise".
         """
         fields = self._fields if fields is None else _known_fields(fields)
         path, slot = self._place(index)
@@ -174,13 +226,29 @@ class Shards(Sequence):
         return {**sample, "valid": valid, "shard": str(path), "slot": slot}
 
     def column(self, name: str) -> np.ndarray:
-        """[len(self), ...]: a column of /pairs (or "gap") of every sample, read without volumes or boxes. Samples of shards that
-        do not have it, since none of theirs has such a thing, get "", NaN or -1; a column that no shard has is a ValueError."""
+        """A column of /pairs of every sample, read without volumes or boxes.
+
+        Parameters
+        ----------
+        name : str
+            The column, or "gap" for gap_frames.
+
+        Returns
+        -------
+        numpy.ndarray
+            [len(self), ...]. Samples of shards that do not have the column, since none of theirs has such a thing, get "", NaN or -1.
+
+        Raises
+        ------
+        ValueError
+            No shard has the column.
+        """
         name = "pairs/" + {"gap": "gap_frames"}.get(name, name)
-        like = next((file.column(name) for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
-        if like is None:
+        having = next((file for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
+        if having is None:
             known = sorted({column for path in self.paths for column in self._files[path].file["pairs"]})
             raise ValueError(f"expected a column of {', '.join(known)}, got {name[len('pairs/'):]!r}, in {self._described_as}")
+        like = having.column(name)
         nothing = {"O": "", "f": np.nan}.get(like.dtype.kind, -1)
 
         def of_shard(file: _OpenShard) -> np.ndarray:
@@ -197,7 +265,18 @@ class Shards(Sequence):
         return np.stack([samples, np.arange(len(samples)) - first[samples]], axis=1) if len(samples) else np.empty((0, 2), int)
 
     def annotated(self, joints: Iterable[str]) -> np.ndarray:
-        """bool [persons]: of every row of `persons` whether any of these joints (see `joint_places`) is annotated."""
+        """Whether any of these joints is annotated, of every row of `persons`.
+
+        Parameters
+        ----------
+        joints : iterable of str
+            Names, as of `joint_places`.
+
+        Returns
+        -------
+        numpy.ndarray
+            bool [persons].
+        """
         joints, persons = list(joints), self.persons
         if not len(persons):
             return np.empty(0, bool)
@@ -209,8 +288,18 @@ class Shards(Sequence):
         return self._gathered(of_shard, self._shard[persons[:, 0]], rows)
 
     def image_area(self) -> np.ndarray:
-        """float64 [4]: left, top, right, bottom in volume pixels (edges) around what the samples' images cover, all together.
-        What is outside is the border that a letterbox adds and never holds events."""
+        """What the samples' images cover, all together. What is outside is the border that a letterbox adds and never holds events.
+
+        Returns
+        -------
+        numpy.ndarray
+            float64 [4]: left, top, right, bottom in volume pixels (edges).
+
+        Raises
+        ------
+        ValueError
+            No sample has images.
+        """
         maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
         if np.isnan(maps).all():
             raise ValueError(f"expected samples with images, got none, in {self._described_as}")
@@ -228,9 +317,20 @@ class Shards(Sequence):
         return np.concatenate([np.nanmin(np.maximum(low, 0), axis=0), np.nanmax(high, axis=0)])
 
     def groups(self, by: str = "sequence") -> np.ndarray:
-        """str [len(self)]: what each sample must not be parted from. "sequence": Human3.6M's take (subject and action, whatever the
-        camera), else the drive, else the sequence, else the labelled frame, as far as each sample's is known. "sample_id": the
-        labelled frame. Any other column: its value, or as "sequence" for samples without."""
+        """What each sample must not be parted from.
+
+        Parameters
+        ----------
+        by : str, default "sequence"
+            "sequence": Human3.6M's take (subject and action, whatever the camera), else the drive, else the sequence, else the labelled
+            frame, as far as each sample's is known. "sample_id": the labelled frame. Any other column: its value, or as "sequence" for
+            samples without.
+
+        Returns
+        -------
+        numpy.ndarray
+            str [len(self)].
+        """
         frames = np.array([_frame_of(name) for name in self.column("sample_id")], object)
         if by == "sample_id":
             return frames
@@ -245,8 +345,26 @@ class Shards(Sequence):
         return np.where(values != "", values, recordings)
 
     def divide(self, fraction: float, by: str = "sequence", seed: int = 0) -> tuple[Shards, Shards]:
-        """Two parts, the first of about `fraction` of the samples, that share none of `groups(by)`: no drive, no subject, no
-        labelled frame is in both. Which groups are in the first is a function of seed and their names."""
+        """Two parts that share none of `groups(by)`: no drive, no subject, no labelled frame is in both.
+
+        Parameters
+        ----------
+        fraction : float
+            About which share of the samples the first part has, between 0 and 1.
+        by : str, default "sequence"
+            As of `groups`.
+        seed : int, default 0
+            Which groups are in the first part is a function of it and their names.
+
+        Returns
+        -------
+        (Shards, Shards)
+
+        Raises
+        ------
+        ValueError
+            There are not two groups, or the fraction is none.
+        """
         if not 0 < fraction < 1:
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
         names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
@@ -259,11 +377,22 @@ class Shards(Sequence):
         return self[np.flatnonzero(first)], self[np.flatnonzero(~first)]
 
     def known_classes(self) -> list[str]:
-        """The names that the shards have for classes, in their order, whether or not a sample here has such a box."""
+        """The names that the shards have for classes, in their order, whether or not a sample here has such a box.
+
+        Returns
+        -------
+        list of str
+        """
         return list(dict.fromkeys(name for path in self.paths for name in self._files[path].names("labels/boxes/class_id", "class_names")))
 
     def class_counts(self) -> dict[str, int]:
-        """How many boxes that are not to be ignored the samples have of each class, by name, in the order the shards name them."""
+        """How many boxes that are not to be ignored the samples have of each class.
+
+        Returns
+        -------
+        dict
+            By name, in the order the shards name them.
+        """
         counts: dict[str, int] = {}
         for number in np.unique(self._shard):
             file, slots = self._files[self.paths[number]], self._slot[self._shard == number]
@@ -276,23 +405,79 @@ class Shards(Sequence):
         return counts
 
     def default_joints(self) -> list[str]:
-        """The joints of the first source that has any: the 17 in common use where it names them (`joint_aliases`), else all."""
+        """The joints of the first source that has any: the 17 in common use where it names them (`joint_aliases`), else all.
+
+        Returns
+        -------
+        list of str
+        """
         files = (self._files[self.paths[number]] for number in np.unique(self._shard))
         sets = ([name for name in file.names("labels/poses", "joint_aliases") if name] or file.names("labels/poses", "joint_names") for file in files)
         return next(filter(None, sets), [])
 
     def class_names(self, index: int) -> list[str]:
-        """What the class ids of sample `index` mean, the same for a whole source."""
+        """What the class ids of a sample mean, the same for a whole source.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        list of str
+        """
         return self._files[self._place(index)[0]].names("labels/boxes/class_id", "class_names")
 
     def joint_names(self, index: int) -> list[str]:
-        """What the joints of sample `index` are, the same for a whole source."""
+        """What the joints of a sample are, the same for a whole source.
+
+        Parameters
+        ----------
+        index : int
+
+        Returns
+        -------
+        list of str
+        """
         return self._files[self._place(index)[0]].names("labels/poses", "joint_names")
 
     def joint_places(self, index: int, names: Iterable[str]) -> list[int]:
-        """Where these joints are among those of sample `index`, found by their names or by those of the 17 joints in common
-        use (`joint_aliases`); a name that is neither is a ValueError."""
+        """Where these joints are among those of a sample.
+
+        Parameters
+        ----------
+        index : int
+        names : iterable of str
+            The source's own, or those of the 17 joints in common use (`joint_aliases`).
+
+        Returns
+        -------
+        list of int
+
+        Raises
+        ------
+        ValueError
+            A name is neither.
+        """
         return self._files[self._place(index)[0]].joint_places(names)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a table of what the samples are, counted without touching a volume."""
+        counts: dict[str, collections.Counter] = collections.defaultdict(collections.Counter)
+        for number in np.unique(self._shard):
+            here, file = self[np.flatnonzero(self._shard == number)], self._files[self.paths[number]]
+            counts["splits"][file.file.attrs["split"]] += len(here)
+            counts["sources"][file.file.attrs["dataset"]] += len(here)
+            counts["gaps, frames"].update(file.column("pairs/gap_frames")[here._slot].tolist())
+            counts["boxes"].update(here.class_counts())
+            counts["volumes"][file.volumes] += len(here)
+        rows = {"samples": f"{len(self):,}"}
+        for what, found in counts.items():
+            rows[what] = ", ".join(f"{value}: {count:,}" for value, count in sorted(found.items()) if count) or "none"
+        rows["quarantined"] = f"{self._quarantined:,} in these shards"
+        cells = "".join(f'<tr><th style="text-align:left">{what}</th><td style="text-align:left">{html.escape(text)}</td></tr>'
+                        for what, text in rows.items())
+        return f"<table><caption>{html.escape(self._described_as)}</caption>{cells}</table>"
 
     def _place(self, index: int) -> tuple[pathlib.Path, int]:
         if not -len(self) <= index < len(self):
@@ -315,7 +500,8 @@ class Shards(Sequence):
     def _gathered(self, of_shard: Callable[[_OpenShard], np.ndarray], shard: np.ndarray | None = None,
                   rows: np.ndarray | None = None) -> np.ndarray:
         """[n, ...]: what `of_shard` gives of a shard, [its rows, ...], for rows [n] of shards [n]; None: for the samples here."""
-        shard, rows = (self._shard, self._slot) if shard is None else (shard, rows)
+        if shard is None or rows is None:
+            shard, rows = self._shard, self._slot
         if not len(shard):
             return of_shard(self._files[self.paths[0]])[:0]
         parts, places, done = [], np.empty(len(shard), np.int64), 0
@@ -384,6 +570,7 @@ class _OpenShard:
         self._kept = kept
         self._volume = self.file["events/volume"]
         self.size = self._volume.shape[2:]  # H, W
+        self.volumes = f"{' x '.join(map(str, self._volume.shape[1:]))}, {self._volume.dtype}"
 
     def fit(self) -> str:
         return json.loads(self.file.attrs["preprocessing"])["fit"]
@@ -444,6 +631,9 @@ class _OpenShard:
 class _Files:
     """The shards that are open in this process, the one used longest ago closed first, and the columns of all that were."""
 
+    _open: collections.OrderedDict[pathlib.Path, _OpenShard]
+    _process: int
+
     def __init__(self, most: int) -> None:
         self._most = most
         self._forget()
@@ -472,13 +662,27 @@ class _Files:
         self._forget()
 
     def _forget(self) -> None:
-        self._open: collections.OrderedDict[pathlib.Path, _OpenShard] = collections.OrderedDict()
+        self._open = collections.OrderedDict()
         self._kept: dict[pathlib.Path, _Kept] = collections.defaultdict(_Kept)
         self._process = os.getpid()
 
 
 def open_shard(path: PathLike) -> h5py.File:
-    """The shard's file. Raises ValueError if it is none of a known version."""
+    """Opens a shard.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Returns
+    -------
+    h5py.File
+
+    Raises
+    ------
+    ValueError
+        It is none of a known version.
+    """
     file = h5py.File(path, "r", rdcc_nbytes=0)  # a volume is a chunk of its own: nothing to keep
     found = file.attrs.get("format"), int(file.attrs.get("format_version", 0))
     if found != (FORMAT, FORMAT_VERSION):
@@ -578,7 +782,21 @@ def _require_whole(done: Sequence[str], missing: Sequence[str], folder: pathlib.
 
 
 def read_description(folder: PathLike) -> dict[str, Any]:
-    """dataset.json of a finalized folder, as a dictionary. Raises ValueError if it is of no known version."""
+    """dataset.json of a finalized folder.
+
+    Parameters
+    ----------
+    folder : str or path
+
+    Returns
+    -------
+    dict
+
+    Raises
+    ------
+    ValueError
+        It is of no known version.
+    """
     path = pathlib.Path(folder, DESCRIPTION)
     description = json.loads(path.read_text(encoding="utf-8"))
     found = description.get("format"), description.get("version")
@@ -591,7 +809,7 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
     description = read_description(folder)
     if not partial:
         _require_whole(description["shards"], description.get("missing", ()), folder)
-    shards = []
+    shards, valid = [], {}
     for entry in description["shards"]:
         if not SHARD_NAME.fullmatch(str(entry["name"])):
             raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in {folder / DESCRIPTION}")
@@ -599,8 +817,8 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
         if not _is_same(path, entry):
             raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
                              "(run eventgan convert, then eventgan finalize)")
-        shards.append(_Shard(path, entry["split"], np.ones(entry["samples"], bool)))
-    valid = {shard.path.name: shard.valid for shard in shards}
+        valid[path.name] = np.ones(entry["samples"], bool)
+        shards.append(_Shard(path, entry["split"], valid[path.name]))
     for sample in description["quarantined"]:
         valid[sample["shard"]][sample["slot"]] = False
     return shards

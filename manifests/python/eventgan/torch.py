@@ -38,15 +38,29 @@ Item = dict[str, Any]
 class EventAugmentation:
     """What may happen to events without making them unlike a camera's. Drawn by torch's random numbers.
 
-    flip: probability of left and right exchanged.
-    reverse: probability of time running backwards, which exchanges polarities and turns the bins round. Labels stay where they are
-        and so come to the other end of time: only samples whose labels lie half-way (`label_position` 0.5) are reversed.
-    reverse_all: True reverses others, too.
-    drop: probability of one polarity (either) being lost, as in a sensor with one threshold set high.
-    scale: factors between which the image is enlarged, uniformly in its logarithm; what lies outside is cut, what is
-        missing is filled with 0, no events.
-    shift: by at most this share of width and height the scaled image is moved.
     There is no change of values: a volume has no brightness or hue.
+
+    Parameters
+    ----------
+    flip : float, default 0.5
+        Probability of left and right exchanged.
+    reverse : float, default 0
+        Probability of time running backwards, which exchanges polarities and turns the bins round. Labels stay where they are
+        and so come to the other end of time: only samples whose labels lie half-way (`label_position` 0.5) are reversed.
+    drop : float, default 0
+        Probability of one polarity (either) being lost, as in a sensor with one threshold set high.
+    scale : (float, float)
+        Factors between which the image is enlarged, uniformly in its logarithm; what lies outside is cut, what is
+        missing is filled with 0, no events.
+    shift : float, default 0
+        By at most this share of width and height the scaled image is moved.
+    reverse_all : bool, default False
+        True reverses others, too.
+
+    Raises
+    ------
+    ValueError
+        A probability, factor or share is none.
     """
 
     flip: float = 0.5
@@ -64,7 +78,18 @@ class EventAugmentation:
             raise ValueError(f"expected factors above 0, the smaller one first, and a shift of at least 0, got {self.scale}, {self.shift}")
 
     def affine(self, height: int, width: int) -> np.ndarray:
-        """[2, 3]: where a point of the volume goes, drawn again."""
+        """Where a point of the volume goes, drawn again.
+
+        Parameters
+        ----------
+        height, width : int
+            Of the volume, pixels.
+
+        Returns
+        -------
+        numpy.ndarray
+            float64 [2, 3].
+        """
         flip, size, dx, dy = (float(each) for each in torch.rand(4))
         s = math.exp(math.log(self.scale[0]) + size * math.log(self.scale[1] / self.scale[0]))
         middle = np.array([(width - 1) / 2, (height - 1) / 2])
@@ -73,7 +98,19 @@ class EventAugmentation:
         return np.column_stack([linear, moved - linear @ middle])
 
     def events(self, volume: torch.Tensor, label_position: float = 0.5) -> torch.Tensor:
-        """[2B, H, W]: the volume, perhaps backwards in time (see `reverse`), perhaps without one polarity."""
+        """The volume, perhaps backwards in time (see `reverse`), perhaps without one polarity.
+
+        Parameters
+        ----------
+        volume : torch.Tensor, [2B, H, W]
+        label_position : float, default 0.5
+            Where in time the labels lie: 0 at the start, 1 at the end.
+
+        Returns
+        -------
+        torch.Tensor
+            [2B, H, W].
+        """
         reverse, drop, which = (float(each) for each in torch.rand(3))
         if reverse < self.reverse and (self.reverse_all or label_position == 0.5):
             volume = volume.flip(0)
@@ -84,8 +121,21 @@ class EventAugmentation:
 
 
 def warp(volume: torch.Tensor, affine: np.ndarray, height: int, width: int) -> torch.Tensor:
-    """[C, height, width]: `volume` [C, H, W] moved by `affine` [2, 3], the map of its points to those of the result;
-    bilinear, 0 where there is nothing. A shift by whole pixels, flipped or not, is exact."""
+    """Moves the pixels of a volume, bilinearly, with 0 where there is nothing. A shift by whole pixels, flipped or not, is exact.
+
+    Parameters
+    ----------
+    volume : torch.Tensor, [C, H, W]
+    affine : numpy.ndarray, [2, 3]
+        The map of its points to those of the result.
+    height, width : int
+        Of the result, pixels.
+
+    Returns
+    -------
+    torch.Tensor
+        [C, height, width].
+    """
     back = inverse(affine)
     if np.allclose(np.abs(back[:, :2]), np.eye(2), rtol=0, atol=1e-9) and np.allclose(back, back.round(), rtol=0, atol=1e-9):
         return _shifted(volume, back.round().astype(int), height, width)
@@ -109,26 +159,72 @@ def _shifted(volume: torch.Tensor, back: np.ndarray, height: int, width: int) ->
 
 
 def move_points(points: np.ndarray, affine: np.ndarray) -> np.ndarray:
-    """[..., 2]: points [..., 2] moved by `affine` [2, 3]."""
+    """Points moved by an affine map.
+
+    Parameters
+    ----------
+    points : numpy.ndarray, [..., 2]
+    affine : numpy.ndarray, [2, 3]
+
+    Returns
+    -------
+    numpy.ndarray
+        [..., 2].
+    """
     return points @ affine[:, :2].T + affine[:, 2]
 
 
 def move_boxes(boxes: np.ndarray, affine: np.ndarray) -> np.ndarray:
-    """[n, 4]: left, top, right, bottom moved by `affine` [2, 3], the map of points, which flips or scales but does not
-    rotate."""
+    """Boxes moved by a map that flips or scales but does not rotate.
+
+    Parameters
+    ----------
+    boxes : numpy.ndarray, [n, 4]
+        Left, top, right, bottom, by edges.
+    affine : numpy.ndarray, [2, 3]
+        The map of points.
+
+    Returns
+    -------
+    numpy.ndarray
+        [n, 4].
+    """
     corners = move_points(np.asarray(boxes, float).reshape(-1, 2, 2) - 0.5, affine) + 0.5
     return np.concatenate([corners.min(1), corners.max(1)], 1)
 
 
 def inverse(affine: np.ndarray) -> np.ndarray:
-    """[2, 3]: the map back."""
+    """The map back.
+
+    Parameters
+    ----------
+    affine : numpy.ndarray, [2, 3]
+
+    Returns
+    -------
+    numpy.ndarray
+        [2, 3].
+    """
     linear = np.linalg.inv(affine[:, :2])
     return np.column_stack([linear, -linear @ affine[:, 2]])
 
 
 def fitted(area: Sequence[float], size: tuple[int, int]) -> np.ndarray:
-    """[2, 3]: the map of points that scales `area` (left, top, right, bottom in volume pixels, edges) to fit into (H, W) and lays it
-    into the middle, both sides by the same factor. Of Shards.image_area(): what a letterbox has added is left out."""
+    """The map of points that scales an area to fit and lays it into the middle, both sides by the same factor. Of Shards.image_area(): what a
+    letterbox has added is left out.
+
+    Parameters
+    ----------
+    area : sequence of 4 floats
+        Left, top, right, bottom in volume pixels, edges.
+    size : (int, int)
+        H, W.
+
+    Returns
+    -------
+    numpy.ndarray
+        float64 [2, 3].
+    """
     left, top, right, bottom = area
     height, width = size
     s = min(width / (right - left), height / (bottom - top))
@@ -149,22 +245,35 @@ def _move(view: np.ndarray | None, augmentation: EventAugmentation | None, heigh
 
 
 class DetectionDataset(Dataset):
-    """Volumes with boxes. An item:
+    """Volumes with boxes. An item is a dictionary:
 
-    volume   [2B, H, W] float32
-    boxes    [n, 4] float32, left, top, right, bottom in its pixels, cut to it
-    labels   [n] int64, position in `classes`; -1 for DontCare, to be ignored whatever the class
-    ignore   [n] bool: neither for training nor for scoring (annotated so, or less than `visible` of it is left)
-    id       str, sample_id
-    index    int, of the sample in `shards`
+    volume : [2B, H, W] float32
+    boxes : [n, 4] float32, left, top, right, bottom in its pixels, cut to it
+    labels : [n] int64, position in `classes`; -1 for DontCare, to be ignored whatever the class
+    ignore : [n] bool: neither for training nor for scoring (annotated so, or less than `visible` of it is left)
+    id : str, sample_id
+    index : int, of the sample in `shards`
 
-    classes: names in the order of their numbers, or name → number, which may join classes: {"Car": 0, "Van": 0}. Boxes of
-        other classes are left out, but for DontCare. A name that no shard knows is a ValueError, and so are shards without any. None:
-        all names that the shards have, in their order, without DontCare: the same numbers for any part of them.
-    size: (H, W) that volumes are filled up to with zeros, or cut to, at the right and at the bottom; None: as they are.
-    augmentation: changes volume and boxes alike; None: nothing.
-    visible: share of a box's area that must be left for it not to be ignored.
-    view: [2, 3], where points of a volume go before that, such as `fitted(area, size)`; None: they stay.
+    Parameters
+    ----------
+    shards : Shards
+    classes : sequence of str, or mapping of str to int, optional
+        Names in the order of their numbers, or name → number, which may join classes: {"Car": 0, "Van": 0}. Boxes of
+        other classes are left out, but for DontCare. None: all names that the shards have, in their order, without DontCare: the same
+        numbers for any part of them.
+    size : (int, int), optional
+        H, W that volumes are filled up to with zeros, or cut to, at the right and at the bottom. None: as they are.
+    augmentation : EventAugmentation, optional
+        Changes volume and boxes alike. None: nothing.
+    visible : float, default 0.25
+        Share of a box's area that must be left for it not to be ignored.
+    view : numpy.ndarray, [2, 3], optional
+        Where points of a volume go before that, such as `fitted(area, size)`. None: they stay.
+
+    Raises
+    ------
+    ValueError
+        No shard knows a name, or there are no samples of sources with boxes.
     """
 
     def __init__(self, shards: Shards, classes: Sequence[str] | Mapping[str, int] | None = None,
@@ -212,9 +321,21 @@ def _areas(boxes: np.ndarray) -> np.ndarray:
 
 
 def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, list[str]]:
-    """imgs [N, 2B, H, W] float32; targets [n, 6] float32: number of the image in the batch, class, and centre x, centre y,
-    width, height as shares of W and H, 0..1; ids. Boxes to be ignored are left out. Volumes must be of one size
-    (DetectionDataset's `size`)."""
+    """Items as YOLO's trainers take them. Boxes to be ignored are left out.
+
+    Parameters
+    ----------
+    items : sequence of dict
+        DetectionDataset's, with volumes of one size (its `size`).
+
+    Returns
+    -------
+    imgs : torch.Tensor
+        float32 [N, 2B, H, W].
+    targets : torch.Tensor
+        float32 [n, 6]: number of the image in the batch, class, and centre x, centre y, width, height as shares of W and H, 0..1.
+    ids : list of str
+    """
     imgs = torch.stack([item["volume"] for item in items])
     height, width = imgs.shape[2:]
     targets = []
@@ -231,9 +352,20 @@ def collate_yolo(items: Sequence[Item]) -> tuple[torch.Tensor, torch.Tensor, lis
 
 
 def collate_torchvision(items: Sequence[Item]) -> tuple[list[torch.Tensor], list[Item]]:
-    """Volumes and targets as torchvision's detectors take them, of any sizes: a list of [2B, H, W] and a list of
-    dictionaries with boxes [n, 4], labels [n] from 1 (0 is their background), `keypoints` [n, J, 3] if the items have
-    them, and `id`. Boxes to be ignored are left out."""
+    """Items as torchvision's detectors take them. Boxes to be ignored are left out.
+
+    Parameters
+    ----------
+    items : sequence of dict
+        DetectionDataset's or KeypointDataset's, with volumes of any sizes.
+
+    Returns
+    -------
+    volumes : list of torch.Tensor
+        [2B, H, W].
+    targets : list of dict
+        boxes [n, 4], labels [n] from 1 (0 is their background), `keypoints` [n, J, 3] if the items have them, and `id`.
+    """
     targets = []
     for item in items:
         kept = ~item["ignore"]
@@ -253,9 +385,24 @@ _NAMELESS = re.compile("joint_[0-9]+")  # what eventgan calls joints of which it
 
 
 def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
-    """Joints that a mirror exchanges, as pairs of positions (left, right): those whose names differ by the side alone, such as l_hip (MPII), left_hip
-    and LeftFoot (Human3.6M), hipL (DHP19), LHip; lhip, too, where there is rhip. Names that suggest a side and have no partner, or that say nothing
-    (joint_3), are a ValueError: a mirror would leave them where they are."""
+    """Joints that a mirror exchanges.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Those that differ by the side alone are a pair, such as l_hip (MPII), left_hip and LeftFoot (Human3.6M), hipL (DHP19), LHip; lhip, too,
+        where there is rhip.
+
+    Returns
+    -------
+    list of (int, int)
+        Positions (left, right).
+
+    Raises
+    ------
+    ValueError
+        A name suggests a side and has no partner, or says nothing (joint_3): a mirror would leave it where it is.
+    """
     places, pairs, alone = {name: i for i, name in enumerate(names)}, [], []
     for name, place in places.items():
         suggested = _SIDE.search(name)
@@ -311,11 +458,24 @@ class KeypointDataset(Dataset):
     """Volumes with persons as boxes and keypoints, as Keypoint R-CNN learns them. Items are DetectionDataset's, all labels 0
     ("person"), and
 
-    keypoints   [n, J, 3] float32: x, y, and 0 not annotated or outside, 1 hidden, 2 visible or annotated without a word on that
+    keypoints : [n, J, 3] float32: x, y, and 0 not annotated or outside, 1 hidden, 2 visible or annotated without a word on that
 
-    A person's box holds its annotated joints and a margin of `margin` of its longer side around them; one without any
-    annotated joint inside is to be ignored. joints: names to take, in that order; None: those of the first source, of Human3.6M the
-    17 in common use; a source without joints is a ValueError. An augmentation that mirrors needs names with partners (`flip_pairs`).
+    A person's box holds its annotated joints and a margin around them; one without any annotated joint inside is to be ignored.
+
+    Parameters
+    ----------
+    shards : Shards
+    joints : sequence of str, optional
+        Names to take, in that order. None: those of the first source, of Human3.6M the 17 in common use.
+    size, augmentation, view
+        As DetectionDataset's. An augmentation that mirrors needs names with partners (`flip_pairs`).
+    margin : float, default 0.15
+        The box's margin, as a share of its longer side.
+
+    Raises
+    ------
+    ValueError
+        A source has not these joints.
     """
 
     def __init__(self, shards: Shards, joints: Sequence[str] | None = None, size: tuple[int, int] | None = None,
@@ -363,9 +523,21 @@ def _around(joints: np.ndarray, annotated: np.ndarray, margin: float) -> tuple[n
 
 @dataclasses.dataclass(frozen=True)
 class PoseAugmentation:
-    """How a person's crop may vary, as Simple Baselines (Xiao et al. 2018) have it: its scale by normal factors of deviation
-    `scale` around 1, cut off at 1 ± scale; in a share `rotated` of the crops turned by normal angles of deviation `rotation` in degrees,
-    cut off at twice that; left and right exchanged with probability `flip`; and what may happen to its events."""
+    """How a person's crop may vary, as Simple Baselines (Xiao et al. 2018) have it.
+
+    Parameters
+    ----------
+    scale : float, default 0.25
+        Its scale by normal factors of this deviation around 1, cut off at 1 ± scale.
+    rotation : float, default 30
+        Turned by normal angles of this deviation in degrees, cut off at twice that.
+    rotated : float, default 0.6
+        The share of the crops that is turned.
+    flip : float, default 0.5
+        Probability of left and right exchanged.
+    events : EventAugmentation
+        What may happen to its events.
+    """
 
     scale: float = 0.25
     rotation: float = 30.0
@@ -378,21 +550,36 @@ class PoseDataset(Dataset):
     """Persons, one an item, cut out as Microsoft's Simple Baselines do (lib/dataset/JointsDataset.py), which its trainer and
     those that follow it take as they are: (input, target, target_weight, meta).
 
-    input          [2B, H, W] float32
-    target         [J, H/4, W/4] float32: a Gaussian of `sigma` pixels and height 1 around each joint
-    target_weight  [J, 1] float32: 1 where the joint is annotated and some of its Gaussian inside
-    meta           joints [J, 3] and joints_vis [J, 3] in input pixels (z 0; visible = annotated), center [2] and scale [2] of
-                   the crop in volume pixels, rotation (degrees), score 1, flipped, image (sample_id), index, person;
-                   to_volume and to_source [2, 3] float64: maps of input points to those of the volume and of the source
+    input : [2B, H, W] float32
+    target : [J, H/4, W/4] float32: a Gaussian of `sigma` pixels and height 1 around each joint
+    target_weight : [J, 1] float32: 1 where the joint is annotated and some of its Gaussian inside
+    meta : joints [J, 3] and joints_vis [J, 3] in input pixels (z 0; visible = annotated), center [2] and scale [2] of
+        the crop in volume pixels, rotation (degrees), score 1, flipped, image (sample_id), index, person;
+        to_volume and to_source [2, 3] float64: maps of input points to those of the volume and of the source
 
     The crop is 200 x scale volume pixels wide, around the person's centre, turned by `rotation`; it fills the input's width, so a
     higher input shows more above and below, a lower one less. MPII's centres are moved down by 15 x scale and its scales enlarged by
     1.25 first, as there. A person without annotated centre or scale has those of its annotated joints' bounding box, enlarged by
-    1.25; one without annotated joints is left out, and shards without anybody else are a ValueError.
-    moved: True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
+    1.25; one without annotated joints is left out.
 
-    size: (H, W) of the input, multiples of 4. joints: names to take, in that order; None: those of the first source, of
-        Human3.6M the 17 in common use. An augmentation that mirrors needs names with partners (`flip_pairs`).
+    Parameters
+    ----------
+    shards : Shards
+    size : (int, int)
+        H, W of the input, multiples of 4.
+    joints : sequence of str, optional
+        Names to take, in that order. None: those of the first source, of Human3.6M the 17 in common use.
+    sigma : float, default 2
+        Of the Gaussians, pixels of the target.
+    augmentation : PoseAugmentation, optional
+        One that mirrors needs names with partners (`flip_pairs`).
+    moved : bool, default False
+        True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
+
+    Raises
+    ------
+    ValueError
+        The size is not of multiples of 4, a source has not these joints, or nobody has one that is annotated.
     """
 
     def __init__(self, shards: Shards, size: tuple[int, int] = (256, 256), joints: Sequence[str] | None = None,
@@ -422,7 +609,7 @@ class PoseDataset(Dataset):
         rotation, flipped = 0.0, False
         if self._augmentation:
             volume = self._augmentation.events.events(volume, sample["pair"]["label_position"])
-            scale, rotation, flipped = self._varied(scale)
+            scale, rotation, flipped = self._varied(self._augmentation, scale)
         to_input = _crop(center, scale, rotation, height, width)
         if flipped:
             to_input = np.array([[-1, 0, width - 1], [0, 1, 0]]) @ np.vstack([to_input, [0, 0, 1]])
@@ -452,8 +639,8 @@ class PoseDataset(Dataset):
             center, scale = (low + high) / 2, 1.25 * max(*(high - low), 1.0) / 200
         return joints, annotated, center, scale, sample
 
-    def _varied(self, scale: float) -> tuple[float, float, bool]:
-        spread = self._augmentation
+    @staticmethod
+    def _varied(spread: PoseAugmentation, scale: float) -> tuple[float, float, bool]:
         factor, angle = torch.randn(2).tolist()
         rotated, flip = torch.rand(2).tolist()
         return (scale * (1 + spread.scale * min(max(factor, -1), 1)),
@@ -470,8 +657,24 @@ def _crop(center: np.ndarray, scale: float, rotation: float, height: int, width:
 
 
 def heatmaps(joints: np.ndarray, annotated: np.ndarray, height: int, width: int, sigma: float) -> tuple[np.ndarray, np.ndarray]:
-    """[J, height, width] and [J, 1] float32: for each joint [J, 2], rounded to a pixel, exp(-d² / 2σ²) within 3 σ, and 1 if it is
-    annotated and any of that inside (else its map is 0), as Simple Baselines' generate_target."""
+    """Targets of joints, as Simple Baselines' generate_target makes them: for each joint, rounded to a pixel, exp(-d² / 2σ²) within 3 σ.
+
+    Parameters
+    ----------
+    joints : numpy.ndarray, [J, 2]
+        x, y in pixels of the maps.
+    annotated : numpy.ndarray, bool [J]
+    height, width : int
+        Of the maps, pixels.
+    sigma : float
+
+    Returns
+    -------
+    maps : numpy.ndarray
+        float32 [J, height, width].
+    weights : numpy.ndarray
+        float32 [J, 1]: 1 if the joint is annotated and any of its map inside, else 0, and its map is 0.
+    """
     at, reach = np.floor(joints + 0.5), math.floor(3 * sigma)
     weight = annotated & np.all((at + reach >= 0) & (at - reach < [width, height]), axis=-1)
     x = np.arange(width) - np.where(weight, at[:, 0], 0)[:, None]
@@ -485,8 +688,27 @@ def heatmaps(joints: np.ndarray, annotated: np.ndarray, height: int, width: int,
 def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | None = None,
             generator: torch.Generator | None = None) -> tuple[ConcatDataset, WeightedRandomSampler]:
     """Several datasets as one, and a sampler that draws from each its share, whatever their sizes: 0.8 and 0.2 for MPII and
-    Human3.6M as in the EventGAN paper. For DataLoader(dataset, sampler=sampler). length: draws an epoch (default: as
-    many as there are items)."""
+    Human3.6M as in the EventGAN paper. For DataLoader(dataset, sampler=sampler).
+
+    Parameters
+    ----------
+    datasets : iterable of Dataset
+    shares : sequence of float
+        One for each dataset, >= 0.
+    length : int, optional
+        Draws an epoch. None: as many as there are items.
+    generator : torch.Generator, optional
+        What the sampler draws with.
+
+    Returns
+    -------
+    (ConcatDataset, WeightedRandomSampler)
+
+    Raises
+    ------
+    ValueError
+        There are not as many shares as datasets, one is below 0, or a dataset is empty.
+    """
     joined = ConcatDataset(datasets)
     sizes = np.diff([0, *joined.cumulative_sizes])
     if len(shares) != len(sizes) or min(shares) < 0 or min(sizes) < 1:
@@ -496,9 +718,24 @@ def mixture(datasets: Iterable[Dataset], shares: Sequence[float], length: int | 
 
 
 def exchange_first_convolution(model: nn.Module, channels: int) -> nn.Module:
-    """Gives the model's first Conv2d (in the order of modules()) `channels` inputs, in place: the layer is initialised again,
-    all other weights stay, as the EventGAN paper does with networks pretrained on images. Returns the model (a model that is that
-    layer alone: the new one)."""
+    """Gives the model's first Conv2d (in the order of modules()) another number of inputs, in place: the layer is initialised again,
+    all other weights stay, as the EventGAN paper does with networks pretrained on images.
+
+    Parameters
+    ----------
+    model : torch.nn.Module
+    channels : int
+
+    Returns
+    -------
+    torch.nn.Module
+        The model; of one that is that layer alone the new one.
+
+    Raises
+    ------
+    ValueError
+        There is no Conv2d, or the first one has groups.
+    """
     for name, layer in model.named_modules():
         if not isinstance(layer, nn.Conv2d):
             continue

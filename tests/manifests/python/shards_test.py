@@ -1,8 +1,10 @@
 """eventgan.Shards: reading, selecting, dividing, in workers of all kinds."""
 
+import collections
 import json
 import multiprocessing
 import pickle
+import xml.etree.ElementTree
 
 import h5py
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 from conftest import NAME, SECOND
 
 from eventgan import InvalidSample, Shards
+from eventgan import shards as shards_module
 
 
 def ids_of(shards):
@@ -105,6 +108,48 @@ def test_labels(folder):
     assert shards.joint_names(-1) == ["nose", "left hand", "right hand"]
     assert shards.class_counts() == {"Car": 2, "DontCare": 0}
     assert shards[1:].class_counts() == {"Car": 1, "DontCare": 0}
+
+
+def table(shards):
+    """What a notebook shows, by row."""
+    rows = xml.etree.ElementTree.fromstring(shards._repr_html_())
+    assert rows.tag == "table"
+    return {row[0].text: row[1].text for row in rows.iter("tr")}
+
+
+def test_what_a_notebook_shows(two_shards, monkeypatch):
+    monkeypatch.setattr(shards_module._OpenShard, "volume", None)  # is not touched
+    shards = Shards(two_shards)
+    gaps, classes = collections.Counter(shards.column("gap").tolist()), shards.class_counts()
+    shown = table(shards)
+    assert shown == {"samples": "8", "splits": "train: 8", "sources": f"{shards.column('dataset')[0]}: 8",
+                     "gaps, frames": ", ".join(f"{gap}: {gaps[gap]}" for gap in sorted(gaps)),
+                     "boxes": ", ".join(f"{name}: {classes[name]}" for name in sorted(classes) if classes[name]),
+                     "volumes": "4 x 6 x 8, uint8: 8", "quarantined": "2 in these shards"}
+    assert any(classes.values()) and not all(classes.values())  # those without a box are left out
+    assert table(Shards(two_shards, invalid="keep"))["samples"] == "10"
+    part = table(shards[[0]])
+    assert part["volumes"] == "4 x 6 x 8, uint8: 1" and part["quarantined"] == shown["quarantined"]
+    assert part["boxes"] == (", ".join(f"{name}: {count}" for name, count in sorted(shards[[0]].class_counts().items()) if count) or "none")
+    assert table(shards[:0]) == {"samples": "0", "quarantined": "2 in these shards"}
+
+
+def test_what_a_notebook_shows_opens_a_shard_once(two_shards, monkeypatch):
+    shards, opened = Shards(two_shards, open_files=1), []
+    shards.close()
+    monkeypatch.setattr(shards_module, "open_shard", lambda path, open_shard=shards_module.open_shard: opened.append(path) or open_shard(path))
+    shards._repr_html_()
+    assert opened == shards.paths
+
+
+def test_what_a_notebook_shows_is_escaped(folder, tmp_path):
+    name = "<script>&amp;"
+    folder.rename(tmp_path / name)
+    with h5py.File(tmp_path / name / NAME, "r+") as file:
+        file.attrs["dataset"] = "<b>"
+    (tmp_path / name / NAME).with_suffix(".json").unlink()
+    html = Shards([tmp_path / name / NAME])._repr_html_()
+    assert "<script" not in html and "<b>" not in html and "&lt;b&gt;: 4" in html and "&lt;script&gt;&amp;amp;" in html
 
 
 def test_labels_do_not_touch_volumes(folder):

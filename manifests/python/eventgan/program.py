@@ -1,0 +1,272 @@
+"""The program `eventgan` from Python: a manifest drafted, a manifest converted, an output folder opened.
+
+The program is the one that the environment variable EVENTGAN_PROGRAM names, else the one beside the package (PREFIX/bin/eventgan of
+PREFIX/lib/python3/dist-packages, or the build tree's), else the first on the PATH.
+
+One rule for what goes wrong: where the program ends with another exit code than 0, its message is raised as ProgramError, with the exit code.
+Where there is no program, it is a FileNotFoundError.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import pathlib
+import shutil
+import signal
+import subprocess
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, Literal
+
+from .shards import PathLike, Shards
+
+Event = dict[str, Any]
+
+
+class ProgramError(RuntimeError):
+    """The program's own message, after it ended with another exit code than 0.
+
+    Attributes
+    ----------
+    exit_code : int
+        1 failed, 64 bad manifest, or a folder of another job, 65 too many quarantined samples, 66 input missing, 75 stopped: run it again;
+        below 0: ended by that signal.
+    """
+
+    def __init__(self, message: str, exit_code: int) -> None:
+        super().__init__(message, exit_code)  # both, so that it can be pickled
+        self.exit_code = exit_code
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
+    """Writes one manifest for these datasets, as `eventgan init` does. Its comments tell what was found.
+
+    Parameters
+    ----------
+    *paths : str or path
+        Folders, videos and recordings, each a source of the manifest. Of several, the first may be the kind of dataset that the others are:
+        "kitti_object", "kitti_tracking", "kitti_raw", "mpii", "mpii_list", "human36m", "frames" or "recording".
+    out : str or path
+        The manifest to write, a new file.
+
+    Returns
+    -------
+    pathlib.Path
+        The manifest, for `convert`, or to be changed first.
+
+    Raises
+    ------
+    ProgramError
+        No dataset is recognised, or `out` exists.
+    FileNotFoundError
+        There is no program.
+    """
+    _output("init", "--out", out, "--", *paths)
+    return pathlib.Path(out)
+
+
+def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = None, *, threads: int | None = None,
+            progress: Literal[False] | Callable[[Event], object] | None = None) -> Shards:
+    """Makes the shards of a manifest and completes the dataset, as `eventgan convert` and then `eventgan finalize` do.
+
+    What is made already stays: called again, it does what is left to do. KeyboardInterrupt (Ctrl-C, a notebook's stop button) stops the
+    program in order: the shard in work is finished or dropped, then the exception goes on. A second one drops it at once.
+
+    Parameters
+    ----------
+    manifest : str, path or dict
+        A manifest; a folder, video or recording, of which the job is what `init` proposes; or a dictionary with what a manifest holds, whose
+        relative paths start at the current folder (there the program reads it from a temporary file).
+    output : str or path, optional
+        Output folder. None: the manifest's.
+    threads : int, optional
+        How many threads the program has. None: all cores.
+    progress : None, False or callable
+        None: a bar, where tqdm is installed. False: none. A callable gets every event of the program as a dictionary:
+        {"event": "progress", "done": 3, "total": 41, "seconds_left": 1.9, ...}, {"event": "warning" or "note", "text": ...}, and the report at
+        the end of either command. Without one, warnings are Python's.
+
+    Returns
+    -------
+    Shards
+        All samples of the output folder.
+
+    Raises
+    ------
+    ProgramError
+        The manifest is not one, an input is missing, more samples are quarantined than `errors` allows, or whatever the program says.
+    FileNotFoundError
+        There is no program.
+    """
+    given = [] if output is None else ["--output", output]
+    given += [] if threads is None else ["--threads", str(threads)]
+    shown = _Shown(bars=progress is None)
+    on_event: Callable[[Event], object] = progress or shown
+    with contextlib.closing(shown), _manifest_file(manifest) as file:
+        # All shards, whatever the variables of a cluster say: what is returned is the whole folder.
+        report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", *given, "--", file)
+        _follow(on_event, "finalize", "--progress", "json", "--", report["folder"])
+    return Shards(report["folder"])
+
+
+def open(folder: PathLike, **options: Any) -> Shards:
+    """The samples of an output folder: `Shards`, but where the folder is not whole, the error says how far the program is with it.
+
+    Parameters
+    ----------
+    folder : str or path
+        What `eventgan convert` writes to.
+    **options
+        Those of `Shards`: split, ids, where, partial...
+
+    Returns
+    -------
+    Shards
+
+    Raises
+    ------
+    ValueError
+        The folder is not whole, or `Shards` refuses the options.
+    """
+    try:
+        return Shards(folder, **options)
+    except ValueError as error:
+        try:
+            status = json.loads(_output("status", "--json", "--", folder))
+        except (ProgramError, FileNotFoundError):
+            raise error from None
+        if status["complete"]:
+            raise
+        shards = status["shards"]
+        raise ValueError(f"{error}: {shards['done']} of {shards['planned']} shards are done, {shards['running']} in work; `eventgan convert`, or "
+                         "eventgan.convert, of the same manifest makes the others") from error
+
+
+def find_program() -> str:
+    """The path of the program `eventgan`. Raises FileNotFoundError if there is none."""
+    named = os.environ.get("EVENTGAN_PROGRAM")
+    if named:
+        if not shutil.which(named):
+            raise FileNotFoundError(f"expected the program eventgan, got none, in {named} (EVENTGAN_PROGRAM)")
+        return named
+    package = os.path.dirname(__file__)
+    # Of PREFIX/lib/python3/dist-packages/eventgan, and of build/release/python/eventgan, which may be a link: its own folders count.
+    for name in ("../../../../bin/eventgan", "../../eventgan", "eventgan"):
+        found = shutil.which(os.path.normpath(os.path.join(package, name)) if "/" in name else name)
+        if found:
+            return found
+    raise FileNotFoundError("expected the program eventgan, got none beside the package, on the PATH, or in EVENTGAN_PROGRAM (install the Debian "
+                            "package eventgan, or build it)")
+
+
+def _output(*arguments: PathLike) -> str:
+    """What the program writes to its standard output."""
+    done = subprocess.run([find_program(), *arguments], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace")
+    if done.returncode:
+        raise ProgramError(done.stderr.strip().removeprefix("error: ") or _ended(arguments[0], done.returncode), done.returncode)
+    return done.stdout
+
+
+def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
+    """Runs a command with --progress json; gives `on_event` each event as it comes. The report that it ends with."""
+    # In a session of its own: a terminal or a notebook interrupts all of ours at once, and a second interrupt would drop the shard in work.
+    process = subprocess.Popen([find_program(), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+                               encoding="utf-8", errors="replace", start_new_session=True)
+    assert process.stdout
+    event: Event = {}
+    told: list[str] = []
+    with process.stdout:
+        try:
+            for line in process.stdout:
+                event = _event_of(line.rstrip("\n"))
+                if event.get("event") == "error":
+                    told.append(event["text"])
+                on_event(event)
+            process.wait()
+        except BaseException:
+            _stop(process)
+            raise
+    if process.returncode:
+        raise ProgramError("\n".join(told) or f"{_ended(arguments[0], process.returncode)}: {json.dumps(event)[:1000]}", process.returncode)
+    return event
+
+
+def _event_of(line: str) -> Event:
+    try:
+        event = json.loads(line)
+    except ValueError:
+        event = None
+    if not isinstance(event, dict):
+        return {"event": "note", "text": line}  # a library may write what it likes
+    return {"event": "report", **event}
+
+
+def _stop(process: subprocess.Popen[str]) -> None:
+    """Interrupts the program and waits for its end; interrupted itself, once more."""
+    assert process.stdout
+    while True:
+        try:
+            process.send_signal(signal.SIGINT)
+            process.stdout.read()  # a full pipe would hold it up
+            process.wait()
+            return
+        except KeyboardInterrupt:
+            continue
+
+
+def _ended(command: PathLike, exit_code: int) -> str:
+    return f"eventgan {os.fspath(command)} ended with exit code {exit_code}"
+
+
+@contextlib.contextmanager
+def _manifest_file(manifest: PathLike | Mapping[str, Any]) -> Iterator[PathLike]:
+    """The manifest's path; that of a temporary file for a dictionary."""
+    if not isinstance(manifest, Mapping):
+        yield manifest
+        return
+    with tempfile.NamedTemporaryFile("w", dir=".", prefix="manifest-", suffix=".json", encoding="utf-8") as file:
+        json.dump(dict(manifest), file, indent=1, default=os.fspath)
+        file.flush()
+        try:
+            yield file.name
+        except ProgramError as error:
+            raise ProgramError(str(error).replace(file.name, "manifest"), error.exit_code) from None
+
+
+class _Shown:
+    """Shows the program's warnings as Python's, and its progress as tqdm's bars if these are wanted and there."""
+
+    def __init__(self, bars: bool) -> None:
+        self._tqdm: Callable[..., Any] | None = None
+        self._bar: Any = None
+        self._phase: str | None = None
+        if bars:
+            with contextlib.suppress(ImportError):
+                from tqdm.auto import tqdm
+
+                self._tqdm = tqdm
+
+    def __call__(self, event: Event) -> None:
+        kind = event.get("event")
+        if kind == "warning":
+            warnings.warn(event["text"], stacklevel=4)  # where convert was called
+        if kind != "progress" or not self._tqdm:
+            return
+        phase = event.get("phase")
+        if not self._bar or phase != self._phase:
+            self.close()
+            unit = next((key[:-len("_per_s")] for key in event if key.endswith("_per_s") and key != "mb_per_s"), "")
+            self._bar, self._phase = self._tqdm(total=event["total"], desc=phase, unit=" " + unit, leave=not phase), phase
+        self._bar.total = event["total"]
+        self._bar.update(event["done"] - self._bar.n)
+
+    def close(self) -> None:
+        if self._bar:
+            self._bar.close()
+            self._bar = None
