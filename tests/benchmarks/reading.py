@@ -11,12 +11,9 @@ import time
 import h5py
 import numpy as np
 
-from measuring.bench import SOURCE, run_part
+from measuring.bench import run_part
 from measuring.report import Section, Table, number
 from measuring.spread import spread
-
-sys.path.insert(0, str(SOURCE / "manifests" / "python"))
-from eventgan import Shards  # noqa: E402
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,6 +74,9 @@ def seconds(samples, order):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
+    sys.path.insert(0, str(bench.build / "python"))
+    from eventgan import Shards
+
     table = Table(["volumes, order", "h5py, volume alone, ms", "eventgan, volume and labels, ms", "times h5py's"])
     for dtype in settings.dtypes:
         paths = demo_shards(bench, settings, dtype)

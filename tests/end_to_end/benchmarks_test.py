@@ -41,7 +41,7 @@ class Benchmarks(program.InFolder):
         sections = sections_of(page)
         self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
                                           "The whole conversion", "Against the image's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
-                                          "Slow disk", "Scope", "Beside v2e"])
+                                          "On the fly", "Slow disk", "Scope", "Beside v2e"])
         self.assertEqual(sections.pop("Beside v2e"), [])
         if "python3-fusepy and /dev/fuse" in page:
             self.assertEqual(sections.pop("Slow disk"), [])

@@ -20,7 +20,7 @@ import functools
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import torch
@@ -31,7 +31,19 @@ from torch.utils.data import ConcatDataset, Dataset, WeightedRandomSampler
 from .detection_scores import DONT_CARE
 from .shards import Shards
 
+if TYPE_CHECKING:
+    from .frame_pairs import FrameAugmentation, FramePairs
+
 Item = dict[str, Any]
+
+
+def __getattr__(name: str) -> Any:
+    """What makes volumes of images: in a file of its own, which needs this one."""
+    if name not in ("FrameAugmentation", "FramePairs"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from . import frame_pairs
+
+    return getattr(frame_pairs, name)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -238,10 +250,35 @@ def _decoded(sample: Mapping[str, Any]) -> torch.Tensor:
     return torch.from_numpy(np.multiply(volume, sample["scale"], dtype=np.float32) if "scale" in sample else volume)
 
 
-def _move(view: np.ndarray | None, augmentation: EventAugmentation | None, height: int, width: int) -> np.ndarray:
-    """[2, 3]: where a point of the volume goes: by `view`, then by the augmentation."""
+def _moved(volume: torch.Tensor, label_position: float, augmentation: EventAugmentation | None, size: tuple[int, int] | None = None,
+           view: np.ndarray | None = None) -> tuple[torch.Tensor, np.ndarray | None]:
+    """The volume, its points moved by `view`, then by the augmentation, cut to `size`; and [2, 3], where a point has gone, None if it stays."""
+    if augmentation:
+        volume = augmentation.events(volume, label_position)
+    elif not size and view is None:
+        return volume, None
+    height, width = size or volume.shape[1:]
     view = np.eye(2, 3) if view is None else view
-    return augmentation.affine(height, width) @ np.vstack([view, [0, 0, 1]]) if augmentation else view
+    affine = augmentation.affine(height, width) @ np.vstack([view, [0, 0, 1]]) if augmentation else view
+    return warp(volume, affine, height, width), affine
+
+
+def _detection_item(volume: torch.Tensor, boxes: np.ndarray, labels: np.ndarray, ignore: np.ndarray, label_position: float,
+                    augmentation: EventAugmentation | None, size: tuple[int, int] | None = None, view: np.ndarray | None = None,
+                    visible: float = 0.25) -> Item:
+    """`volume`, `boxes`, `labels` and `ignore` of an item of DetectionDataset, of boxes [n, 4] in pixels of the volume."""
+    volume, affine = _moved(volume, label_position, augmentation, size, view)
+    boxes = boxes if affine is None else move_boxes(boxes, affine)
+    height, width = volume.shape[1:]
+    cut = np.clip(boxes, 0, [width, height, width, height])
+    ignore = ignore | (_areas(cut) < visible * np.maximum(_areas(boxes), 1e-9))
+    kept = _areas(cut) > 0
+    return {"volume": volume, "boxes": torch.from_numpy(cut[kept]).float(), "labels": torch.from_numpy(labels[kept]),
+            "ignore": torch.from_numpy(ignore[kept])}
+
+
+def _numbered(classes: Sequence[str] | Mapping[str, int]) -> dict[str, int]:
+    return dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
 
 
 class DetectionDataset(Dataset):
@@ -285,7 +322,7 @@ class DetectionDataset(Dataset):
             raise ValueError(f"expected samples of sources with boxes, got none, in {shards._described_as}")
         if classes is None:
             classes = [name for name in known if name != DONT_CARE]
-        self.classes = dict(classes) if isinstance(classes, Mapping) else {name: i for i, name in enumerate(classes)}
+        self.classes = _numbered(classes)
         unknown = [name for name in self.classes if name not in known]
         if unknown:
             raise ValueError(f"expected classes of {', '.join(known)}, got {', '.join(unknown)}, in {shards._described_as}")
@@ -302,18 +339,9 @@ class DetectionDataset(Dataset):
         labels = np.array([self.classes.get(names[each], -1) for each in rows["class_id"]], np.int64)
         ignore = rows["ignore"] != 0
         wanted = (labels >= 0) | ignore & np.isin(rows["class_id"], [i for i, name in enumerate(names) if name == DONT_CARE])
-        boxes = rows["xyxy"]
-        height, width = self._size or volume.shape[1:]
-        if self._augmentation:
-            volume = self._augmentation.events(volume, sample["pair"]["label_position"])
-        if self._augmentation or self._size or self._view is not None:
-            affine = _move(self._view, self._augmentation, height, width)
-            volume, boxes = warp(volume, affine, height, width), move_boxes(boxes, affine)
-        cut = np.clip(boxes, 0, [width, height, width, height])
-        ignore = ignore | (_areas(cut) < self._visible * np.maximum(_areas(boxes), 1e-9))
-        kept = (_areas(cut) > 0) & wanted
-        return {"volume": volume, "boxes": torch.from_numpy(cut[kept]).float(), "labels": torch.from_numpy(labels[kept]),
-                "ignore": torch.from_numpy(ignore[kept]), "id": sample["pair"]["sample_id"], "index": int(index)}
+        item = _detection_item(volume, rows["xyxy"][wanted], labels[wanted], ignore[wanted], sample["pair"]["label_position"],
+                               self._augmentation, self._size, self._view, self._visible)
+        return {**item, "id": sample["pair"]["sample_id"], "index": int(index)}
 
 
 def _areas(boxes: np.ndarray) -> np.ndarray:
@@ -491,13 +519,10 @@ class KeypointDataset(Dataset):
     def __getitem__(self, index: int) -> Item:
         sample = self._shards.sample(index, {"volume", "pair", "persons"})
         joints, annotated, hidden = self._joints.of(sample["persons"], index)
-        volume = _decoded(sample)
-        height, width = self._size or volume.shape[1:]
-        if self._augmentation:
-            volume = self._augmentation.events(volume, sample["pair"]["label_position"])
-        if self._augmentation or self._size or self._view is not None:
-            affine = _move(self._view, self._augmentation, height, width)
-            volume, joints = warp(volume, affine, height, width), move_points(joints, affine)
+        volume, affine = _moved(_decoded(sample), sample["pair"]["label_position"], self._augmentation, self._size, self._view)
+        height, width = volume.shape[1:]
+        if affine is not None:
+            joints = move_points(joints, affine)
             if affine[0, 0] < 0:
                 joints = self._joints.mirrored(joints)
                 annotated, hidden = (self._joints.mirrored(each[..., None])[..., 0] for each in (annotated, hidden))

@@ -8,7 +8,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 import torch
@@ -49,13 +49,13 @@ def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
     return np.concatenate([*near, np.empty(0, bool)])
 
 
-def network(task: str, classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
-    """The detector for inputs of 18 channels that are of this size already and are not normalised. A volume holds tens of objects, not hundreds
-    as an image of COCO: fewer regions are looked at."""
+def network(classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
+    """The detector, of persons' joints if there are any, for inputs of 18 channels that are of this size already and are not normalised. A volume
+    holds tens of objects, not hundreds as an image of COCO: fewer regions are looked at."""
     settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size), "image_mean": [0.0] * 18,
                 "image_std": [1.0] * 18, "box_batch_size_per_image": regions, "rpn_post_nms_top_n_train": 4 * regions,
                 "rpn_post_nms_top_n_test": 2 * regions, "box_detections_per_img": regions // 2}
-    if task == "keypoints":
+    if joints:
         return torchvision.models.detection.keypointrcnn_resnet50_fpn(num_classes=2, num_keypoints=joints, **settings)
     return torchvision.models.detection.fasterrcnn_mobilenet_v3_large_fpn(num_classes=classes + 1, **settings)
 
@@ -77,9 +77,19 @@ def main() -> None:
             test = DetectionDataset(training.tested(args, train_shards, validation_shards, usable(args.task)), train_set.classes, **place)
     except ValueError as error:
         raise SystemExit(str(error))
-    classes = list(train_set.classes)
-    print(f"input {width}x{height}, classes " + ", ".join(classes))
-    model = network(args.task, len(classes), len(getattr(train_set, "joint_names", ())), (height, width), args.regions)
+    predict = train(args, train_set, validation_set, (height, width))
+    if args.task == "detection":
+        classes = list(train_set.classes)
+        training.write_predictions(args, (entry for item, found in predict(test)
+                                          for entry in training.box_predictions(item, found, classes, place["view"])))
+
+
+def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset, size: tuple[int, int]) -> Callable[[Dataset], Iterator]:
+    """Trains on items of DetectionDataset, of KeypointDataset or of FramePairs, all of one size, and draws some validation items. Returns what gives
+    each item of a dataset, without its volume, with the boxes, labels and scores that the network finds in it."""
+    joints, classes = len(getattr(train_set, "joint_names", ())), list(train_set.classes)
+    print(f"input {size[1]}x{size[0]}, classes " + ", ".join(classes))
+    model = network(len(classes), joints, size, args.regions)
     model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device)
@@ -103,7 +113,7 @@ def main() -> None:
     def measure() -> dict[str, float]:
         pairs = list(search(validation_set))
         values = training.average_precisions(((item, boxes(found)) for item, found in pairs), classes)
-        if args.task == "detection":
+        if not joints:
             return values
         near = [near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item) for item, found in pairs]
         return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))}
@@ -119,14 +129,12 @@ def main() -> None:
         texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
         canvas = training.draw_item(item, found["boxes"][sure], texts)
         for source, kept, colour in ((item, ~item["ignore"], drawing.TRUE), (found, sure, drawing.FOUND)):
-            for joints in source["keypoints"][kept].numpy() if "keypoints" in source else ():
-                drawing.draw_joints(canvas, joints[joints[:, 2] > 0, :2], colour)
+            for points in source["keypoints"][kept].numpy() if "keypoints" in source else ():
+                drawing.draw_joints(canvas, points[points[:, 2] > 0, :2], colour)
         return item["id"], canvas
 
-    if args.task == "detection":
-        training.write_predictions(args, (entry for item, found in search(test)
-                                          for entry in training.box_predictions(item, boxes(found), classes, place["view"])))
     training.write_images(args, len(validation_set), image_of)
+    return lambda dataset: ((item, boxes(found)) for item, found in search(dataset))
 
 
 if __name__ == "__main__":

@@ -35,10 +35,8 @@ MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", 
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
-    """The options that all examples have. The first limit that is reached ends the training."""
-    parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--data", required=True, help="output folder completed by eventgan finalize")
-    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the same command again to resume")
+    """The options of all examples that train on shards."""
+    parser = options_of_any(description, "output folder completed by eventgan finalize", **defaults)
     parser.add_argument("--dataset", help="use only samples of this kind of source, such as kitti_object")
     parser.add_argument("--test", help="folder of shards whose labelled samples (of its validation split, if it has one) are predicted at the "
                         "end, into predictions.json; default: the validation samples")
@@ -49,6 +47,14 @@ def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     parser.add_argument("--frames", action="store_true", help="train on the labelled frames instead of events, grey in the first channel; "
                         "their paths come from the shards (next_path)")
     parser.add_argument("--overfit", action="store_true", help="validate on the training samples, to see whether the network can fit them")
+    return parser
+
+
+def options_of_any(description: str, data: str, **defaults: Any) -> argparse.ArgumentParser:
+    """The options that all examples have, of which --data is `data`. The first limit that is reached ends the training."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("--data", required=True, help=data)
+    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the same command again to resume")
     parser.add_argument("--epochs", type=int, help="stop after this many epochs")
     parser.add_argument("--steps", type=int, help="stop after this many batches")
     parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation (default: 30 if there is no other limit)")
@@ -276,6 +282,8 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     while not done:
         state["epoch"] += 1
         torch.manual_seed(args.seed * 1_000_003 + state["epoch"])  # what an epoch draws does not depend on where a run went on
+        if hasattr(loader.dataset, "set_epoch"):  # FramePairs
+            loader.dataset.set_epoch(state["epoch"])
         model.train()
         losses = []
         for batch in loader:

@@ -132,6 +132,62 @@ def test_yolov3_learns(data, tmp_path):
     assert "got Bus" in said and str(data) in said
 
 
+def test_faster_rcnn_learns_on_the_fly(tmp_path):
+    pytest.importorskip("eventgan._engine")
+    import cv2
+
+    (tmp_path / "road" / "images").mkdir(parents=True)
+    ground = np.random.default_rng(1).integers(0, 256, (60, 100, 3), np.uint8)
+    boxes, frames = ["image,class,left,top,right,bottom"], ["image,width,height,sequence,index"]
+    for number in range(10):
+        image = ground.copy()
+        image[20:40, 5 * number:5 * number + 30] = 200
+        assert cv2.imwrite(str(tmp_path / "road" / "images" / f"{number}.png"), image)
+        boxes.append(f"{number}.png," + (f"car,{5 * number},20,{5 * number + 30},40" if number else ",,,,"))
+        frames.append(f"{number}.png,100,60,{'drive' if number < 7 else ''},{2 * number}")
+    (tmp_path / "road" / "boxes.csv").write_text("\n".join(boxes))
+    (tmp_path / "road" / "frames.csv").write_text("\n".join(frames))
+    options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--pictures", "1", "--workers", "1", "--epochs", "1"]
+    said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options)
+    assert "8 images for training, 2 for validation, of 1 folders" in said and "input 96x64, classes car" in said
+    assert_trained(tmp_path / "out", [0, 2], images=1)
+    assert "AP50 car" in history(tmp_path / "out")[1]
+    said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options, "--classes", "bus", expect=1)
+    assert "expected images with boxes of bus, got 8 for training and 2 for validation, with car, in" in said
+
+
+def test_pairs_on_the_fly_are_of_a_sequence_or_moved(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    import cv2
+    import train_on_the_fly
+
+    (tmp_path / "images").mkdir()
+    image = np.zeros((40, 60), np.uint8)
+    image[20:22, 30:33] = 255
+    assert cv2.imwrite(str(tmp_path / "images" / "still.png"), image)
+    (tmp_path / "boxes.csv").write_text("image,class,left,top,right,bottom,track,note\n" + "".join(f"{n}.png,car,1,2,3,4,1,\n{n}.png,dog,5,6,7.5,8,,\n"
+                                                                                           for n in (19, 21, 31, "still")) + "none.png,,,,,,,\n")
+    (tmp_path / "frames.csv").write_text("image,width,height,sequence,index\n" + "".join(f"{n}.png,60,40,drive,{n}\n" for n in (13, 15, 17, 19, 21, 27, 29, 31))
+                                         + "still.png,60,40,,train\n")
+    clips = train_on_the_fly.labelled_clips(tmp_path, seed=1)
+    assert [clip if isinstance(clip, train_on_the_fly.Moved) else [pathlib.Path(path).stem for path in clip] for clip, _ in clips[:2]] == [
+        ["13", "15", "17", "19"], ["15", "17", "19", "21"]]
+    assert all(isinstance(clip, train_on_the_fly.Moved) for clip, _ in clips[2:])  # 25.png is missing before 31.png
+    assert clips[0][1] == {"boxes": [[1, 2, 3, 4], [5, 6, 7.5, 8]], "labels": ["car", "dog"], "id": f"{tmp_path.name}/19.png"}
+    assert clips[4][1]["boxes"] == clips[4][1]["labels"] == []
+    still = clips[3][0]
+    assert still[3] == str(tmp_path / "images" / "still.png") and len(still) == 4
+
+    def middle(image):
+        return np.array([np.average(np.arange(length), weights=image[..., 0].sum(axis, dtype=float)) for axis, length in ((0, 60), (1, 40))])
+
+    moved = [np.linalg.norm(middle(still[t]) - [31, 20.5]) for t in (2, 1, 0)]
+    # 1 to 4 px a step, and at most 1.6 px from the centre (29.5, 19.5) turned and zoomed: 0.03 px a step
+    assert 0.9 < moved[0] < 4.1 and np.allclose(moved, np.array([1, 2, 3]) * moved[0], atol=0.3)
+    assert (still[0] == train_on_the_fly.labelled_clips(tmp_path, seed=1)[3][0][0]).all()
+    assert (still[0] != train_on_the_fly.labelled_clips(tmp_path, seed=2)[3][0][0]).any()
+
+
 DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
 POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"]
 
