@@ -54,11 +54,11 @@ void renew_sample(const Dataset& dataset, const LabelledFrame& frame, const Sour
 ///
 /// A sample of unknown size will be quarantined; once its image is mended it may have any size,
 /// and the number of shards cannot change then. So it gets a shard of its own, after the others of
-/// its source, marked size_unknown; only samples that follow each other share one if they are of one
-/// file (a video), or of one sequence and labels name them that has no such frames (FrameRef::index
-/// -1): of these there may be as many as labels, and once they are there all most likely have one
-/// size. It is a guess until then: the one that most samples of the source have (the first of
-/// several; where none is known: 1x1).
+/// its source, marked size_unknown; only samples that follow each other share one if they are of
+/// one file (a video), or of one sequence and labels name them that has no such frames
+/// (FrameRef::index -1): of these there may be as many as labels, and once they are there all most
+/// likely have one size. It is a guess until then: the one that most samples of the source have
+/// (the first of several; where none is known: 1x1).
 class ShardLayout {
  public:
   ShardLayout(std::string name, int samples_per_shard);
