@@ -258,6 +258,6 @@ def _numbers(values: npt.ArrayLike | None, name: str, dtype: npt.DTypeLike = np.
     if values is None:
         return None
     try:
-        return np.ascontiguousarray(values, dtype)
+        return np.require(values, dtype, ("C_CONTIGUOUS", "ALIGNED"))
     except (TypeError, ValueError, RuntimeError) as error:
         raise ValueError(f"expected numbers, got {type(values).__name__} for {name}: {error}") from error
