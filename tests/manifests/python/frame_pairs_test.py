@@ -184,7 +184,7 @@ def test_reversed_time():
             ([first, second, third], -1, (third, second), 0.0)]:
         pairs = FramePairs(generator, [(clip, boxes)], gap=1, label_frame=label_frame, **backwards)
         assert torch.equal(pairs[0]["volume"], torch.from_numpy(generator(*images))) and pairs[0]["label_position"] == position
-    assert FramePairs(generator, [(first, second, boxes)])[0]["label_position"] == 1
+    assert [FramePairs(generator, [(first, second, boxes)], **settings)[0]["label_position"] for settings in ({}, backwards)] == [1, 0]
     half = FramePairs(generator, clips(400), gap=1, frame_augmentation=FrameAugmentation(reverse=0.5))
     drawn = [half.drawn(i).reversed for i in range(400)]
     assert 160 <= sum(drawn) <= 240  # four deviations of sqrt(400) / 2
@@ -290,8 +290,9 @@ def test_items_with_boxes():
     images, targets = collate_torchvision([item, empty])
     assert len(images) == 2 and targets[0]["labels"].tolist() == [1] and targets[0]["boxes"].tolist() == [[3, 3, 5, 5]]
     assert generator.gaps == [1, 1]
-    clip = FramePairs(generator, [([image(), image(), image()], {"boxes": torch.tensor([[0.0, 0, 1, 1]]), "labels": torch.tensor([3])})], gap=2)
-    assert clip[0]["labels"].tolist() == [3] and generator.gaps[-1] == 2
+    numbered = {"boxes": torch.tensor([[0.0, 0, 1, 1], [1, 1, 2, 2]]), "labels": torch.tensor([3, -1])}
+    clip = FramePairs(generator, [([image(), image(), image()], numbered)], gap=2)
+    assert clip[0]["labels"].tolist() == [3, -1] and clip[0]["ignore"].tolist() == [False, True] and generator.gaps[-1] == 2
 
 
 def test_boxes_move_with_the_volume():
@@ -325,7 +326,7 @@ def test_boxes_move_with_the_volume():
 def test_the_cache_counts_its_hits_and_keeps_within_its_bytes():
     generator = StandIn()
     nbytes = 2 * 2 * 3 * 4  # of a volume of clips(): [2, 2, 3] float32
-    pairs = FramePairs(generator, clips(3), gap=1, cache_bytes=2 * nbytes + 1)
+    pairs = FramePairs(generator, clips(3), gap=1, cache_bytes=3 * nbytes - 1)
     first = pairs[0][0].clone()
     assert pairs.cache_info() == (0, 1, nbytes)
     pairs[0][0].zero_()  # what was handed out is the caller's own
