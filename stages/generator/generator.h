@@ -23,6 +23,9 @@ struct GenerationNotes {
   /// Of the activations stored in 8 bits the share that is at the end of the calibrated range,
   /// where all beyond it is clipped; 0..1. 0 for engines that store none.
   double saturated_share = 0;
+  /// Every value of the volume is finite and >= 0: the engine looked while it stored them. If not,
+  /// nobody has looked, or there is another one.
+  bool sound = false;
 };
 
 /// A volume with a larger share is flagged (kFlagBeyondCalibration). manifests/guides/numerics.md

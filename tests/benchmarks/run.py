@@ -24,6 +24,7 @@ import layers
 import numerics
 import on_the_fly
 import pair_counts
+import python_call
 import reading
 import scopes
 import slow_disk
@@ -38,7 +39,8 @@ from measuring.curves import draw
 from measuring.report import markdown
 
 PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "image_sizes": image_sizes,
-         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly, "slow_disk": slow_disk,
+         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly,
+         "python_call": python_call, "slow_disk": slow_disk,
          "scopes": scopes, "v2e": v2e}
 
 

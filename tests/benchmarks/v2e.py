@@ -18,6 +18,7 @@ import statistics
 import subprocess
 import sys
 import time
+import warnings
 
 import h5py
 import numpy as np
@@ -174,8 +175,30 @@ def cost_of_job(bench, folders, job):
     return Cost(pair_cost(few, many).stage_s["generate"], None, counted[-1] if job.generator else None)
 
 
+def call_of(job):
+    """eventgan.Generator of a job, in this process; None where the module is not built."""
+    try:
+        from eventgan import Generator
+    except ImportError:
+        return None
+    manifest = job.manifest()
+    with warnings.catch_warnings(action="ignore"):  # of stand-in weights
+        return Generator(**manifest["generator"], preset=job.preset, seed=manifest["seed"])
+
+
+def cost_of_call(settings, folders, generator, job):
+    frames = [np.asarray(PIL.Image.open(path)) for path in sorted(folders[1].iterdir())]
+    seconds, events = [], []
+    for previous, following in itertools.pairwise(frames):
+        start = time.process_time()
+        volume = generator(previous, following)
+        seconds.append(time.process_time() - start)
+        events.append(volume.sum(dtype=np.float64))
+    return Cost(statistics.fmean(seconds[settings.few:]), None, statistics.fmean(events) if job.generator else None)
+
+
 def time_table(bench, settings, what, images, refused):
-    """`pictures`: files of one size, in order."""
+    """`images`: files of one size, in order."""
     size = PIL.Image.open(images[0]).size[::-1]
     scratch = bench.folder(f"times-{size[0]}x{size[1]}")
     folders = [link_frames(scratch / f"frames-{pairs}", images, pairs + 1) for pairs in (settings.few, settings.many)]
@@ -184,7 +207,10 @@ def time_table(bench, settings, what, images, refused):
     jobs = {f"{kind}, threshold {threshold}": simulated_job(folders[0], size, kind, threshold)
             for threshold in settings.thresholds for kind in ("difference", "esim")}
     jobs |= network_jobs(bench, settings, folders[0], size, refused)
-    contenders |= {name: functools.partial(cost_of_job, bench, folders, job) for name, job in jobs.items()}
+    for name, job in jobs.items():
+        contenders[name] = functools.partial(cost_of_job, bench, folders, job)
+        if generator := call_of(job):
+            contenders[f"{name}, by eventgan.Generator"] = functools.partial(cost_of_call, settings, folders, generator, job)
 
     costs = {name: [] for name in contenders}
     for turn in range(settings.rounds):
@@ -308,12 +334,13 @@ def measure(bench):
         return Section(title, "Skipped: no --v2e.", [])
     if not (bench.v2e / "v2ecore").is_dir():
         return Section(title, f"Skipped: expected a checkout of SensorsINI/v2e with v2ecore, got none, in {bench.v2e}.", [])
-    sys.path += [str(bench.v2e), str(bench.v2e / "stubs")]  # at the end: installed packages come first
+    sys.path += [str(bench.build / "python"), str(bench.v2e), str(bench.v2e / "stubs")]  # at the end: installed packages come first
     torch.set_num_threads(1)
     refused = {}
     tables = [*time_tables(bench, settings, refused), *score_tables(bench, settings, refused)]
     text = f"""One core; processor time from two decoded frames of the volume's size to a volume of 2 x {BINS} channels: neither reading nor storing counts
-for anybody. Of the project's own it is the stage `generate` of `eventgan convert`, a long run less a short one; of v2e `EventEmulator.generate_events` and
+for anybody. Of the project's own it is the stage `generate` of `eventgan convert`, a long run less a short one, and, where a row says so, the call of
+`eventgan.Generator` in the process in which v2e runs, too, on the same frames, which it prepares itself; of v2e `EventEmulator.generate_events` and
 the events' way into the volume, by PyTorch {torch.__version__} in one thread, the first pairs left out. Pair by pair v2e is given both frames of each
 pair, as a dataset's pairs are drawn; as one video it goes on from frame to frame and keeps its levels; blended, seven frames between those of a pair are
 mixed from both and given to it too. The times of v2e and of the models depend on the number of events. 0.2 is the default threshold of all three, 0.5 about what slider_depth's camera has; v2e's logarithm is linear below 20 grey levels,

@@ -41,8 +41,10 @@ class Benchmarks(program.InFolder):
         sections = sections_of(page)
         self.assertEqual(list(sections), ["Engines", "Generators against threads within one", "Layers", "Numbers at the extremes", "Stages",
                                           "The whole conversion", "Against the image's size", "Against the number of pairs", "Against threads", "Storage", "Reading",
-                                          "On the fly", "Slow disk", "Scope", "Beside v2e"])
+                                          "On the fly", "The call in Python", "Slow disk", "Scope", "Beside v2e"])
         self.assertEqual(sections.pop("Beside v2e"), [])
+        if "Skipped: no compiled module" in page:
+            self.assertEqual(sections.pop("The call in Python"), [])
         if "python3-fusepy and /dev/fuse" in page:
             self.assertEqual(sections.pop("Slow disk"), [])
         self.assertIn("Skipped: no --v2e", page)
@@ -70,6 +72,12 @@ class Benchmarks(program.InFolder):
         rows = sections_of(self.run_all("--parts", "v2e", "--v2e", V2E))["Beside v2e"]
         headings = [row for row in rows if row[0] == "made by"]
         self.assertEqual([len(heading) for heading in headings], [5, 5, 11])  # times twice, scores
+        if (pathlib.Path(program.PROGRAM).parent / "python" / "eventgan").is_dir():
+            times = {row[0]: row for row in rows if len(row) == 5}
+            for kind in ("difference", "esim"):
+                stage, call = (times[f"{kind}, threshold 0.2{how}"][3] for how in ("", ", by eventgan.Generator"))
+                self.assertEqual(call, stage)  # events
+            self.assertIn("shipped:8 float32, by eventgan.Generator", times)
         scores = {row[0]: dict(zip(headings[-1], row)) for row in rows[rows.index(headings[-1]) + 1:]}
         self.assertEqual(scores["real"]["F1 over time"], "1")
         self.assertEqual(scores["v2e, pair by pair"], scores["v2e, as one video"] | {"made by": "v2e, pair by pair"})  # one pair

@@ -60,10 +60,13 @@ Resizable grey_if_first(const ImageView& frame, const ImageSpec& spec) {
 
 /// Resized, grey and blurred, uncut.
 cv::Mat scaled_grey(const Resizable& whole, const Placement& placement, const ImageSpec& spec) {
-  const ImageSize scaled = placement.scaled;
-  cv::Mat resized;
-  cv::resize(without_borders(whole.image, placement), resized,
-             cv::Size(scaled.width, scaled.height), 0, 0, cv::INTER_LINEAR);
+  const cv::Size scaled(placement.scaled.width, placement.scaled.height);
+  cv::Mat resized = without_borders(whole.image, placement);
+  if (resized.size() != scaled) {  // else OpenCV would make a copy
+    cv::Mat other;
+    cv::resize(resized, other, scaled, 0, 0, cv::INTER_LINEAR);
+    resized = other;
+  }
   resized = as_grey(resized, whole.channels);
   if (spec.blur == 0) return resized;
   cv::Mat blurred;
@@ -161,10 +164,17 @@ PreparedPair prepare_pair(const PreparedFrame& previous, const PreparedFrame& ne
   prepared.content = part.size;
   prepared.content_x = part.volume_x;
   prepared.content_y = part.volume_y;
-  prepared.input.resize(2 * part.size.pixel_count());
-  const std::span<float> input = prepared.input;
-  to_input(previous.grey, input.first(previous.grey.size()));
-  to_input(next.grey, input.last(next.grey.size()));
+  // By way of a block in the first-level cache: a vector that is made longer is filled with zeros.
+  std::array<float, 4096> block;
+  prepared.input.reserve(2 * part.size.pixel_count());
+  for (std::span<const std::uint8_t> grey : {std::span(previous.grey), std::span(next.grey)}) {
+    while (!grey.empty()) {
+      const std::size_t count = std::min(grey.size(), block.size());
+      to_input(grey.first(count), block);
+      prepared.input.insert(prepared.input.end(), block.begin(), block.begin() + count);
+      grey = grey.subspan(count);
+    }
+  }
   return prepared;
 }
 

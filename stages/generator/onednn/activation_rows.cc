@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <limits>
 
 #include "stages/base/processor_clones.h"
 #include "stages/generator/weights.h"
@@ -121,12 +122,16 @@ EVENTGAN_CLONES
 void combine_phases(const DecoderRow& row, std::uint8_t* stored) { combine_and_store(row, stored); }
 
 EVENTGAN_CLONES
-void rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
+bool rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
                          std::size_t plane_stride) {
   // In blocks that stay in the first-level cache, since pixels and planes are far apart.
   constexpr std::size_t kBlock = 64;
+  std::uint32_t largest = 0;  // magnitude, as bits: in the numbers' order, NaN above infinity
   for (std::size_t begin = 0; begin < pixel_count; begin += kBlock) {
     const std::size_t end = std::min(begin + kBlock, pixel_count);
+    for (std::size_t i = begin * channels; i < end * channels; ++i) {
+      largest = std::max(largest, std::bit_cast<std::uint32_t>(pixels[i]) & 0x7fffffff);
+    }
     for (int c = 0; c < channels; ++c) {
       float* plane = planes + c * plane_stride;
       for (std::size_t i = begin; i < end; ++i) {
@@ -135,6 +140,7 @@ void rectify_into_planes(const float* pixels, std::size_t pixel_count, int chann
       }
     }
   }
+  return largest < std::bit_cast<std::uint32_t>(std::numeric_limits<float>::infinity());
 }
 
 std::vector<DecoderStrip> decoder_strips(int height, int phase_rows) {

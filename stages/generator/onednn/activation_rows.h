@@ -57,7 +57,8 @@ void combine_phases(const DecoderRow& row, Bfloat16* stored);
 void combine_phases(const DecoderRow& row, std::uint8_t* stored);
 
 /// ReLU of pixels [pixel, channel] into planes: planes[c * plane_stride + pixel]. NaN stays NaN.
-void rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
+/// Whether all pixels are finite.
+bool rectify_into_planes(const float* pixels, std::size_t pixel_count, int channels, float* planes,
                          std::size_t plane_stride);
 
 /// Output rows [first_row, first_row + row_count) of a decoder, and the rows of its phases' kernel

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <limits>
 #include <stdexcept>
 #include <type_traits>
 
@@ -26,6 +27,7 @@ constexpr int kLanes = 16;
 constexpr int kOutputs = NarrowLayers::kChannels;
 using Lanes = float __attribute__((vector_size(kLanes * sizeof(float))));
 using WholeLanes = std::int32_t __attribute__((vector_size(kLanes * sizeof(std::int32_t))));
+using Bits = std::uint32_t __attribute__((vector_size(kLanes * sizeof(std::uint32_t))));
 /// 32 bits of what a pixel holds: a channel in float32, two in bfloat16, four in bytes. What moves
 /// and shuffles lanes takes them as floats, whatever they are.
 using Word = NarrowLayers::Word;
@@ -171,6 +173,16 @@ EVENTGAN_LANES_INLINE void add_row(const float* planes, std::ptrdiff_t pitch, in
   }
 }
 
+/// Whether none of the lanes' largest values is infinity or NaN, which as bits lies above it; other
+/// numbers >= 0 lie below, in their order.
+EVENTGAN_LANES_INLINE bool is_finite(const Bits (&largest)[kVectors]) {
+  Word most = 0;
+  for (const Bits& bits : largest) {
+    for (int lane = 0; lane < kLanes; ++lane) most = std::max<Word>(most, bits[lane]);
+  }
+  return most < std::bit_cast<Word>(std::numeric_limits<float>::infinity());
+}
+
 /// A row of the volume, and what makes it of the last decoder's sums.
 struct Prediction {
   const std::vector<float>& decoder_bias;
@@ -180,9 +192,9 @@ struct Prediction {
   float* row;  ///< of the first channel
 };
 
-/// For the pixels from x on.
+/// For the pixels from x on. `largest`: of each lane's values, see is_finite.
 EVENTGAN_LANES_INLINE void predict(Lanes (&sums)[kVectors][kOutputs], int x,
-                                   const Prediction& prediction) {
+                                   const Prediction& prediction, Bits (&largest)[kVectors]) {
 #pragma GCC unroll 2
   for (int v = 0; v < kVectors; ++v) {
 #pragma GCC unroll 8
@@ -201,7 +213,11 @@ EVENTGAN_LANES_INLINE void predict(Lanes (&sums)[kVectors][kOutputs], int x,
       for (int v = 0; v < kVectors; ++v) values[v] += sums[v][c] * weights[c];
     }
 #pragma GCC unroll 2
-    for (Lanes& value : values) value = value <= 0 ? Lanes{} : value;
+    for (int v = 0; v < kVectors; ++v) {
+      values[v] = values[v] <= 0 ? Lanes{} : values[v];
+      const Bits bits = reinterpret_cast<Bits>(values[v]);
+      largest[v] = bits > largest[v] ? bits : largest[v];
+    }
     // The next pixels but one: written long ago, if ever.
     __builtin_prefetch(plane + 2 * kPixels, 1);
     __builtin_prefetch(plane + 2 * kPixels + kLanes, 1);
@@ -401,9 +417,10 @@ EVENTGAN_AVX512 void NarrowLayers::add_phases(const DecoderRow& edges, int y, fl
 }
 
 template <class Stored>
-EVENTGAN_AVX512 void NarrowLayers::predict_planes(int y, float* rows, float* volume) const {
+EVENTGAN_AVX512 bool NarrowLayers::predict_planes(int y, float* rows, float* volume) const {
   const Prediction prediction{skip_bias_, prediction_, prediction_bias_, size_,
                               volume + static_cast<std::ptrdiff_t>(y) * size_.width};
+  Bits largest[kVectors] = {};
   for (int x = 0; x < size_.width; x += kPixels) {
     constexpr int kWords = kChannels / kWordChannels<Stored>;
     Sums<Stored> sums[kVectors][kOutputs] = {};
@@ -420,14 +437,16 @@ EVENTGAN_AVX512 void NarrowLayers::predict_planes(int y, float* rows, float* vol
                        load(phase_planes(rows) + o * pitch_ + 1 + x + v * kLanes);
       }
     }
-    predict(values, x, prediction);
+    predict(values, x, prediction, largest);
   }
+  return is_finite(largest);
 }
 
 EVENTGAN_AVX512
-void NarrowLayers::predict_pixels(const float* pixels, int y, float* volume) const {
+bool NarrowLayers::predict_pixels(const float* pixels, int y, float* volume) const {
   const Prediction prediction{skip_bias_, prediction_, prediction_bias_, size_,
                               volume + static_cast<std::ptrdiff_t>(y) * size_.width};
+  Bits largest[kVectors] = {};
   for (int x = 0; x < size_.width; x += kPixels, pixels += kPixels * kOutputs) {
     Lanes sums[kVectors][kOutputs];
 #pragma GCC unroll 2
@@ -438,40 +457,40 @@ void NarrowLayers::predict_pixels(const float* pixels, int y, float* volume) con
       }
       to_planes(sums[v]);
     }
-    predict(sums, x, prediction);
+    predict(sums, x, prediction, largest);
   }
+  return is_finite(largest);
 }
 
 template <class Stored>
-void NarrowLayers::compute_row(const Stored* small, const Stored* skip, const DecoderRow& edges,
+bool NarrowLayers::compute_row(const Stored* small, const Stored* skip, const DecoderRow& edges,
                                int y, std::byte* block, float* volume) const {
   if constexpr (std::is_same_v<Stored, Bfloat16>) {
     if (tiles_) {
       const float* sums = tiles_->sum_row(small, skip, edges, y, block + buffer_);
-      predict_pixels(sums + kChannels, y, volume);
-      return;
+      return predict_pixels(sums + kChannels, y, volume);
     }
   }
   auto* rows = reinterpret_cast<float*>(block + buffer_);
   read_rows(small, skip, y, rows);
   add_phases<Stored>(edges, y, rows);
-  predict_planes<Stored>(y, rows, volume);
+  return predict_planes<Stored>(y, rows, volume);
 }
 
-void NarrowLayers::volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,
+bool NarrowLayers::volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,
                               std::byte* block, float* volume) const {
-  compute_row(small, skip, edges, y, block, volume);
+  return compute_row(small, skip, edges, y, block, volume);
 }
 
-void NarrowLayers::volume_row(const Bfloat16* small, const Bfloat16* skip, const DecoderRow& edges,
+bool NarrowLayers::volume_row(const Bfloat16* small, const Bfloat16* skip, const DecoderRow& edges,
                               int y, std::byte* block, float* volume) const {
-  compute_row(small, skip, edges, y, block, volume);
+  return compute_row(small, skip, edges, y, block, volume);
 }
 
-void NarrowLayers::volume_row(const std::uint8_t* small, const std::uint8_t* skip,
+bool NarrowLayers::volume_row(const std::uint8_t* small, const std::uint8_t* skip,
                               const DecoderRow& edges, int y, std::byte* block,
                               float* volume) const {
-  compute_row(small, skip, edges, y, block, volume);
+  return compute_row(small, skip, edges, y, block, volume);
 }
 
 }  // namespace eventgan

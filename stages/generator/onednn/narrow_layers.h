@@ -47,12 +47,13 @@ class NarrowLayers {
 
   /// Row y of the volume [channel, y, x], from the last decoder's inputs as they are stored: small
   /// [y, x, 16] and skip [y, x, 8], as many bytes a value as the constructor was told. edges:
-  /// `whole_row` and `last_pixel` alone.
-  void volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,
+  /// `whole_row` and `last_pixel` alone. Whether all of its values are finite; what lies behind the
+  /// row's end may make that false.
+  bool volume_row(const float* small, const float* skip, const DecoderRow& edges, int y,
                   std::byte* block, float* volume) const;
-  void volume_row(const Bfloat16* small, const Bfloat16* skip, const DecoderRow& edges, int y,
+  bool volume_row(const Bfloat16* small, const Bfloat16* skip, const DecoderRow& edges, int y,
                   std::byte* block, float* volume) const;
-  void volume_row(const std::uint8_t* small, const std::uint8_t* skip, const DecoderRow& edges,
+  bool volume_row(const std::uint8_t* small, const std::uint8_t* skip, const DecoderRow& edges,
                   int y, std::byte* block, float* volume) const;
 
  private:
@@ -61,10 +62,10 @@ class NarrowLayers {
   template <class Stored>
   void add_phases(const DecoderRow& edges, int y, float* rows) const;
   template <class Stored>
-  void predict_planes(int y, float* rows, float* volume) const;
-  void predict_pixels(const float* pixels, int y, float* volume) const;
+  bool predict_planes(int y, float* rows, float* volume) const;
+  bool predict_pixels(const float* pixels, int y, float* volume) const;
   template <class Stored>
-  void compute_row(const Stored* small, const Stored* skip, const DecoderRow& edges, int y,
+  bool compute_row(const Stored* small, const Stored* skip, const DecoderRow& edges, int y,
                    std::byte* block, float* volume) const;
 
   float* skip_planes(float* rows, int y) const { return rows + y % 3 * kChannels * pitch_; }

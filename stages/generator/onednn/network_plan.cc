@@ -218,8 +218,9 @@ void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
       DecoderRow edges;
       edges.width = size_.width;
       decoder.add_edges(run, y, 0, edges);
-      narrow_->volume_row(reinterpret_cast<const Stored*>(small),
-                          reinterpret_cast<const Stored*>(skip), edges, y, run.block, volume);
+      run.sound &=
+          narrow_->volume_row(reinterpret_cast<const Stored*>(small),
+                              reinterpret_cast<const Stored*>(skip), edges, y, run.block, volume);
     }
     return;
   }
@@ -229,7 +230,7 @@ void NetworkPlan::run_last_decoder(const EngineRun& run, const std::byte* small,
       combine_phases(decoder.row(run, strip, strip.first_row + y), decoded + y * row_values);
     }
     prediction_->run(run.stream, 0, strip.row_count, decoded, predicted, run.scratch);
-    rectify_into_planes(
+    run.sound &= rectify_into_planes(
         predicted, static_cast<std::size_t>(strip.row_count) * size_.width, 2 * bins_,
         volume + static_cast<std::ptrdiff_t>(strip.first_row) * size_.width, size_.pixel_count());
   }
@@ -249,11 +250,12 @@ void NetworkPlan::with_stored_type(Compute&& compute) const {
   }
 }
 
-SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* block,
+GenerationNotes NetworkPlan::run(const float* frames, float* volume, std::byte* block,
                                  const TensorObserver& observe) const {
   dnnl::stream stream(engine_);
   SaturationCount saturation;
-  const EngineRun run{stream, block, block + scratch_, saturation};
+  bool sound = true;
+  const EngineRun run{stream, block, block + scratch_, saturation, sound};
   const auto at = [&](const Buffer& buffer) { return block + buffer.offset; };
   with_stored_type([&]<class Stored>(Stored) {
     const auto values_of = [&](const Buffer& buffer) {
@@ -291,7 +293,7 @@ SaturationCount NetworkPlan::run(const float* frames, float* volume, std::byte* 
     }
     run_last_decoder<Stored>(run, small, volume);
   });
-  return saturation;
+  return {.saturated_share = saturation.share(), .sound = sound};
 }
 
 template <class Stored>
@@ -340,22 +342,24 @@ void NetworkPlan::run_last_tiles(const EngineRun& run, const TiledLayers& layers
                                  std::min(left + tile.size().width, size_.width)};
     wanted.visit_within(piece, [&](const TileMask::Pixels& pixels) {
       for (int y = pixels.top; y < pixels.bottom; ++y) {
-        rectify_into_planes(predicted + pixel_at(y, pixels.left) * 2 * bins_,
-                            static_cast<std::size_t>(pixels.right - pixels.left), 2 * bins_,
-                            volume + static_cast<std::ptrdiff_t>(y) * size_.width + pixels.left,
-                            size_.pixel_count());
+        run.sound &=
+            rectify_into_planes(predicted + pixel_at(y, pixels.left) * 2 * bins_,
+                                static_cast<std::size_t>(pixels.right - pixels.left), 2 * bins_,
+                                volume + static_cast<std::ptrdiff_t>(y) * size_.width + pixels.left,
+                                size_.pixel_count());
       }
     });
   }
 }
 
-SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
+GenerationNotes NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
                                        const TileMask& wanted, const float* frames, float* volume,
                                        std::byte* block, std::byte* tiles) const {
   dnnl::stream stream(engine_);
   SaturationCount saturation;
   SaturationCount* counted = stored_type_ == Type::u8 ? &saturation : nullptr;
-  const EngineRun run{stream, block, block + scratch_, saturation, tiles};
+  bool sound = true;
+  const EngineRun run{stream, block, block + scratch_, saturation, sound, tiles};
   const std::size_t value = dnnl::memory::data_type_size(stored_type_);
   const auto skip = [&](int level) {
     return Activations{block + skips_[level].offset, sizes_[level],
@@ -388,7 +392,7 @@ SaturationCount NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
     }
     run_last_tiles(run, layers, work, wanted, small, volume);
   });
-  return saturation;
+  return {.saturated_share = saturation.share(), .sound = sound};
 }
 
 std::vector<std::string> NetworkPlan::implementations() const {

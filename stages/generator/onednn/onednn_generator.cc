@@ -132,7 +132,7 @@ class OnednnGenerator final : public Generator {
     const OneOpenMpThread one_thread;
     const FlushSubnormals flush;
     try {
-      return {.saturated_share = work().share()};
+      return work();
     } catch (const dnnl::error&) {
       std::throw_with_nested(std::runtime_error("the generator failed in oneDNN"));
     } catch (const std::bad_alloc&) {

@@ -17,7 +17,7 @@ class ContenderFailed(Exception):
 
 
 class Contender(contextlib.AbstractContextManager):
-    """See eager_baseline.py and engines/engine_benchmark.cc for the requests."""
+    """See eager_baseline.py, python_caller.py and engines/engine_benchmark.cc for the requests."""
 
     def __init__(self, command, cores=1, environment=None):
         self._errors = tempfile.TemporaryFile("w+")
@@ -57,6 +57,14 @@ class Contender(contextlib.AbstractContextManager):
     def amplification(self, change, tries):
         """{"l2", "largest", "relative_l2"}, the largest of so many changes of one "level" of one pixel, or of "noise" of 1e-6 everywhere."""
         return self._ask(f"{change} {tries}")
+
+    def many(self, pairs, threads):
+        """{"wall_ms", "cpu_ms", "caller_ms"} of one call of many(); python_caller.py alone, as the next."""
+        return self._ask(f"many {pairs} {threads}")
+
+    def epoch(self, pairs, workers, method):
+        """{"wall_ms", "cpu_ms", "caller_ms"} of a DataLoader whose workers run already, processor time of these and of their caller."""
+        return self._ask(f"epoch {pairs} {workers} {method}")
 
     def _ask(self, request):
         print(request, file=self._process.stdin, flush=True)

@@ -168,7 +168,8 @@ TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
         std::vector<float> expected = generated(*generator, frames, size);
         clear_unwanted(wanted, expected);
         std::vector<float> volume(expected.size(), -1.0f);
-        generator->generate_tiles(frames, wanted, volume);
+        const GenerationNotes notes = generator->generate_tiles(frames, wanted, volume);
+        EXPECT_EQ(notes.sound, GetParam().engine == Engine::kOnednn);
         EXPECT_LE(largest_difference(volume, expected),
                   largest.at(GetParam().precision) * std::ranges::max(expected))
             << to_string(size) << " " << origin << ", width " << base_channels;
@@ -230,7 +231,9 @@ TEST_P(Engines, IsTheSameWhateverTheCallersOpenmpSettingIs) {
     std::jthread([&] {
       omp_set_num_threads(threads);
       volume = generated(*generator, frames, size);
-      EXPECT_EQ(omp_get_max_threads(), 1);  // of this thread, from its first call on
+      // LibTorch keeps the one thread, of this thread alone; oneDNN's engine gives back what was
+      // set.
+      EXPECT_EQ(omp_get_max_threads(), GetParam().engine == Engine::kOnednn ? threads : 1);
     }).join();
     EXPECT_EQ(volume, expected) << threads;
   }
@@ -244,8 +247,43 @@ TEST_P(Engines, LosesNoNan) {
          {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
       auto frames = natural_frames(size, 1);
       frames[200] = bad;
-      const auto volume = generated(*generator, frames, size);
+      std::vector<float> volume(18 * size.pixel_count());
+      const GenerationNotes notes = generator->generate(frames, size, volume);
       EXPECT_TRUE(std::ranges::any_of(volume, [](float value) { return !std::isfinite(value); }));
+      EXPECT_FALSE(notes.sound);
+    }
+  }
+}
+
+TEST_P(Engines, SeesInfinityInAnyChannelAndAtAnyPixel) {
+  constexpr int kBins = 3;
+  for (const int base_channels : {4, 8}) {
+    // The last of them, as it is, and each of the others with a channel that overflows in places.
+    for (int channel = 0; channel <= 2 * kBins; ++channel) {
+      Weights weights = untrained_weights(base_channels, kBins, 5);
+      Convolution& pred = weights.convolutions.back();
+      ASSERT_EQ(pred.name, "pred");
+      if (channel < 2 * kBins) {
+        pred.bias[channel] = std::numeric_limits<float>::max();
+        pred.weight[channel * base_channels] = 1e38f;
+      }
+      std::unique_ptr<Generator> generator;
+      try {
+        generator = engine(weights);
+      } catch (const std::invalid_argument&) {
+        EXPECT_EQ(GetParam().precision, Precision::kInt8);  // 8 bits cannot serve such numbers
+        continue;
+      }
+      int overflowed = 0;
+      for (const ImageSize size : {ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{5, 95},
+                                   ImageSize{33, 1}, ImageSize{9, 64}}) {
+        std::vector<float> volume(2 * kBins * size.pixel_count());
+        const GenerationNotes notes = generator->generate(natural_frames(size, 11), size, volume);
+        overflowed += !all_finite(volume);
+        EXPECT_EQ(notes.sound, GetParam().engine == Engine::kOnednn && all_finite(volume))
+            << to_string(size) << ", channel " << channel << ", width " << base_channels;
+      }
+      EXPECT_EQ(overflowed > 0, channel < 2 * kBins) << channel;
     }
   }
 }

@@ -8,6 +8,7 @@
 #include <limits>
 #include <memory>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -252,7 +253,7 @@ TEST(RectifyIntoPlanes, TurnsPixelsIntoPlanes) {
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = float(i) - 100;
   values[7] = kNan;
   std::vector<float> planes(channels * 200, -7);
-  rectify_into_planes(values.data(), pixels, channels, planes.data(), 200);
+  EXPECT_FALSE(rectify_into_planes(values.data(), pixels, channels, planes.data(), 200));
   for (int c = 0; c < channels; ++c) {
     for (std::size_t i = 0; i < 200; ++i) {
       const float got = planes[c * 200 + i];
@@ -265,6 +266,26 @@ TEST(RectifyIntoPlanes, TurnsPixelsIntoPlanes) {
       }
     }
   }
+}
+
+TEST(RectifyIntoPlanes, SaysWhetherAllPixelsAreFinite) {
+  const std::size_t pixels = 131;
+  const int channels = 3;
+  std::vector<float> values(pixels * channels), planes(pixels * channels);
+  const auto are_finite = [&] {
+    return rectify_into_planes(values.data(), pixels, channels, planes.data(), pixels);
+  };
+  values[5] = std::numeric_limits<float>::max();
+  values[8] = std::numeric_limits<float>::lowest();
+  EXPECT_TRUE(are_finite());
+  for (const float bad : {kNan, -kNan, kInfinity, -kInfinity}) {
+    for (const std::size_t at : {std::size_t{0}, std::size_t{200}, values.size() - 1}) {
+      const float before = std::exchange(values[at], bad);
+      EXPECT_FALSE(are_finite()) << bad << " " << at;
+      values[at] = before;
+    }
+  }
+  EXPECT_TRUE(rectify_into_planes(values.data(), 0, channels, planes.data(), 0));
 }
 
 TEST(DecoderStrips, HoldEveryRowOnceWithItsPhases) {

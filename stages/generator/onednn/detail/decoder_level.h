@@ -22,6 +22,7 @@ struct EngineRun {
   std::byte* block = nullptr;  ///< what BufferLayout's offsets count from
   std::byte* scratch = nullptr;
   SaturationCount& saturation;  ///< of all activations that the run stores
+  bool& sound;                  ///< GenerationNotes::sound
   std::byte* tiles = nullptr;   ///< TiledLayers' buffers, where it is used
 };
 

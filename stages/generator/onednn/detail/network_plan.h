@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
+#include "stages/generator/generator.h"
 #include "stages/generator/onednn/buffers.h"
 #include "stages/generator/onednn/detail/decoder_level.h"
 #include "stages/generator/onednn/detail/fused_convolution.h"
@@ -52,12 +53,12 @@ class NetworkPlan {
 
   /// frames [2, y, x], volume [2 bins, y, x] as Generator::generate has them. `block`:
   /// block_bytes(), whatever is in it. `observe` is called in float32 only, and may throw.
-  SaturationCount run(const float* frames, float* volume, std::byte* block,
+  GenerationNotes run(const float* frames, float* volume, std::byte* block,
                       const TensorObserver& observe = {}) const;
 
   /// The same for the tiles that are wanted, by what tiled_work says of them; nothing else of the
   /// volume is written. `tiles`: a block for layers.layout.
-  SaturationCount run_tiles(const TiledLayers& layers, const TiledWork& work,
+  GenerationNotes run_tiles(const TiledLayers& layers, const TiledWork& work,
                             const TileMask& wanted, const float* frames, float* volume,
                             std::byte* block, std::byte* tiles) const;
 
