@@ -615,6 +615,13 @@ py::array events_of(const py::array_t<float, py::array::c_style>& volume, double
 }  // namespace
 
 PYBIND11_MODULE(_engine, module) {
+#if PYBIND11_VERSION_HEX < 0x020C0000
+  // It would take other fields of NumPy 2's dtypes for those of NumPy 1.
+  const auto numpy = py::module_::import("numpy").attr("__version__").cast<std::string>();
+  if (!numpy.starts_with("1.")) {
+    throw std::runtime_error("expected NumPy 1, as pybind11 before 2.12 does, got " + numpy);
+  }
+#endif
   PYBIND11_NUMPY_DTYPE(EventRow, t, x, y, p);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {

@@ -1,5 +1,5 @@
 """What is installed, by `cmake --install` and as Debian packages: the program, its man pages and completion, pages that
-find each other, examples, schemas, the Python package; apart from these what needs LibTorch."""
+find each other, examples, schemas; apart from these what needs LibTorch, and the Python package."""
 
 import gzip
 import os
@@ -14,6 +14,7 @@ import unittest
 SOURCE = pathlib.Path(os.environ["EVENTGAN_SOURCE_DIR"])
 BUILD = pathlib.Path(os.environ["EVENTGAN_PROGRAM"]).parent
 SKIPPED = 77  # what ctest knows as skipped
+ENGINES = [path.name for path in (BUILD / "python" / "eventgan").glob("_engine.*.so")]  # none without pybind11
 COMPLETION_LIBRARY = pathlib.Path("/usr/share/bash-completion/bash_completion")
 
 
@@ -87,18 +88,22 @@ class Install(unittest.TestCase):
                 self.assertTrue((page.parent / link).exists(), f"{page}: {link}")
         self.assertIn("MIT License", (self.prefix / "share" / "doc" / "eventgan" / "copyright").read_text())
 
-    def test_python_reads_shards_with_the_installed_package(self):
-        where = run("/usr/bin/python3", "-B", "-c", "import eventgan; print(eventgan.__file__)", cwd="/",
-                    env={"PYTHONPATH": str(self.prefix / "lib" / "python3" / "dist-packages")})
-        self.assertTrue(where.startswith(str(self.prefix)))
+    def test_python_takes_the_installed_package(self):
+        code = "import eventgan; print(eventgan.__file__, len(eventgan.Shards.__mro__))"
+        if ENGINES:
+            code += "; print(eventgan.Generator('untrained:2')([[0.0, 1.0]], [[1.0, 0.0]]).shape)"
+        said = run("/usr/bin/python3", "-B", "-c", code, cwd="/", env={"PYTHONPATH": str(self.prefix / "lib" / "python3" / "dist-packages")})
+        self.assertTrue(said.startswith(str(self.prefix)))
+        self.assertEqual(said.splitlines()[1:], ["(18, 1, 2)"] * len(ENGINES))
 
     def test_nothing_else_is_installed(self):
         self.assertEqual([path.relative_to(self.root).as_posix() for path in self.root.glob("*/*")], ["opt/eventgan"])
         self.assertEqual({path.name for path in self.prefix.iterdir()} - {"files"}, {"bin", "libexec", "share", "lib"})
         executables = [path for path in self.prefix.rglob("*") if path.is_file() and path.read_bytes()[:4] == b"\x7fELF"]
         self.assertEqual({path.relative_to(self.prefix).as_posix() for path in executables},
-                         {"bin/eventgan", "libexec/eventgan/eventgan-torch", "libexec/eventgan/eventgan-video"})
-        self.assertTrue(all(os.access(path, os.X_OK) for path in executables))
+                         {"bin/eventgan", "libexec/eventgan/eventgan-torch", "libexec/eventgan/eventgan-video",
+                          *(f"lib/python3/dist-packages/eventgan/{name}" for name in ENGINES)})
+        self.assertTrue(all(os.access(path, os.X_OK) for path in executables if path.suffix != ".so"))
         self.assertFalse([path for path in self.prefix.rglob("*") if "__pycache__" in path.parts])
 
 
@@ -131,27 +136,52 @@ class Packages(unittest.TestCase):
     def names(self, package, name):
         return {entry.split()[0] for entry in self.field(package, name).split(",")}
 
-    def test_two_packages_share_the_files(self):
+    def test_three_packages_share_the_files(self):
         contents = {name: set(re.findall(r"(?m) \./(\S*[^/\s])$", run("dpkg-deb", "--contents", path)))
                     for name, path in self.files.items()}
-        self.assertEqual(set(contents), {"eventgan", "eventgan-torch"})
+        self.assertEqual(set(contents), {"eventgan", "eventgan-torch", "python3-eventgan"})
         self.assertEqual(contents["eventgan-torch"], {"usr/libexec/eventgan/eventgan-torch"})
         self.assertLessEqual({"usr/bin/eventgan", "usr/libexec/eventgan/eventgan-video"}, contents["eventgan"])
         self.assertIn("usr/share/man/man1/eventgan.1.gz", contents["eventgan"])
-        self.assertIn("usr/lib/python3/dist-packages/eventgan/__init__.py", contents["eventgan"])
+        package = SOURCE / "manifests" / "python"
+        self.assertEqual(contents["python3-eventgan"], {f"usr/lib/python3/dist-packages/{name}" for name in (
+            *(path.relative_to(package) for folder in ("eventgan", "eventgan_shards") for path in (package / folder).glob("*.py*")),
+            "eventgan/py.typed", *(f"eventgan/{name}" for name in ENGINES))})
+        self.assertFalse([name for name in contents["eventgan"] if "dist-packages" in name])
         self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])
 
     def test_dependencies_are_the_libraries_packages(self):
-        for package, executable in [("eventgan", "eventgan"), ("eventgan", "eventgan-video"),
-                                    ("eventgan-torch", "eventgan-torch")]:
+        for package, executable in [("eventgan", "eventgan"), ("eventgan", "eventgan-video"), ("eventgan-torch", "eventgan-torch"),
+                                    *(("python3-eventgan", f"python/eventgan/{name}") for name in ENGINES)]:
             self.assertLessEqual(loaded_packages(BUILD / executable), self.names(package, "Depends"))
         version = run(BUILD / "eventgan", "--version").split()[1]
         self.assertIn(f"eventgan (= {version})", self.field("eventgan-torch", "Depends"))
-        self.assertLessEqual({"python3-h5py", "python3-numpy"}, self.names("eventgan", "Recommends"))
+        self.assertEqual(self.names("eventgan", "Recommends"), {"python3-eventgan"})
+        self.assertEqual(self.names("python3-eventgan", "Recommends"), {"python3-h5py", "python3-matplotlib"})
+        self.assertLessEqual({"python3-torch", "python3-tqdm"}, self.names("python3-eventgan", "Suggests"))
+
+    @unittest.skipUnless(ENGINES, "no pybind11")
+    def test_the_module_is_for_the_python_that_it_was_built_for(self):
+        minor = int(re.search(r"cpython-3(\d+)", ENGINES[0])[1])
+        wanted = {entry.strip() for entry in self.field("python3-eventgan", "Depends").split(",")}
+        self.assertLessEqual({f"python3 (>= 3.{minor}~)", f"python3 (<< 3.{minor + 1})", "python3-numpy"}, wanted)
+
+    def test_python_compiles_it_when_it_is_installed_and_takes_that_away_with_it(self):
+        control = self.folder / "control"
+        run("dpkg-deb", "--control", self.files["python3-eventgan"], control)
+        for script, command in [("postinst", "py3compile"), ("prerm", "py3clean")]:
+            self.assertTrue(os.access(control / script, os.X_OK))
+            self.assertIn(f"{command} -p python3-eventgan\n", (control / script).read_text())
+
+    def test_an_earlier_eventgan_gives_its_python_files_up(self):
+        """It had them itself, which dpkg would not let another package write over."""
+        version = run(BUILD / "eventgan", "--version").split()[1]
+        self.assertEqual(self.field("python3-eventgan", "Breaks"), f"eventgan (<< {version})")
+        self.assertEqual(self.field("python3-eventgan", "Replaces"), "eventgan")
 
     def test_only_one_needs_libtorch(self):
-        self.assertTrue([name for name in self.names("eventgan-torch", "Depends") if name.startswith("libtorch")])
-        self.assertEqual([name for name in self.names("eventgan", "Depends") if name.startswith("libtorch")], [])
+        needing = [package for package in self.files if [name for name in self.names(package, "Depends") if name.startswith("libtorch")]]
+        self.assertEqual(needing, ["eventgan-torch"])
 
     def test_descriptions_are_well_formed(self):
         for package in self.files:

@@ -15,9 +15,9 @@ import numpy as np
 import program
 from camera_files import (BBOX, DHP19_JOINTS, DHP19_MATRICES, HEIGHT, WIDTH, random_events, volume_of, whole_microseconds, write_columns,
                           write_dhp19, write_mvsec)
-from program import SHARED, SOURCE, run, shard_bytes, text
+from program import PACKAGE, SHARED, run, shard_bytes, text
 
-sys.path.insert(0, str(SOURCE / "manifests" / "python"))
+sys.path.insert(0, str(PACKAGE))
 
 HEADER = "time_s,left,top,right,bottom,class,category\n"
 FRAMES = [10.0 + 0.05 * k for k in range(9)]

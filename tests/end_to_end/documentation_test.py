@@ -13,7 +13,7 @@ import tempfile
 import unittest
 
 import program
-from program import SOURCE, run
+from program import PACKAGE, SOURCE, run
 
 PAGES = [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", SOURCE / "docker" / "running.md", SOURCE / "manifests" / "weights" / "README.md",
          *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
@@ -23,8 +23,7 @@ NUMERICS = SOURCE / "manifests" / "guides" / "numerics.md"
 OPTION = r"--[a-z][a-z0-9-]*"
 OWN_PATH = re.compile(r"(\.ci|docker|manifests|pipeline|stages|tests)/[\w./*-]*")
 BLOCK = re.compile(r"(?:^    .*\n|^\n(?=    ))+", re.M)
-BUILT = pathlib.Path(program.PROGRAM).parent / "python"  # with the compiled module
-PYTHON_PATH = {**os.environ, "PYTHONPATH": str(BUILT if BUILT.is_dir() else SOURCE / "manifests" / "python")}
+PYTHON_PATH = {**os.environ, "PYTHONPATH": str(PACKAGE)}
 
 
 def exit_codes():

@@ -15,7 +15,7 @@ import numpy as np
 import PIL.Image
 
 import program
-from program import SOURCE, run
+from program import PACKAGE, SOURCE, run
 from small_job import LENIENT, broken_cars, small_job
 
 PAIRS = 30
@@ -33,7 +33,7 @@ def relative_distance(volumes, reference):
 
 def pytorch():
     """PyTorch, and what of the package is tried here; (None, None) without it."""
-    sys.path.insert(0, str(SOURCE / "manifests" / "python"))
+    sys.path.insert(0, str(PACKAGE))
     try:
         import torch
     except ImportError:

@@ -21,7 +21,7 @@ from folders import shards as shards_in
 from program import run
 from small_job import small_job
 
-sys.path.insert(0, str(program.SOURCE / "manifests" / "python"))
+sys.path.insert(0, str(program.PACKAGE))
 import eventgan  # noqa: E402
 
 SHARDS = 8  # 3 of cars, 3 of the same cars as "val", 2 of people
@@ -245,7 +245,7 @@ class Reading(unittest.TestCase):
     def test_the_reader_opens_few_files_and_none_before_it_reads(self):
         said = self.in_python(f"""
             import sys, os
-            sys.path.insert(0, {str(program.SOURCE / "manifests" / "python")!r})
+            sys.path.insert(0, {str(program.PACKAGE)!r})
             import eventgan
             samples = eventgan.Shards(".", split="train", open_files=2)
             print(len(samples._files._open))

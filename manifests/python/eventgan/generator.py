@@ -17,8 +17,8 @@ import numpy.typing as npt
 try:
     from . import _engine
 except ImportError as error:
-    raise ImportError("expected the compiled module eventgan._engine, got none: install the Debian package python3-eventgan, or build it with "
-                      "pip install ./manifests/python in a checkout (manifests/guides/python.md)") from error
+    raise ImportError(f"expected the compiled module eventgan._engine, got none ({error}): install the Debian package python3-eventgan, or run "
+                      "`pip install -v ./manifests/python` in a checkout, which builds it or says what is missing") from error
 
 PathLike = Union[str, os.PathLike]
 _PLACES = {  # of settings in a manifest

@@ -8,7 +8,8 @@ import sys
 import pytest
 
 SOURCE = pathlib.Path(__file__).resolve().parents[3]
-sys.path[:0] = [*os.environ.get("PYTHONPATH", str(SOURCE / "manifests" / "python")).split(os.pathsep), str(SOURCE / "tests" / "stages" / "shards")]
+PACKAGE = pathlib.Path(os.environ.get("PYTHONPATH", str(SOURCE / "manifests" / "python")).split(os.pathsep)[0])
+sys.path[:0] = [str(PACKAGE), str(SOURCE / "tests" / "stages" / "shards")]
 
 from example_shards import NAME, ExampleShards  # noqa: E402
 

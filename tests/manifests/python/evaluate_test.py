@@ -12,7 +12,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from conftest import NAME, SECOND, SOURCE
+from conftest import NAME, PACKAGE, SECOND, SOURCE
 
 from eventgan import Shards
 from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, average_precisions, detection_scores,
@@ -605,7 +605,7 @@ def test_poses_of_a_folder(folder, tmp_path):
 
 def evaluate(*arguments, expect=0):
     done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", *map(str, arguments)], capture_output=True, text=True,
-                          env={**os.environ, "PYTHONPATH": str(SOURCE / "manifests" / "python")})
+                          env={**os.environ, "PYTHONPATH": str(PACKAGE)})
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 

@@ -12,7 +12,7 @@ import types
 
 import numpy as np
 import pytest
-from conftest import SOURCE
+from conftest import PACKAGE, SOURCE
 
 from eventgan import Shards
 
@@ -64,7 +64,7 @@ def need_trainer(name, *modules):
 
 def evaluate(what, out, data, *more):
     done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", what, out / "predictions.json", "--truth", data, "--json", *more],
-                          capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(EXAMPLES.parent)})
+                          capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(PACKAGE)})
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
