@@ -278,12 +278,12 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     if not state["history"]:
         report(None)
         began = time.monotonic()
+    set_epoch = getattr(getattr(loader, "dataset", None), "set_epoch", lambda epoch: None)  # FramePairs has one
     done = progress() >= 1
     while not done:
         state["epoch"] += 1
         torch.manual_seed(args.seed * 1_000_003 + state["epoch"])  # what an epoch draws does not depend on where a run went on
-        if hasattr(loader.dataset, "set_epoch"):  # FramePairs
-            loader.dataset.set_epoch(state["epoch"])
+        set_epoch(state["epoch"])
         model.train()
         losses = []
         for batch in loader:
