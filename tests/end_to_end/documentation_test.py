@@ -140,7 +140,7 @@ class Documentation(unittest.TestCase):
         """All its Python blocks one after the other in one process, as somebody who pastes them, where its `eventgan make-demo` was run; what a line
         prints is the comment beside it."""
         page = SOURCE / "manifests" / "guides" / "python.md"
-        shell = {"eventgan", "export", "pip", "python3"}  # any other first word is Python's
+        shell = {"docker/bootstrap.sh", "eventgan", "export", "python3"}  # any other first word is Python's
         of_shell = {is_shell: [block for block in blocks_of(page) if (block.split()[0] in shell) == is_shell] for is_shell in (True, False)}
         code = "\n".join(of_shell[False])
         told = re.findall(r"(?m)^ *print\(.*\) {2,}# (.*)$", code)
