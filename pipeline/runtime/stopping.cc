@@ -87,20 +87,25 @@ double ShardPace::commit_seconds() const {
 StopMonitor::StopMonitor(SinceRequest since_request, double grace_s, Left left)
     : since_request_(std::move(since_request)), grace_s_(grace_s), left_(std::move(left)) {
   if (!since_request_) return;
-  look();
+  order();
   thread_ = std::jthread([this](const std::stop_token& end) {
     std::mutex mutex;
     std::condition_variable_any wake;
     std::unique_lock lock(mutex);
     while (order_ != StopOrder::kAbort && !end.stop_requested()) {
       wake.wait_for(lock, end, kInterval, [] { return false; });
-      look();
+      order();
     }
   });
 }
 
-void StopMonitor::look() {
-  order_ = std::max(order_.load(), stop_order(since_request_(), grace_s_, left_()));
+StopOrder StopMonitor::order() const {
+  if (!since_request_) return StopOrder::kGoOn;
+  const StopOrder now = stop_order(since_request_(), grace_s_, left_());
+  StopOrder strictest = order_.load();
+  while (strictest < now && !order_.compare_exchange_weak(strictest, now)) {
+  }
+  return std::max(strictest, now);
 }
 
 namespace {

@@ -74,27 +74,25 @@ class ShardPace {
   std::optional<double> last_commit_s_;
 };
 
-/// Turns a request to stop into orders while it lives: asks some fifty times a second, also when
-/// nothing else moves. Orders only get stricter.
+/// Turns a request to stop into orders while it lives: asks whenever its order is asked for, and
+/// some fifty times a second, also when nothing else moves. Orders only get stricter.
 class StopMonitor {
  public:
   using SinceRequest = std::function<std::optional<double>()>;  ///< StopSignal's, say
   using Left = std::function<std::optional<WorkLeft>()>;        ///< ShardPace's, say
 
-  /// Both functions are called from a thread of its own; they must be thread safe and not throw.
+  /// Both functions are called from other threads, too; they must be thread safe and not throw.
   /// Without `since_request` the order is always kGoOn. The first order holds on return.
   StopMonitor(SinceRequest since_request, double grace_s, Left left);
 
   /// Thread safe, and cheap enough to ask for every sample.
-  StopOrder order() const { return order_.load(); }
+  StopOrder order() const;
 
  private:
-  void look();
-
   SinceRequest since_request_;
   double grace_s_;
   Left left_;
-  std::atomic<StopOrder> order_{StopOrder::kGoOn};
+  mutable std::atomic<StopOrder> order_{StopOrder::kGoOn};
   std::jthread thread_;  // last, so that it ends first
 };
 
