@@ -139,7 +139,8 @@ Amplification EngineContender::amplification(SmallChange change, int tries) cons
   return most;
 }
 
-/// The engines take one thread on the first call of each thread; after it the setting is ours.
+/// LibTorch's engine takes one thread on the first call of each thread; after it the setting is
+/// ours. (oneDNN's computes with one, whatever the setting.)
 void EngineContender::allow_intra_op_threads() {
   if (setup_.intra_op == 1) return;
   std::vector<float> volume = volume_of(weights_, kSmallSize);
