@@ -396,8 +396,18 @@ class PairGenerator {
     return shape;
   }
 
+  /// Without labels a scope of labels would give a volume that looks as if nothing had moved.
+  void require_labels(const Labels* labels) const {
+    const Scope scope = job_.generator.scope.scope;
+    if (scope != Scope::kLabels && scope != Scope::kLabelsOnly) return;
+    if (labels && (labels->has_boxes || labels->has_joints)) return;
+    throw UsageError("expected boxes or joints, which Generator.sample takes, since scope is \"" +
+                     std::string(to_string(scope)) + "\", got none");
+  }
+
   MadeVolume make(const Pair& pairs, std::size_t index, const Labels* labels, int gap,
                   std::span<float> volume) const {
+    require_labels(labels);
     const PreparedPair pair =
         prepare_pair(prepared(pairs.previous.at(index), job_.image, pairs.previous.name()),
                      prepared(pairs.following.at(index), job_.image, pairs.following.name()));

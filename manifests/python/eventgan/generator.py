@@ -58,7 +58,7 @@ class Generator:
     blur : int, optional
         Side of the Gaussian kernel in pixels, odd; 0: none.
     scope : {"whole", "motion", "labels", "labels_only"}
-        Which part of a volume is computed; the rest is zeros. "labels" and "labels_only" need the labels: see `sample`.
+        Which part of a volume is computed; the rest is zeros. "labels" and "labels_only" need labels, which only `sample` takes.
     normalize : {"none", "eta98"}
         Whether a volume is divided by its 98th percentile and clipped.
     seed : int, default 0

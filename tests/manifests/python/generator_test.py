@@ -250,6 +250,17 @@ def test_labels_and_gap(images):
             generator.sample(images[0], images[1], **more)
 
 
+@pytest.mark.parametrize("scope", ["labels", "labels_only"])
+def test_a_scope_of_labels_needs_them(images, scope):
+    generator = eventgan.Generator("shipped:8", scope=scope)
+    batches = np.stack(images[:1]), np.stack(images[1:2])
+    for call in (lambda: generator(*images[:2]), lambda: generator.sample(*images[:2]), lambda: generator.many(*batches)):
+        with pytest.raises(ValueError, match=f'expected boxes or joints, .*scope is "{scope}", got none'):
+            call()
+    still = generator.sample(images[0], images[0], boxes=np.empty((0, 4)))  # an image without objects has labels
+    assert not still["statistics"]["tiles"].any() and not still["volume"].any()
+
+
 def test_prepare(images):
     grey = images[0][..., 0]
     np.testing.assert_array_equal(eventgan.Generator("shipped:8").prepare(grey), grey)
