@@ -23,13 +23,14 @@ if TYPE_CHECKING:
     from .generator import Generator, sample_events
     from .plotting import show
     from .program import ProgramError, convert, init, open
+    from .representations import signed_channel
     from .shards import FIELDS, InvalidSample, Sample, Shards, open_shard, read_description
 
 _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",
     "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards", "read_description": "shards",
     "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
-    "show": "plotting",
+    "show": "plotting", "signed_channel": "representations",
 }
 _MODULES = ("evaluate", "shards", "torch")
 

@@ -50,7 +50,8 @@ def __getattr__(name: str) -> Any:
 class EventAugmentation:
     """What may happen to events without making them unlike a camera's. Drawn by torch's random numbers.
 
-    There is no change of values: a volume has no brightness or hue.
+    There is no change of values: a volume has no brightness or hue. A volume is [2B, H, W] here, or [1, H, W] as `signed_channel` makes it.
+    `threshold`, `lost` and `isolated` come last, at the pixels that a network sees.
 
     Parameters
     ----------
@@ -68,6 +69,16 @@ class EventAugmentation:
         By at most this share of width and height the scaled image is moved.
     reverse_all : bool, default False
         True reverses others, too.
+    invert : float, default 0
+        Probability of the polarities being exchanged, time running as it does: what was bright is dark.
+    threshold : (float, float)
+        Another sensor's threshold: pixels with fewer events than a share of the volume's strongest ones (98th percentile of the sums over its
+        channels, where there are any) have none. The share is drawn uniformly from this range.
+    lost : (float, float)
+        The share of the pixels with events that lose them, drawn uniformly from this range.
+    isolated : (float, float)
+        The share of all pixels that get an event of their own, as noise makes them, drawn uniformly from this range: in a random channel (one channel: of
+        random sign), 0.3 to 1 times as strong as the strongest ones.
 
     Raises
     ------
@@ -81,13 +92,37 @@ class EventAugmentation:
     scale: tuple[float, float] = (1.0, 1.0)
     shift: float = 0.0
     reverse_all: bool = False
+    invert: float = 0.0
+    threshold: tuple[float, float] = (0.0, 0.0)
+    lost: tuple[float, float] = (0.0, 0.0)
+    isolated: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
-        for name in ("flip", "reverse", "drop"):
+        for name in ("flip", "reverse", "drop", "invert"):
             if not 0 <= getattr(self, name) <= 1:
                 raise ValueError(f"expected {name} to be a probability, got {getattr(self, name)}")
+        for name in ("threshold", "lost", "isolated"):
+            least, most = getattr(self, name)
+            if not 0 <= least <= most <= 1:
+                raise ValueError(f"expected {name} to be a range of shares from 0 to 1, got {least}, {most}")
         if not 0 < self.scale[0] <= self.scale[1] < math.inf or not 0 <= self.shift < math.inf:
             raise ValueError(f"expected factors above 0, the smaller one first, and a shift of at least 0, got {self.scale}, {self.shift}")
+
+    def __call__(self, item: Item) -> Item:
+        """An item of DetectionDataset or FramePairs, volume and boxes changed alike: for items that are kept in memory and drawn again each epoch.
+
+        Parameters
+        ----------
+        item : dict
+            With `volume`, `boxes`, `labels` and `ignore`; `label_position`, which FramePairs gives, is 0.5 where it is not there.
+
+        Returns
+        -------
+        dict
+            A new item; what else is in `item` is there, too.
+        """
+        boxes, labels, ignore = (item[name].numpy() for name in ("boxes", "labels", "ignore"))
+        return {**item, **_detection_item(item["volume"], boxes, labels, ignore, item.get("label_position", 0.5), self)}
 
     def affine(self, height: int, width: int) -> np.ndarray:
         """Where a point of the volume goes, drawn again.
@@ -114,21 +149,52 @@ class EventAugmentation:
 
         Parameters
         ----------
-        volume : torch.Tensor, [2B, H, W]
+        volume : torch.Tensor, [2B, H, W] or [1, H, W]
         label_position : float, default 0.5
             Where in time the labels lie: 0 at the start, 1 at the end.
 
         Returns
         -------
         torch.Tensor
-            [2B, H, W].
+            Of the same shape.
         """
+        is_signed = len(volume) == 1
         reverse, drop, which = (float(each) for each in torch.rand(3))
         if reverse < self.reverse and (self.reverse_all or label_position == 0.5):
-            volume = volume.flip(0)
-        if drop < self.drop:
+            volume = -volume if is_signed else volume.flip(0)
+        if self.invert and float(torch.rand(())) < self.invert:
+            volume = -volume if is_signed else volume.roll(len(volume) // 2, 0)
+        if drop < self.drop and is_signed:
+            volume = volume.clamp(max=0) if which >= 0.5 else volume.clamp(min=0)
+        elif drop < self.drop:
             volume = volume.clone()
             volume.chunk(2)[int(which < 0.5)].zero_()
+        return volume
+
+    def sensor(self, volume: torch.Tensor) -> torch.Tensor:
+        """The volume as another sensor might have seen it: `threshold`, `lost` and `isolated`.
+
+        Parameters
+        ----------
+        volume : torch.Tensor, [2B, H, W] or [1, H, W]
+
+        Returns
+        -------
+        torch.Tensor
+            Of the same shape; the one given if all three are off.
+        """
+        ranges = torch.tensor([self.threshold, self.lost, self.isolated])
+        if not ranges.any():
+            return volume
+        threshold, lost, isolated = (ranges[:, 0] + torch.rand(3) * (ranges[:, 1] - ranges[:, 0])).tolist()
+        strength = volume.abs().sum(0)
+        there = strength[strength > 0]
+        strongest = float(np.percentile(there.numpy(), 98)) if len(there) else 0.0
+        volume = volume * ((strength >= threshold * strongest) & (torch.rand(strength.shape) >= lost))
+        count = round(isolated * strength.numel())
+        at = torch.randint(max(volume.numel(), 1), (count,))
+        signs = 2 * torch.randint(2, (count,)) - 1 if len(volume) == 1 else 1
+        volume.view(-1)[at] = strongest * (0.3 + 0.7 * torch.rand(count)) * signs
         return volume
 
 
@@ -259,8 +325,10 @@ def _moved(volume: torch.Tensor, label_position: float, augmentation: EventAugme
         return volume, None
     height, width = size or volume.shape[1:]
     view = np.eye(2, 3) if view is None else view
-    affine = augmentation.affine(height, width) @ np.vstack([view, [0, 0, 1]]) if augmentation else view
-    return warp(volume, affine, height, width), affine
+    if not augmentation:
+        return warp(volume, view, height, width), view
+    affine = augmentation.affine(height, width) @ np.vstack([view, [0, 0, 1]])
+    return augmentation.sensor(warp(volume, affine, height, width)), affine
 
 
 def _detection_item(volume: torch.Tensor, boxes: np.ndarray, labels: np.ndarray, ignore: np.ndarray, label_position: float,

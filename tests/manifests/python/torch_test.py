@@ -91,10 +91,74 @@ def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
             assert torch.equal(KeypointDataset(again, augmentation=backwards)[0]["volume"], expected)
 
 
-@pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)}, {"scale": (1.2, 0.8)}, {"shift": -1}])
+@pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)}, {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2},
+                                   {"threshold": (0.2, 0.1)}, {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
 def test_augmentations_that_cannot_be(wrong):
     with pytest.raises(ValueError, match="expected "):
         EventAugmentation(**wrong)
+
+
+def test_events_in_one_signed_channel():
+    signed = torch.tensor([[[0.5, -1.0, 0.0]]])
+    assert EventAugmentation(reverse=1).events(signed).tolist() == EventAugmentation(invert=1).events(signed).tolist() == [[[-0.5, 1, 0]]]
+    torch.manual_seed(0)
+    assert {tuple(EventAugmentation(drop=1).events(signed).flatten().tolist()) for _ in range(20)} == {(0.5, 0, 0), (0, -1, 0)}
+    volume = torch.arange(1.0, 7).reshape(6, 1, 1)  # three bins: positive 1, 2, 3, negative 4, 5, 6
+    assert EventAugmentation(invert=1).events(volume).flatten().tolist() == [4, 5, 6, 1, 2, 3]
+
+
+def test_another_sensor_s_threshold():
+    """98 of 100 pixels with events have 1 to 98 of them, in two channels, and two have 200: the 98th percentile is 98 + 0.02 (200 - 98) of them."""
+    counts = torch.tensor([*range(1, 99), 200, 200, *[0] * 28]).float().reshape(1, 8, 16)
+    for volume in (torch.cat([0.25 * counts, 0.75 * counts]), counts, -counts):
+        left = EventAugmentation(threshold=(0.5, 0.5)).sensor(volume)
+        strongest = 98 + 0.02 * (200 - 98)
+        assert torch.equal(left, torch.where(counts >= 0.5 * strongest, volume, torch.zeros(())))
+    torch.manual_seed(3)
+    least = [EventAugmentation(threshold=(0.1, 0.3)).sensor(counts)[counts > 0] for _ in range(200)]
+    least = torch.stack([each[each > 0].min() for each in least])  # each draw has a threshold of its own
+    assert 0.1 * strongest <= least.min() < 0.11 * strongest and 0.29 * strongest < least.max() <= 0.3 * strongest + 1
+
+
+def test_another_sensor_s_lost_and_isolated_events():
+    torch.manual_seed(5)
+    volume = torch.ones(4, 100, 100)
+    assert not EventAugmentation(lost=(1, 1)).sensor(volume).any()
+    kept = EventAugmentation(lost=(0.4, 0.4)).sensor(volume)
+    assert torch.equal(kept[0], kept[3])  # a pixel loses all of its events
+    assert abs(float(kept.mean()) - 0.6) < 4 * (0.24 / 10_000) ** 0.5
+    volume = torch.zeros(4, 100, 100)
+    volume[0, 0, :50] = 2.0
+    added = EventAugmentation(isolated=(0.02, 0.02)).sensor(volume) - volume
+    places = added[:, 1:].nonzero()
+    assert 180 < len(places) <= 200 and set(places[:, 0].tolist()) == {0, 1, 2, 3}  # 200 of 10,000, some at one place or in the first line
+    assert 0.6 <= added[:, 1:][added[:, 1:] != 0].min() and added.max() <= 2.0
+    signed = EventAugmentation(isolated=(0.02, 0.02)).sensor(volume[:1])[:, 1:]
+    assert 60 < (signed > 0).sum() < 140 and 60 < (signed < 0).sum() < 140
+    everything = EventAugmentation(threshold=(0, 0.3), lost=(0, 0.4), isolated=(0.01, 0.03))
+    assert not everything.sensor(torch.zeros(2, 8, 8)).any()  # nothing is as strong as nothing
+    assert everything.sensor(torch.zeros(2, 0, 8)).shape == (2, 0, 8)
+
+
+def test_a_sensor_that_is_left_alone_draws_nothing():
+    """What is drawn without these settings is what was drawn before there were any."""
+    volume, state = torch.rand(2, 4, 4), torch.get_rng_state()
+    assert EventAugmentation().sensor(volume) is volume and torch.equal(torch.get_rng_state(), state)
+
+
+def test_an_item_in_memory_is_changed_as_one_that_is_read(shards):
+    augmentation = EventAugmentation(flip=0.5, scale=(0.5, 2), shift=0.2, threshold=(0, 0.3), lost=(0, 0.4), isolated=(0, 0.1))
+    plain, changed = DetectionDataset(shards), DetectionDataset(shards, augmentation=augmentation)
+    for i in range(len(shards)):
+        item = plain[i]
+        torch.manual_seed(i)
+        once = augmentation(item)
+        torch.manual_seed(i)
+        again = changed[i]
+        assert once.keys() == again.keys() and once["id"] == again["id"]
+        for name in ("volume", "boxes", "labels", "ignore"):
+            torch.testing.assert_close(once[name], again[name], atol=1e-5, rtol=0)
+        assert torch.equal(item["volume"], plain[i]["volume"])
 
 
 def test_an_augmentation_s_map():
