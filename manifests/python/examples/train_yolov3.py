@@ -28,10 +28,6 @@ def read_args() -> argparse.Namespace:
     return training.begin(parser)
 
 
-def with_boxes(shards: Shards) -> list[int]:
-    return [i for i in range(len(shards)) if shards.class_names(i)]
-
-
 def collate(items: list) -> tuple:
     return (*collate_yolo(items)[:2], items)
 
@@ -68,7 +64,7 @@ def main() -> None:
     from train import hyp
     from utils.utils import clip_coords, compute_loss, non_max_suppression
 
-    train_shards, validation_shards = training.divided(args, with_boxes)
+    train_shards, validation_shards = training.divided(args, training.with_boxes)
     classes = args.classes.split(",")
     area = train_shards.image_area()  # what a letterbox has added costs time and shows nothing
     width, height = (32 * int(np.ceil(side * args.scale / 32)) for side in (area[2:] - area[:2]))
@@ -77,7 +73,7 @@ def main() -> None:
     try:
         train_set = DetectionDataset(train_shards, classes, (height, width), augmentation, view=view)
         validation_set = DetectionDataset(validation_shards, classes, (height, width), view=view)
-        test = DetectionDataset(training.tested(args, train_shards, validation_shards, with_boxes), classes, (height, width), view=view)
+        test = DetectionDataset(training.tested(args, train_shards, validation_shards, training.with_boxes), classes, (height, width), view=view)
     except ValueError as error:
         raise SystemExit(str(error))
 

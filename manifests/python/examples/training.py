@@ -121,6 +121,11 @@ def validation_split(description: dict[str, Any]) -> str | None:
     return next((name for name in VALIDATION_SPLITS if name in description["counts"]["by_split"]), None)
 
 
+def with_boxes(shards: Shards) -> list[int]:
+    """The positions of the samples of sources with boxes."""
+    return [i for i in range(len(shards)) if shards.class_names(i)]
+
+
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
     """The training samples and the validation samples, of which `usable` gives the positions of those with labels: by the folder's
     splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no labelled frame."""
@@ -200,16 +205,29 @@ def place_of(sample: Sample) -> tuple[int, int, int, int]:
     return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
 
 
-def labelled_frame(sample: Sample) -> np.ndarray:
-    """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel. It must be an image at the pair's end."""
-    pair, volume = sample["pair"], np.zeros_like(sample["volume"])
+def placed(sample: Sample, image: np.ndarray) -> np.ndarray:
+    """[H, W] float32: an image of the size of the sample's source, grey, where it lies in the volume, and 0 around it."""
+    result = np.zeros(sample["volume"].shape[1:], np.float32)
+    left, top, width, height = place_of(sample)
+    whole = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
+    seen = whole[max(0, -top):, max(0, -left):][:result.shape[0] - max(0, top), :result.shape[1] - max(0, left)]
+    result[max(0, top):, max(0, left):][:seen.shape[0], :seen.shape[1]] = seen
+    return result
+
+
+def labelled_image(sample: Sample) -> np.ndarray:
+    """The labelled frame as it was read, uint8 grey [H, W]. It must be an image at the pair's end."""
+    pair = sample["pair"]
     image = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
     if image is None:
         raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
-    left, top, width, height = place_of(sample)
-    whole = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
-    seen = whole[max(0, -top):, max(0, -left):][:volume.shape[1] - max(0, top), :volume.shape[2] - max(0, left)]
-    volume[0, max(0, top):, max(0, left):][:seen.shape[0], :seen.shape[1]] = seen / 255
+    return image
+
+
+def labelled_frame(sample: Sample) -> np.ndarray:
+    """In place of the volume: the labelled frame, grey from 0 to 1, in the first channel."""
+    volume = np.zeros_like(sample["volume"])
+    volume[0] = placed(sample, labelled_image(sample)) / 255
     return volume
 
 
@@ -352,9 +370,16 @@ def write_predictions(args: argparse.Namespace, entries: Iterable[dict]) -> None
     _replace(pathlib.Path(args.out, "predictions.json"), lambda path: path.write_text(text, encoding="utf-8"))
 
 
+def markdown(cells: Sequence[Sequence[str]]) -> str:
+    """A table: the headings' line, then the others; numbers are set to the right."""
+    head, *lines = cells
+    return "\n".join(f"| {' | '.join(line)} |" for line in [head, ["---", *["---:"] * (len(head) - 1)], *lines])
+
+
 def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarray:
-    """The item's volume with its boxes, and those that were found [n, 4] with their texts."""
-    canvas = drawing.of_events(item["volume"].numpy())
+    """The item's volume, or its signed channel, with its boxes, and those that were found [n, 4] with their texts."""
+    volume = item["volume"].numpy()
+    canvas = drawing.of_events(np.concatenate([volume, -volume]).clip(0) if len(volume) == 1 else volume)
     drawing.draw_boxes(canvas, item["boxes"][item["ignore"]], drawing.IGNORED)
     drawing.draw_boxes(canvas, item["boxes"][~item["ignore"]], drawing.TRUE)
     drawing.draw_boxes(canvas, found, drawing.FOUND, texts)

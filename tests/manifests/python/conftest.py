@@ -3,6 +3,7 @@
 import os
 import pathlib
 import shutil
+import subprocess
 import sys
 
 import pytest
@@ -36,3 +37,16 @@ def two_shards(folder):
     record = (folder / NAME).with_suffix(".json").read_text()
     (folder / SECOND).with_suffix(".json").write_text(record.replace(NAME, SECOND))
     return folder
+
+
+@pytest.fixture(scope="session")
+def data(tmp_path_factory):
+    """The demo, converted at half its size and finalized."""
+    demo, program = tmp_path_factory.mktemp("data") / "demo", os.environ["EVENTGAN_PROGRAM"]
+    subprocess.run([program, "make-demo", demo], check=True, capture_output=True)
+    manifest = (demo / "manifest.json").read_text()
+    assert '"width": 346, "height": 260' in manifest
+    (demo / "manifest.json").write_text(manifest.replace('"width": 346, "height": 260', '"width": 176, "height": 132'))
+    subprocess.run([program, "convert", demo / "manifest.json", "--output", demo / "out", "--progress", "none"], check=True, capture_output=True)
+    subprocess.run([program, "finalize", demo / "out"], check=True, capture_output=True)
+    return demo / "out"

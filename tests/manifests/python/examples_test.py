@@ -26,19 +26,6 @@ ONE_THREAD = {**os.environ, "OMP_NUM_THREADS": "1"}
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
 
 
-@pytest.fixture(scope="session")
-def data(tmp_path_factory):
-    """The demo, converted at half its size and finalized."""
-    demo = tmp_path_factory.mktemp("data") / "demo"
-    subprocess.run([PROGRAM, "make-demo", demo], check=True, capture_output=True)
-    manifest = (demo / "manifest.json").read_text()
-    assert '"width": 346, "height": 260' in manifest
-    (demo / "manifest.json").write_text(manifest.replace('"width": 346, "height": 260', '"width": 176, "height": 132'))
-    subprocess.run([PROGRAM, "convert", demo / "manifest.json", "--output", demo / "out", "--progress", "none"], check=True, capture_output=True)
-    subprocess.run([PROGRAM, "finalize", demo / "out"], check=True, capture_output=True)
-    return demo / "out"
-
-
 def line(example, data, out, *more):
     return [sys.executable, EXAMPLES / f"{example}.py", "--data", data, "--out", out, "--threads", "1", *more]
 

@@ -1,0 +1,214 @@
+#!/usr/bin/python3
+"""Trains a small detector on the boxes of event-volume shards: minutes on one core, and no other trainer is needed.
+
+    train_detector.py --data out --classes person --out persons --steps 300
+
+It sees one channel, positive minus negative events (`eventgan.signed_channel`), unless --channels says that it sees the volume. In a map of an eighth
+of the image's size it finds how likely the middle of an object is at each place, and how far the object's edges are from there, as TTFNet does (Liu et
+al. 2020, "Training-Time-Friendly Network for Real-Time Object Detection").
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import torch
+import torch.nn.functional as F
+import training
+from eventgan import Shards, signed_channel
+from eventgan.detection_scores import Detections, non_maximum_suppression
+from eventgan.torch import DetectionDataset, EventAugmentation, fitted
+from torch import nn
+from torch.utils.data import Dataset
+
+STRIDE = 8  # input pixels per cell of the map
+Norm = Callable[[int], nn.Module]  # channels -> layer
+SPREAD = 0.54 / 6  # standard deviation of a box's Gaussian, as a share of its sides: TTFNet's
+# What the events of another scene or camera may look like: measured on real cameras, manifests/guides/real_cameras.md.
+AUGMENTATION = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15, threshold=(0.0, 0.3), lost=(0.0, 0.4), isolated=(0.005, 0.03))
+
+
+def convolution(inputs: int, outputs: int, stride: int = 1, norm: Norm = nn.BatchNorm2d) -> nn.Sequential:
+    return nn.Sequential(nn.Conv2d(inputs, outputs, 3, stride, 1, bias=False), norm(outputs), nn.ReLU(inplace=True))
+
+
+class Detector(nn.Module):
+    """Of events [N, C, H, W], sides multiples of 32: logits of the classes [N, K, H/8, W/8], and the distances of the left, top, right and bottom edge from
+    each cell's middle, in input pixels, [N, 4, H/8, W/8]. A U-Net down to 1/32 of the size; 0.5 million numbers."""
+
+    def __init__(self, channels: int, classes: int, norm: Norm = nn.BatchNorm2d) -> None:
+        super().__init__()
+        layer = functools.partial(convolution, norm=norm)
+        self.eighth = nn.Sequential(layer(channels, 16, 2), layer(16, 32, 2), layer(32, 32), layer(32, 64, 2), layer(64, 64))
+        self.sixteenth = nn.Sequential(layer(64, 96, 2), layer(96, 96))
+        self.thirtysecond = nn.Sequential(layer(96, 96, 2), layer(96, 96))
+        self.to_sixteenth, self.to_eighth = layer(96 + 96, 64), layer(64 + 64, 64)
+        self.logits, self.edges = nn.Conv2d(64, classes, 1), nn.Conv2d(64, 4, 1)
+        nn.init.constant_(self.logits.bias, -4.6)  # at first an object has a chance of 1 % everywhere
+        nn.init.constant_(self.edges.bias, np.log(4))  # and is 64 pixels wide and high
+
+    def forward(self, events: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
+        eighth = self.eighth(events)
+        sixteenth = self.sixteenth(eighth)
+        below = F.interpolate(self.thirtysecond(sixteenth), scale_factor=2.0)
+        below = F.interpolate(self.to_sixteenth(torch.cat([sixteenth, below], 1)), scale_factor=2.0)
+        seen = self.to_eighth(torch.cat([eighth, below], 1))
+        return self.logits(seen).float(), STRIDE * self.edges(seen).float().clamp(max=5).exp()
+
+
+def middles(height: int, width: int, device: torch.device | None = None) -> torch.Tensor:
+    """[H, W, 2]: x and y of the cells' middles, in input pixels."""
+    y, x = torch.meshgrid(torch.arange(height, device=device), torch.arange(width, device=device), indexing="ij")
+    return STRIDE * (torch.stack([x, y], -1) + 0.5)
+
+
+def target_of(item: dict[str, Any], classes: int, height: int, width: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Of an item of DetectionDataset, for a map of that size: the height of the Gaussians [K, H, W], 1 in the cell of a box's middle, -1 where a box is to be
+    ignored; the box [4, H, W] that a cell is to give, the smallest where several overlap; and how much that counts [H, W]."""
+    heat, boxes, weight = torch.zeros(classes, height, width), torch.zeros(4, height, width), torch.zeros(height, width)
+    at = middles(height, width)
+    ignored = item["boxes"][item["ignore"]]
+    inside = ((at[..., None, :] > ignored[:, :2]) & (at[..., None, :] < ignored[:, 2:])).all(-1).any(-1)
+    heat[:, inside] = -1
+    kept = ~item["ignore"]
+    sides = item["boxes"][kept, 2:] - item["boxes"][kept, :2]
+    for i in sides.prod(1).argsort(descending=True).tolist():
+        box, label = item["boxes"][kept][i], int(item["labels"][kept][i])
+        cell = ((box[:2] + box[2:]) / 2 / STRIDE).long().clamp(max=torch.tensor([width - 1, height - 1]))
+        deviation = (SPREAD * sides[i]).clamp(min=STRIDE / 4)
+        gauss = torch.exp(-((at - at[cell[1], cell[0]]) ** 2 / (2 * deviation**2)).sum(-1))
+        heat[label] = torch.where(gauss > 0.01, torch.maximum(heat[label], gauss), heat[label])
+        there = gauss > 0.1
+        boxes[:, there] = box[:, None]
+        weight[there] = (gauss * sides[i].prod().log() / gauss[there].sum())[there]
+    return heat, boxes, weight
+
+
+def corners(edges: torch.Tensor) -> torch.Tensor:
+    """[N, 4, H, W]: left, top, right, bottom of the boxes, of their distances from the cells' middles."""
+    at = middles(*edges.shape[2:], edges.device).permute(2, 0, 1)
+    return torch.cat([at - edges[:, :2], at + edges[:, 2:]], 1)
+
+
+def giou(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
+    """[n], of boxes [4, n]: generalised intersection over union (Rezatofighi et al. 2019)."""
+    overlap = (torch.minimum(first[2:], second[2:]) - torch.maximum(first[:2], second[:2])).clamp(min=0).prod(0)
+    hull = (torch.maximum(first[2:], second[2:]) - torch.minimum(first[:2], second[:2])).prod(0)
+    union = (first[2:] - first[:2]).prod(0) + (second[2:] - second[:2]).prod(0) - overlap
+    return overlap / union - (hull - union) / hull
+
+
+def detection_loss(logits: torch.Tensor, edges: torch.Tensor, heat: torch.Tensor, boxes: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
+    """The focal loss of CornerNet (Law and Deng 2018) of the classes, and 5 (1 - GIoU) of the boxes, as TTFNet has them."""
+    score = logits.sigmoid()
+    found = (1 - score) ** 2 * F.logsigmoid(logits) * (heat == 1)
+    nothing = (1 - heat.clamp(min=0)) ** 4 * score**2 * F.logsigmoid(-logits) * ((heat < 1) & (heat >= 0))
+    focal = -(found + nothing).sum() / (heat == 1).sum().clamp(min=1)
+    there = weight > 0
+    true, given = (each.permute(1, 0, 2, 3)[:, there] for each in (boxes, corners(edges)))
+    return focal + 5 * (weight[there] * (1 - giou(given, true))).sum() / weight.sum().clamp(min=1e-6)
+
+
+def detect(model: Detector, volumes: torch.Tensor, most: int = 50) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
+    """Of each volume [N, C, H, W]: boxes [n, 4], labels [n], scores [n]. The model must be in evaluation mode."""
+    with torch.no_grad():
+        logits, edges = (each.cpu() for each in model(volumes.to(next(model.parameters()).device)))
+    scores = logits.sigmoid()
+    scores = scores * (scores == F.max_pool2d(scores, 3, 1, 1))
+    limits = torch.tensor([volumes.shape[3], volumes.shape[2]] * 2)
+    for score, box in zip(scores, corners(edges)):
+        values, places = score.flatten().topk(min(most, score.numel()))
+        labels, cells = places // score[0].numel(), places % score[0].numel()
+        boxes = torch.minimum(box.flatten(1)[:, cells].T.clamp(min=0), limits)
+        kept = (values > 0.001) & (boxes[:, 2:] > boxes[:, :2]).all(1)
+        boxes, labels, values = boxes[kept], labels[kept], values[kept]
+        sole = non_maximum_suppression(Detections(np.zeros(len(values), int), labels.numpy(), boxes.numpy(), values.numpy()), 0.5)
+        yield boxes[sole], labels[sole], values[sole]
+
+
+class InMemory(Dataset):
+    """Items of DetectionDataset, read once, changed anew each time and with the detector's targets."""
+
+    def __init__(self, items: Iterable[dict[str, Any]], classes: int, augmentation: EventAugmentation | None) -> None:
+        self.items, self._classes, self._augmentation = list(items), classes, augmentation
+
+    def __len__(self) -> int:
+        return len(self.items)
+
+    def __getitem__(self, index: int) -> tuple[torch.Tensor, ...]:
+        item = self._augmentation(self.items[index]) if self._augmentation else self.items[index]
+        return (item["volume"], *target_of(item, self._classes, *(side // STRIDE for side in item["volume"].shape[1:])))
+
+
+def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Sequence[str], augmentation: EventAugmentation | None,
+          check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d) -> Detector:
+    """The detector trained on the items, by the options of `training`, in evaluation mode; `check`: items whose AP is reported."""
+    data = InMemory(items, len(classes), augmentation)
+    model = Detector(len(data.items[0]["volume"]), len(classes), norm)
+    training.load_fitting(model, args.pretrained)
+    model = model.to(args.device).to(memory_format=torch.channels_last)
+    optimizer = torch.optim.AdamW(model.parameters(), args.lr, weight_decay=0.01)
+
+    def loss_of(batch: tuple, _: float) -> torch.Tensor:
+        volumes, *targets = (each.to(args.device) for each in batch)
+        with torch.autocast(args.device, torch.bfloat16, enabled=args.bfloat16):
+            logits, edges = model(volumes.contiguous(memory_format=torch.channels_last))
+        return detection_loss(logits, edges, *targets)
+
+    training.fit(args, model, optimizer, training.batches(args, data, shuffle=True), loss_of,
+                 lambda: training.average_precisions(search(model, check, args.batch), classes), f"AP50 {classes[0]}")
+    return model
+
+
+def search(model: Detector, items: Sequence[dict[str, Any]], batch: int) -> Iterator[tuple[dict, tuple[torch.Tensor, ...]]]:
+    """Each item with the boxes, labels and scores that are found in it."""
+    for first in range(0, len(items), batch):
+        some = [items[i] for i in range(first, min(first + batch, len(items)))]
+        yield from zip(some, detect(model, torch.stack([item["volume"] for item in some])))
+
+
+def signed(sample: Mapping[str, Any]) -> np.ndarray:
+    return signed_channel(sample["volume"])
+
+
+def main() -> None:
+    parser = training.options(__doc__.splitlines()[0], batch=16, lr=2e-3)
+    parser.add_argument("--classes", default="Car", help="class names, separated by commas; the first one's AP is the result")
+    parser.add_argument("--channels", choices=["signed", "volume"], default="signed", help="what the network sees")
+    parser.add_argument("--scale", type=float, default=1.0, help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
+    parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where the processor has AMX")
+    args = training.begin(parser)
+    train_shards, validation_shards = training.divided(args, training.with_boxes)
+    test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
+    area = train_shards.image_area()  # what a letterbox has added shows nothing
+    size = tuple(32 * math.ceil(side * args.scale / 32) for side in (area[2:] - area[:2])[::-1])
+    view, classes = fitted(area, size), args.classes.split(",")
+
+    def items_of(shards: Shards) -> list[dict[str, Any]]:
+        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, classes, size, view=view)
+        return [dataset[i] for i in range(len(dataset))]
+
+    try:
+        items, validation, test = (items_of(shards) for shards in (train_shards, validation_shards, test_shards))
+    except ValueError as error:
+        raise SystemExit(str(error))
+    model = train(args, items, classes, AUGMENTATION, validation)
+
+    def image_of(i: int) -> tuple[str, np.ndarray]:
+        boxes, labels, scores = next(detect(model, validation[i]["volume"][None]))
+        sure = scores > 0.3
+        texts = [f"{classes[label]} {score:.2f}" for label, score in zip(labels[sure].tolist(), scores[sure].tolist())]
+        return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
+
+    found = search(model, test, args.batch)
+    training.write_predictions(args, (entry for item, boxes in found for entry in training.box_predictions(item, boxes, classes, view)))
+    training.write_images(args, len(validation), image_of)
+
+
+if __name__ == "__main__":
+    main()

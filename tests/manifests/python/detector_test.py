@@ -1,0 +1,117 @@
+"""manifests/python/examples/train_detector.py: targets, loss and boxes that belong together, and a few steps on the demo."""
+
+import json
+import pathlib
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import SOURCE
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("cv2")
+EXAMPLES = SOURCE / "manifests" / "python" / "examples"
+sys.path.append(str(EXAMPLES))
+
+import train_detector as detector  # noqa: E402
+
+
+def item(boxes, labels=None, ignore=None, height=96, width=128):
+    boxes = torch.tensor(boxes, dtype=torch.float32).reshape(-1, 4)
+    return {"volume": torch.zeros(1, height, width), "boxes": boxes, "labels": torch.tensor(labels or [0] * len(boxes)),
+            "ignore": torch.tensor(ignore or [False] * len(boxes), dtype=torch.bool)}
+
+
+class Learnt(torch.nn.Module):
+    """Gives what it was told to."""
+
+    def __init__(self, *output):
+        super().__init__()
+        self.output, self.scale = output, torch.nn.Parameter(torch.ones(()))
+
+    def forward(self, _):
+        return self.output
+
+
+def perfect(given, classes=1):
+    """Output [1, ...] of a network that has learnt the item."""
+    heat, boxes, weight = (each[None] for each in detector.target_of(given, classes, 12, 16))
+    at = detector.middles(12, 16).permute(2, 0, 1)
+    edges = torch.where(weight[:, None] > 0, torch.cat([at - boxes[:, :2], boxes[:, 2:] - at], 1), torch.ones(()))
+    return torch.where(heat == 1, 20.0, -20.0), edges, heat, boxes, weight
+
+
+def test_targets_of_a_box():
+    """Its middle, (44, 36), is in the cell from 40 to 48, 32 to 40, whose own middle it is: there the Gaussian has 1, and around it what its deviations say,
+    0.09 of the sides, at least a quarter of a cell."""
+    heat, boxes, weight = detector.target_of(item([[4, 16, 84, 56]]), 1, 12, 16)
+    assert heat.shape == (1, 12, 16) and heat[0, 4, 5] == 1 and (heat == 1).sum() == 1
+    assert heat[0, 4, 6] == pytest.approx(np.exp(-0.5 * (8 / 7.2) ** 2)) and heat[0, 5, 5] == pytest.approx(np.exp(-0.5 * (8 / 3.6) ** 2))
+    assert boxes[:, 4, 5].tolist() == [4, 16, 84, 56] and (weight > 0).sum() == (heat > 0.1).sum()
+    assert weight.sum() == pytest.approx(np.log(80 * 40), rel=1e-5)  # a large box counts a little more than a small one
+
+
+def test_targets_of_several_boxes():
+    """The smaller one in the middle of the larger one has its cell; a box to be ignored is neither found nor missed; one at the edge stays inside."""
+    heat, boxes, _ = detector.target_of(item([[36, 28, 52, 44], [4, 0, 84, 72], [100, 60, 128, 96], [120, 88, 136, 104]], [0, 1, 0, 0],
+                                             [False, False, True, False]), 2, 12, 16)
+    assert heat[0, 4, 5] == heat[1, 4, 5] == 1 and boxes[:, 4, 5].tolist() == [36, 28, 52, 44]
+    assert (heat[:, 8:11, 13:15] == -1).all()
+    assert heat[0, 11, 15] == 1
+    nothing = detector.target_of(item([]), 2, 12, 16)
+    assert all(not each.any() for each in nothing)
+
+
+def test_what_is_learnt_is_what_is_found():
+    given = item([[4, 16, 84, 56], [70, 2, 90, 90], [100, 60, 128, 96]])
+    logits, edges, heat, boxes, weight = perfect(given)
+
+    found, labels, scores = next(detector.detect(Learnt(logits, edges), given["volume"][None]))
+    order = found[:, 0].argsort()
+    torch.testing.assert_close(found[order], given["boxes"], atol=1e-4, rtol=0)
+    assert (labels == 0).all() and (scores > 0.99).all()
+    assert detector.detection_loss(logits, edges, heat, boxes, weight) == pytest.approx(0, abs=1e-4)
+    assert detector.detection_loss(logits, 1.5 * edges, heat, boxes, weight) > 1
+    assert detector.detection_loss(-logits, edges, heat, boxes, weight) > 10
+    absent = detector.target_of(item([]), 1, 12, 16)
+    assert torch.isfinite(detector.detection_loss(logits, edges, *(each[None] for each in absent)))
+
+
+def test_giou():
+    """Of boxes 0..4 and 2..6 of height 2: overlap 4, union 12, hull 12; of 0..2 and 4..6: none, union 8, hull 12."""
+    def boxes(*given):
+        return torch.tensor(given, dtype=torch.float32).T
+
+    first, second = boxes([0, 0, 4, 2], [0, 0, 2, 2], [1, 1, 2, 2]), boxes([2, 0, 6, 2], [4, 0, 6, 2], [1, 1, 2, 2])
+    torch.testing.assert_close(detector.giou(first, second), torch.tensor([4 / 12, -4 / 12, 1]))
+
+
+def test_overlapping_boxes_are_one():
+    """Both cells have the same box; the likelier one is left. A box without an area is none."""
+    logits, edges = torch.full((1, 1, 2, 3), -20.0), torch.ones(1, 4, 2, 3)
+    logits[0, 0, 0, 0], logits[0, 0, 1, 2] = 1.0, 2.0
+    edges[0, :, 0, 0], edges[0, :, 1, 2] = torch.tensor([4.0, 4, 20, 12]), torch.tensor([20.0, 12, 4, 4])
+
+    [(found, _, scores)] = detector.detect(Learnt(logits, edges), torch.zeros(1, 1, 16, 24))
+    assert found.tolist() == [[0, 0, 24, 16]] and scores.tolist() == pytest.approx([1 / (1 + np.exp(-2))])
+
+
+@pytest.mark.parametrize("channels", ["signed", "volume"])
+def test_a_few_steps(channels, data, tmp_path):
+    line = [sys.executable, EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset", "kitti_object", "--threads", "1",
+            "--channels", channels, "--batch", "4", "--pictures", "2", "--every", "2"]
+    for steps, epochs in ((4, "2"), (8, "4")):  # and on
+        done = subprocess.run([*line, "--epochs", epochs], capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
+    assert "resuming after epoch 2" in done.stdout
+    history = json.loads((tmp_path / "out" / "metrics.json").read_text())["history"]
+    assert [row["epoch"] for row in history] == [0, 2, 4] and history[-1]["loss"] < history[1]["loss"]
+    assert len([*pathlib.Path(tmp_path, "out", "pictures").iterdir()]) == 2
+    entries = json.loads((tmp_path / "out" / "predictions.json").read_text())
+    more = [*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained", tmp_path / "out" / "weights.pt"]
+    done = subprocess.run(more, capture_output=True, text=True)
+    assert done.returncode == 0 and "of the model's" in done.stdout, done.stdout + done.stderr
+    assert all(entry["category_id"] == "Car" and len(entry["bbox"]) == 4 for entry in entries)
+    done = subprocess.run([*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats"], capture_output=True, text=True)
+    assert done.returncode == 1 and "got Cat" in done.stderr and "Traceback" not in done.stderr
