@@ -19,7 +19,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from . import evaluate, shards, torch
+    from . import evaluate, reconstruction, shards, torch
     from .generator import Generator, sample_events
     from .plotting import show
     from .program import ProgramError, convert, init, open
@@ -32,7 +32,7 @@ _MODULE_OF = {
     "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
     "show": "plotting", "signed_channel": "representations",
 }
-_MODULES = ("evaluate", "shards", "torch")
+_MODULES = ("evaluate", "reconstruction", "shards", "torch")
 
 __all__ = [*_MODULE_OF, *_MODULES]
 
