@@ -219,8 +219,9 @@ def warp(volume: torch.Tensor, affine: np.ndarray, height: int, width: int) -> t
         return _shifted(volume, back.round().astype(int), height, width)
     xs = torch.arange(width, dtype=torch.float64)
     ys = torch.arange(height, dtype=torch.float64)[:, None]
-    x, y = (row[0] * xs + row[1] * ys + row[2] for row in back)
-    grid = torch.stack([(2 * x + 1) / volume.shape[2] - 1, (2 * y + 1) / volume.shape[1] - 1], -1).to(volume.dtype)
+    grid = volume.new_empty(height, width, 2)  # from -1 to 1, edge to edge
+    for axis, (row, side) in enumerate(zip(back.tolist(), (volume.shape[2], volume.shape[1]))):
+        grid[..., axis] = (2 * row[0] / side) * xs + ((2 * row[1] / side) * ys + ((2 * row[2] + 1) / side - 1))
     return nn.functional.grid_sample(volume[None], grid[None], mode="bilinear", padding_mode="zeros", align_corners=False)[0]
 
 

@@ -88,6 +88,11 @@ def begin(parser: argparse.ArgumentParser) -> argparse.Namespace:
     return args
 
 
+def has_bfloat16() -> bool:
+    """Whether the processor computes in bfloat16; one that does not is slower in it than in float32."""
+    return "avx512_bf16" in pathlib.Path("/proc/cpuinfo").read_text(encoding="utf-8")
+
+
 def use_trainer(folder: str, *modules: str) -> pathlib.Path:
     """Puts the trainer's folder of modules first on the path, and stand-ins that keep nothing in place of the TensorBoards that its
     modules ask for, if they are not installed."""
