@@ -4,6 +4,7 @@
     experiment.py detection --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
     experiment.py pose --program build/release/eventgan --trainer ../shared/trainers/pose_resnet --out poses
     experiment.py trade --program build/release/eventgan --trainer ../shared/trainers/yolov3 --out cars
+    experiment.py real --program build/release/eventgan --frames labelled_frames --real real_labels --peers peers --out persons
 
 detection: the demo's streets are converted by the network, by log differences and by ESIM; YOLOv3-tiny is trained on each, and on the grey frames. The
 detectors of the three kinds of events are tested on the "camera's" events of other streets, as they are and made as bright as the training volumes,
@@ -11,9 +12,10 @@ that of the frames on their frames.
 pose: pose_resnet is trained on the demo's figures as the network converts them, and is tested on the "camera's" events of others: as they are, without
 those that stand alone, and after its last layer was trained on the camera's for 1 and for 5 epochs; and one that was trained on the camera's alone.
 trade: as detection, of the network's volumes in several widths, precisions and scopes: what their errors mean to a detector.
+real: detectors of persons, trained on labelled photographs turned into events, on those of models and on frames, are tested on real cameras' events.
 
-The "camera" is the sensor model with noise, before which the scenes move as they do: drawn at 160 images a second. The same command resumes where
-it was.
+The "camera" of the first three is the sensor model with noise, before which the scenes move as they do: drawn at 160 images a second. The same
+command resumes where it was.
 """
 
 from __future__ import annotations
@@ -54,18 +56,28 @@ STEPS = {"detection": 200, "pose": 250, "trade": 200}
 
 def read_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("what", choices=["detection", "pose", "trade"])
-    parser.add_argument("--program", default="eventgan", help="the eventgan program")
-    parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3, for pose of microsoft/human-pose-estimation.pytorch")
-    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for all results; run the same command again to resume")
-    parser.add_argument("--scenes", type=int, default=400, help="synthetic sequences to train on; the camera sees a quarter as many others, at least 8")
-    parser.add_argument("--steps", type=int, help=f"training steps of each network (default: {STEPS})")
-    parser.add_argument("--seeds", type=int, default=3)
-    parser.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, instead of the simulated camera")
-    parser.add_argument("--small", action="store_true", help="8 sequences, one seed, 2 steps: tests that it runs; the scores mean nothing")
+    shared = argparse.ArgumentParser(add_help=False)
+    shared.add_argument("--program", default="eventgan", help="the eventgan program")
+    shared.add_argument("--out", required=True, type=pathlib.Path, help="folder for all results; run the same command again to resume")
+    kinds = parser.add_subparsers(dest="what", required=True)
+    for name in STEPS:
+        kind = kinds.add_parser(name, parents=[shared])
+        kind.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3, for pose of microsoft/human-pose-estimation.pytorch")
+        kind.add_argument("--scenes", type=int, default=400, help="synthetic sequences to train on; the camera sees a quarter as many others, at least 8")
+        kind.add_argument("--steps", type=int, default=STEPS[name], help="training steps of each network (default: %(default)s)")
+        kind.add_argument("--seeds", type=int, default=3)
+        kind.add_argument("--truth", type=pathlib.Path, help="finalized folder of a camera's volumes with labels, instead of the simulated camera")
+        kind.add_argument("--small", action="store_true", help="8 sequences, one seed, 2 steps: tests that it runs; the scores mean nothing")
+    real = kinds.add_parser("real", parents=[shared])
+    real.add_argument("--frames", required=True, type=pathlib.Path, help="folder of photographs and clips with boxes.csv and frames.csv")
+    real.add_argument("--real", required=True, type=pathlib.Path, help="folder of real recordings with boxes, for the rows that learn from these, and to test on")
+    real.add_argument("--test", type=pathlib.Path, help="test on the recordings of this folder instead; detectors that are trained are kept")
+    real.add_argument("--peers", type=pathlib.Path, help="folder with v2e/, a checkout of SensorsINI/v2e, for its row")
+    real.add_argument("--trainer", help="folder of ultralytics/yolov3, for the rows of YOLOv3-tiny")
+    real.add_argument("--seeds", type=int, default=5)
+    real.add_argument("--quick", action="store_true", help="one row, one seed, 60 steps; fails unless it finds more than an untrained network")
     args = parser.parse_args()
-    args.steps = args.steps or STEPS[args.what]
-    if args.small:
+    if getattr(args, "small", False):
         args.scenes, args.seeds, args.steps = 8, 1, 2
     args.out = args.out.resolve()
     return args
@@ -252,6 +264,11 @@ def spread(values: list[float]) -> str:
 
 def main() -> None:
     args = read_args()
+    if args.what == "real":
+        import real_cameras  # it needs the compiled module of the package
+
+        real_cameras.run(args)
+        return
     columns = {"detection": PAPER_COLUMNS, "pose": POSE_COLUMNS, "trade": TRADE_COLUMNS}[args.what]
     scores = pose(args) if args.what == "pose" else detection(args)
     rows = {name: {key: [each[key] for each in of_seeds] for key in columns} for name, of_seeds in scores.items()}

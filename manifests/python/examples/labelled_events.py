@@ -1,0 +1,291 @@
+"""Events with boxes of persons, for `experiment.py real`: photographs and clips turned into events in several ways, and recordings of real cameras.
+
+All of them become items of `DetectionDataset`, which are kept in OUT/items. `args` is experiment.py's: frames, real, peers, out.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import csv
+import dataclasses
+import functools
+import json
+import math
+import os
+import pathlib
+import zlib
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import cv2
+import numpy as np
+import recordings
+import torch
+import train_detector
+import training
+from eventgan import Generator, Shards, convert, signed_channel
+from eventgan.torch import DetectionDataset, fitted, move_boxes
+
+STILLS, CLIPS = ("pennfudan", "coco256", "voc100"), ("sot_person", "davis_tennis")
+EVERY = 3  # labelled frame of a clip is used: its neighbours are nearly the same
+SIZE, DAVIS346 = (192, 320), (260, 346)  # of volumes and of the camera, H, W
+MOTION_PX = 8  # of stills, at most
+CLASSES = ["person"]
+
+Item = dict[str, Any]  # of DetectionDataset, its volume in half precision
+
+
+@dataclasses.dataclass(frozen=True)
+class Source:
+    """A way to make events of the photographs. The generator's part of a manifest, or what is made of the pairs that were converted for another."""
+
+    generator: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    of_pair: Callable[[argparse.Namespace, Mapping[str, Any]], np.ndarray] | None = None  # a signed channel, of a sample of EventGAN 16's
+    normalize: str = "none"
+    motion_px: float = MOTION_PX
+    size: tuple[int, int] = SIZE
+
+
+def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
+    """The labelled frame itself."""
+    return _where_shown(sample, lambda _, image: signed_channel(image))
+
+
+def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
+    """The slope of the labelled frame's log intensity along a direction drawn for it: what a small shift would bring about, without any generator."""
+    angle = np.random.default_rng(zlib.crc32(sample["pair"]["sample_id"].encode())).uniform(0, 2 * np.pi)
+
+    def slope(_: np.ndarray, image: np.ndarray) -> np.ndarray:
+        y, x = np.gradient(np.log(image / 255 + recordings.LOG_EPSILON))
+        along = np.cos(angle) * x + np.sin(angle) * y
+        return signed_channel(np.stack([along.clip(0), (-along).clip(0)]))
+
+    return _where_shown(sample, slope)
+
+
+def v2e(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
+    return _where_shown(sample, lambda previous, image: signed_channel(recordings.V2e(args.peers)(previous, image)))
+
+
+def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
+    """channel_of(previous, labelled frame), both without the letterbox's borders, which are 0."""
+    (height, width), size = sample["pair"]["source_size"], np.array(sample["volume"].shape[1:])
+    shown = np.round(np.array([height, width]) * min(size[0] / height, size[1] / width)).astype(int)
+    (top, left), (bottom, right) = (size - shown) // 2, (size - shown) // 2 + shown
+    result = np.zeros((1, *size), np.float32)
+    result[:, top:bottom, left:right] = channel_of(*(each[top:bottom, left:right] for each in pair_of(sample)))
+    return result
+
+
+def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+    """Both frames of a sample where they lie in the volume, uint8 [H, W]: of a still the first one is moved as its shard says."""
+    image, pair = training.labelled_image(sample), sample["pair"]
+    x, y, angle, scale = pair.get("motion", [math.nan] * 4)
+    if math.isnan(scale):  # two frames of a clip
+        previous = cv2.imread(pair["prev_path"], cv2.IMREAD_GRAYSCALE)
+    else:
+        cos, sin, middle = scale * np.cos(np.deg2rad(angle)), scale * np.sin(np.deg2rad(angle)), (np.array(image.shape[::-1]) - 1) / 2
+        linear = np.array([[cos, -sin], [sin, cos]])
+        affine = np.column_stack([linear, middle - linear @ middle + [x, y]])  # from a point of the previous frame to that of the next one
+        previous = cv2.warpAffine(image, affine, image.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)
+    first, second = (training.placed(sample, each).round().astype(np.uint8) for each in (previous, image))
+    return first, second
+
+
+SHIPPED = {width: {"weights": f"shipped:{width}"} for width in (16, 8)}
+METHODS = {  # of the main table
+    "EventGAN 16": Source(SHIPPED[16]),
+    "EventGAN 8": Source(SHIPPED[8]),
+    "gradient": Source(of_pair=gradient),
+    "grey frames": Source(of_pair=grey),
+    "difference": Source({"kind": "difference"}),
+    "difference, fitted": Source({"kind": "difference", "sensor": "fitted"}),
+    "ESIM": Source({"kind": "esim"}),
+    "v2e": Source(of_pair=v2e),
+}
+SOURCES = METHODS | {
+    "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
+    "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
+    "ESIM, eta98": Source({"kind": "esim"}, normalize="eta98"),
+    "EventGAN 16, bfloat16": Source({**SHIPPED[16], "precision": "bfloat16"}),
+    "EventGAN 16, int8": Source({**SHIPPED[16], "precision": "int8"}),
+    "EventGAN 8, bfloat16": Source({**SHIPPED[8], "precision": "bfloat16"}),
+    "EventGAN 8, int8": Source({**SHIPPED[8], "precision": "int8"}),
+    "EventGAN 16, motion": Source({**SHIPPED[16], "scope": "motion"}),
+    "EventGAN 16, 4 px": Source(SHIPPED[16], motion_px=4),
+    "EventGAN 16, 16 px": Source(SHIPPED[16], motion_px=16),
+    "EventGAN 16, 128x224": Source(SHIPPED[16], size=(128, 224)),
+    "EventGAN 16, 288x480": Source(SHIPPED[16], size=(288, 480)),
+}
+
+
+def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str, Any]:
+    """That converts the photographs and the clips with boxes of persons."""
+    labels = args.out / "labels"
+    labels.mkdir(parents=True, exist_ok=True)
+    sources = []
+    for folder in (*STILLS, *CLIPS):
+        path = labels / f"{folder}.csv"
+        if not path.exists():
+            _write_boxes(args.frames / folder, path, EVERY if folder in CLIPS else 1)
+        pairs = {"gaps": [1, 2, 3], "side": "before", "choose": "one"} if folder in CLIPS else {
+            "from": "stills", "motion": {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
+        sources.append({"dataset": "frames", "root": str(args.frames / folder / "images"), "labels": {"format": "csv", "path": str(path)}, "pairs": pairs})
+    generator = dict(source.generator)
+    if generator.get("sensor") == "fitted":
+        threshold = fitted_threshold(args)
+        generator["sensor"] = {"positive_threshold": threshold, "negative_threshold": threshold}
+    return {"format": "eventgan-manifest", "version": 1, "name": "persons", "seed": 7, "sources": sources, "generator": generator,
+            "image": {"height": source.size[0], "width": source.size[1], "fit": "letterbox", "preset": "mpii"},
+            "volume": {"normalize": source.normalize}, "output": {"directory": name, "dtype": "float16", "samples_per_shard": 64}}
+
+
+def _write_boxes(folder: pathlib.Path, path: pathlib.Path, every: int) -> None:
+    """The program's table of boxes, of every `every`-th image."""
+    with open(folder / "frames.csv", newline="", encoding="utf-8") as file:
+        images = [row["image"] for row in csv.DictReader(file)][::every]
+    with open(folder / "boxes.csv", newline="", encoding="utf-8") as file:
+        boxes = collections.defaultdict(list)
+        for row in csv.DictReader(file):
+            boxes[row["image"]].append([row["class"], *(row[edge] for edge in ("x1", "y1", "x2", "y2"))])
+    with open(path, "w", newline="", encoding="utf-8") as file:
+        table_of = csv.writer(file)
+        table_of.writerow("image class left top right bottom".split())
+        table_of.writerows([image, *box] for image in images for box in boxes[image] or [[""] * 5])
+
+
+def shards_of(args: argparse.Namespace, name: str) -> Shards:
+    folder = args.out / "shards" / file_name(name)
+    if (folder / "dataset.json").exists():
+        return Shards(folder)
+    print(f"converting for {name}", flush=True)
+    return convert(manifest_of(args, str(folder), SOURCES[name]), folder, progress=False)
+
+
+def fitted_threshold(args: argparse.Namespace) -> float:
+    """The contrast threshold with which log differences of the photographs have events at as many pixels as the windows of the first camera that has
+    events, not drawings of them; their labels are not looked at."""
+    path = args.out / "threshold.json"
+    if not path.exists():
+        folder = next(folder for folder in recordings_in(args.real) if any(folder.glob("*.npz")))
+        wanted = np.mean([(window["volume"] > 0).any(0).mean() for window in windows_of(args, folder, SIZE, "none")])
+        samples = shards_of(args, "EventGAN 16")
+        pairs = [pair_of(samples[i]) for i in range(0, len(samples), 12)]
+        low, high = 0.02, 2.0
+        for _ in range(12):
+            middle = math.sqrt(low * high)
+            model = Generator(kind="difference", sensor={"positive_threshold": middle, "negative_threshold": middle})
+            share = np.mean([(model(previous, following) > 0).any(0).mean() for previous, following in pairs])
+            low, high = (middle, high) if share > wanted else (low, middle)
+        path.write_text(json.dumps({"threshold": middle, "active_pixels": share, "of_camera": wanted}) + "\n", encoding="utf-8")
+    return json.loads(path.read_text(encoding="utf-8"))["threshold"]
+
+
+def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[Item]:
+    """The items of a source, or of "real NAME"."""
+    if name.startswith("real "):
+        return test_items(args, args.real / name.removeprefix("real "), SIZE, signed)
+    source = SOURCES[name]
+
+    def make() -> list[Item]:
+        shards = shards_of(args, name if source.generator else "EventGAN 16")
+        if source.of_pair:
+            shards = shards.changed(functools.partial(source.of_pair, args))
+        return _read(shards, signed and not source.of_pair)
+
+    return _kept(args, f"{file_name(name)}{'' if signed else '-volume'}", make)
+
+
+def _read(shards: Shards, signed: bool) -> list[Item]:
+    data = DetectionDataset(shards.changed(train_detector.signed) if signed else shards, CLASSES)
+    return [_halved(data[i]) for i in range(len(data))]
+
+
+def _kept(args: argparse.Namespace, name: str, make: Callable[[], list[Item]]) -> list[Item]:
+    """What is kept in OUT/items, made if it is not there."""
+    path = args.out / "items" / f"{name}.pt"
+    if not path.exists():
+        path.parent.mkdir(parents=True, exist_ok=True)
+        items = make()
+        replace(path, lambda new: torch.save(items, new))
+    return torch.load(path)
+
+
+def _halved(item: Item) -> Item:
+    return {**item, "volume": item["volume"].half()}
+
+
+def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
+    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/ and labels/)."""
+    found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir() and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
+                                                                                        (each / "images").is_dir() and (each / "labels").is_dir())]
+    if not found:
+        raise SystemExit(f"expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/, labels/), got none, in {folder}")
+    return found
+
+
+def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], signed: bool = True) -> list[Item]:
+    """The windows of a recording with boxes, brought to the size; [] if it has drawings of events alone and volumes are asked for."""
+    def make() -> list[Item]:
+        if not (folder / "images").is_dir():
+            return _read(windows_of(args, folder, size, "none" if signed else "eta98"), signed)
+        return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size) for path in sorted((folder / "images").iterdir())] if signed else []
+
+    return _kept(args, f"{key_of(folder)}-{size[0]}x{size[1]}{'' if signed else '-volume'}", make)
+
+
+def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> Item:
+    """Of an image in which somebody has drawn positive minus negative events in grey, stretched to 0..255 by its own range."""
+    image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
+    if image is None:
+        raise ValueError(f"expected an image, got none, in {path}")
+    affine = fitted([0, 0, image.shape[1], image.shape[0]], size)
+    # What is no event is known before the image is made smaller, when values are still whole.
+    small = cv2.warpAffine(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), affine, size[::-1], flags=cv2.INTER_AREA)
+    boxes = move_boxes(_boxes(labels, image.shape), affine)
+    return _halved({"volume": torch.from_numpy(signed_channel(np.stack([small.clip(0), (-small).clip(0)]))), "boxes": torch.from_numpy(boxes).float(),
+                    "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem})
+
+
+def windows_folder(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], normalize: str) -> pathlib.Path:
+    return args.out / "shards" / f"{key_of(folder)}-{size[0]}x{size[1]}-{normalize}"
+
+
+def windows_of(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], normalize: str) -> Shards:
+    """Files of a window each, NAME.npz with t_us, x, y and p of a DAVIS346, with their boxes, as the program converts them."""
+    out = windows_folder(args, folder, size, normalize)
+    labels = args.out / "labels" / key_of(folder)
+    labels.mkdir(parents=True, exist_ok=True)
+    for path in folder.glob("*.npz"):
+        end = f"{np.load(path)['t_us'][-1] * 1e-6:.6f}"  # a sample is at the time of its label, the window's end
+        boxes = _boxes(path.with_suffix(".txt"), DAVIS346)
+        lines = [f"{end},{','.join(f'{edge:.3f}' for edge in box)},{CLASSES[0]}" for box in boxes] or [end]
+        (labels / f"{path.stem}.csv").write_text("\n".join(["time_s,left,top,right,bottom,class", *lines, ""]), encoding="utf-8")
+    source = {"dataset": "recording", "root": str(folder), "annotations": str(labels), "sensor": dict(zip(("height", "width"), DAVIS346)),
+              "columns": {"t": "t_us"}, "window_s": 0.05, "split": "test"}
+    return convert({"format": "eventgan-manifest", "version": 1, "name": "windows", "sources": [source], "generator": {"kind": "events"},
+                    "image": {"height": size[0], "width": size[1], "fit": "letterbox"}, "volume": {"normalize": normalize},
+                    "output": {"directory": str(out), "dtype": "float32"}}, out, progress=False)
+
+
+def _boxes(labels: pathlib.Path, size: tuple[int, int]) -> np.ndarray:
+    """[n, 4] edges in pixels of the image of size H, W, of YOLO's text, cut to it: its shares are rounded."""
+    x, y, width, height = np.loadtxt(labels, ndmin=2).reshape(-1, 5)[:, 1:].T
+    edges = np.column_stack([x - width / 2, y - height / 2, x + width / 2, y + height / 2])
+    return edges.clip(0, 1) * np.tile(size[::-1], 2)
+
+
+def key_of(path: pathlib.Path) -> str:
+    """Of a folder of recordings, for the names of what is made of it."""
+    return f"{path.name}-{zlib.crc32(str(path).encode()):08x}"
+
+
+def file_name(name: str) -> str:
+    return name.replace(",", "").replace(" ", "-")
+
+
+def replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
+    new = path.with_name(path.name + f".{os.getpid()}")
+    write(new)
+    os.replace(new, path)

@@ -1,0 +1,176 @@
+"""manifests/python/examples/{labelled_events,real_cameras}.py: boxes and events against what they are made of, and `experiment.py real --quick` where
+there is data."""
+
+import argparse
+import csv
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from conftest import SOURCE
+
+torch = pytest.importorskip("torch")
+cv2 = pytest.importorskip("cv2")
+pytest.importorskip("eventgan._engine")
+EXAMPLES = SOURCE / "manifests" / "python" / "examples"
+sys.path.append(str(EXAMPLES))
+import labelled_events  # noqa: E402
+import real_cameras  # noqa: E402
+
+from eventgan import Generator  # noqa: E402
+
+DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
+
+
+def texture(height, width, seed):
+    noise = np.random.default_rng(seed).normal(size=(height, width))
+    smooth = cv2.GaussianBlur(noise, (0, 0), 3)
+    return np.uint8(127 + 100 * smooth / np.abs(smooth).max())
+
+
+def write_frames(folder, images, sequence=""):
+    """A folder of images, each with a box of a person, as real_cameras reads it."""
+    (folder / "images").mkdir(parents=True)
+    with open(folder / "frames.csv", "w", newline="") as frames, open(folder / "boxes.csv", "w", newline="") as boxes:
+        csv.writer(frames).writerow(["image", "width", "height", "sequence", "index"])
+        csv.writer(boxes).writerow(["image", "class", "x1", "y1", "x2", "y2", "track", "note"])
+        for i, image in enumerate(images):
+            cv2.imwrite(str(folder / "images" / f"{i:04}.png"), image)
+            csv.writer(frames).writerow([f"{i:04}.png", image.shape[1], image.shape[0], sequence, i])
+            csv.writer(boxes).writerow([f"{i:04}.png", "person", 20, 30, 60, 90, "", ""])
+
+
+def write_window(folder, name, left, top, right, bottom):
+    """A window of 40 ms whose events, five a pixel, all positive, fill a box; with its label."""
+    folder.mkdir(parents=True, exist_ok=True)
+    y, x = (np.tile(each.ravel(), 5) for each in np.mgrid[top:bottom, left:right])
+    t = np.linspace(1.6e15, 1.6e15 + 40_000, len(x)).astype(np.int64)
+    np.savez(folder / f"{name}.npz", t_us=t, x=x.astype(np.int16), y=y.astype(np.int16), p=np.ones(len(x), np.int8))
+    (folder / f"{name}.txt").write_text(f"0 {(left + right) / 2 / 346:.12f} {(top + bottom) / 2 / 260:.12f} {(right - left) / 346:.12f} {(bottom - top) / 260:.12f}\n")
+
+
+@pytest.fixture
+def args(tmp_path, monkeypatch):
+    """Two folders of stills and one clip of seven frames; a recording of two windows and one of a drawing."""
+    monkeypatch.setattr(labelled_events, "STILLS", ("wide", "high"))
+    monkeypatch.setattr(labelled_events, "CLIPS", ("clip",))
+    frames, real = tmp_path / "frames", tmp_path / "real"
+    write_frames(frames / "wide", [texture(100, 260, i) for i in range(3)])
+    write_frames(frames / "high", [texture(200, 150, 5 + i) for i in range(3)])
+    large = texture(200, 300, 9)
+    write_frames(frames / "clip", [large[10:170, 4 * i:4 * i + 240] for i in range(7)], "clip")
+    write_window(real / "windows", "a", 100, 40, 140, 160)
+    write_window(real / "windows", "b", 0, 0, 346, 260)
+    for name in ("images", "labels"):
+        (real / "drawn" / name).mkdir(parents=True)
+    drawing = np.full((360, 640), 90, np.uint8)
+    drawing[100:300, 200:240] = 255
+    drawing[100:300, 240:280] = 0
+    cv2.imwrite(str(real / "drawn" / "images" / "c.png"), drawing)
+    (real / "drawn" / "labels" / "c.txt").write_text(f"0 {240 / 640} {200 / 360} {80 / 640} {200 / 360}\n")
+    (real / "notes").mkdir()
+    return argparse.Namespace(frames=frames, real=real, test=real, out=tmp_path / "out", peers=None, steps=2)
+
+
+def test_pairs_are_those_of_the_program(args):
+    """Log differences of the frames that are put together here have events where those of the program have them. The program resamples a still once, here
+    it is done twice; another motion has no more than chance in common."""
+    args.out.mkdir()
+    shards = labelled_events.shards_of(args, "difference")
+    assert len(shards) == 3 + 3 + 2  # every third frame of a clip, of which the first has none before it
+    model = Generator(kind="difference")
+
+    def agreement(sample):
+        made, expected = model(*labelled_events.pair_of(sample)), sample["volume"]
+        inside = np.s_[:, 64:-64, 4:-4] if sample["pair"]["source_size"][0] == 100 else np.s_[:, 4:-4, 100:-100]
+        made, expected = (each.reshape(2, 9, *each.shape[1:]).sum(1)[inside] for each in (made, expected))
+        return np.corrcoef(made.ravel(), expected.ravel())[0, 1]
+
+    for sample in shards:
+        own = agreement(sample)
+        if "motion" not in sample["pair"]:
+            assert own > 0.8
+            continue
+        x, y, angle, scale = sample["pair"]["motion"]
+        sample["pair"]["motion"] = -x, -y, -angle, 1 / scale
+        assert own > 0.6 and agreement(sample) < own - 0.4, sample["pair"]["sample_id"]
+
+
+def test_controls_are_of_the_frame(args):
+    args.out.mkdir()
+    sample = labelled_events.shards_of(args, "EventGAN 16")[0]
+    grey, slope = labelled_events.grey(args, sample), labelled_events.gradient(args, sample)
+    assert grey.shape == slope.shape == (1, *labelled_events.SIZE) and np.abs(slope).max() == np.abs(grey).max() == 1
+    shown = np.abs(slope[0]).sum(1) > 0  # 100x260 in 192x320: 123 lines, the others are the letterbox's
+    assert 120 <= shown.sum() <= 123 and not slope[0, :34].any() and not slope[0, -34:].any()
+    np.testing.assert_array_equal(slope, labelled_events.gradient(args, sample))  # its direction is the sample's
+
+
+def test_windows_and_drawings_have_their_boxes_around_their_events(args):
+    drawn, windows = labelled_events.recordings_in(args.real)
+    assert (drawn.name, windows.name) == ("drawn", "windows") and labelled_events.recordings_in(windows) == [windows]
+    a, b = labelled_events.test_items(args, windows, (192, 320))
+    scale = 192 / 260  # 346x260 in 320x192: 256 wide, 32 left of it
+    expected = [100 * scale + 32, 40 * scale, 140 * scale + 32, 160 * scale]
+    np.testing.assert_allclose(a["boxes"][0], expected, atol=0.5)
+    left, top, right, bottom = (round(edge) for edge in expected)
+    channel = a["volume"][0].float()
+    assert (channel[top + 1:bottom - 1, left + 1:right - 1] > 0).all() and not channel[:, :left - 1].any() and not channel[bottom + 1:].any()
+    np.testing.assert_allclose(b["boxes"][0], [32, 0, 288, 192], atol=0.5)
+    [c] = labelled_events.test_items(args, drawn, (192, 320))
+    np.testing.assert_allclose(c["boxes"][0], [100, 56, 140, 156], atol=1e-4)  # 640x360: half of it, 6 lines below the top
+    channel = c["volume"][0].float()
+    assert (channel[57:155, 101:119] == 1).all() and (channel[57:155, 121:139] < -0.5).all() and not channel[:, :99].any() and not channel[:55].any()
+    assert labelled_events.test_items(args, drawn, (192, 320), signed=False) == []
+    assert labelled_events.test_items(args, windows, (192, 320), signed=False)[0]["volume"].shape == (18, 192, 320)
+    with pytest.raises(SystemExit, match="expected folders with windows .* got none"):
+        labelled_events.recordings_in(args.frames)
+
+
+def test_trained_once_and_never_on_what_it_is_tested_on(args, monkeypatch):
+    args.out.mkdir()
+    monkeypatch.setitem(real_cameras.DEVELOPMENT, "windows", 1)
+    row = real_cameras.Row("windows", ("real windows",))
+    scores = real_cameras.train_and_test(args, row, 0)
+    assert [*scores] == ["drawn"]
+    network = real_cameras.train_and_test(args, real_cameras.Row("difference", ("difference",), images=5), 0)
+    assert [*network] == ["drawn", "windows", "windows, development"]
+    assert all(0 <= value <= 1 for score in network.values() for value in score.values())
+    args.test = args.real.rename(args.real.with_name("others"))
+    args.real.symlink_to(args.test)
+    monkeypatch.setattr(real_cameras.train_detector, "train", None)  # it would fail
+    assert [*real_cameras.train_and_test(args, row, 0)] == ["drawn", "windows"]
+
+
+def test_tables_compare_seed_by_seed():
+    def score(value):
+        return {"camera": dict.fromkeys(real_cameras.COLUMNS, value), "camera, development": {}}
+
+    text = real_cameras.tables({"EventGAN 16": [score(0.5), score(0.7)], "other": [score(0.4), score(0.9)]}, ["EventGAN 16", "other", "none"], "Plain", "EventGAN 16")
+    head, _, first, second = text.strip().splitlines()
+    assert head.startswith("| Plain: camera | seeds | AP@0.5 |") and first.startswith("| EventGAN 16 | 2 | 0.60 ± 0.10 |") and first.endswith(" |  |")
+    assert second.startswith("| other | 2 | 0.65 ± 0.25 |") and second.endswith("| +0.05 (-0.10 to +0.20) |")
+
+
+def test_rows_are_those_of_one_thing_each():
+    rows = [*real_cameras.rows(["one", "other"]), *real_cameras.ablations()]
+    assert len({row.name for row in rows}) == len(rows)
+    known = {*labelled_events.SOURCES, "real one", "real other"}
+    assert all(set(row.sources) <= known for row in rows)
+    assert {name for row in rows for name in row.sources} == known
+
+
+def test_a_detector_that_learnt_from_photographs_finds_persons_in_real_events(tmp_path):
+    if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
+        pytest.skip("no ../shared/data")
+    line = [sys.executable, EXAMPLES / "experiment.py", "real", "--program", os.environ["EVENTGAN_PROGRAM"], "--frames", DATA / "labelled_frames",
+            "--real", DATA / "real_labels", "--out", tmp_path, "--quick"]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    shutil.copytree(DATA / "real_labels" / "pedro", tmp_path / "other" / "pedro")
+    again = subprocess.run([*line, "--test", tmp_path / "other"], capture_output=True, text=True)
+    assert again.returncode == 0 and "epoch" not in again.stdout and "pedro, development" not in again.stdout, again.stdout + again.stderr
