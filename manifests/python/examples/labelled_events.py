@@ -25,7 +25,7 @@ import torch
 import train_detector
 import training
 from eventgan import Generator, Shards, convert, signed_channel
-from eventgan.torch import DetectionDataset, fitted, move_boxes
+from eventgan.torch import DetectionDataset
 
 STILLS, CLIPS = ("pennfudan", "coco256", "voc100"), ("sot_person", "davis_tennis")
 EVERY = 3  # labelled frame of a clip is used: its neighbours are nearly the same
@@ -240,11 +240,15 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
-    affine = fitted([0, 0, image.shape[1], image.shape[0]], size)
+    scale = min(np.divide(size, image.shape))
+    shown = np.round(np.multiply(image.shape, scale)).astype(int)
+    (top, left), (bottom, right) = (size - shown) // 2, (size - shown) // 2 + shown
+    signed = np.zeros(size, np.float32)
     # What is no event is known before the image is made smaller, when values are still whole.
-    small = cv2.warpAffine(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), affine, size[::-1], flags=cv2.INTER_AREA)
-    boxes = move_boxes(_boxes(labels, image.shape), affine)
-    return _halved({"volume": torch.from_numpy(signed_channel(np.stack([small.clip(0), (-small).clip(0)]))), "boxes": torch.from_numpy(boxes).float(),
+    signed[top:bottom, left:right] = cv2.resize(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), shown[::-1].tolist(),
+                                                interpolation=cv2.INTER_AREA)
+    boxes = _boxes(labels, tuple(shown)) + [left, top, left, top]
+    return _halved({"volume": torch.from_numpy(signed_channel(np.stack([signed.clip(0), (-signed).clip(0)]))), "boxes": torch.from_numpy(boxes).float(),
                     "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem})
 
 
