@@ -15,7 +15,7 @@ import math
 import os
 import pathlib
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -70,12 +70,18 @@ def v2e(args: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
 
 def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> np.ndarray:
     """channel_of(previous, labelled frame), both without the letterbox's borders, which are 0."""
-    (height, width), size = sample["pair"]["source_size"], np.array(sample["volume"].shape[1:])
-    shown = np.round(np.array([height, width]) * min(size[0] / height, size[1] / width)).astype(int)
-    (top, left), (bottom, right) = (size - shown) // 2, (size - shown) // 2 + shown
+    size = sample["volume"].shape[1:]
+    shown = _shown(sample["pair"]["source_size"], size)
     result = np.zeros((1, *size), np.float32)
-    result[:, top:bottom, left:right] = channel_of(*(each[top:bottom, left:right] for each in pair_of(sample)))
+    result[:, shown[0], shown[1]] = channel_of(*(each[shown] for each in pair_of(sample)))
     return result
+
+
+def _shown(shape: Sequence[int], size: tuple[int, int]) -> tuple[slice, slice]:
+    """The lines and columns of a letterbox of the size H, W in which an image of a shape H, W lies."""
+    sides = np.round(np.multiply(shape[:2], min(np.divide(size, shape[:2])))).astype(int)
+    lines, columns = (slice((whole - side) // 2, (whole - side) // 2 + side) for whole, side in zip(size, sides.tolist()))
+    return lines, columns
 
 
 def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
@@ -240,14 +246,11 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
-    scale = min(np.divide(size, image.shape))
-    shown = np.round(np.multiply(image.shape, scale)).astype(int)
-    (top, left), (bottom, right) = (size - shown) // 2, (size - shown) // 2 + shown
+    lines, columns = shown = _shown(image.shape, size)
     signed = np.zeros(size, np.float32)
     # What is no event is known before the image is made smaller, when values are still whole.
-    signed[top:bottom, left:right] = cv2.resize(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), shown[::-1].tolist(),
-                                                interpolation=cv2.INTER_AREA)
-    boxes = _boxes(labels, tuple(shown)) + [left, top, left, top]
+    signed[shown] = cv2.resize(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), signed[shown].shape[::-1], interpolation=cv2.INTER_AREA)
+    boxes = _boxes(labels, signed[shown].shape) + [columns.start, lines.start, columns.start, lines.start]
     return _halved({"volume": torch.from_numpy(signed_channel(np.stack([signed.clip(0), (-signed).clip(0)]))), "boxes": torch.from_numpy(boxes).float(),
                     "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem})
 
