@@ -94,7 +94,7 @@ def unknown_words(words):
             return unknown_options(rest, "-m", *rest[:2])
         for script in (word, f"manifests/python/examples/{word}"):
             if name.endswith(".py") and (SOURCE / script).is_file():
-                return unknown_options(rest, script)
+                return unknown_options(rest, script, *(word for word in rest[:1] if re.fullmatch("[a-z]+", word)))
     return None
 
 
