@@ -47,7 +47,7 @@ class Detector(nn.Module):
         self.eighth = nn.Sequential(layer(channels, 16, 2), layer(16, 32, 2), layer(32, 32), layer(32, 64, 2), layer(64, 64))
         self.sixteenth = nn.Sequential(layer(64, 96, 2), layer(96, 96))
         self.thirtysecond = nn.Sequential(layer(96, 96, 2), layer(96, 96))
-        self.to_sixteenth, self.to_eighth = layer(96 + 96, 64), layer(64 + 64, 64)
+        self.to_sixteenth, self.to_eighth = layer(96 + 96, 32), layer(64 + 32, 64)
         self.logits, self.edges = nn.Conv2d(64, classes, 1), nn.Conv2d(64, 4, 1)
         nn.init.constant_(self.logits.bias, -4.6)  # at first an object has a chance of 1 % everywhere
         nn.init.constant_(self.edges.bias, np.log(4))  # and is 64 pixels wide and high
