@@ -25,7 +25,7 @@ import json
 import math
 import pathlib
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -140,11 +140,11 @@ class Samples:
         Folder of shards, or one shard.
     split, dataset : str, optional
         Only samples of this split, of this kind of source.
-    ids : str or path, optional
-        Only the samples listed in this file.
+    ids : str, path or iterable of str, optional
+        Only these samples, as `Shards` takes them.
     """
 
-    def __init__(self, truth: PathLike, split: str | None, dataset: str | None, ids: PathLike | None) -> None:
+    def __init__(self, truth: PathLike, split: str | None, dataset: str | None, ids: PathLike | Iterable[str] | None) -> None:
         where = {"dataset": dataset} if dataset else None
         self.shards = Shards(truth, split=split, where=where, ids=ids)
         self._of_split, self.classes = Shards(truth, split=split), Shards(truth).known_classes()

@@ -28,7 +28,7 @@ import numpy as np
 import torch
 import train_detector
 import training
-from eventgan import drawing
+from eventgan import Shards, drawing
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
@@ -117,7 +117,7 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
     untrained = train_detector.Detector(len(model.eighth[0][0].weight[0]), len(CLASSES)).eval()
     for recording in recordings_in(args.test):
         windows = [_float(item) for item in test_items(args, recording, row.size(), row.signed)]
-        kept = DEVELOPMENT.get(recording.name, 0) if args.test == args.real else 0
+        kept = development_windows(args, recording)
         if args.test != args.real or f"real {recording.name}" not in row.sources:
             parts = {recording.name: windows[kept:], f"{recording.name}, development": windows[:kept]}
             if windows and not row.signed:
@@ -127,6 +127,11 @@ def train_and_test(args: argparse.Namespace, row: Row, seed: int) -> dict[str, A
                     scores[name] = scores_of(model, part) | {"untrained": scores_of(untrained, part)["ap50"]}
     replace(path, lambda new: new.write_text(json.dumps(scores, indent=1) + "\n", encoding="utf-8"))
     return scores
+
+
+def development_windows(args: argparse.Namespace, recording: pathlib.Path) -> int:
+    """How many of the recording's first windows are in no table."""
+    return DEVELOPMENT.get(recording.name, 0) if args.test == args.real else 0
 
 
 def _as_bright(windows: list[Item], training_items: list[Item]) -> list[Item]:
@@ -172,7 +177,8 @@ def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
         if not found.exists():
             subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
             (folder / "predictions.json").replace(found)
-        result, _, _ = evaluate_detections(found, Samples(windows, None, None, None), CLASSES)
+        ids = Shards(windows).column("sample_id")[development_windows(args, recording):].tolist()
+        result, _, _ = evaluate_detections(found, Samples(windows, None, None, ids), CLASSES)
         scores[recording.name] = {"ap50": result["classes"][CLASSES[0]]["ap_voc"], "ap": result["classes"][CLASSES[0]]["ap_coco"]}
     return scores
 
@@ -247,7 +253,7 @@ def draw(args: argparse.Namespace, drawn: Sequence[Row]) -> None:
         items = [_float(item) for item in test_items(args, recording, SIZE)]
         models = {row.name: train(args, row, 0) for row in drawn}
         lines = []
-        for i in np.unique(np.linspace(DEVELOPMENT.get(recording.name, 0), len(items) - 1, 4).round().astype(int)):
+        for i in np.unique(np.linspace(development_windows(args, recording), len(items) - 1, 4).round().astype(int)):
             cells = []
             for name, model in models.items():
                 boxes, _, scores = next(train_detector.detect(model, items[i]["volume"][None]))
