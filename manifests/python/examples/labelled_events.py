@@ -175,7 +175,7 @@ def fitted_threshold(args: argparse.Namespace) -> float:
     path = args.out / "threshold.json"
     if not path.exists():
         folder = next(folder for folder in recordings_in(args.real) if any(folder.glob("*.npz")))
-        wanted = np.mean([(window["volume"] > 0).any(0).mean() for window in windows_of(args, folder, SIZE, "none")])
+        wanted = np.mean([(window["volume"] > 0).any(0).float().mean().item() for window in test_items(args, folder, SIZE, signed=False)])
         samples = shards_of(args, "EventGAN 16")
         pairs = [pair_of(samples[i]) for i in range(0, len(samples), 12)]
         low, high = 0.02, 2.0
@@ -232,11 +232,13 @@ def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
 
 
 def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], signed: bool = True) -> list[Item]:
-    """The windows of a recording with boxes, brought to the size; [] if it has drawings of events alone and volumes are asked for."""
+    """The windows of a recording with boxes, brought to the size: signed channels, or volumes divided by their 98th percentiles and clipped at 1; [] if it
+    has drawings of events alone and volumes are asked for."""
     def make() -> list[Item]:
-        if not (folder / "images").is_dir():
-            return _read(windows_of(args, folder, size, "none" if signed else "eta98"), signed)
-        return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size) for path in sorted((folder / "images").iterdir())] if signed else []
+        if (folder / "images").is_dir():
+            return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size) for path in sorted((folder / "images").iterdir())] if signed else []
+        windows = DetectionDataset(windows_of(args, folder, DAVIS346, "none"), CLASSES)
+        return [_smaller(windows[i], size, signed_channel if signed else _normalized) for i in range(len(windows))]
 
     return _kept(args, f"{key_of(folder)}-{size[0]}x{size[1]}{'' if signed else '-volume'}", make)
 
@@ -246,13 +248,29 @@ def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> I
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
-    lines, columns = shown = _shown(image.shape, size)
-    signed = np.zeros(size, np.float32)
     # What is no event is known before the image is made smaller, when values are still whole.
-    signed[shown] = cv2.resize(image.astype(np.float32) - np.bincount(image.ravel()).argmax(), signed[shown].shape[::-1], interpolation=cv2.INTER_AREA)
-    boxes = _boxes(labels, signed[shown].shape) + [columns.start, lines.start, columns.start, lines.start]
-    return _halved({"volume": torch.from_numpy(signed_channel(np.stack([signed.clip(0), (-signed).clip(0)]))), "boxes": torch.from_numpy(boxes).float(),
-                    "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem})
+    events = torch.from_numpy(image.astype(np.float32) - np.bincount(image.ravel()).argmax())
+    boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
+    item = {"volume": events[None], "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
+            "id": path.stem}
+    return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
+
+
+def _smaller(item: Item, size: tuple[int, int], finish: Callable[[np.ndarray], np.ndarray]) -> Item:
+    """The item in a letterbox of the size, each pixel the mean of those that it covers, and then finished: pixels taken singly, or events put into the
+    pixel in which they fall, would make a pattern of lines where the sides' quotient is no whole number."""
+    events = item["volume"].numpy()
+    lines, columns = shown = _shown(events.shape[1:], size)
+    height, width = lines.stop - lines.start, columns.stop - columns.start
+    volume = np.zeros((len(events), *size), np.float32)
+    volume[:, shown[0], shown[1]] = [cv2.resize(each, (width, height), interpolation=cv2.INTER_AREA) for each in events]
+    scale = np.tile(np.divide((width, height), events.shape[:0:-1]), 2)
+    boxes = item["boxes"] * torch.from_numpy(scale).float() + torch.tensor([columns.start, lines.start] * 2)
+    return _halved({**item, "volume": torch.from_numpy(finish(volume)), "boxes": boxes})
+
+
+def _normalized(volume: np.ndarray) -> np.ndarray:
+    return np.minimum(volume / (np.percentile(volume[volume > 0], 98) if volume.any() else 1), 1)
 
 
 def windows_folder(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], normalize: str) -> pathlib.Path:

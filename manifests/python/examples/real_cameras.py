@@ -32,7 +32,7 @@ from eventgan import Shards, drawing
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import CLASSES, METHODS, SIZE, SOURCES, Item, file_name, items_of, key_of, recordings_in, replace, test_items, windows_folder
+from labelled_events import CLASSES, METHODS, SIZE, SOURCES, Item, file_name, items_of, key_of, recordings_in, replace, test_items, windows_folder, windows_of
 from torch import nn
 
 STEPS, YOLO_STEPS, BATCH, RATE = 300, 200, 16, 2e-3
@@ -168,7 +168,7 @@ def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
     for recording in recordings_in(args.test):
         if (recording / "images").is_dir():
             continue
-        windows = windows_folder(args, recording, SIZE, "eta98")  # made with the items
+        windows = windows_folder(args, recording, SIZE, "eta98")
         folder = args.out / "runs" / f"YOLOv3-tiny-{file_name(name)}-{seed}"
         command = [sys.executable, pathlib.Path(__file__).with_name("train_yolov3.py"), "--trainer", args.trainer, "--data",
                    args.out / "shards" / file_name(name), "--test", windows, "--out", folder, "--classes", CLASSES[0], "--scale", "1", "--steps", YOLO_STEPS,
@@ -295,6 +295,8 @@ def run(args: argparse.Namespace) -> None:
     for recording in recordings_in(args.test):
         for size, signed in {(row.size(), row.signed) for row in detectors}:
             test_items(args, recording, size, signed)
+        if len(detectors) < len(tasks) and not (recording / "images").is_dir():
+            windows_of(args, recording, SIZE, "eta98")
     results: Results = collections.defaultdict(list)
     with multiprocessing.get_context("fork").Pool(len(os.sched_getaffinity(0))) as pool:
         for done, (name, seed, scores) in enumerate(pool.imap(_run, tasks), 1):

@@ -122,13 +122,15 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
     channel = a["volume"][0].float()
     assert (channel[top + 1:bottom - 1, left + 1:right - 1] > 0).all() and not channel[:, :left - 1].any() and not channel[bottom + 1:].any()
     np.testing.assert_allclose(b["boxes"][0], [32, 0, 288, 192], atol=0.5)
+    assert (b["volume"][0, :, 32:288] > 0.99).all()  # as many events everywhere make no pattern of lines
     [c] = labelled_events.test_items(args, drawn, (192, 320))
     np.testing.assert_allclose(c["boxes"][0], [100, 56, 140, 156], atol=1e-4)  # 640x360: half of it, 6 lines below the top
     channel = c["volume"][0].float()
     assert (channel[57:155, 101:119] == 1).all() and (channel[57:155, 121:139] < -0.5).all() and not channel[:, :99].any()
     assert channel[:55, :190].abs().max() == channel[12:50, 202:298].abs().max() == 0  # all pixels count in a smaller one, not some
     assert labelled_events.test_items(args, drawn, (192, 320), signed=False) == []
-    assert labelled_events.test_items(args, windows, (192, 320), signed=False)[0]["volume"].shape == (18, 192, 320)
+    volume = labelled_events.test_items(args, windows, (192, 320), signed=False)[0]["volume"]
+    assert volume.shape == (18, 192, 320) and volume.max() == 1 and volume.min() == 0 and not volume[9:].any()  # no negative events
     with pytest.raises(SystemExit, match="expected folders with windows .* got none"):
         labelled_events.recordings_in(args.frames)
 
