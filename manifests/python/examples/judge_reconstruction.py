@@ -46,7 +46,7 @@ SETTLING = 3  # images: the SSIM of the long recordings rises until then
 LEAST_CORRELATION = 0.5
 CAMERA, DENOISED, FLAT = "camera", "camera, denoised", "flat grey"
 CONTROLS = (CAMERA, DENOISED, FLAT)
-TILE_PX = 240  # width in the pictures
+TILE_PX, TILES = 240, 6  # width in the pictures, and how many in a line
 
 
 def read_args() -> argparse.Namespace:
@@ -148,7 +148,7 @@ def _picture(image: np.ndarray) -> np.ndarray:
 
 
 def draw(folder: pathlib.Path, rows: Iterable[str]) -> None:
-    """FOLDER.png: the frame at the end of the middle window and each row's image of it, side by side."""
+    """FOLDER.png: the frame at the end of the middle window and each row's image of it, TILES side by side."""
     tiles = []
     for row in ("frame", *rows):
         image = cv2.imread(str(folder / f"{row}.png"))
@@ -157,7 +157,8 @@ def draw(folder: pathlib.Path, rows: Iterable[str]) -> None:
         tile = cv2.copyMakeBorder(tile, 18, 0, 0, 4, cv2.BORDER_CONSTANT, value=(255, 255, 255))
         cv2.putText(tile, row, (2, 13), cv2.FONT_HERSHEY_SIMPLEX, 0.42, (0, 0, 0), 1, cv2.LINE_AA)
         tiles.append(tile)
-    write(folder.parent, folder.name, np.hstack(tiles))
+    tiles += [np.full_like(tiles[0], 255)] * (-len(tiles) % TILES)
+    write(folder.parent, folder.name, np.vstack([np.hstack(tiles[i:i + TILES]) for i in range(0, len(tiles), TILES)]))
 
 
 def mean(one: Mapping[str, Any], row: str, measure: str) -> float:
