@@ -198,14 +198,12 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
         shards = shards_of(args, name if source.generator else "EventGAN 16")
         if source.of_pair:
             shards = shards.changed(functools.partial(source.of_pair, args))
-        return _read(shards, signed and not source.of_pair)
+        elif signed:
+            shards = shards.changed(train_detector.signed)
+        data = DetectionDataset(shards, CLASSES)
+        return [_halved(data[i]) for i in range(len(data))]
 
     return _kept(args, f"{file_name(name)}{'' if signed else '-volume'}", make)
-
-
-def _read(shards: Shards, signed: bool) -> list[Item]:
-    data = DetectionDataset(shards.changed(train_detector.signed) if signed else shards, CLASSES)
-    return [_halved(data[i]) for i in range(len(data))]
 
 
 def _kept(args: argparse.Namespace, name: str, make: Callable[[], list[Item]]) -> list[Item]:

@@ -181,7 +181,7 @@ def main() -> None:
     parser.add_argument("--classes", default="Car", help="class names, separated by commas; the first one's AP is the result")
     parser.add_argument("--channels", choices=["signed", "volume"], default="signed", help="what the network sees")
     parser.add_argument("--scale", type=float, default=1.0, help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
-    parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where the processor has AMX")
+    parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where the processor has AVX512-BF16 or AMX")
     args = training.begin(parser)
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
