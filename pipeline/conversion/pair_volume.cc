@@ -9,11 +9,11 @@ GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope
                               const PreparedPair& pair, const VolumeLabels& labels,
                               std::span<float> volume) {
   if (scope.scope == Scope::kWhole) {
-    return {generator.generate(pair.input, pair.content, volume), {}};
+    return {generator.generate({pair.input, pair.content}, volume), {}};
   }
   const TileMask wanted =
       wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
-  return {generator.generate_tiles(pair.input, wanted, volume),
+  return {generator.generate_tiles({pair.input, pair.content}, wanted, volume),
           tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
 }
 

@@ -96,7 +96,7 @@ class Watch {
 
 std::vector<float> volume_of(const Generator& generator, const PreparedPair& pair) {
   std::vector<float> volume(VolumeShape{generator.bins(), pair.content}.value_count());
-  generator.generate(pair.input, pair.content, volume);
+  generator.generate({pair.input, pair.content}, volume);
   return volume;
 }
 

@@ -79,7 +79,7 @@ class CameraEvents final : public Generator {
     return VolumeShape{bins_, size}.value_count() * sizeof(double);
   }
 
-  GenerationNotes generate(std::span<const float>, ImageSize, std::span<float>) const override {
+  GenerationNotes generate(const GeneratorInput&, std::span<float>) const override {
     throw std::logic_error("expected frames to generate events from, got events");
   }
 

@@ -51,15 +51,13 @@ class SimulatedGenerator final : public Generator {
     return static_cast<std::size_t>(std::min(needed, static_cast<double>(memory_bytes_) / 2));
   }
 
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
-    const VolumeShape shape{bins_, size};
-    const std::size_t pixels = size.pixel_count();
-    check_generator_spans(frames, size, volume, bins_);
-    check_events_fit(spec_.sensor, size, spec_.duration_s, memory_bytes_);
-    const GreyImage previous = grey_image(frames.first(pixels), size);
-    const GreyImage next = grey_image(frames.last(pixels), size);
-    const std::vector<float> values = event_volume(events(previous, next), shape);
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    check_generator_spans(pair, volume, bins_);
+    check_events_fit(spec_.sensor, pair.size, spec_.duration_s, memory_bytes_);
+    const std::size_t pixels = pair.size.pixel_count();
+    const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
+    const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
+    const std::vector<float> values = event_volume(events(previous, next), {bins_, pair.size});
     std::ranges::copy(values, volume.begin());
     return {};
   }

@@ -34,7 +34,7 @@ class NetworkMethod final : public VolumeMethod {
   std::vector<float> volume(const IntervalFrames& frames, int /*draw*/) const override {
     const ImageSize size = frames.previous.size;
     std::vector<float> volume(VolumeShape{generator_->bins(), size}.value_count());
-    generator_->generate(network_input(frames), size, volume);
+    generator_->generate({network_input(frames), size}, volume);
     return volume;
   }
 

@@ -76,10 +76,10 @@ std::vector<RealismScores> real_scores(const RealPart& part, const JobManifest& 
     const std::vector<float> input = network_input(frames);
     const ScopeSpec& scope = job.generator.scope;
     if (scope.scope == Scope::kWhole) {
-      loaded.generator->generate(input, own_shape.size, generated);
+      loaded.generator->generate({input, own_shape.size}, generated);
     } else {  // a recording has no labels
-      loaded.generator->generate_tiles(input, wanted_tiles(scope, input, own_shape.size, 0, 0, {}),
-                                       generated);
+      loaded.generator->generate_tiles(
+          {input, own_shape.size}, wanted_tiles(scope, input, own_shape.size, 0, 0, {}), generated);
     }
     for (std::size_t k = 0; k < dtypes.size(); ++k) {
       const EncodedVolume stored = VolumeCodec(dtypes[k], 0).encode(generated);

@@ -123,7 +123,7 @@ CsvTable::Row validation_columns() {
 
 std::vector<float> generated_volume(const Generator& generator, const TrainingSample& sample) {
   std::vector<float> volume(sample.shape.value_count());
-  generator.generate(sample.network_frames, sample.shape.size, volume);
+  generator.generate({sample.network_frames, sample.shape.size}, volume);
   return volume;
 }
 

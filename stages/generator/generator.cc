@@ -7,14 +7,14 @@
 
 namespace eventgan {
 
-GenerationNotes Generator::generate_tiles(std::span<const float> frames, const TileMask& wanted,
+GenerationNotes Generator::generate_tiles(const GeneratorInput& pair, const TileMask& wanted,
                                           std::span<float> volume) const {
   if (std::ranges::find(wanted.wanted, 1) == wanted.wanted.end()) {
-    check_generator_spans(frames, wanted.size, volume, bins());
+    check_generator_spans({pair.frames, wanted.size}, volume, bins());
     std::ranges::fill(volume, 0.0f);
     return {};
   }
-  const GenerationNotes notes = generate(frames, wanted.size, volume);
+  const GenerationNotes notes = generate(pair, volume);
   clear_unwanted(wanted, volume);
   return notes;
 }
@@ -35,8 +35,8 @@ void clear_unwanted(const TileMask& wanted, std::span<float> volume) {
   }
 }
 
-void check_generator_spans(std::span<const float> frames, ImageSize size,
-                           std::span<const float> volume, int bins) {
+void check_generator_spans(const GeneratorInput& pair, std::span<const float> volume, int bins) {
+  const auto& [frames, size, threshold] = pair;
   const std::size_t plane = size.pixel_count();
   if (size.height >= 1 && size.width >= 1 && frames.size() == 2 * plane &&
       volume.size() == 2 * bins * plane) {

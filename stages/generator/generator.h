@@ -18,6 +18,15 @@ struct GapRange {
   bool operator==(const GapRange&) const = default;
 };
 
+/// What a volume is made of.
+struct GeneratorInput {
+  /// [frame, y, x] float32, C order, previous then next, in [-1, 1].
+  std::span<const float> frames;
+  ImageSize size;
+  /// Contrast threshold of the sensor, log units, > 0; none: the generator's own.
+  std::optional<double> threshold = std::nullopt;
+};
+
 /// What an engine noticed while it made a volume.
 struct GenerationNotes {
   /// Of the activations stored in 8 bits the share that is at the end of the calibrated range,
@@ -44,20 +53,18 @@ class Generator {
   /// Bins per polarity of the volumes it makes.
   virtual int bins() const = 0;
 
-  /// frames: [frame, y, x] float32, C order, previous then next, in [-1, 1].
   /// volume: [2 bins, y, x] float32, C order, dimensionless, ≥ 0 without upper bound; positive
   /// polarity in time order, then negative. Overwritten whole. A network computes with subnormal
   /// numbers taken for zero, whatever the calling thread does otherwise (flush_subnormals.h).
   /// Throws std::invalid_argument if the spans do not have these sizes, std::runtime_error if the
   /// engine fails. Values that are not finite are left for the caller to find.
-  virtual GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                                   std::span<float> volume) const = 0;
+  virtual GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const = 0;
 
   /// The same where `wanted`, a mask of the frames' size, says so, and zeros elsewhere. What is
   /// wanted is what `generate` gives; kernels for other shapes may add up in another order, which
   /// changes the last bits of float32 and bfloat16. Spends less than `generate` where it can, and
   /// next to nothing if no tile is wanted.
-  virtual GenerationNotes generate_tiles(std::span<const float> frames, const TileMask& wanted,
+  virtual GenerationNotes generate_tiles(const GeneratorInput& pair, const TileMask& wanted,
                                          std::span<float> volume) const;
 
   /// Memory that one call needs beyond its spans, about; calls at the same time need it each. 0:
@@ -84,7 +91,6 @@ void clear_unwanted(const TileMask& wanted, std::span<float> volume);
 
 /// Throws std::invalid_argument "expected frames [2, H, W] and a volume [2 bins, H, W] of ..., got
 /// ..." unless the spans are what Generator::generate takes for this size.
-void check_generator_spans(std::span<const float> frames, ImageSize size,
-                           std::span<const float> volume, int bins);
+void check_generator_spans(const GeneratorInput& pair, std::span<const float> volume, int bins);
 
 }  // namespace eventgan

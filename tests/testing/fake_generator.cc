@@ -5,10 +5,10 @@
 
 namespace eventgan::testing {
 
-GenerationNotes FakeGenerator::generate(std::span<const float> frames, ImageSize size,
-                                        std::span<float> volume) const {
+GenerationNotes FakeGenerator::generate(const GeneratorInput& pair, std::span<float> volume) const {
   ++calls_;
-  const std::size_t plane = size.pixel_count();
+  const auto& frames = pair.frames;
+  const std::size_t plane = pair.size.pixel_count();
   for (int bin = 0; bin < bins_; ++bin) {
     const float weight = float(bin + 1) / float(bins_);
     for (std::size_t i = 0; i < plane; ++i) {

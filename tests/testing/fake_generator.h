@@ -22,8 +22,7 @@ class FakeGenerator final : public Generator {
   int calls() const { return calls_; }
 
   int bins() const override { return bins_; }
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override;
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override;
   std::string description() const override { return "fake"; }
 
  private:

@@ -109,7 +109,7 @@ Calibrator::~Calibrator() = default;
 
 void Calibrator::add(std::span<const float> frames, ImageSize size) {
   std::vector<float> volume(VolumeShape{network_->layers.bins(), size}.value_count());
-  check_generator_spans(frames, size, volume, network_->layers.bins());
+  check_generator_spans({frames, size}, volume, network_->layers.bins());
   if (!all_finite(frames)) {
     throw std::runtime_error("expected finite values of the frames, got NaN or infinity");
   }

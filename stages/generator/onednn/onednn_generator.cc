@@ -85,35 +85,34 @@ class OnednnGenerator final : public Generator {
     return activation_bytes(size, layers_.base_channels(), stored_bytes(precision_));
   }
 
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
-    check_generator_spans(frames, size, volume, bins_);
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    check_generator_spans(pair, volume, bins_);
     // Whole numbers cannot hold what is not a number: it would come out as a plausible volume.
-    if (precision_ == Precision::kInt8 && !all_finite(frames)) {
+    if (precision_ == Precision::kInt8 && !all_finite(pair.frames)) {
       std::ranges::fill(volume, std::numeric_limits<float>::quiet_NaN());
       return {};
     }
-    return compute(size, [&] {
-      const auto plan = plans_.plan(size);
+    return compute(pair.size, [&] {
+      const auto plan = plans_.plan(pair.size);
       const BlockPool::Lease block = blocks_.take(plan->block_bytes());
-      return plan->run(frames.data(), volume.data(), block.data());
+      return plan->run(pair.frames.data(), volume.data(), block.data());
     });
   }
 
-  GenerationNotes generate_tiles(std::span<const float> frames, const TileMask& wanted,
+  GenerationNotes generate_tiles(const GeneratorInput& pair, const TileMask& wanted,
                                  std::span<float> volume) const override {
-    check_generator_spans(frames, wanted.size, volume, bins_);
+    check_generator_spans({pair.frames, wanted.size}, volume, bins_);
     // Above it, computing all is not slower; what tiles depend on is more than they are.
     constexpr double kLargestShare = 0.9;
     constexpr double kManyTiles = 0.6;
     const auto tiles = static_cast<double>(std::ranges::count(wanted.wanted, 1));
     TiledWork work;
     if (tiles > 0 && tiles < kManyTiles * static_cast<double>(wanted.wanted.size()) &&
-        (precision_ != Precision::kInt8 || all_finite(frames))) {
+        (precision_ != Precision::kInt8 || all_finite(pair.frames))) {
       work = tiled_work(wanted);
     }
     if (work.share == 0 || work.share > kLargestShare) {
-      return Generator::generate_tiles(frames, wanted, volume);
+      return Generator::generate_tiles(pair, wanted, volume);
     }
     std::memset(volume.data(), 0, volume.size_bytes());
     return compute(wanted.size, [&] {
@@ -121,7 +120,7 @@ class OnednnGenerator final : public Generator {
       const auto plan = plans_.plan(wanted.size);
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
       const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
-      return plan->run_tiles(layers, work, wanted, frames.data(), volume.data(), block.data(),
+      return plan->run_tiles(layers, work, wanted, pair.frames.data(), volume.data(), block.data(),
                              block.data() + plan_bytes);
     });
   }

@@ -73,20 +73,19 @@ class BatchedGenerator final : public Generator {
   /// One batch at work, and the next one.
   int device_calls(ImageSize size) const override { return 2 * pairs_in_batch(size); }
 
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
-    check_generator_spans(frames, size, volume, bins_);
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    check_generator_spans(pair, volume, bins_);
     use_one_thread();
     const c10::InferenceMode inference;
     const FlushSubnormals flush;
     try {
-      const at::Tensor computed = batches_.compute(frames, size);
+      const at::Tensor computed = batches_.compute(pair.frames, pair.size);
       at::from_blob(volume.data(), computed.sizes()).copy_(computed);
       return {};
     } catch (const c10::OutOfMemoryError&) {
       std::throw_with_nested(std::runtime_error(
-          "expected memory on the device for " + std::to_string(pairs_in_batch(size)) +
-          " pairs of " + to_string(size) +
+          "expected memory on the device for " + std::to_string(pairs_in_batch(pair.size)) +
+          " pairs of " + to_string(pair.size) +
           " at once, got less: set a smaller $.image.width and height, \"bfloat16\", or "
           "\"device\": \"cpu\""));
     } catch (const c10::Error&) {

@@ -38,14 +38,14 @@ class TorchGenerator final : public Generator {
     return 2 * activation_bytes(size, base_channels_, precision_ == Precision::kFloat32 ? 4 : 2);
   }
 
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
-    check_generator_spans(frames, size, volume, bins_);
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    check_generator_spans(pair, volume, bins_);
     const c10::InferenceMode inference;
     const FlushSubnormals flush;
     try {
-      at::Tensor output = at::from_blob(volume.data(), {1, 2 * bins_, size.height, size.width});
-      at::Tensor computed = forward_(frames, size);
+      at::Tensor output =
+          at::from_blob(volume.data(), {1, 2 * bins_, pair.size.height, pair.size.width});
+      at::Tensor computed = forward_(pair.frames, pair.size);
       // Channels are brought together in two bytes a value, and then converted: a third of the
       // time.
       if (precision_ == Precision::kBfloat16) computed = computed.contiguous();

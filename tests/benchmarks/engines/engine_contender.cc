@@ -103,18 +103,18 @@ VolumeError EngineContender::error() {
   if (volumes_.empty()) throw std::logic_error("expected an input before error");
   instances_.run();
   std::vector<float> expected = volume_of(weights_, size_);
-  make_torch_generator(weights_)->generate(frames_, size_, expected);
+  make_torch_generator(weights_)->generate({frames_, size_}, expected);
   return volume_error(volumes_.front(), expected);
 }
 
 double EngineContender::saturated_share() const {
   std::vector<float> volume = volume_of(weights_, size_);
-  return generator_->generate(frames_, size_, volume).saturated_share;
+  return generator_->generate({frames_, size_}, volume).saturated_share;
 }
 
 Amplification EngineContender::amplification(SmallChange change, int tries) const {
   std::vector<float> before = volume_of(weights_, size_), after = before;
-  generator_->generate(frames_, size_, before);
+  generator_->generate({frames_, size_}, before);
   const CounterRandom random(kChangesSeed);
   std::uint64_t drawn = 0;
   Amplification most;
@@ -129,7 +129,7 @@ Amplification EngineContender::amplification(SmallChange change, int tries) cons
         value += kNoise * static_cast<float>(2 * random.uniform(drawn++) - 1);
       }
     }
-    generator_->generate(changed, size_, after);
+    generator_->generate({changed, size_}, after);
     const double frames_moved = distance(changed, frames_), moved = distance(after, before);
     const VolumeError error = volume_error(after, before);
     most.l2 = std::max(most.l2, moved / frames_moved);
@@ -145,13 +145,13 @@ void EngineContender::allow_intra_op_threads() {
   if (setup_.intra_op == 1) return;
   std::vector<float> volume = volume_of(weights_, kSmallSize);
   const std::vector<float> frames(2 * kSmallSize.pixel_count());
-  generator_->generate(frames, kSmallSize, volume);
+  generator_->generate({frames, kSmallSize}, volume);
   at::set_num_threads(setup_.intra_op);
   omp_set_num_threads(setup_.intra_op);
 }
 
 void EngineContender::generate(int instance) {
-  generator_->generate(frames_, size_, volumes_[static_cast<std::size_t>(instance)]);
+  generator_->generate({frames_, size_}, volumes_[static_cast<std::size_t>(instance)]);
 }
 
 }  // namespace eventgan

@@ -297,9 +297,7 @@ class LargeGenerator final : public Generator {
  public:
   explicit LargeGenerator(int device_calls = 0) : device_calls_(device_calls) {}
   int bins() const override { return 9; }
-  GenerationNotes generate(std::span<const float>, ImageSize, std::span<float>) const override {
-    return {};
-  }
+  GenerationNotes generate(const GeneratorInput&, std::span<float>) const override { return {}; }
   std::string description() const override { return "large"; }
   std::size_t working_bytes(ImageSize size) const override { return 1024 * size.pixel_count(); }
   int device_calls(ImageSize) const override { return device_calls_; }

@@ -149,10 +149,9 @@ class Deleting final : public Generator {
 
   int bins() const override { return generator_.bins(); }
   std::string description() const override { return generator_.description(); }
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
     std::filesystem::remove(file_);
-    return generator_.generate(frames, size, volume);
+    return generator_.generate(pair, volume);
   }
 
  private:

@@ -45,9 +45,8 @@ class StoppingGenerator final : public Generator {
   StoppingGenerator(Request& request, int at) : request_(request), at_(at) {}
   int bins() const override { return generator_.bins(); }
   std::string description() const override { return generator_.description(); }
-  GenerationNotes generate(std::span<const float> frames, ImageSize size,
-                           std::span<float> volume) const override {
-    const GenerationNotes notes = generator_.generate(frames, size, volume);
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    const GenerationNotes notes = generator_.generate(pair, volume);
     if (generator_.calls() == at_) request_.make_and_wait(1);
     return notes;
   }

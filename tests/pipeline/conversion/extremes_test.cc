@@ -341,7 +341,7 @@ TEST_P(Extremes, CalibrationsThatDoNotFit) {
   if (precision_ != Precision::kInt8) GTEST_SKIP() << "needs none";
   const Weights fitting = ready(weights_);
   std::vector<float> volume(VolumeShape{weights_.bins, kSize}.value_count());
-  EXPECT_LT(engine(fitting)->generate(natural(kSize), kSize, volume).saturated_share,
+  EXPECT_LT(engine(fitting)->generate({natural(kSize), kSize}, volume).saturated_share,
             kMostSaturated)
       << "images like these";
   for (const CalibrationCase& one : kCalibrations) {

@@ -303,8 +303,7 @@ class FlatGenerator final : public Generator {
  public:
   explicit FlatGenerator(float value) : value_(value) {}
   int bins() const override { return 9; }
-  GenerationNotes generate(std::span<const float>, ImageSize,
-                           std::span<float> volume) const override {
+  GenerationNotes generate(const GeneratorInput&, std::span<float> volume) const override {
     if (value_ < 0) throw std::bad_alloc();
     std::ranges::fill(volume, value_);
     return {};

@@ -327,7 +327,7 @@ TEST(LoadGenerator, OfACamerasEventsGeneratesNone) {
   // 6 channels of 4 pixels, sums in double.
   EXPECT_EQ(loaded.generator->working_bytes({2, 2}), 6u * 4 * 8);
   std::vector<float> frames(8), volume(24);
-  EXPECT_THROW(loaded.generator->generate(frames, {2, 2}, volume), std::logic_error);
+  EXPECT_THROW(loaded.generator->generate({frames, {2, 2}}, volume), std::logic_error);
   EXPECT_TRUE(loaded.warnings.empty());
 }
 

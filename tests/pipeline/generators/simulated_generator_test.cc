@@ -36,7 +36,7 @@ std::vector<float> volume_of(const Generator& generator, std::vector<float> prev
                              const std::vector<float>& next) {
   previous.insert(previous.end(), next.begin(), next.end());
   std::vector<float> volume(VolumeShape{generator.bins(), kSize}.value_count(), -1);
-  generator.generate(previous, kSize, volume);
+  generator.generate({previous, kSize}, volume);
   return volume;
 }
 
@@ -100,7 +100,7 @@ TEST(SimulatedGenerator, IsDescribedWithAllItsParameters) {
 TEST(SimulatedGenerator, RefusesSpansOfAnotherSizeAndTheNetwork) {
   const auto generator = make_simulated_generator(quiet(GeneratorKind::kEsim), 9, 1);
   std::vector<float> frames(2 * kSize.pixel_count()), volume(7);
-  EXPECT_THROW(generator->generate(frames, kSize, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate({frames, kSize}, volume), std::invalid_argument);
   EXPECT_THROW(make_simulated_generator({}, 9, 1), std::invalid_argument);
 }
 

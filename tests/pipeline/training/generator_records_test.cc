@@ -57,7 +57,7 @@ TEST(TrainedWeights, EqualTheTrainersGenerator) {
   const Weights weights =
       trained_weights(trainer.generator_state(), manifest, {TrainingPhase::kGenerator, 0});
   std::vector<float> volume(sample.shape.value_count());
-  make_torch_generator(weights)->generate(sample.network_frames, sample.shape.size, volume);
+  make_torch_generator(weights)->generate({sample.network_frames, sample.shape.size}, volume);
   ASSERT_EQ(volume.size(), expected.size());
   const float largest = *std::max_element(expected.begin(), expected.end());
   ASSERT_GT(largest, 0);

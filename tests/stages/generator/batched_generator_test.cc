@@ -106,7 +106,7 @@ TEST_P(BatchedGenerator, ClearsTheTilesThatAreNotWanted) {
   auto expected = generated(*generator, frames, size);
   clear_unwanted(wanted, expected);
   std::vector<float> volume(expected.size(), -1.0f);
-  generator->generate_tiles(frames, wanted, volume);
+  generator->generate_tiles({frames, wanted.size}, wanted, volume);
   EXPECT_EQ(volume, expected);
 }
 
@@ -124,7 +124,7 @@ TEST_P(BatchedGenerator, SaysWhatItIsAndRefusesWhatItIsNot) {
               ::testing::StartsWith(GetParam() == Device::kCuda ? "torch float32 on cuda: "
                                                                 : "torch float32 on cpu, "));
   std::vector<float> frames(2 * 6), volume(6 * 5);
-  EXPECT_THROW(generator->generate(frames, {2, 3}, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate({frames, {2, 3}}, volume), std::invalid_argument);
   EXPECT_THROW(make(untrained_weights(2, 3, 5), Precision::kInt8), std::invalid_argument);
 }
 

@@ -38,7 +38,7 @@ std::vector<float> natural_frames(ImageSize size, std::uint64_t seed) {
 std::vector<float> generated(const Generator& generator, const std::vector<float>& frames,
                              ImageSize size) {
   std::vector<float> volume(2 * generator.bins() * size.pixel_count(), -1.0f);
-  generator.generate(frames, size, volume);
+  generator.generate({frames, size}, volume);
   return volume;
 }
 

@@ -168,7 +168,8 @@ TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
         std::vector<float> expected = generated(*generator, frames, size);
         clear_unwanted(wanted, expected);
         std::vector<float> volume(expected.size(), -1.0f);
-        const GenerationNotes notes = generator->generate_tiles(frames, wanted, volume);
+        const GenerationNotes notes =
+            generator->generate_tiles({frames, wanted.size}, wanted, volume);
         EXPECT_EQ(notes.sound, GetParam().engine == Engine::kOnednn);
         EXPECT_LE(largest_difference(volume, expected),
                   largest.at(GetParam().precision) * std::ranges::max(expected))
@@ -183,11 +184,12 @@ TEST_P(Engines, GivesZerosIfNothingIsWanted) {
   const auto generator = engine(untrained_weights(2, 3, 5));
   const TileMask nothing{{17, 40}, 16, 0, 0, std::vector<std::uint8_t>(2 * 3)};
   std::vector<float> volume(2 * 3 * nothing.size.pixel_count(), -1.0f);
-  generator->generate_tiles(natural_frames(nothing.size, 1), nothing, volume);
+  generator->generate_tiles({natural_frames(nothing.size, 1), nothing.size}, nothing, volume);
   EXPECT_EQ(volume, std::vector<float>(volume.size(), 0.0f));
   volume.pop_back();
-  EXPECT_THROW(generator->generate_tiles(natural_frames(nothing.size, 1), nothing, volume),
-               std::invalid_argument);
+  EXPECT_THROW(
+      generator->generate_tiles({natural_frames(nothing.size, 1), nothing.size}, nothing, volume),
+      std::invalid_argument);
 }
 
 TEST_P(Engines, EqualsTheReferenceWithShippedWeightsAtTheUsualSize) {
@@ -248,7 +250,7 @@ TEST_P(Engines, LosesNoNan) {
       auto frames = natural_frames(size, 1);
       frames[200] = bad;
       std::vector<float> volume(18 * size.pixel_count());
-      const GenerationNotes notes = generator->generate(frames, size, volume);
+      const GenerationNotes notes = generator->generate({frames, size}, volume);
       EXPECT_TRUE(std::ranges::any_of(volume, [](float value) { return !std::isfinite(value); }));
       EXPECT_FALSE(notes.sound);
     }
@@ -278,7 +280,7 @@ TEST_P(Engines, SeesInfinityInAnyChannelAndAtAnyPixel) {
       for (const ImageSize size : {ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{5, 95},
                                    ImageSize{33, 1}, ImageSize{9, 64}}) {
         std::vector<float> volume(2 * kBins * size.pixel_count());
-        const GenerationNotes notes = generator->generate(natural_frames(size, 11), size, volume);
+        const GenerationNotes notes = generator->generate({natural_frames(size, 11), size}, volume);
         overflowed += !all_finite(volume);
         EXPECT_EQ(notes.sound, GetParam().engine == Engine::kOnednn && all_finite(volume))
             << to_string(size) << ", channel " << channel << ", width " << base_channels;
@@ -291,10 +293,10 @@ TEST_P(Engines, SeesInfinityInAnyChannelAndAtAnyPixel) {
 TEST_P(Engines, RefusesSpansOfOtherSizes) {
   const auto generator = engine(untrained_weights(2, 9, 1));
   std::vector<float> frames(2 * 6), volume(18 * 6);
-  EXPECT_THROW(generator->generate(frames, {3, 3}, volume), std::invalid_argument);
-  EXPECT_THROW(generator->generate(frames, {0, 0}, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate({frames, {3, 3}}, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate({frames, {0, 0}}, volume), std::invalid_argument);
   volume.pop_back();
-  EXPECT_THROW(generator->generate(frames, {2, 3}, volume), std::invalid_argument);
+  EXPECT_THROW(generator->generate({frames, {2, 3}}, volume), std::invalid_argument);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Engines,
