@@ -91,6 +91,20 @@ RecordingSpec read_recording(const StrictValue& value) {
       last->fault("a frame after first_frame (" + std::to_string(spec.first_frame) + ")");
     }
   }
+  if (const auto threshold = object.find("threshold")) {
+    spec.threshold = threshold->number(0.01, 5);
+  }
+  object.finish();
+  return spec;
+}
+
+SimulatedSpec read_simulated(const StrictValue& value) {
+  SimulatedSpec spec;
+  StrictObject object = value.object();
+  for (const StrictValue& folder : object.at("textures").elements(1)) {
+    spec.textures.push_back(read_path(folder));
+  }
+  if (const auto fraction = object.find("fraction")) spec.fraction = fraction->number(0, 1);
   object.finish();
   return spec;
 }
@@ -114,6 +128,7 @@ NetworkSpec read_network(const StrictValue& value) {
   if (const auto gain = object.find("difference_gain")) {
     spec.difference_gain = gain->number(0, 1000);
   }
+  if (const auto sensor = object.find("sensor")) spec.sensor = sensor->boolean();
   if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
   object.finish();
   return spec;
@@ -131,6 +146,7 @@ LossWeights read_losses(const StrictValue& value) {
   read("volume", losses.volume);
   read("count", losses.count);
   read("overlap", losses.overlap);
+  read("likelihood", losses.likelihood);
   if (const auto quantile = object.find("quantile")) losses.quantile = quantile->number(0.01, 0.99);
   read("smoothness", losses.smoothness);
   object.finish();
@@ -226,10 +242,31 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   };
   check(count.flow, factor.flow, "flow");
   check(count.reconstruction, factor.reconstruction, "reconstruction");
-  if (factor.adversarial == 0 && factor.flow == 0 && factor.reconstruction == 0 &&
-      factor.volume == 0 && factor.count == 0) {
+  const bool of_volumes = factor.adversarial != 0 || factor.flow != 0 ||
+                          factor.reconstruction != 0 || factor.volume != 0 || factor.count != 0 ||
+                          factor.overlap != 0;
+  if (manifest.network.sensor && (of_volumes || factor.likelihood == 0)) {
+    losses.fault("likelihood above 0 and all others 0, since network.sensor", "others");
+  } else if (!manifest.network.sensor && factor.likelihood != 0) {
+    losses.fault("likelihood 0, unless network.sensor", "another");
+  } else if (!of_volumes && !manifest.network.sensor) {
     losses.fault("one of adversarial, flow, reconstruction, volume, count above 0", "all 0");
   }
+}
+
+/// A sensor's threshold must be known where the network is to learn it, and is of no use elsewhere.
+void check_sensor(StrictObject& object, const TrainingManifest& manifest) {
+  const bool wanted = manifest.network.sensor;
+  const auto check = [&](const char* key, const std::vector<RecordingSpec>& specs) {
+    const auto wrong = std::ranges::find_if(
+        specs, [&](const RecordingSpec& spec) { return spec.threshold.has_value() != wanted; });
+    if (wrong == specs.end()) return;
+    object.at(key).fault(wanted ? "a threshold of each recording, since network.sensor"
+                                : "no threshold, unless network.sensor",
+                         (wanted ? "none of " : "that of ") + wrong->path);
+  };
+  check("recordings", manifest.recordings);
+  if (!manifest.validation.empty()) check("validation", manifest.validation);
 }
 
 void read_training_output(const StrictValue& value, TrainingManifest& manifest) {
@@ -254,6 +291,8 @@ TrainingManifest read_training_document(const StrictValue& document) {
   if (const auto validation = object.find("validation")) {
     manifest.validation = read_recordings(*validation, 0);
   }
+  const auto simulated = object.find("simulated");
+  if (simulated) manifest.simulated = read_simulated(*simulated);
   if (const auto gaps = object.find("gaps")) manifest.gaps = read_gaps(*gaps, PairSide::kBefore);
   const auto losses = object.find("losses");
   if (losses) manifest.losses = read_losses(*losses);
@@ -277,8 +316,12 @@ TrainingManifest read_training_document(const StrictValue& document) {
   const StrictValue steps = object.at("steps");
   manifest.steps = read_steps(steps);
   read_training_output(object.at("output"), manifest);
+  check_sensor(object, manifest);
   object.finish();
   check_phases(steps, losses.value_or(steps), manifest);
+  if (simulated && !manifest.network.sensor) {
+    simulated->fault("network.sensor with it", "none");
+  }
   return manifest;
 }
 

@@ -33,6 +33,9 @@ struct RecordingSpec {
   double weight = 1;                       ///< relative chance of a sample to come from here, > 0
   std::int64_t first_frame = 0;            ///< frames before are not used
   std::optional<std::int64_t> last_frame;  ///< frames after are not used; none: to the end
+  /// The sensor's contrast threshold in the frames' log intensity, 0.01..5; NetworkSpec::sensor
+  /// needs it.
+  std::optional<double> threshold;
   bool operator==(const RecordingSpec&) const = default;
 };
 
@@ -55,6 +58,16 @@ struct NetworkSpec {
   /// the same, but small changes, which events come of, weigh as much as brightness. Weights are
   /// written for the frames.
   double difference_gain = 0;
+  /// The generator sees the sensor's threshold too (sensor_input.h) and learns rates of events, by
+  /// LossWeights::likelihood alone; without it, normalised volumes of the frames.
+  bool sensor = false;
+};
+
+/// Pairs of scenes that no camera saw: planes with the images' textures before a simulated sensor
+/// (moving_planes.h), each made when it is needed.
+struct SimulatedSpec {
+  std::vector<std::string> textures;  ///< folders of images, as written in the manifest
+  double fraction = 0.5;              ///< share of samples, 0..1
 };
 
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
@@ -69,6 +82,7 @@ struct LossWeights {
   double volume = 0;
   double count = 0;
   double overlap = 0;
+  double likelihood = 0;    ///< of NetworkSpec::sensor, and of no other
   double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
   double smoothness = 0.5;  ///< of the flow loss
 };
@@ -120,7 +134,8 @@ struct TrainingManifest : ManifestOrigin {
   std::string name;
   std::uint64_t seed = 0;
   std::vector<RecordingSpec> recordings;
-  std::vector<RecordingSpec> validation;  ///< may be empty
+  std::vector<RecordingSpec> validation;   ///< may be empty
+  std::optional<SimulatedSpec> simulated;  ///< with NetworkSpec::sensor
   std::vector<int> gaps = {1, 2, 3, 4, 5, 6};
   ImageSize crop = {256, 256};  ///< sides 16..2048; from 48 with adversarial loss
   int batch = 8;                ///< 1..512, even with adversarial loss

@@ -121,7 +121,7 @@ std::vector<PreparedPair> collect(const SampleStages& stages,
     } else if (sample.held_out) {
       held_out.push_back(std::move(message.prepared));
     } else {
-      calibrator.add(message.prepared.input, message.prepared.content);
+      calibrator.add({message.prepared.input, message.prepared.content});
       watch.after_pair(/*skipped=*/false);
     }
   }

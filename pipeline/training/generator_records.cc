@@ -17,6 +17,8 @@
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/sha256.h"
 #include "stages/events/images/comparison_image.h"
+#include "stages/events/simulation/moving_planes.h"
+#include "stages/events/volume_statistics.h"
 #include "stages/generator/checkpoints/fold.h"
 #include "stages/generator/generator.h"
 #include "stages/generator/torch/torch_generator.h"
@@ -56,9 +58,29 @@ std::string steps_text(const TrainingManifest& manifest, const TrainingPosition&
 
 }  // namespace
 
+namespace {
+
+/// Those of the recordings, and all that simulated scenes are drawn with; with gamma each is told
+/// as the threshold of more or less contrast.
+std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest) {
+  if (!manifest.network.sensor) return std::nullopt;
+  const auto [low, high] = std::ranges::minmax(manifest.recordings, {},
+                                               [](const auto& spec) { return *spec.threshold; });
+  ThresholdRange range{*low.threshold * manifest.augmentation.gamma[0],
+                       *high.threshold * manifest.augmentation.gamma[1]};
+  if (manifest.simulated) {
+    range.lowest = std::min(range.lowest, kPlaneThresholds.lowest);
+    range.highest = std::max(range.highest, kPlaneThresholds.highest);
+  }
+  return range;
+}
+
+}  // namespace
+
 Weights trained_weights(const StateDict& generator_state, const TrainingManifest& manifest,
                         const TrainingPosition& position) {
-  Weights weights = fold_generator(generator_state, "the trained generator");
+  Weights weights =
+      fold_generator(generator_state, "the trained generator", trained_thresholds(manifest));
   const auto [first, last] = std::ranges::minmax(manifest.gaps);
   weights.training_gaps = GapRange{first, last};
   weights.metadata["origin"] = "eventgan train";
@@ -123,7 +145,7 @@ CsvTable::Row validation_columns() {
 
 std::vector<float> generated_volume(const Generator& generator, const TrainingSample& sample) {
   std::vector<float> volume(sample.shape.value_count());
-  generator.generate({sample.network_frames, sample.shape.size}, volume);
+  generator.generate({sample.network_frames, sample.shape.size, sample.threshold}, volume);
   return volume;
 }
 
@@ -147,11 +169,16 @@ ValidationScores ValidationPairs::judge(const Generator& generator) const {
   ValidationScores result;
   std::vector<RealismScores> scores;
   for (const TrainingSample& sample : samples_) {
-    const std::vector<float> volume = generated_volume(generator, sample);
+    std::vector<float> volume = generated_volume(generator, sample);
     result.volume_loss +=
         mean_difference(volume, sample.volume) / static_cast<double>(samples_.size());
-    scores.push_back(realism_scores(volume, sample.volume, sample.shape, grey_frame(sample, 0),
-                                    grey_frame(sample, 1)));
+    std::vector<float> real = sample.volume;
+    if (sample.threshold) {  // numbers of events, rounded at half an event
+      volume = normalized(std::move(volume));
+      real = normalized(std::move(real));
+    }
+    scores.push_back(
+        realism_scores(volume, real, sample.shape, grey_frame(sample, 0), grey_frame(sample, 1)));
   }
   result.realism = mean_scores(scores);
   return result;

@@ -1,18 +1,36 @@
 #include "pipeline/training/sample_source.h"
 
 #include <algorithm>
+#include <array>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "pipeline/planning/spread.h"
+#include "pipeline/simulation/clip_frames.h"
+#include "stages/base/images/image_file.h"
+#include "stages/events/event_volume.h"
+#include "stages/events/simulation/moving_planes.h"
+#include "stages/frames/decoding/prepared_frame.h"
+#include "stages/frames/sequences/image_folder.h"
 
 namespace eventgan {
 namespace {
 
 /// Counters of one attempt's draws.
 enum SampleCounter : std::uint64_t { kStatic, kGap, kFirstFrame, kAtEvent, kEvent };
+
+CounterRandom sample_random(const TrainingManifest& manifest, const SamplePlace& place) {
+  return CounterRandom(manifest.seed)
+      .keyed("sample")
+      .keyed(to_string(place.phase))
+      .keyed(std::to_string(place.step))
+      .keyed(std::to_string(place.index));
+}
 
 std::size_t by_weight(std::span<const TrainingRecording> recordings, double uniform) {
   double total = 0;
@@ -31,11 +49,7 @@ SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
                        const TrainingManifest& manifest, const SamplePlace& place, int attempt) {
   if (recordings.empty())
     throw std::invalid_argument("expected a recording to draw from, got none");
-  const CounterRandom sample = CounterRandom(manifest.seed)
-                                   .keyed("sample")
-                                   .keyed(to_string(place.phase))
-                                   .keyed(std::to_string(place.step))
-                                   .keyed(std::to_string(place.index));
+  const CounterRandom sample = sample_random(manifest, place);
   const CounterRandom random = sample.keyed("attempt " + std::to_string(attempt));
   SampleDraw draw;
   draw.recording = by_weight(recordings, sample.keyed("recording").uniform(0));
@@ -67,6 +81,8 @@ namespace {
 
 constexpr std::size_t kFewestEvents = 100;
 constexpr int kMostAttempts = 10;
+/// A few hundred images hold more than a training sees; they stay in memory.
+constexpr std::size_t kMostTextures = 256;
 
 /// Where a crop of `cut` pixels that was drawn to begin at `drawn`, uniformly over `image`
 /// pixels, begins if it is to hold pixel `at`: uniformly over the places where it does.
@@ -79,11 +95,71 @@ int holding(int drawn, int at, int cut, int image) {
 
 }  // namespace
 
+std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
+                                     std::size_t most) {
+  namespace fs = std::filesystem;
+  const auto is_image = [](const fs::path& file) {
+    return std::ranges::find(kImageExtensions, lower_extension(file)) != kImageExtensions.end();
+  };
+  std::vector<fs::path> files;
+  for (const fs::path& folder : folders) {
+    try {
+      for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+        if (entry.is_regular_file() && is_image(entry.path())) files.push_back(entry.path());
+      }
+    } catch (const fs::filesystem_error&) {
+      std::throw_with_nested(InputError("cannot list the textures in " + folder.string()));
+    }
+  }
+  if (files.empty()) {
+    throw InputError("expected images for simulated.textures, got none, in " +
+                     (folders.empty() ? "no folder" : folders.front().string()));
+  }
+  std::ranges::sort(files);
+  std::vector<GreyImage> textures;
+  for (const std::size_t place : spread(most, files.size())) {
+    try {
+      textures.push_back(sensor_image(decode_image_file(files[place]), std::nullopt));
+    } catch (const std::runtime_error&) {
+      std::throw_with_nested(InputError("cannot use the texture " + files[place].string()));
+    }
+  }
+  return textures;
+}
+
 SampleSource::SampleSource(const TrainingManifest& manifest,
                            std::vector<TrainingRecording> recordings)
-    : manifest_(manifest), reader_(std::move(recordings), manifest.network.bins) {}
+    : manifest_(manifest), reader_(std::move(recordings), manifest.network.bins) {
+  if (!manifest.simulated) return;
+  std::vector<std::filesystem::path> folders;
+  for (const std::string& folder : manifest.simulated->textures) {
+    folders.push_back(resolve(manifest, folder));
+  }
+  textures_ = read_textures(folders, kMostTextures);
+}
+
+TrainingSample SampleSource::simulated_sample(const SamplePlace& place,
+                                              const CounterRandom& random) const {
+  const SimulatedPair pair = simulate_planes(textures_, manifest_.crop, random);
+  TrainingSample sample;
+  sample.shape = {manifest_.network.bins, manifest_.crop};
+  const std::size_t pixels = manifest_.crop.pixel_count();
+  sample.frames.resize(2 * pixels);
+  to_input(pair.previous.pixels, std::span(sample.frames).first(pixels));
+  to_input(pair.next.pixels, std::span(sample.frames).last(pixels));
+  sample.volume = event_volume(pair.events, sample.shape, std::array{0.0, pair.duration_s});
+  sample.threshold = pair.threshold;
+  sample.origin =
+      "simulated sample " + std::to_string(place.index) + " of step " + std::to_string(place.step);
+  sample.network_frames = sample.frames;
+  return sample;
+}
 
 TrainingSample SampleSource::sample(const SamplePlace& place) const {
+  if (manifest_.simulated) {
+    const CounterRandom random = sample_random(manifest_, place).keyed("simulated");
+    if (random.uniform(0) < manifest_.simulated->fraction) return simulated_sample(place, random);
+  }
   const auto draw_again = [&](const SampleDraw& draw) {
     return draw.first_frame != draw.last_frame &&
            reader_.event_count(draw.recording, draw.first_frame) < kFewestEvents;

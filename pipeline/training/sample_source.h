@@ -3,12 +3,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <filesystem>
 #include <functional>
 #include <future>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "manifests/values/counter_random.h"
+#include "manifests/values/frames.h"
 #include "manifests/values/training.h"
 #include "pipeline/training/training_recording.h"
 #include "stages/training/training_sample.h"
@@ -43,14 +46,21 @@ struct SampleDraw {
 SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
                        const TrainingManifest& manifest, const SamplePlace& place, int attempt);
 
+/// The images of the folders and their subfolders, grey, in the order of their paths: at most
+/// `most`, evenly spread. Throws InputError if there is none, or one cannot be read.
+std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
+                                     std::size_t most);
+
 /// The samples of a training: each a function of the manifest and its place, whatever was asked for
 /// before. Thread safe.
 class SampleSource {
  public:
-  /// `recordings` of the manifest, opened.
+  /// `recordings` of the manifest, opened. Reads the textures of simulated scenes; throws as
+  /// read_textures.
   SampleSource(const TrainingManifest& manifest, std::vector<TrainingRecording> recordings);
 
-  /// The sample drawn by draw_sample. As in the published code a pair whose first interval has
+  /// With probability simulated.fraction a simulated one (simulate_planes), flipped and no more;
+  /// else the sample drawn by draw_sample. As in the published code a pair whose first interval has
   /// fewer than 100 events in the whole image is drawn again (at most 10 times, from the same
   /// recording): η98 would blow its noise up to full scale. Throws InputError naming the recording
   /// if it cannot be read.
@@ -62,8 +72,11 @@ class SampleSource {
   const std::vector<TrainingRecording>& recordings() const { return reader_.recordings(); }
 
  private:
+  TrainingSample simulated_sample(const SamplePlace& place, const CounterRandom& random) const;
+
   TrainingManifest manifest_;
   CropReader reader_;
+  std::vector<GreyImage> textures_;
 };
 
 /// Prepares the batches of the steps to come in the background, a few ahead and no more. Since a

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "manifests/values/faults.h"
@@ -52,6 +53,7 @@ std::vector<TrainingRecording> open_training_recordings(std::span<const Recordin
     opened.recording = open_recording(opened.file, spec.format, spec.options);
     opened.weight = spec.weight;
     opened.first_frame = spec.first_frame;
+    opened.threshold = spec.threshold;
     opened.last_frame = spec.last_frame.value_or(opened.recording->frame_count() - 1);
     const std::string fault = fault_of(spec, opened, smallest, smallest_gap);
     if (!fault.empty()) faults.push_back(fault);
@@ -142,11 +144,22 @@ TrainingSample CropReader::read(std::size_t recording, std::int64_t first_frame,
   for (std::int64_t i = first_frame; i < last_frame; ++i) {
     append_cut(*interval(recording, i), box, events);
   }
-  sample.volume = normalized(event_volume(events, sample.shape));
+  const TrainingRecording& source = recordings_[recording];
+  if (source.threshold && !events.empty()) {
+    // A clock that is not the frames' may put an event just outside of their times.
+    const auto [first, last] = std::ranges::minmax(events, {}, &Event::t_s);
+    sample.volume =
+        event_volume(events, sample.shape,
+                     std::array{std::min(source.recording->frame_time_s(first_frame), first.t_s),
+                                std::max(source.recording->frame_time_s(last_frame), last.t_s)});
+  } else {
+    sample.volume = normalized(event_volume(events, sample.shape));
+  }
+  sample.threshold = source.threshold;
 
-  sample.origin = recordings_[recording].recording->name() + " frames " +
-                  std::to_string(first_frame) + "-" + std::to_string(last_frame) + " crop " +
-                  std::to_string(box.left) + "," + std::to_string(box.top);
+  sample.origin = source.recording->name() + " frames " + std::to_string(first_frame) + "-" +
+                  std::to_string(last_frame) + " crop " + std::to_string(box.left) + "," +
+                  std::to_string(box.top);
   return sample;
 }
 

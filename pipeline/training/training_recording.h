@@ -23,9 +23,10 @@ namespace eventgan {
 struct TrainingRecording {
   std::filesystem::path file;  ///< absolute
   std::shared_ptr<const Recording> recording;
-  double weight = 1;             ///< relative chance of a sample to come from here
-  std::int64_t first_frame = 0;  ///< of the part in use
-  std::int64_t last_frame = 0;   ///< of the part in use, itself included; > first_frame
+  double weight = 1;                ///< relative chance of a sample to come from here
+  std::int64_t first_frame = 0;     ///< of the part in use
+  std::int64_t last_frame = 0;      ///< of the part in use, itself included; > first_frame
+  std::optional<double> threshold;  ///< its sensor's, for a network that knows it
 };
 
 /// Opens the recordings of a manifest; relative paths start at `directory`. Throws InputError if
@@ -117,7 +118,8 @@ class CropReader {
 
   /// As the published code does, events are cut first, and the volume is made and normalised by the
   /// η98 of the events in the rectangle alone: its first and last event, not the image's, span
-  /// the time bins. Frames are x = (u/255 - 0.5)·2; network_frames are the same. first_frame ==
+  /// the time bins. Of a recording with a threshold the volume counts events, and the frames' times
+  /// span the bins. Frames are x = (u/255 - 0.5)·2; network_frames are the same. first_frame ==
   /// last_frame gives one frame twice and an empty volume. Throws InputError naming the recording
   /// if it cannot be read.
   TrainingSample read(std::size_t recording, std::int64_t first_frame, std::int64_t last_frame,

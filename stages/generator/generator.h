@@ -6,6 +6,7 @@
 #include <string>
 
 #include "manifests/values/frames.h"
+#include "manifests/values/sensor_input.h"
 #include "manifests/values/tiles.h"
 
 namespace eventgan {
@@ -23,7 +24,8 @@ struct GeneratorInput {
   /// [frame, y, x] float32, C order, previous then next, in [-1, 1].
   std::span<const float> frames;
   ImageSize size;
-  /// Contrast threshold of the sensor, log units, > 0; none: the generator's own.
+  /// Contrast threshold of the sensor, log units, > 0, for a generator that has thresholds();
+  /// none: the generator's own.
   std::optional<double> threshold = std::nullopt;
 };
 
@@ -78,6 +80,10 @@ class Generator {
   /// What it was trained on; beyond it, it extrapolates. None: not known, or not trained at all (a
   /// model of a sensor).
   virtual std::optional<GapRange> training_gaps() const { return std::nullopt; }
+
+  /// The thresholds that it can be told. A network that has them gives rates: the number of events
+  /// to be expected in each voxel (draw_events makes events of them). None: it cannot be told one.
+  virtual std::optional<ThresholdRange> thresholds() const { return std::nullopt; }
 
   /// Engine, precision and the libraries that change bytes, for the plan's fingerprint.
   virtual std::string description() const = 0;

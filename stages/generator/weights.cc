@@ -17,13 +17,13 @@ std::string shape_text(const Convolution& convolution) {
 
 }  // namespace
 
-std::vector<Convolution> network_layout(int base_channels, int bins) {
+std::vector<Convolution> network_layout(int base_channels, int bins, int inputs) {
   const int b = base_channels;
   std::vector<Convolution> layout;
   const auto add = [&](std::string name, int out, int in, int kernel, int stride) {
     layout.push_back({std::move(name), out, in, kernel, stride, {}, {}});
   };
-  add("head", b, 2, 3, 1);
+  add("head", b, inputs, 3, 1);
   for (int level = 0; level < kNetworkLevels; ++level) {
     add("encoders." + std::to_string(level), b << (level + 1), b << level, 3, 2);
   }
@@ -46,6 +46,18 @@ std::string describe_training_gaps(const std::optional<GapRange>& gaps) {
   return "trained on gaps " + std::to_string(gaps->first) + "-" + std::to_string(gaps->last);
 }
 
+std::span<const float> network_planes(const GeneratorInput& pair,
+                                      const std::optional<ThresholdRange>& thresholds,
+                                      std::vector<float>& kept) {
+  if (pair.threshold && !(thresholds && *pair.threshold > 0)) {
+    throw std::invalid_argument(
+        "expected " + std::string(thresholds ? "a contrast threshold above 0" : "none") +
+        " for these weights, got a contrast threshold of " + std::to_string(*pair.threshold));
+  }
+  if (!thresholds) return pair.frames;
+  return kept = sensor_input(pair.frames, pair.threshold.value_or(thresholds->geometric_mean()));
+}
+
 std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes) {
   // What the encoders read and the decoders but the last write: levels of half the side and twice
   // the channels, the topmost once, the others twice; and two tensors at the bottleneck.
@@ -55,7 +67,8 @@ std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t valu
 }
 
 void check_weights(const Weights& weights, const std::string& name) {
-  const std::vector<Convolution> layout = network_layout(weights.base_channels, weights.bins);
+  const std::vector<Convolution> layout =
+      network_layout(weights.base_channels, weights.bins, weights.inputs());
   if (weights.convolutions.size() != layout.size()) {
     throw std::runtime_error("expected " + std::to_string(layout.size()) + " convolutions, got " +
                              std::to_string(weights.convolutions.size()) + ", in " + name);

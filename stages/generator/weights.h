@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -42,7 +43,7 @@ struct Calibration;  // calibration.h
 
 /// The generator's network, spectral and batch norm folded into the convolutions, which all have a
 /// bias, with the base width b:
-///   head        3x3, 2 → b, LeakyReLU
+///   head        3x3, inputs() → b, LeakyReLU
 ///   4 encoders  3x3, stride 2, b → 2b → 4b → 8b → 16b, LeakyReLU
 ///   2 resblocks 3x3, ReLU, 3x3 at 16b; the block's input is added, ReLU
 ///   4 decoders  doubled to the size of the matching encoder's input (nearest), then 3x3 over
@@ -55,14 +56,27 @@ struct Weights {
   std::map<std::string, std::string> metadata;  ///< origin: where the numbers come from
   std::shared_ptr<const Calibration> calibration;        ///< what int8 needs; null: none
   std::optional<GapRange> training_gaps = std::nullopt;  ///< none: not known
+  /// Of a network that knows its sensor: its inputs are sensor_input(), its values rates. None: its
+  /// inputs are the frames, its values a normalised volume's.
+  std::optional<ThresholdRange> thresholds = std::nullopt;
+
+  int inputs() const { return thresholds ? 3 : 2; }
 };
 
 /// Names and shapes of the network's convolutions for a base width, without numbers: head,
 /// encoders.0-3, resblocks.0-1.conv1-2, decoders.0-3, pred.
-std::vector<Convolution> network_layout(int base_channels, int bins);
+std::vector<Convolution> network_layout(int base_channels, int bins, int inputs = 2);
 
 /// "trained on gaps 1-5" or "training gaps unknown"; for people.
 std::string describe_training_gaps(const std::optional<GapRange>& gaps);
+
+/// The planes that a network of these thresholds sees of a pair, [inputs, y, x] float32: the frames
+/// themselves, or sensor_input(), which is put into `kept`; where the pair tells no threshold, for
+/// the geometric mean of `thresholds`. Throws std::invalid_argument for a threshold that is not
+/// above 0, and for any where there are no thresholds. Thread safe.
+std::span<const float> network_planes(const GeneratorInput& pair,
+                                      const std::optional<ThresholdRange>& thresholds,
+                                      std::vector<float>& kept);
 
 /// Bytes of the activations between the network's layers for one image, each held once, with
 /// `value_bytes` a value, and of its input and output: what an engine that reuses nothing needs,

@@ -1,5 +1,7 @@
 #include "stages/generator/weights_file.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
@@ -101,6 +103,7 @@ std::shared_ptr<const Calibration> take_calibration(SafetensorsFile& content, in
 constexpr char kFormat[] = "eventgan-generator";
 constexpr char kVersion[] = "1";
 constexpr char kTrainingGaps[] = "training_gaps";
+constexpr char kThresholds[] = "thresholds";
 
 GapRange parse_gap_range(const std::string& text) {
   GapRange gaps;
@@ -130,6 +133,24 @@ std::optional<GapRange> take_training_gaps(std::map<std::string, std::string>& m
   }
 }
 
+/// Of a network that knows its sensor.
+std::optional<ThresholdRange> take_thresholds(std::map<std::string, std::string>& metadata) {
+  const auto stated = metadata.extract(kThresholds);
+  if (stated.empty()) return std::nullopt;
+  const std::string& text = stated.mapped();
+  ThresholdRange range;
+  const char* const end = text.data() + text.size();
+  const auto first = std::from_chars(text.data(), end, range.lowest);
+  const bool has_both = first.ec == std::errc() && first.ptr != end && *first.ptr == '-';
+  const auto last = std::from_chars(has_both ? first.ptr + 1 : end, end, range.highest);
+  if (!has_both || last.ec != std::errc() || last.ptr != end ||
+      !(range.lowest > 0 && range.lowest <= range.highest && range.highest < 1e6)) {
+    throw std::runtime_error("expected metadata thresholds LOWEST-HIGHEST such as 0.1-0.8, got \"" +
+                             text + "\"");
+  }
+  return range;
+}
+
 Weights from_content(SafetensorsFile content, const std::string& name) {
   if (content.metadata["format"] != kFormat || content.metadata["format_version"] != kVersion) {
     throw std::runtime_error("expected metadata format " + std::string(kFormat) + " version " +
@@ -142,7 +163,8 @@ Weights from_content(SafetensorsFile content, const std::string& name) {
   Weights weights;
   weights.base_channels = take_number(content, "base_channels", kMostBaseChannels);
   weights.bins = take_number(content, "bins", kMostWeightBins);
-  weights.convolutions = network_layout(weights.base_channels, weights.bins);
+  weights.thresholds = take_thresholds(content.metadata);
+  weights.convolutions = network_layout(weights.base_channels, weights.bins, weights.inputs());
   for (Convolution& convolution : weights.convolutions) {
     const std::int64_t out = convolution.out_channels;
     const std::int64_t side = convolution.kernel;
@@ -175,6 +197,9 @@ std::string serialize_weights(const Weights& weights) {
   metadata["bins"] = std::to_string(weights.bins);
   if (const auto& gaps = weights.training_gaps) {
     metadata[kTrainingGaps] = std::to_string(gaps->first) + "-" + std::to_string(gaps->last);
+  }
+  if (const auto& thresholds = weights.thresholds) {
+    metadata[kThresholds] = fmt::format("{}-{}", thresholds->lowest, thresholds->highest);
   }
   std::map<std::string, TensorView> tensors;
   for (const Convolution& convolution : weights.convolutions) {

@@ -82,4 +82,13 @@ at::Tensor count_loss(const at::Tensor& generated, const at::Tensor& real, doubl
 /// that something might happen, it does not. A NaN of the real volume does not pass.
 at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real);
 
+/// How unlikely the real volume is where the generated one is the number of events to be expected
+/// in each voxel (a Poisson process), but for what does not depend on it: the mean over all voxels
+/// of
+///   r - n ln r,  r = λ + δ,  n = real + δ,  δ = 0.02
+/// λ the generated one, ≥ 0. The background δ, in both, keeps the gradient (λ - real) / (λ + δ)
+/// finite where nothing is expected and leaves the best λ what it is without: the mean of what
+/// happens. Else as volume_loss says.
+at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real);
+
 }  // namespace eventgan

@@ -39,7 +39,8 @@ void check_generator_phase(const TrainingManifest& manifest) {
   const LossWeights& weights = manifest.losses;
   if (manifest.steps.generator == 0) return;
   if (weights.adversarial == 0 && weights.flow == 0 && weights.reconstruction == 0 &&
-      weights.volume == 0 && weights.count == 0 && weights.overlap == 0) {
+      weights.volume == 0 && weights.count == 0 && weights.overlap == 0 &&
+      weights.likelihood == 0) {
     throw UsageError("expected a loss for the generator, got weight 0 for all, in " +
                      manifest.name);
   }
@@ -251,7 +252,7 @@ std::vector<float> Trainer::generate(const TrainingSample& sample) const {
     const BufferSnapshot before({generator.get()});
     generator->eval();
     const at::Tensor volume =
-        generator->forward(network_frames_tensor(sample, learners_->networks.device))[0]
+        generator->forward(generator_input_tensor(sample, learners_->networks.device))[0]
             .cpu()
             .contiguous();
     const float* begin = volume.data_ptr<float>();

@@ -29,9 +29,9 @@ double learning_rate(double rate, double final_fraction, std::int64_t step, std:
 double output_slope(double slope, std::int64_t step, std::int64_t steps);
 
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
-/// "volume", "count", "overlap", "generator" (adversarial), "generator.total", "discriminator",
-/// "discriminator.real_accuracy", "discriminator.fake_accuracy"; only those the step computed. Each
-/// before its weight, "flow" and "generator.total" being weighted sums.
+/// "volume", "count", "overlap", "likelihood", "generator" (adversarial), "generator.total",
+/// "discriminator", "discriminator.real_accuracy", "discriminator.fake_accuracy"; only those the
+/// step computed. Each before its weight, "flow" and "generator.total" being weighted sums.
 using StepLosses = std::map<std::string, double>;
 
 /// A loss or a gradient that is not finite. The networks are as before the step.

@@ -106,8 +106,8 @@ TrainingNetworks::TrainingNetworks(const TrainingManifest& manifest, c10::Device
       difference_gain(manifest.network.difference_gain) {
   const NetworkSpec& spec = manifest.network;
   const int channels = 2 * spec.bins;
-  generator = UNet(UNetSettings{2, channels, spec.generator_channels, false, spec.spectral_norm,
-                                spec.difference_gain});
+  generator = UNet(UNetSettings{spec.sensor ? 3 : 2, channels, spec.generator_channels, false,
+                                spec.spectral_norm, spec.difference_gain});
   flow = UNet(cycle_network(spec, channels, 2));
   reconstruction = UNet(cycle_network(spec, 2, 1));
   discriminator = PatchDiscriminator(channels, 2, spec.discriminator_channels);
@@ -151,14 +151,17 @@ StateDict TrainingNetworks::generator_of_frames() const {
   StateDict state;
   save_network(*generator, state, "");
   if (difference_gain == 0) return state;
-  // m (p + n) / 2 + d g (n - p) = (m / 2 - g d) p + (m / 2 + g d) n; of weights [b, 2, 3, 3]
+  // m (p + n) / 2 + d g (n - p) = (m / 2 - g d) p + (m / 2 + g d) n; of weights [b, 2, 3, 3], or
+  // [b, 3, 3, 3] with g c for the change c
   NamedTensor& head = state.at("head.conv2d.weight");
   const std::size_t kernel = std::size_t(head.shape[2] * head.shape[3]);
-  for (std::size_t first = 0; first < head.values.size(); first += 2 * kernel) {
+  const std::size_t inputs = std::size_t(head.shape[1]);
+  for (std::size_t first = 0; first < head.values.size(); first += inputs * kernel) {
     for (std::size_t i = first; i < first + kernel; ++i) {
       const double mean = head.values[i], difference = difference_gain * head.values[i + kernel];
       head.values[i] = static_cast<float>(mean / 2 - difference);
       head.values[i + kernel] = static_cast<float>(mean / 2 + difference);
+      if (inputs == 3) head.values[i + 2 * kernel] *= static_cast<float>(difference_gain);
     }
   }
   return state;

@@ -117,6 +117,7 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
     for (float& x : result.network_frames)
       x = with_gain_and_gamma(x, augmentation.gain, augmentation.gamma);
   }
+  if (sample.threshold) result.threshold = *sample.threshold * augmentation.gamma;
   result.origin =
       sample.origin + ", crop " + to_string(augmentation.crop) + " at row " +
       std::to_string(augmentation.top) + ", column " + std::to_string(augmentation.left) +

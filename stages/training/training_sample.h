@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -18,8 +19,11 @@ struct TrainingSample {
   std::vector<float> frames;
   /// The same with gain and gamma: what the networks see. Equal to `frames` without augmentation.
   std::vector<float> network_frames;
-  /// [2 bins, y, x] float32, C order, normalised by η98, in [0, 1].
+  /// [2 bins, y, x] float32, C order: normalised by η98, in [0, 1]; of a network that knows its
+  /// sensor, as it is.
   std::vector<float> volume;
+  /// The sensor's in the network frames' log intensity; none unless the network knows its sensor.
+  std::optional<double> threshold = std::nullopt;
   std::string origin;  ///< for messages: recording, frames, crop
 };
 
@@ -48,7 +52,8 @@ Augmentation draw_augmentation(ImageSize image, ImageSize crop, const Augmentati
 ///
 ///   u' = min(1, gain · u^gamma),  u = (x + 1) / 2 in [0, 1],  x' = 2 u' - 1,
 ///
-/// exactly the frames where gain and gamma are 1; `network_frames` of the input are not looked at.
+/// exactly the frames where gain and gamma are 1; a threshold grows by gamma, as contrasts do.
+/// `network_frames` of the input are not looked at.
 /// A NaN stays one. The origin names the crop. Throws std::invalid_argument if the crop is empty or
 /// leaves the sample, or the sample's arrays do not have its shape. Thread safe.
 TrainingSample augment(const TrainingSample& sample, const Augmentation& augmentation);

@@ -61,9 +61,10 @@ UpdateLoss discriminator_update(TrainingNetworks& networks, const TrainingBatch&
   at::Tensor volumes;
   {
     const at::NoGradGuard generator_stays;
-    volumes = at::cat({networks.run(networks.generator, batch.network_frames.narrow(0, 0, half))[0],
-                       batch.volume.narrow(0, half, half)},
-                      0);
+    volumes =
+        at::cat({networks.run(networks.generator, batch.generator_input.narrow(0, 0, half))[0],
+                 batch.volume.narrow(0, half, half)},
+                0);
   }
   // One pass for both halves: the discriminator treats each sample on its own.
   const at::Tensor logits = networks.discriminate(volumes, batch.frames);
@@ -81,7 +82,7 @@ UpdateLoss discriminator_update(TrainingNetworks& networks, const TrainingBatch&
 
 UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& batch,
                             const LossWeights& weights) {
-  const at::Tensor volume = networks.run(networks.generator, batch.network_frames)[0];
+  const at::Tensor volume = networks.run(networks.generator, batch.generator_input)[0];
   UpdateLoss loss;
   loss.total = at::zeros({}, volume.options());
   if (weights.adversarial != 0) {
@@ -108,6 +109,10 @@ UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& bat
   if (weights.overlap != 0) {
     loss.parts["overlap"] = overlap_loss(volume, batch.volume);
     loss.total = loss.total + weights.overlap * loss.parts["overlap"];
+  }
+  if (weights.likelihood != 0) {
+    loss.parts["likelihood"] = likelihood_loss(volume, batch.volume);
+    loss.total = loss.total + weights.likelihood * loss.parts["likelihood"];
   }
   loss.parts["generator.total"] = loss.total;
   return loss;

@@ -175,18 +175,22 @@ std::vector<std::int64_t> weight_shape(const FoldedState& state, const std::stri
 
 }  // namespace
 
-Weights fold_generator(StateDict tensors, const std::string& name) {
+Weights fold_generator(StateDict tensors, const std::string& name,
+                       const std::optional<ThresholdRange>& thresholds) {
   FoldedState state(std::move(tensors), name);
+  Weights weights;
+  weights.thresholds = thresholds;
+  const int inputs = weights.inputs();
   const std::vector<std::int64_t> head = weight_shape(state, "head");
   const std::vector<std::int64_t> pred = weight_shape(state, "pred");
-  if (head.size() != 4 || head[0] < 1 || head[0] > kMostBaseChannels || head[1] != 2 ||
+  if (head.size() != 4 || head[0] < 1 || head[0] > kMostBaseChannels || head[1] != inputs ||
       pred.size() != 4 || pred[0] % 2 != 0 || pred[0] < 2 || pred[0] > 2 * kMostWeightBins) {
-    state.fail("a generator of 2 frames to 2 x bins channels", "another network");
+    state.fail(fmt::format("a generator of {} inputs to 2 x bins channels", inputs),
+               "another network");
   }
-  Weights weights;
   weights.base_channels = static_cast<int>(head[0]);
   weights.bins = static_cast<int>(pred[0] / 2);
-  weights.convolutions = network_layout(weights.base_channels, weights.bins);
+  weights.convolutions = network_layout(weights.base_channels, weights.bins, inputs);
   for (Convolution& layer : weights.convolutions) fold_layer(state, layer);
   state.check_empty();
   check_weights(weights, name);

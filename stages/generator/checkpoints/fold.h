@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "manifests/values/weights.h"
@@ -8,7 +9,8 @@
 namespace eventgan {
 
 /// The published generator's state dict as folded convolutions. Base width and
-/// bins come from the shapes. Each layer's convolution may be
+/// bins come from the shapes; a network with `thresholds` has three inputs, others two. Each
+/// layer's convolution may be
 ///   spectral-normalised, NAME.conv2d.module.{weight_bar, weight_u, weight_v},
 ///   plain, NAME.conv2d.weight, or
 ///   NAME.weight as network_layout names it,
@@ -22,6 +24,7 @@ namespace eventgan {
 /// in double precision. A tensor is freed when its layer is done. Throws std::runtime_error naming
 /// the key that is missing, has another shape or belongs to no layer (a network with more blocks
 /// computes something else), or σ = 0.
-Weights fold_generator(StateDict state, const std::string& name);
+Weights fold_generator(StateDict state, const std::string& name,
+                       const std::optional<ThresholdRange>& thresholds = std::nullopt);
 
 }  // namespace eventgan

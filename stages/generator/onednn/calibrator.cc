@@ -96,7 +96,9 @@ struct Calibrator::Network {
 };
 
 Calibrator::Calibrator(const Weights& weights)
-    : sums_(empty_calibration_sums(weights.base_channels)), base_channels_(weights.base_channels) {
+    : sums_(empty_calibration_sums(weights.base_channels)),
+      base_channels_(weights.base_channels),
+      thresholds_(weights.thresholds) {
   require_onednn(weights, Precision::kFloat32);
   try {
     network_ = std::make_unique<Network>(weights);
@@ -107,10 +109,10 @@ Calibrator::Calibrator(const Weights& weights)
 
 Calibrator::~Calibrator() = default;
 
-void Calibrator::add(std::span<const float> frames, ImageSize size) {
-  std::vector<float> volume(VolumeShape{network_->layers.bins(), size}.value_count());
-  check_generator_spans({frames, size}, volume, network_->layers.bins());
-  if (!all_finite(frames)) {
+void Calibrator::add(const GeneratorInput& input) {
+  std::vector<float> volume(VolumeShape{network_->layers.bins(), input.size}.value_count());
+  check_generator_spans(input, volume, network_->layers.bins());
+  if (!all_finite(input.frames)) {
     throw std::runtime_error("expected finite values of the frames, got NaN or infinity");
   }
   CalibrationSums pair = empty_calibration_sums(base_channels_);
@@ -118,12 +120,14 @@ void Calibrator::add(std::span<const float> frames, ImageSize size) {
   const auto add_observed = [&](const std::string& name, std::span<const float> values) {
     add_tensor(*std::ranges::find(pair.tensors, name, &TensorSums::name), values);
   };
+  std::vector<float> kept;
+  const std::span<const float> planes = network_planes(input, thresholds_, kept);
   const OneOpenMpThread one_thread;
   const FlushSubnormals flush;
   try {
-    const auto plan = network_->plans.plan(size);
+    const auto plan = network_->plans.plan(input.size);
     const BlockPool::Lease block = network_->blocks.take(plan->block_bytes());
-    plan->run(frames.data(), volume.data(), block.data(), add_observed);
+    plan->run(planes.data(), volume.data(), block.data(), add_observed);
   } catch (const dnnl::error&) {
     std::throw_with_nested(std::runtime_error("the calibration failed in oneDNN"));
   }

@@ -1,11 +1,11 @@
 #pragma once
 
 #include <memory>
-#include <span>
+#include <optional>
 #include <string>
 
-#include "manifests/values/frames.h"
 #include "stages/generator/calibration.h"
+#include "stages/generator/generator.h"
 #include "stages/generator/weights.h"
 
 namespace eventgan {
@@ -29,10 +29,10 @@ class Calibrator {
   explicit Calibrator(const Weights& weights);
   ~Calibrator();
 
-  /// Adds a pair; frames as Generator::generate takes them. Throws std::invalid_argument if the
-  /// span does not have this size, std::runtime_error if a value is not finite or oneDNN fails;
-  /// then nothing was added.
-  void add(std::span<const float> frames, ImageSize size);
+  /// Adds a pair, as Generator::generate takes it. Throws std::invalid_argument if the frames do
+  /// not have this size, std::runtime_error if a value is not finite or oneDNN fails; then nothing
+  /// was added.
+  void add(const GeneratorInput& pair);
 
   int pairs() const { return sums_.pairs; }
 
@@ -44,6 +44,7 @@ class Calibrator {
   std::unique_ptr<Network> network_;
   CalibrationSums sums_;
   int base_channels_;
+  std::optional<ThresholdRange> thresholds_;
 };
 
 }  // namespace eventgan

@@ -300,7 +300,8 @@ bool NarrowLayers::fit(int base_channels, Precision precision) {
 NarrowLayers::NarrowLayers(const LayerNumbers& head, const LayerNumbers& skip,
                            const LayerNumbers& phases, const LayerNumbers& pred, ImageSize size,
                            int stored_bytes, bool tiles, BufferLayout& layout)
-    : size_(size),
+    : inputs_(head.in_channels),
+      size_(size),
       pitch_(pitch_of(rounded_up(size.width, 2 * kLanes) + 2 * kLanes)),
       small_pitch_(pitch_of(rounded_up(size.width / 2 + 1, kLanes) + 2)),
       head_(packed(head, 1, 1)),
@@ -319,15 +320,14 @@ NarrowLayers::NarrowLayers(const LayerNumbers& head, const LayerNumbers& skip,
 }
 
 EVENTGAN_AVX512
-void NarrowLayers::head_row(const float* frames, int y, std::byte* block, float* pixels) const {
+void NarrowLayers::head_row(const float* inputs, int y, std::byte* block, float* pixels) const {
   auto* rows = reinterpret_cast<float*>(block + buffer_);
   if (y == 0) std::memset(rows, 0, buffer_values() * sizeof(float));
-  constexpr int kFrames = 2;
-  const auto planes_of = [&](int row) { return rows + row % 3 * kFrames * pitch_; };
+  const auto planes_of = [&](int row) { return rows + row % 3 * inputs_ * pitch_; };
   for (int row = y == 0 ? 0 : y + 1; row < std::min(y + 2, size_.height); ++row) {
-    for (int frame = 0; frame < kFrames; ++frame) {
-      std::memcpy(planes_of(row) + frame * pitch_ + 1,
-                  frames + (static_cast<std::ptrdiff_t>(frame) * size_.height + row) * size_.width,
+    for (int plane = 0; plane < inputs_; ++plane) {
+      std::memcpy(planes_of(row) + plane * pitch_ + 1,
+                  inputs + (static_cast<std::ptrdiff_t>(plane) * size_.height + row) * size_.width,
                   size_.width * sizeof(float));
     }
   }
@@ -339,8 +339,8 @@ void NarrowLayers::head_row(const float* frames, int y, std::byte* block, float*
       for (int o = 0; o < kOutputs; ++o) sums[v][o] = Lanes{} + head_bias_[o];
     }
     for (int row = std::max(y - 1, 0); row < std::min(y + 2, size_.height); ++row) {
-      add_row<float>(planes_of(row) + x, pitch_, kFrames, 3,
-                     head_.data() + (row - y + 1) * kFrames * 3 * kOutputs, sums);
+      add_row<float>(planes_of(row) + x, pitch_, inputs_, 3,
+                     head_.data() + (row - y + 1) * inputs_ * 3 * kOutputs, sums);
     }
 #pragma GCC unroll 2
     for (int v = 0; v < kVectors; ++v) {

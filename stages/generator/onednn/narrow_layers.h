@@ -42,8 +42,8 @@ class NarrowLayers {
   /// Pixels that are computed at once, and may be written behind the end of a row of the head.
   static constexpr int kPixels = 32;
 
-  /// Row y of the head, LeakyReLU included: pixels [x, channel]. frames: [2, y, x].
-  void head_row(const float* frames, int y, std::byte* block, float* pixels) const;
+  /// Row y of the head, LeakyReLU included: pixels [x, channel]. inputs: [input, y, x].
+  void head_row(const float* inputs, int y, std::byte* block, float* pixels) const;
 
   /// Row y of the volume [channel, y, x], from the last decoder's inputs as they are stored: small
   /// [y, x, 16] and skip [y, x, 8], as many bytes a value as the constructor was told. edges:
@@ -75,6 +75,7 @@ class NarrowLayers {
   }
   std::size_t buffer_values() const { return 4 * kChannels * (pitch_ + small_pitch_); }
 
+  int inputs_;  ///< of the head
   ImageSize size_;
   std::optional<NarrowTiles> tiles_;
   /// From a channel of a row to the next: a row has a zero before its first pixel and zeros behind

@@ -82,7 +82,8 @@ void NetworkPlan::plan_head(NetworkLayers& layers) {
   setup.padding = 1;
   setup.activation = Activation::kLeakyRelu;
   RowConvolution& head = head_.emplace(setup, layers.at("head"), engine_);
-  input_ = layout_.add(2 * size_.pixel_count() * sizeof(float));
+  inputs_ = layers.at("head").numbers().in_channels;
+  input_ = layout_.add(inputs_ * size_.pixel_count() * sizeof(float));
   // Float32 activations are written where they stay.
   head_rows_ = stored_type_ == Type::f32
                    ? size_.height
@@ -151,17 +152,17 @@ void NetworkPlan::plan_prediction(NetworkLayers& layers) {
 }
 
 template <class Stored>
-void NetworkPlan::run_head(const EngineRun& run, const float* frames) const {
+void NetworkPlan::run_head(const EngineRun& run, const float* planes) const {
   auto* stored = reinterpret_cast<Stored*>(run.block + skips_[0].offset);
   const std::size_t row_values = static_cast<std::size_t>(size_.width) * base_channels_;
   if (narrow_) {
     for (int y = 0; y < size_.height; ++y) {
       Stored* const row = stored + y * row_values;
       if constexpr (std::is_same_v<Stored, float>) {
-        narrow_->head_row(frames, y, run.block, row);
+        narrow_->head_row(planes, y, run.block, row);
       } else {
         auto* const values = reinterpret_cast<float*>(run.block + head_rows_buffer_);
-        narrow_->head_row(frames, y, run.block, values);
+        narrow_->head_row(planes, y, run.block, values);
         store_activations(values, row_values, row);
         run.saturation.add(row, row_values);
       }
@@ -171,8 +172,9 @@ void NetworkPlan::run_head(const EngineRun& run, const float* frames) const {
   auto* input = reinterpret_cast<float*>(run.block + input_);
   const std::size_t pixels = size_.pixel_count();
   for (std::size_t i = 0; i < pixels; ++i) {
-    input[2 * i] = frames[i];
-    input[2 * i + 1] = frames[pixels + i];
+    for (std::size_t plane = 0; plane < inputs_; ++plane) {
+      input[inputs_ * i + plane] = planes[plane * pixels + i];
+    }
   }
   if constexpr (std::is_same_v<Stored, float>) {
     head_->run(run.stream, 0, size_.height, input, stored, run.scratch);
@@ -250,7 +252,7 @@ void NetworkPlan::with_stored_type(Compute&& compute) const {
   }
 }
 
-GenerationNotes NetworkPlan::run(const float* frames, float* volume, std::byte* block,
+GenerationNotes NetworkPlan::run(const float* planes, float* volume, std::byte* block,
                                  const TensorObserver& observe) const {
   dnnl::stream stream(engine_);
   SaturationCount saturation;
@@ -271,7 +273,7 @@ GenerationNotes NetworkPlan::run(const float* frames, float* volume, std::byte* 
       saturation.add(values_of(buffer).data(), values_of(buffer).size());
       show(name, buffer);
     };
-    run_head<Stored>(run, frames);
+    run_head<Stored>(run, planes);
     show("head", skips_[0]);
     for (int level = 0; level < kNetworkLevels; ++level) {
       const Buffer& target = level + 1 < kNetworkLevels ? skips_[level + 1] : bottleneck_;
@@ -353,7 +355,7 @@ void NetworkPlan::run_last_tiles(const EngineRun& run, const TiledLayers& layers
 }
 
 GenerationNotes NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWork& work,
-                                       const TileMask& wanted, const float* frames, float* volume,
+                                       const TileMask& wanted, const float* planes, float* volume,
                                        std::byte* block, std::byte* tiles) const {
   dnnl::stream stream(engine_);
   SaturationCount saturation;
@@ -370,7 +372,7 @@ GenerationNotes NetworkPlan::run_tiles(const TiledLayers& layers, const TiledWor
                        value * (static_cast<std::size_t>(base_channels_) << kNetworkLevels)};
   };
   with_stored_type([&]<class Stored>(Stored) {
-    run_head<Stored>(run, frames);
+    run_head<Stored>(run, planes);
     for (int level = 0; level < kTiledEncoders; ++level) {
       for (const TilePlace place : work.encoders[level]) {
         layers.encoders[level].run(stream, tiles, place, skip(level), skip(level + 1), counted);

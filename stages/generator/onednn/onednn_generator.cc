@@ -70,6 +70,7 @@ class OnednnGenerator final : public Generator {
   OnednnGenerator(const Weights& weights, Precision precision)
       : bins_(weights.bins),
         training_gaps_(weights.training_gaps),
+        thresholds_(weights.thresholds),
         precision_(precision),
         description_("onednn " + std::string(to_string(precision)) + ", 1 thread, oneDNN " +
                      version_text() + ", " + onednn_support(precision).instruction_set +
@@ -80,6 +81,7 @@ class OnednnGenerator final : public Generator {
 
   int bins() const override { return bins_; }
   std::optional<GapRange> training_gaps() const override { return training_gaps_; }
+  std::optional<ThresholdRange> thresholds() const override { return thresholds_; }
   std::string description() const override { return description_; }
   std::size_t working_bytes(ImageSize size) const override {
     return activation_bytes(size, layers_.base_channels(), stored_bytes(precision_));
@@ -92,10 +94,12 @@ class OnednnGenerator final : public Generator {
       std::ranges::fill(volume, std::numeric_limits<float>::quiet_NaN());
       return {};
     }
+    std::vector<float> kept;
+    const std::span<const float> planes = network_planes(pair, thresholds_, kept);
     return compute(pair.size, [&] {
       const auto plan = plans_.plan(pair.size);
       const BlockPool::Lease block = blocks_.take(plan->block_bytes());
-      return plan->run(pair.frames.data(), volume.data(), block.data());
+      return plan->run(planes.data(), volume.data(), block.data());
     });
   }
 
@@ -114,13 +118,15 @@ class OnednnGenerator final : public Generator {
     if (work.share == 0 || work.share > kLargestShare) {
       return Generator::generate_tiles(pair, wanted, volume);
     }
+    std::vector<float> kept;
+    const std::span<const float> planes = network_planes(pair, thresholds_, kept);
     std::memset(volume.data(), 0, volume.size_bytes());
     return compute(wanted.size, [&] {
       const TiledLayers& layers = tiled_layers();
       const auto plan = plans_.plan(wanted.size);
       const std::size_t plan_bytes = BufferLayout::aligned(plan->block_bytes());
       const BlockPool::Lease block = blocks_.take(plan_bytes + layers.layout.total_bytes());
-      return plan->run_tiles(layers, work, wanted, pair.frames.data(), volume.data(), block.data(),
+      return plan->run_tiles(layers, work, wanted, planes.data(), volume.data(), block.data(),
                              block.data() + plan_bytes);
     });
   }
@@ -150,6 +156,7 @@ class OnednnGenerator final : public Generator {
 
   int bins_;
   std::optional<GapRange> training_gaps_;
+  std::optional<ThresholdRange> thresholds_;
   Precision precision_;
   std::string description_;
   mutable NetworkLayers layers_;

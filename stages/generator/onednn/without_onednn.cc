@@ -21,7 +21,7 @@ Calibrator::Calibrator(const Weights& weights) : base_channels_(weights.base_cha
   require_onednn(weights, Precision::kFloat32);
 }
 Calibrator::~Calibrator() = default;
-void Calibrator::add(std::span<const float>, ImageSize) {}
+void Calibrator::add(const GeneratorInput&) {}
 Calibration Calibrator::calibration(std::string) const { return {}; }
 
 }  // namespace eventgan

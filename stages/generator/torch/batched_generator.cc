@@ -49,6 +49,8 @@ class BatchedGenerator final : public Generator {
   BatchedGenerator(const Weights& weights, Precision precision, c10::Device device)
       : bins_(weights.bins),
         training_gaps_(weights.training_gaps),
+        thresholds_(weights.thresholds),
+        inputs_(weights.inputs()),
         precision_(precision),
         device_(device),
         forward_(weights, at::TensorOptions(device).dtype(
@@ -58,6 +60,7 @@ class BatchedGenerator final : public Generator {
 
   int bins() const override { return bins_; }
   std::optional<GapRange> training_gaps() const override { return training_gaps_; }
+  std::optional<ThresholdRange> thresholds() const override { return thresholds_; }
 
   std::string description() const override {
     return "torch " + std::string(to_string(precision_)) + " on " + describe_device() +
@@ -75,11 +78,13 @@ class BatchedGenerator final : public Generator {
 
   GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
     check_generator_spans(pair, volume, bins_);
+    std::vector<float> kept;
+    const std::span<const float> planes = network_planes(pair, thresholds_, kept);
     use_one_thread();
     const c10::InferenceMode inference;
     const FlushSubnormals flush;
     try {
-      const at::Tensor computed = batches_.compute(pair.frames, pair.size);
+      const at::Tensor computed = batches_.compute(planes, pair.size);
       at::from_blob(volume.data(), computed.sizes()).copy_(computed);
       return {};
     } catch (const c10::OutOfMemoryError&) {
@@ -114,7 +119,8 @@ class BatchedGenerator final : public Generator {
                                   ImageSize size) const {
     const auto count = static_cast<std::int64_t>(pairs.size());
     const at::TensorOptions pinned = at::TensorOptions(at::kFloat).pinned_memory(device_.is_cuda());
-    const at::Tensor frames = at::empty({pairs_in_batch(size), 2, size.height, size.width}, pinned);
+    const at::Tensor frames =
+        at::empty({pairs_in_batch(size), inputs_, size.height, size.width}, pinned);
     for (std::int64_t i = 0; i < count; ++i) {
       std::ranges::copy(pairs[static_cast<std::size_t>(i)], frames[i].data_ptr<float>());
     }
@@ -128,6 +134,8 @@ class BatchedGenerator final : public Generator {
 
   int bins_;
   std::optional<GapRange> training_gaps_;
+  std::optional<ThresholdRange> thresholds_;
+  int inputs_;
   Precision precision_;
   c10::Device device_;
   NetworkForward forward_;

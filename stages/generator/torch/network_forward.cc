@@ -158,8 +158,10 @@ at::Tensor NetworkForward::residual(const std::string& block, const at::Tensor& 
   return at::relu_(y.add_(x));
 }
 
-at::Tensor NetworkForward::operator()(std::span<const float> frames, ImageSize size) const {
-  return (*this)(at::from_blob(const_cast<float*>(frames.data()), {1, 2, size.height, size.width}));
+at::Tensor NetworkForward::operator()(std::span<const float> planes, ImageSize size) const {
+  return (*this)(at::from_blob(
+      const_cast<float*>(planes.data()),
+      {1, static_cast<std::int64_t>(planes.size() / size.pixel_count()), size.height, size.width}));
 }
 
 at::Tensor NetworkForward::operator()(const at::Tensor& frames) const {

@@ -7,6 +7,7 @@
 
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "stages/generator/flush_subnormals.h"
 #include "stages/generator/generator.h"
@@ -21,11 +22,13 @@ class TorchGenerator final : public Generator {
       : bins_(weights.bins),
         base_channels_(weights.base_channels),
         training_gaps_(weights.training_gaps),
+        thresholds_(weights.thresholds),
         precision_(precision),
         forward_(weights, precision == Precision::kBfloat16 ? at::kBFloat16 : at::kFloat) {}
 
   int bins() const override { return bins_; }
   std::optional<GapRange> training_gaps() const override { return training_gaps_; }
+  std::optional<ThresholdRange> thresholds() const override { return thresholds_; }
 
   std::string description() const override {
     return "torch " + std::string(to_string(precision_)) + ", 1 thread, LibTorch " + TORCH_VERSION +
@@ -40,12 +43,14 @@ class TorchGenerator final : public Generator {
 
   GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
     check_generator_spans(pair, volume, bins_);
+    std::vector<float> kept;
+    const std::span<const float> planes = network_planes(pair, thresholds_, kept);
     const c10::InferenceMode inference;
     const FlushSubnormals flush;
     try {
       at::Tensor output =
           at::from_blob(volume.data(), {1, 2 * bins_, pair.size.height, pair.size.width});
-      at::Tensor computed = forward_(pair.frames, pair.size);
+      at::Tensor computed = forward_(planes, pair.size);
       // Channels are brought together in two bytes a value, and then converted: a third of the
       // time.
       if (precision_ == Precision::kBfloat16) computed = computed.contiguous();
@@ -60,6 +65,7 @@ class TorchGenerator final : public Generator {
   int bins_;
   int base_channels_;
   std::optional<GapRange> training_gaps_;
+  std::optional<ThresholdRange> thresholds_;
   Precision precision_;
   NetworkForward forward_;
 };

@@ -11,9 +11,10 @@ namespace eventgan {
 
 /// Samples as tensors: float32, channels last in memory (the faster layout on CPU), on one device.
 struct TrainingBatch {
-  at::Tensor frames;          ///< [B, 2, H, W], previous then next, in [-1, 1], as recorded
-  at::Tensor network_frames;  ///< [B, 2, H, W], with gain and gamma
-  at::Tensor volume;          ///< [B, 2 bins, H, W], real, in [0, 1]
+  at::Tensor frames;           ///< [B, 2, H, W], previous then next, in [-1, 1], as recorded
+  at::Tensor network_frames;   ///< [B, 2, H, W], with gain and gamma
+  at::Tensor volume;           ///< [B, 2 bins, H, W], real, as TrainingSample has it
+  at::Tensor generator_input;  ///< [B, 2 or 3, H, W]: the network frames, or sensor_input of them
 
   at::Tensor previous() const { return frames.narrow(1, 0, 1); }       ///< [B, 1, H, W]
   at::Tensor next() const { return frames.narrow(1, 1, 1); }           ///< [B, 1, H, W]
@@ -25,7 +26,7 @@ struct TrainingBatch {
 TrainingBatch make_training_batch(std::span<const TrainingSample> samples, int bins,
                                   c10::Device device);
 
-/// One sample's network frames as a batch of one, likewise.
-at::Tensor network_frames_tensor(const TrainingSample& sample, c10::Device device);
+/// One sample's generator_input as a batch of one, likewise.
+at::Tensor generator_input_tensor(const TrainingSample& sample, c10::Device device);
 
 }  // namespace eventgan

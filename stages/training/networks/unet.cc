@@ -179,7 +179,9 @@ std::vector<at::Tensor> UNetImpl::forward(const at::Tensor& input) {
   at::Tensor x = input;
   if (difference_gain_ > 0) {
     const at::Tensor previous = input.narrow(1, 0, 1), next = input.narrow(1, 1, 1);
-    x = at::cat({(previous + next) / 2, difference_gain_ * (next - previous)}, 1);
+    x = at::cat({(previous + next) / 2, difference_gain_ * (next - previous),
+                 difference_gain_ * input.narrow(1, 2, input.size(1) - 2)},
+                1);
   }
   x = head_.forward(x);
   std::vector<at::Tensor> skips;

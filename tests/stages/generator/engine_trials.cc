@@ -60,7 +60,7 @@ float largest_difference(const std::vector<float>& a, const std::vector<float>& 
 Weights calibrated(const Weights& weights, ImageSize size) {
   Calibrator calibrator(weights);
   for (std::uint64_t pair = 0; pair < 4; ++pair) {
-    calibrator.add(natural_frames(size, 1000 + pair), size);
+    calibrator.add({natural_frames(size, 1000 + pair), size});
   }
   Weights result = weights;
   result.calibration = std::make_shared<Calibration>(calibrator.calibration("tests"));

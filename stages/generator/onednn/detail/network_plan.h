@@ -51,15 +51,15 @@ class NetworkPlan {
   /// Bytes that a run needs.
   std::size_t block_bytes() const { return layout_.total_bytes(); }
 
-  /// frames [2, y, x], volume [2 bins, y, x] as Generator::generate has them. `block`:
+  /// planes [inputs, y, x] as network_planes() gives them, volume [2 bins, y, x]. `block`:
   /// block_bytes(), whatever is in it. `observe` is called in float32 only, and may throw.
-  GenerationNotes run(const float* frames, float* volume, std::byte* block,
+  GenerationNotes run(const float* planes, float* volume, std::byte* block,
                       const TensorObserver& observe = {}) const;
 
   /// The same for the tiles that are wanted, by what tiled_work says of them; nothing else of the
   /// volume is written. `tiles`: a block for layers.layout.
   GenerationNotes run_tiles(const TiledLayers& layers, const TiledWork& work,
-                            const TileMask& wanted, const float* frames, float* volume,
+                            const TileMask& wanted, const float* planes, float* volume,
                             std::byte* block, std::byte* tiles) const;
 
   /// oneDNN's names of all kernels.
@@ -83,7 +83,7 @@ class NetworkPlan {
   template <class Compute>
   void with_stored_type(Compute&& compute) const;
   template <class Stored>
-  void run_head(const EngineRun& run, const float* frames) const;
+  void run_head(const EngineRun& run, const float* planes) const;
   template <class Stored>
   void run_decoder(const EngineRun& run, int level, const std::byte* small) const;
   template <class Stored>
@@ -103,7 +103,8 @@ class NetworkPlan {
 
   /// Where it fits, in place of `head_`, the last decoder's strips and `prediction_`.
   std::optional<NarrowLayers> narrow_;
-  std::size_t input_ = 0;             ///< [y, x, frame] float32
+  std::size_t inputs_ = 0;            ///< of the head
+  std::size_t input_ = 0;             ///< [y, x, input] float32
   std::size_t head_rows_buffer_ = 0;  ///< float32
   int head_rows_ = 0;                 ///< of a strip
   std::optional<RowConvolution> head_;

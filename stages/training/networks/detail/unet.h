@@ -18,7 +18,7 @@ struct UNetSettings {
   /// Cycle networks: a tanh prediction after each decoder, concatenated to its features.
   bool multi_scale = false;
   SpectralNormPlace spectral_norm = SpectralNormPlace::kNone;
-  double difference_gain = 0;  ///< as NetworkSpec says, of a network of two frames
+  double difference_gain = 0;  ///< as NetworkSpec says, of a network of frames
 };
 
 /// The U-Net of generator and cycle networks as it is trained: batch norm and
