@@ -35,20 +35,25 @@ std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
 
 namespace {
 
+/// Reads [least, most], both in lowest..highest.
+std::array<double, 2> read_ends(const StrictValue& value, double lowest, double highest) {
+  const std::vector<StrictValue> ends = value.elements(2);
+  if (ends.size() != 2) {
+    if (!ends.empty()) value.fault("an array of 2");
+    return {lowest, lowest};
+  }
+  const std::array<double, 2> range{ends[0].number(lowest, highest),
+                                    ends[1].number(lowest, highest)};
+  if (range[1] < range[0]) ends[1].fault("a number not below the previous one");
+  return range;
+}
+
 StillsSpec read_motion(const StrictValue& value) {
   constexpr double kFarthest_px = 100, kMost_deg = 45, kMostScale = 0.5;
   StillsSpec spec;
   StrictObject object = value.object();
   if (const auto range = object.find("translation_px")) {
-    const auto ends = range->elements(2);
-    if (ends.size() == 2) {
-      spec.translation_px = {ends[0].number(0, kFarthest_px), ends[1].number(0, kFarthest_px)};
-      if (spec.translation_px[1] < spec.translation_px[0]) {
-        ends[1].fault("a number not below the previous one");
-      }
-    } else if (!ends.empty()) {
-      range->fault("an array of 2");
-    }
+    spec.translation_px = read_ends(*range, 0, kFarthest_px);
   }
   if (const auto angle = object.find("rotation_deg")) {
     spec.rotation_deg = angle->number(0, kMost_deg);
@@ -379,13 +384,12 @@ namespace {
 
 constexpr double kLargestRate_hz = 1e6;
 
-}  // namespace
-
-SensorSpec read_sensor(const StrictValue& value) {
+/// Reads what the simulators share; find(key) is a key's value, or none.
+template <class Find>
+SensorSpec read_sensor_keys(const Find& find) {
   SensorSpec spec;
-  StrictObject object = value.object();
   const auto read = [&](const char* key, double& number, double lowest, double highest) {
-    if (const auto found = object.find(key)) number = found->number(lowest, highest);
+    if (const std::optional<StrictValue> found = find(key)) number = found->number(lowest, highest);
   };
   read("positive_threshold", spec.positive_threshold, 0.01, 5);
   read("negative_threshold", spec.negative_threshold, 0.01, 5);
@@ -396,6 +400,14 @@ SensorSpec read_sensor(const StrictValue& value) {
   read("hot_pixel_fraction", spec.hot_pixel_fraction, 0, 1);
   read("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, 0, kLargestRate_hz);
   read("log_epsilon", spec.log_epsilon, 1e-6, 1);
+  return spec;
+}
+
+}  // namespace
+
+SensorSpec read_sensor(const StrictValue& value) {
+  StrictObject object = value.object();
+  const SensorSpec spec = read_sensor_keys([&](const char* key) { return object.find(key); });
   object.finish();
   return spec;
 }
@@ -424,6 +436,39 @@ class KindKeys {
   StrictObject& object_;
   std::optional<GeneratorKind> kind_;
 };
+
+/// Reads a number, or [least, most].
+std::array<double, 2> read_range(const StrictValue& value, double lowest, double highest) {
+  if (value.is_array()) return read_ends(value, lowest, highest);
+  const double number = value.number(lowest, highest);
+  return {number, number};
+}
+
+NoiseSpec read_noise(const StrictValue& value) {
+  NoiseSpec spec;
+  StrictObject object = value.object();
+  const auto read = [&](const char* key, std::array<double, 2>& range, double highest) {
+    if (const auto found = object.find(key)) range = read_range(*found, 0, highest);
+  };
+  read("shot_hz", spec.shot_hz, kMostNoise_hz);
+  read("leak_hz", spec.leak_hz, kMostNoise_hz);
+  read("hot_pixels", spec.hot_pixels, 1);
+  object.finish();
+  return spec;
+}
+
+/// Reads a generator's `sensor`: what is asked of any, and of a simulator its settings.
+void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind> kind,
+                           GeneratorSpec& spec) {
+  using enum GeneratorKind;
+  StrictObject object = value.object();
+  if (const auto noise = object.find("noise")) spec.noise = read_noise(*noise);
+  KindKeys keys(object, kind);
+  spec.sensor = read_sensor_keys([&](const char* key) {
+    return keys.find(key, {kEsim, kDifference});
+  });
+  object.finish();
+}
 
 /// Reads the manifest's `generator`; which keys it may have depends on its kind.
 GeneratorSpec read_generator(const StrictValue& value) {
@@ -464,11 +509,14 @@ GeneratorSpec read_generator(const StrictValue& value) {
   }
   if (const auto tile = keys.find("tile_px", {kNetwork}))
     spec.scope.tile_px = tile->integer(8, 128);
-  if (const auto sensor = keys.find("sensor", {kEsim, kDifference})) {
-    spec.sensor = read_sensor(*sensor);
+  if (const auto sensor = keys.find("sensor", {kNetwork, kEsim, kDifference})) {
+    read_generator_sensor(*sensor, kind, spec);
   }
-  if (const auto duration = keys.find("duration_s", {kEsim, kDifference})) {
+  if (const auto duration = keys.find("duration_s", {kNetwork, kEsim, kDifference})) {
     spec.duration_s = duration->number(1e-4, 10);
+    if (kind == kNetwork && !spec.noise) {
+      duration->fault("no such key for kind \"network\" without sensor.noise");
+    }
   }
   if (const auto displacement = keys.find("max_displacement_px", {kEsim})) {
     spec.max_displacement_px = displacement->number(0.1, 100);

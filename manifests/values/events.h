@@ -1,7 +1,9 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "manifests/values/frames.h"
 
@@ -35,6 +37,17 @@ struct SensorSpec {
   bool operator==(const SensorSpec&) const = default;
 };
 
+/// Noise of an event camera, added to finished volumes (stages/events/noise.h), whatever made them.
+/// Each number is drawn uniformly from [least, most] for each pair; zeros: no noise.
+struct NoiseSpec {
+  std::array<double, 2> shot_hz{};     ///< events per pixel and second, half of them of either
+                                       ///< polarity; 0..kMostNoise_hz
+  std::array<double, 2> leak_hz{};     ///< positive events per pixel and second, 0..kMostNoise_hz
+  std::array<double, 2> hot_pixels{};  ///< share of the pixels that are hot, 0..1
+  bool operator==(const NoiseSpec&) const = default;
+};
+inline constexpr double kMostNoise_hz = 1000;
+
 /// Shape of an event volume: [2 bins, height, width], C order. Channels 0..bins-1 are the positive
 /// polarity in time order, bins..2 bins-1 the negative one.
 struct VolumeShape {
@@ -57,6 +70,7 @@ enum VolumeFlag : std::uint32_t {
   /// more of the network's activations than kMostSaturated were clipped to what int8 was calibrated
   /// for
   kFlagBeyondCalibration = 1u << 4,
+  kFlagNoise = 1u << 5,  ///< noise events were added to what the generator made (NoiseSpec)
 };
 
 /// Numbers about one volume as generated, before it is quantised for storage.

@@ -220,8 +220,9 @@ struct GeneratorSpec {
   Precision precision = Precision::kFloat32;  ///< kNetwork
   ScopeSpec scope;                            ///< kNetwork
   SensorSpec sensor;                          ///< kEsim, kDifference
-  double duration_s = 0.1;          ///< kEsim, kDifference: time between the two frames, for the
-                                    ///< noise and the refractory time; 1e-4..10
+  std::optional<NoiseSpec> noise = {};        ///< of any kind but kEvents
+  double duration_s = 0.1;          ///< time between the two frames, 1e-4..10. kEsim, kDifference:
+                                    ///< for the sensor. `noise`: of pairs whose times are unknown
   double max_displacement_px = 10;  ///< kEsim: of the random motion, 0.1..100
 };
 

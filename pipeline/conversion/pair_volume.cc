@@ -1,5 +1,9 @@
 #include "pipeline/conversion/pair_volume.h"
 
+#include <cmath>
+
+#include "manifests/values/counter_random.h"
+#include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
 
@@ -15,6 +19,15 @@ GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope
       wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
   return {generator.generate_tiles({pair.input, pair.content}, wanted, volume),
           tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
+}
+
+bool add_pair_noise(const GeneratorSpec& spec, const PairKey& key, double gap_s,
+                    const VolumeShape& content, std::span<float> volume) {
+  if (!spec.noise) return false;
+  const double duration_s = gap_s > 0 && std::isfinite(gap_s) ? gap_s : spec.duration_s;
+  const CounterRandom random = CounterRandom(key.seed).keyed("noise").keyed(key.dataset);
+  const NoiseRandom draws{random.keyed("hot pixels"), random.keyed("pair").keyed(key.sample_id)};
+  return add_noise(*spec.noise, duration_s, content, draws, volume) > 0;
 }
 
 std::optional<VolumeStatistics> finish_volume(const Generator& generator,

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "manifests/values/events.h"
@@ -29,6 +30,21 @@ struct GeneratedPart {
 GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
                               const PreparedPair& pair, const VolumeLabels& labels,
                               std::span<float> volume);
+
+/// What a pair's random numbers are keyed by, as the plan's are: they do not depend on the other
+/// samples, on workers or on shards.
+struct PairKey {
+  std::uint64_t seed = 0;
+  std::string_view dataset;
+  std::string_view sample_id;
+};
+
+/// Adds the noise that a manifest may ask for (stages/events/noise.h) to the volume of a pair's
+/// content, [2 bins, y, x], whatever part of it was generated; over the pair's gap_s, or where that
+/// is not above 0 or unknown, over spec.duration_s. Hot pixels are those of the dataset. Returns
+/// whether there were any events, which is kFlagNoise. Thread safe.
+bool add_pair_noise(const GeneratorSpec& spec, const PairKey& key, double gap_s,
+                    const VolumeShape& content, std::span<float> volume);
 
 /// Statistics of the generated values [2 bins, y, x] of the pair's content, with kFlagExtrapolated
 /// for a gap that the generator has not seen and kFlagBeyondCalibration; then normalises the values

@@ -212,14 +212,20 @@ void SampleStages::finish(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kFinish);
   const PreparedPair& prepared = message.prepared;
+  const FramePair& pair = message.planned().pair;
+  const auto source = static_cast<std::size_t>(message.shard->source);
+  const bool has_noise = add_pair_noise(
+      manifest_.generator,
+      {manifest_.seed, to_string(manifest_.sources[source].dataset), message.sample.sample_id},
+      pair.gap_s(), {generator_.bins(), prepared.content}, message.volume);
   const std::optional<VolumeStatistics> found =
-      finish_volume(generator_, message.notes, message.planned().pair.gap_frames,
-                    manifest_.volume.normalize, prepared, message.volume);
+      finish_volume(generator_, message.notes, pair.gap_frames, manifest_.volume.normalize,
+                    prepared, message.volume);
   if (!found) {
     const std::size_t bad = first_unsound_value(message.volume);
     message.fail("expected finite values >= 0, got " + std::to_string(message.volume[bad]) +
                  " in channel " + std::to_string(bad / prepared.content.pixel_count()) +
-                 " of the generated volume, from " + frame_names(message.planned().pair));
+                 " of the generated volume, from " + frame_names(pair));
     return;
   }
   VolumeStatistics& statistics = message.sample.statistics = *found;
@@ -231,6 +237,7 @@ void SampleStages::finish(SampleMessage& message) const try {
                                          prepared.content_x,
                                          prepared.content_y},
                                         reaches_one ? 1 : statistics.max);
+  if (has_noise) statistics.flags |= kFlagNoise;
   if (encoded.saturated) statistics.flags |= kFlagSaturated;
   if (encoded.vanished) statistics.flags |= kFlagVanished;
   message.sample.scale = encoded.scale;

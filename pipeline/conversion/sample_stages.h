@@ -69,8 +69,8 @@ class SampleStages {
   /// Runs the generator on the prepared frames; or makes the events' volume.
   void generate(SampleMessage& message) const;
 
-  /// Checks the volume and takes its statistics, normalises if asked, encodes it into the volume's
-  /// frame.
+  /// Adds noise if asked, checks the volume and takes its statistics, normalises if asked, encodes
+  /// it into the volume's frame.
   void finish(SampleMessage& message) const;
 
  private:

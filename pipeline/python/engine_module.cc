@@ -12,6 +12,7 @@
 #include <cstring>
 #include <exception>
 #include <filesystem>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -30,6 +31,7 @@
 #include "pipeline/python/detail/array_images.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"
+#include "stages/base/files/sha256.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/exports/sampled_events.h"
 #include "stages/frames/decoding/prepared_frame.h"
@@ -129,6 +131,15 @@ void lay_into(std::span<const float> content, const PreparedPair& pair, std::spa
       std::ranges::copy(content.subspan(row * width, width), volume.data() + place);
     }
   }
+}
+
+/// What stands for a sample's id where images have none: their content.
+std::string content_name(const PreparedFrame& previous, const PreparedFrame& following) {
+  Sha256 hash;
+  for (const PreparedFrame* frame : {&previous, &following}) {
+    hash.update(std::as_bytes(std::span(frame->grey)));
+  }
+  return hash.hex();
 }
 
 /// What a caller knows of the image's labels.
@@ -238,9 +249,12 @@ class PairGenerator {
   MadeVolume make(const Pair& pairs, std::size_t index, const Labels* labels, int gap,
                   std::span<float> volume) const {
     require_labels(labels);
-    const PreparedPair pair =
-        prepare_pair(prepared(pairs.previous.at(index), job_.image, pairs.previous.name()),
-                     prepared(pairs.following.at(index), job_.image, pairs.following.name()));
+    const PreparedFrame previous =
+        prepared(pairs.previous.at(index), job_.image, pairs.previous.name());
+    const PreparedFrame following =
+        prepared(pairs.following.at(index), job_.image, pairs.following.name());
+    const std::string name = job_.generator.noise ? content_name(previous, following) : "";
+    const PreparedPair pair = prepare_pair(previous, following);
     MadeVolume made;
     made.placement = pair.placement;
     if (labels) {
@@ -255,6 +269,9 @@ class PairGenerator {
       values = content;
     }
     made.part = generate_volume(generator(), job_.generator.scope, pair, made.labels, values);
+    const bool has_noise =
+        add_pair_noise(job_.generator, {job_.seed, to_string(DatasetKind::kFrames), name},
+                       std::numeric_limits<double>::quiet_NaN(), {bins(), pair.content}, values);
     // A fifth of the time of a network of width 8 in bfloat16: only for who wants them.
     bool is_sound = made.part.notes.sound;
     if (labels || job_.volume.normalize != Normalization::kNone) {
@@ -262,6 +279,7 @@ class PairGenerator {
           finish_volume(generator(), made.part.notes, gap, job_.volume.normalize, pair, values);
       is_sound = statistics.has_value();
       made.statistics = statistics.value_or(VolumeStatistics{});
+      if (has_noise) made.statistics.flags |= kFlagNoise;
     } else if (!is_sound) {
       is_sound = scan_values(values).sound;
     }

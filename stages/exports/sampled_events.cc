@@ -9,29 +9,10 @@
 #include <cstdint>
 #include <iterator>
 
+#include "manifests/values/poisson_random.h"
+
 namespace eventgan {
 namespace {
-
-/// By inversion; a large mean is the sum of several small ones, since exp(-mean) must not vanish.
-/// Draws counters `place`, `place + stride`, ...
-int draw_poisson(double mean, const CounterRandom& random, std::uint64_t place,
-                 std::uint64_t stride) {
-  constexpr double kLargestStep = 16;
-  int count = 0;
-  for (; mean > 0; mean -= kLargestStep, place += stride) {
-    const double step = std::min(mean, kLargestStep);
-    const double uniform = random.uniform(place);
-    double probability = std::exp(-step);
-    double sum = probability;
-    int drawn = 0;
-    while (uniform >= sum && probability > 0) {
-      probability *= step / ++drawn;
-      sum += probability;
-    }
-    count += drawn;
-  }
-  return count;
-}
 
 /// The events of one volume on their way.
 class Sampling {
@@ -109,8 +90,9 @@ std::vector<Event> sample_events(std::span<const float> volume, const VolumeShap
   const CounterRandom draws = random.keyed("counts");
   std::vector<int> drawn(volume.size());
   for (std::size_t i = 0; i < volume.size(); ++i) {
-    drawn[i] = counts == EventCounts::kRounded ? static_cast<int>(std::lround(volume[i]))
-                                               : draw_poisson(volume[i], draws, i, volume.size());
+    drawn[i] = counts == EventCounts::kRounded
+                   ? static_cast<int>(std::lround(volume[i]))
+                   : static_cast<int>(poisson(volume[i], draws, i, volume.size()));
   }
   return Sampling(shape, duration_s, random).run(drawn);
 }

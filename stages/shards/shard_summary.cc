@@ -45,6 +45,7 @@ std::vector<std::string> flag_names(std::uint32_t flags) {
   if (flags & kFlagSaturated) names.emplace_back("saturated");
   if (flags & kFlagVanished) names.emplace_back("vanished");
   if (flags & kFlagBeyondCalibration) names.emplace_back("beyond_calibration");
+  if (flags & kFlagNoise) names.emplace_back("noise");
   return names;
 }
 

@@ -62,7 +62,7 @@ class Generator:
     normalize : {"none", "eta98"}
         Whether a volume is divided by its 98th percentile and clipped.
     seed : int, default 0
-        Of the models' random numbers, and of untrained weights.
+        Of the models' random numbers, of noise (sensor={"noise": {...}}), and of untrained weights.
     **settings
         Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
         sensor (a dictionary), duration_s, max_displacement_px, bins. manifest.schema.json has their meanings and ranges.

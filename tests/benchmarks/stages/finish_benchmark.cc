@@ -1,4 +1,4 @@
-// From the generator's volume to the chunk that the writer gets: statistics, codes, shuffle,
+// From the generator's volume to the chunk that the writer gets: noise, statistics, codes, shuffle,
 // deflate, checksum, each alone and all together. Items are volumes, so items a second are pairs a
 // second; bytes are what the step reads. Names that begin with `plain_` are what the step next to
 // them replaced, for the ratio.
@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/shards/codec/chunk_filters.h"
 #include "stages/shards/codec/quantization.h"
@@ -76,6 +77,19 @@ std::vector<std::byte> planes_of(const std::vector<float>& values, StoredType ty
   std::vector<std::byte> planes(values.size() * stored_size(type));
   quantize(values, quantization(type, largest(values)), planes.data(), values.size());
   return planes;
+}
+
+/// Shot noise of tenths of a hertz over 0.1 s; 15 are 34,000 events.
+void noise(benchmark::State& state, double hot_pixels) {
+  std::vector<float> values = volume();
+  const double shot_hz = 0.1 * static_cast<double>(state.range(0));
+  const NoiseSpec spec{.shot_hz = {shot_hz, shot_hz}, .hot_pixels = {hot_pixels, hot_pixels}};
+  std::uint64_t pair = 0;
+  for (auto _ : state) {
+    const NoiseRandom random{CounterRandom(1), CounterRandom(++pair)};
+    benchmark::DoNotOptimize(add_noise(spec, 0.1, kShape, random, values));
+  }
+  count(state, values.size() * sizeof(float));
 }
 
 void statistics(benchmark::State& state, bool dense) {
@@ -194,6 +208,8 @@ void deflate_levels(benchmark::internal::Benchmark* benchmark) {
 void all_levels(benchmark::internal::Benchmark* benchmark) { deflate_levels(benchmark->Arg(0)); }
 
 constexpr auto kMilliseconds = benchmark::kMillisecond;
+BENCHMARK_CAPTURE(noise, shot, 0)->Arg(1)->Arg(15)->Arg(10000)->Unit(kMilliseconds);
+BENCHMARK_CAPTURE(noise, hot_pixels, 1e-4)->Arg(0)->Arg(15)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(statistics, sparse, false)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(plain_statistics, sparse, false)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(statistics, dense, true)->Unit(kMilliseconds);

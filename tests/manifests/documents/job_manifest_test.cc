@@ -165,6 +165,16 @@ TEST(JobManifest, HoldsASimulatorsSettings) {
   EXPECT_EQ(spec.sensor, sensor);
 }
 
+TEST(JobManifest, HoldsNoiseAsRanges) {
+  EXPECT_EQ(parse(kSoundManifest).generator.noise, std::nullopt);
+  const GeneratorSpec spec = parse(testing::edited(kSoundManifest, {{"/generator/sensor", R"({
+    "noise": {"shot_hz": [0.1, 1.5], "leak_hz": 0.1}})"}}))
+                                 .generator;
+  EXPECT_EQ(spec.noise, (NoiseSpec{.shot_hz = {0.1, 1.5}, .leak_hz = {0.1, 0.1}}));
+  EXPECT_EQ(spec.duration_s, 0.1);
+  EXPECT_EQ(spec.sensor, SensorSpec());
+}
+
 TEST(JobManifest, KeepsItsTextByteForByte) {
   const std::string text = "// caf\xc3\xa9\r\n\t" + std::string(kSoundManifest) + "\n\n/* end */";
   EXPECT_EQ(parse(text).text, text);

@@ -280,6 +280,119 @@ TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
   EXPECT_EQ(message.sample.statistics.eta98, 0.0f);
 }
 
+class NoiseTest : public SampleStagesTest {
+ protected:
+  /// 4 x 6 pixels, or what the shard has.
+  std::vector<float> volume(const SampleMessage& message) {
+    EXPECT_FALSE(message.failed()) << message.sample.fault;
+    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
+    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
+    return dequantize(stored.value(), StoredType::kFloat32, 1);
+  }
+
+  /// Whether pixels have an event in any channel.
+  std::vector<bool> struck() {
+    const std::vector<float> values = volume(run());
+    std::vector<bool> pixels(shard_.volume_size.pixel_count());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (values[i] > 0) pixels[i % pixels.size()] = true;
+    }
+    return pixels;
+  }
+
+  void stand_still() { shard_.samples[0].pair.next = shard_.samples[0].pair.previous; }
+};
+
+constexpr NoiseSpec kShotNoise{.shot_hz = {1000, 1000}};
+
+TEST_F(NoiseTest, IsAddedOverTheGapOrElseTheDuration) {
+  manifest_.generator.noise = kShotNoise;
+  const auto events = [&] {
+    const VolumeStatistics statistics = run().sample.statistics;
+    EXPECT_EQ(statistics.flags, kFlagNoise);
+    return statistics.sum_positive + statistics.sum_negative - 48;  // as MakesAWholeSample
+  };
+  manifest_.generator.duration_s = 0.2;
+  EXPECT_NEAR(events(), 1000 * 0.2 * 24, 5 * std::sqrt(4800));
+  shard_.samples[0].pair.previous.time_s = 7;
+  shard_.samples[0].pair.next.time_s = 8;
+  EXPECT_NEAR(events(), 1000 * 1 * 24, 5 * std::sqrt(24000));
+  shard_.samples[0].pair.next.time_s = 7;  // a file's times may say anything
+  EXPECT_NEAR(events(), 1000 * 0.2 * 24, 5 * std::sqrt(4800));
+}
+
+TEST_F(NoiseTest, OfNoRateChangesNoByte) {
+  const SampleMessage without = run();
+  manifest_.generator.noise = NoiseSpec();
+  const SampleMessage with = run();
+  EXPECT_EQ(with.chunk, without.chunk);
+  EXPECT_EQ(with.sample.statistics.flags, 0u);
+}
+
+TEST_F(NoiseTest, MakesAStillSceneEventful) {
+  stand_still();
+  manifest_.generator.noise = kShotNoise;
+  const SampleMessage message = run();
+  EXPECT_EQ(message.sample.statistics.flags, kFlagNoise);
+  for (const float value : volume(message)) ASSERT_EQ(value, std::floor(value));
+}
+
+TEST_F(NoiseTest, LeavesTheBordersOfALetterboxEmpty) {
+  // As LetterboxBordersHoldNoEvents: 2 rows above and below.
+  manifest_.image.size = shard_.volume_size = {12, 12};
+  manifest_.image.fit = ImageFit::kLetterbox;
+  manifest_.generator.noise = kShotNoise;
+  manifest_.generator.duration_s = 1;
+  const std::vector<bool> pixels = struck();
+  for (std::size_t pixel = 0; pixel < pixels.size(); ++pixel) {
+    EXPECT_EQ(pixels[pixel], 24 <= pixel && pixel < 120) << pixel;
+  }
+}
+
+TEST_F(NoiseTest, CoversWhatTheScopeLeavesOut) {
+  manifest_.generator.scope.scope = Scope::kMotion;
+  manifest_.image.size = shard_.volume_size = {24, 40};
+  stand_still();
+  manifest_.generator.noise = kShotNoise;
+  const SampleMessage message = run();
+  EXPECT_THAT(message.sample.tiles, ::testing::Each(0));
+  EXPECT_EQ(generator_.calls(), 0);
+  EXPECT_THAT(struck(), ::testing::Each(true));
+}
+
+TEST_F(NoiseTest, FollowsFromSeedDatasetAndSampleAlone) {
+  manifest_.generator.noise = kShotNoise;
+  const std::vector<std::byte> chunk = run().chunk;
+  shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
+  EXPECT_EQ(run().chunk, chunk) << "another shard";
+  manifest_.sources.insert(manifest_.sources.begin(), SourceSpec{.dataset = DatasetKind::kMpii});
+  datasets_.insert(datasets_.begin(), std::make_unique<testing::FakeDataset>("other", 2));
+  shard_.source = 1;
+  EXPECT_EQ(run().chunk, chunk) << "another source before it";
+  shard_.samples[0].sample_id = "0002";
+  EXPECT_NE(run().chunk, chunk);
+  shard_.samples[0].sample_id = "0001";
+  manifest_.seed = 1;
+  EXPECT_NE(run().chunk, chunk);
+  manifest_.seed = 0;
+  manifest_.sources[1].dataset = DatasetKind::kMpiiList;
+  EXPECT_NE(run().chunk, chunk);
+}
+
+TEST_F(NoiseTest, HotPixelsAreThoseOfTheDataset) {
+  stand_still();
+  manifest_.generator.noise = NoiseSpec{.hot_pixels = {0.3, 0.3}};
+  manifest_.generator.duration_s = 10;
+  const std::vector<bool> hot = struck();
+  shard_.samples[0].sample_id = "0002";
+  EXPECT_EQ(struck(), hot);
+  manifest_.sources[0].dataset = DatasetKind::kMpii;
+  EXPECT_NE(struck(), hot);
+  manifest_.sources[0].dataset = DatasetKind::kFrames;
+  manifest_.seed = 1;
+  EXPECT_NE(struck(), hot);
+}
+
 TEST_F(SampleStagesTest, GeneratesWhatTheScopeWants) {
   // 24 x 40: 2 x 3 tiles.
   manifest_.generator.scope.scope = Scope::kMotion;

@@ -119,8 +119,8 @@ TEST_F(ShardSummary, Counts) {
 
 TEST_F(ShardSummary, FlagsHaveNames) {
   EXPECT_TRUE(flag_names(0).empty());
-  EXPECT_THAT(flag_names((1u << 5) - 1),
-              ElementsAre("empty", "extrapolated", "saturated", "vanished", "beyond_calibration"));
+  EXPECT_THAT(flag_names((1u << 6) - 1), ElementsAre("empty", "extrapolated", "saturated",
+                                                     "vanished", "beyond_calibration", "noise"));
 }
 
 TEST_F(ShardSummary, TextSaysWhatIsInTheShard) {
