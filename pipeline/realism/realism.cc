@@ -68,7 +68,7 @@ class MethodMaker {
     for (const RealismMethod method : wanted) {
       switch (method) {
         case RealismMethod::kNetwork:
-          methods.push_back(make_network_method(std::move(generator), options_.weights));
+          methods.push_back(network(std::move(generator)));
           break;
         case RealismMethod::kDifference:
           methods.push_back(simulated(difference_scene()));
@@ -83,12 +83,26 @@ class MethodMaker {
   }
 
  private:
-  std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {
-    double threshold = options_.threshold.value_or(0);
-    if (!options_.threshold) {
-      if (frames_.empty()) frames_ = frames_to_fit(recording_, intervals_);
-      threshold = fitted_threshold(scene, frames_, options_.log_epsilon, options_.seed, threads_);
+  const std::vector<IntervalFrames>& fitted_frames() {
+    if (frames_.empty()) frames_ = frames_to_fit(recording_, intervals_);
+    return frames_;
+  }
+
+  std::unique_ptr<VolumeMethod> network(std::unique_ptr<Generator> generator) {
+    std::optional<double> threshold;
+    if (generator->thresholds()) {
+      threshold = options_.threshold ? *options_.threshold
+                                     : fitted_threshold(*generator, fitted_frames(), threads_);
     }
+    return make_network_method(std::move(generator), options_.weights, threshold,
+                               !options_.threshold, options_.seed);
+  }
+
+  std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {
+    const double threshold = options_.threshold
+                                 ? *options_.threshold
+                                 : fitted_threshold(scene, fitted_frames(), options_.log_epsilon,
+                                                    options_.seed, threads_);
     return make_simulated_method(std::move(scene), realism_sensor(threshold, options_.log_epsilon),
                                  !options_.threshold, bins_, options_.seed);
   }

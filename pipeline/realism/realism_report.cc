@@ -82,17 +82,26 @@ std::optional<double> real_value(const RealismReport& report, const ScoreRow& ro
   return report.real.mean.*row.member;
 }
 
+/// How far the methods' shares of the events by bin and polarity are from the camera's.
+std::string share_row(const RealismReport& report, const std::string& label) {
+  std::vector<Cell> cells;
+  for (const MethodSummary& method : report.methods) {
+    cells.push_back({share_distance(method.mean, report.real.mean), {}});
+  }
+  return table_row(label, BetterScore::kLower, std::nullopt, cells);
+}
+
 std::string bin_rows(const RealismReport& report) {
   std::string text;
-  for (std::size_t bin = 0; bin < report.real.mean.events_per_bin.size(); ++bin) {
+  const std::vector<double> real = report.real.mean.events_per_bin();
+  for (std::size_t bin = 0; bin < real.size(); ++bin) {
     std::vector<Cell> cells;
     for (const MethodSummary& method : report.methods) {
-      cells.push_back({method.mean.events_per_bin[bin], {}});
+      cells.push_back({method.mean.events_per_bin()[bin], {}});
     }
-    text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal,
-                      report.real.mean.events_per_bin[bin], cells);
+    text += table_row("  in bin " + std::to_string(bin), BetterScore::kLikeReal, real[bin], cells);
   }
-  return text;
+  return text + share_row(report, "  distance of shares");
 }
 
 constexpr const char* kDirectionLabel = "direction within 30 deg";
@@ -168,7 +177,7 @@ RealismScores mean_over(std::span<const RealismReport> reports,
   std::vector<RealismScores> scores;
   for (const RealismReport& report : reports) {
     scores.push_back(method(report).mean);
-    scores.back().events_per_bin.clear();  // of as many bins as the weights have
+    scores.back().events_per_channel.clear();  // of as many bins as the weights have
   }
   return mean_scores(scores);
 }
@@ -207,6 +216,10 @@ std::string several_recordings(std::span<const RealismReport> reports) {
     }
     text += table_row("  mean", row.better, real_value(mean, row), cells_of(mean, row.member));
   }
+  text += "distance of shares by bin and polarity ↓\n";
+  for (const RealismReport& report : reports) {
+    text += share_row(report, "  " + short_name(report.recording));
+  }
   std::string directions;
   for (const RealismReport& report : reports) {
     if (!report.real.direction) continue;
@@ -238,7 +251,7 @@ nlohmann::json scores_json(const RealismScores& scores,
                            const std::optional<DirectionScore>& direction) {
   nlohmann::json json = nlohmann::json::object();
   for (const ScoreRow& row : kScoreRows) json[row.key] = scores.*row.member;
-  json["events_per_bin"] = scores.events_per_bin;
+  json["events_per_channel"] = scores.events_per_channel;
   if (direction) {
     json["direction"] = {{"pixels", direction->pixels}, {"within_30_deg", direction->within}};
   }
@@ -253,9 +266,9 @@ nlohmann::json bounds_json(const MethodSummary& method) {
   for (const ScoreRow& row : kScoreRows) {
     json[row.key] = {bounds.low.*row.member, bounds.high.*row.member};
   }
-  for (std::size_t bin = 0; bin < bounds.low.events_per_bin.size(); ++bin) {
-    json["events_per_bin"].push_back(
-        {bounds.low.events_per_bin[bin], bounds.high.events_per_bin[bin]});
+  for (std::size_t i = 0; i < bounds.low.events_per_channel.size(); ++i) {
+    json["events_per_channel"].push_back(
+        {bounds.low.events_per_channel[i], bounds.high.events_per_channel[i]});
   }
   if (method.direction) {
     json["direction"] = {method.direction_bounds.low, method.direction_bounds.high};
@@ -263,7 +276,7 @@ nlohmann::json bounds_json(const MethodSummary& method) {
   return json;
 }
 
-nlohmann::json method_json(const MethodSummary& method,
+nlohmann::json method_json(const MethodSummary& method, const RealismScores& real,
                            const std::vector<IntervalSummary>& intervals) {
   nlohmann::json pairs = nlohmann::json::array();
   for (std::size_t i = 0; i < method.intervals.size(); ++i) {
@@ -276,6 +289,7 @@ nlohmann::json method_json(const MethodSummary& method,
   return {{"name", method.name},
           {"settings", method.settings},
           {"mean", scores_json(method.mean, method.direction)},
+          {"share_distance", share_distance(method.mean, real)},
           {"bounds", bounds_json(method)},
           {"pairs", pairs}};
 }
@@ -291,7 +305,7 @@ nlohmann::json report_json(const RealismReport& report) {
   }
   nlohmann::json methods = nlohmann::json::array();
   for (const MethodSummary& method : report.methods) {
-    methods.push_back(method_json(method, report.intervals));
+    methods.push_back(method_json(method, report.real.mean, report.intervals));
   }
   return {{"recording", report.recording},
           {"height", report.size.height},
@@ -299,7 +313,7 @@ nlohmann::json report_json(const RealismReport& report) {
           {"bins", report.bins},
           {"seed", report.seed},
           {"pairs", pairs},
-          {"real", method_json(report.real, report.intervals)},
+          {"real", method_json(report.real, report.real.mean, report.intervals)},
           {"methods", methods},
           {"wall_seconds", report.wall_seconds}};
 }

@@ -11,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
 #include "pipeline/runtime/threads.h"
+#include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/events/volume_statistics.h"
@@ -22,25 +23,61 @@
 namespace eventgan {
 namespace {
 
+std::vector<float> network_volume(const Generator& generator, const IntervalFrames& frames,
+                                  std::optional<double> threshold) {
+  const ImageSize size = frames.previous.size;
+  std::vector<float> volume(VolumeShape{generator.bins(), size}.value_count());
+  generator.generate({network_input(frames), size, threshold}, volume);
+  return volume;
+}
+
+CounterRandom draw_random(const std::string& method, const FrameInterval& interval, int draw,
+                          std::uint64_t seed) {
+  return CounterRandom(seed)
+      .keyed("realism")
+      .keyed(method)
+      .keyed(std::to_string(interval.first) + ":" + std::to_string(interval.last))
+      .keyed(std::to_string(draw));
+}
+
+std::string threshold_text(double threshold, bool fitted, double log_epsilon) {
+  return fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})", threshold,
+                     fitted ? " (fitted)" : "", log_epsilon);
+}
+
 class NetworkMethod final : public VolumeMethod {
  public:
-  NetworkMethod(std::unique_ptr<Generator> generator, std::string weights)
-      : generator_(std::move(generator)), weights_(std::move(weights)) {}
+  NetworkMethod(std::unique_ptr<Generator> generator, std::string weights,
+                std::optional<double> threshold, bool fitted, std::uint64_t seed)
+      : generator_(std::move(generator)),
+        weights_(std::move(weights)),
+        threshold_(threshold),
+        fitted_(fitted),
+        seed_(seed) {}
 
   std::string name() const override { return "network"; }
-  std::string settings() const override { return "weights " + weights_; }
-  int draws() const override { return 1; }
+  std::string settings() const override {
+    const std::string text = "weights " + weights_;
+    if (!threshold_) return text;
+    return fmt::format("{}, {}, mean of {} draws of events", text,
+                       threshold_text(*threshold_, fitted_, kFrameLogEpsilon), draws());
+  }
+  int draws() const override { return threshold_ ? 5 : 1; }
 
-  std::vector<float> volume(const IntervalFrames& frames, int /*draw*/) const override {
-    const ImageSize size = frames.previous.size;
-    std::vector<float> volume(VolumeShape{generator_->bins(), size}.value_count());
-    generator_->generate({network_input(frames), size}, volume);
-    return volume;
+  std::vector<float> volume(const IntervalFrames& frames, int draw) const override {
+    std::vector<float> volume = network_volume(*generator_, frames, threshold_);
+    if (!threshold_) return volume;
+    draw_events(volume, {generator_->bins(), frames.previous.size},
+                draw_random(name(), frames.interval, draw, seed_));
+    return normalized(std::move(volume));
   }
 
  private:
   std::unique_ptr<Generator> generator_;
   std::string weights_;
+  std::optional<double> threshold_;
+  bool fitted_;
+  std::uint64_t seed_;
 };
 
 Weights named_weights(const std::string& name) {
@@ -56,8 +93,10 @@ Weights named_weights(const std::string& name) {
 }  // namespace
 
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
-                                                  const std::string& weights) {
-  return std::make_unique<NetworkMethod>(std::move(generator), weights);
+                                                  const std::string& weights,
+                                                  std::optional<double> threshold, bool fitted,
+                                                  std::uint64_t seed) {
+  return std::make_unique<NetworkMethod>(std::move(generator), weights, threshold, fitted, seed);
 }
 
 std::unique_ptr<Generator> open_realism_generator(const std::string& weights) {
@@ -73,18 +112,9 @@ constexpr double kLeastThreshold = 0.01;
 constexpr double kLargestThreshold = 5;
 constexpr double kSpreadShare = 0.15;
 
-CounterRandom draw_random(const SimulatedScene& scene, const FrameInterval& interval, int draw,
-                          std::uint64_t seed) {
-  return CounterRandom(seed)
-      .keyed("realism")
-      .keyed(scene.name)
-      .keyed(std::to_string(interval.first) + ":" + std::to_string(interval.last))
-      .keyed(std::to_string(draw));
-}
-
-std::vector<Event> draw_events(const SimulatedScene& scene, const IntervalFrames& frames, int draw,
-                               const SensorSpec& sensor, std::uint64_t seed) {
-  return scene.events(frames, sensor, draw_random(scene, frames.interval, draw, seed));
+std::vector<Event> simulated_events(const SimulatedScene& scene, const IntervalFrames& frames,
+                                    int draw, const SensorSpec& sensor, std::uint64_t seed) {
+  return scene.events(frames, sensor, draw_random(scene.name, frames.interval, draw, seed));
 }
 
 class SimulatedMethod final : public VolumeMethod {
@@ -97,15 +127,14 @@ class SimulatedMethod final : public VolumeMethod {
 
   std::string settings() const override {
     const std::string text =
-        fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})", sensor_.positive_threshold,
-                    fitted_ ? " (fitted)" : "", sensor_.log_epsilon);
+        threshold_text(sensor_.positive_threshold, fitted_, sensor_.log_epsilon);
     return scene_.draws == 1 ? text : fmt::format("{}, mean of {} motions", text, scene_.draws);
   }
 
   int draws() const override { return scene_.draws; }
 
   std::vector<float> volume(const IntervalFrames& frames, int draw) const override {
-    return normalized(event_volume(draw_events(scene_, frames, draw, sensor_, seed_),
+    return normalized(event_volume(simulated_events(scene_, frames, draw, sensor_, seed_),
                                    {bins_, frames.previous.size}));
   }
 
@@ -151,27 +180,20 @@ std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const 
   return std::make_unique<SimulatedMethod>(std::move(scene), sensor, fitted, bins, seed);
 }
 
-double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
-                        double log_epsilon, std::uint64_t seed, int threads) {
+namespace {
+
+/// Bisects: `made` gives the events at a threshold, fewer the higher it is.
+template <class Made>
+double bisect_threshold(std::span<const IntervalFrames> frames, const ThresholdRange& range,
+                        const Made& made) {
   double wanted = 0;
   for (const IntervalFrames& interval : frames) {
     wanted += static_cast<double>(interval.event_count);
   }
-  const auto made = [&](double threshold) {
-    const SensorSpec sensor = realism_sensor(threshold, log_epsilon);
-    const auto draws = static_cast<std::size_t>(scene.draws);
-    std::vector<std::size_t> counts(frames.size() * draws);
-    for_each_index(counts.size(), threads, [&](std::size_t i) {
-      counts[i] =
-          draw_events(scene, frames[i / draws], static_cast<int>(i % draws), sensor, seed).size();
-    });
-    return static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0})) /
-           scene.draws;
-  };
   constexpr int kMostSteps = 16;  // 500^(1/2^16): far below the tolerance
   constexpr double kTolerance = 0.005;
-  double low = kLeastThreshold;
-  double high = kLargestThreshold;
+  double low = range.lowest;
+  double high = range.highest;
   for (int step = 0; step < kMostSteps; ++step) {
     const double middle = std::sqrt(low * high);
     const double count = made(middle);
@@ -179,6 +201,36 @@ double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFra
     (count > wanted ? low : high) = middle;
   }
   return std::sqrt(low * high);
+}
+
+}  // namespace
+
+double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
+                        double log_epsilon, std::uint64_t seed, int threads) {
+  return bisect_threshold(frames, {kLeastThreshold, kLargestThreshold}, [&](double threshold) {
+    const SensorSpec sensor = realism_sensor(threshold, log_epsilon);
+    const auto draws = static_cast<std::size_t>(scene.draws);
+    std::vector<std::size_t> counts(frames.size() * draws);
+    for_each_index(counts.size(), threads, [&](std::size_t i) {
+      counts[i] =
+          simulated_events(scene, frames[i / draws], static_cast<int>(i % draws), sensor, seed)
+              .size();
+    });
+    return static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0})) /
+           scene.draws;
+  });
+}
+
+double fitted_threshold(const Generator& generator, std::span<const IntervalFrames> frames,
+                        int threads) {
+  return bisect_threshold(frames, generator.thresholds().value(), [&](double threshold) {
+    std::vector<double> sums(frames.size());
+    for_each_index(frames.size(), threads, [&](std::size_t i) {
+      const std::vector<float> rates = network_volume(generator, frames[i], threshold);
+      sums[i] = std::accumulate(rates.begin(), rates.end(), 0.0);
+    });
+    return std::accumulate(sums.begin(), sums.end(), 0.0);
+  });
 }
 
 }  // namespace eventgan

@@ -29,9 +29,12 @@ class VolumeMethod {
 };
 
 /// The generator as "network": the frames go in as they are, at their own size, in [-1, 1].
-/// `weights` is stated in the report.
+/// `weights` is stated in the report. A network that knows its sensor is told `threshold`, `fitted`
+/// or not, and gives events drawn by the seed (draw_events); others are told none.
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
-                                                  const std::string& weights);
+                                                  const std::string& weights,
+                                                  std::optional<double> threshold, bool fitted,
+                                                  std::uint64_t seed);
 
 /// The generator of a safetensors file, of "shipped" or of "shipped:WIDTH". Throws InputError if
 /// the weights cannot be read or are not shipped, UsageError for another WIDTH than 1..64 and for
@@ -65,5 +68,10 @@ std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const 
 /// a higher threshold makes fewer events. The result does not depend on `threads`.
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
                         double log_epsilon, std::uint64_t seed, int threads);
+
+/// The same through a network that knows its sensor: with which its rates add up to the camera's
+/// events.
+double fitted_threshold(const Generator& generator, std::span<const IntervalFrames> frames,
+                        int threads);
 
 }  // namespace eventgan

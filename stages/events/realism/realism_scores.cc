@@ -179,13 +179,12 @@ void add_amounts(const std::vector<float>& volume, const VolumeShape& shape,
   const auto pixels = static_cast<double>(plane);
   double positive = 0;
   double total = 0;
-  scores.events_per_bin.assign(static_cast<std::size_t>(shape.bins), 0.0);
   for (int channel = 0; channel < shape.channels(); ++channel) {
     double sum = 0;
     for (std::size_t i = 0; i < plane; ++i) {
       sum += static_cast<double>(volume[static_cast<std::size_t>(channel) * plane + i]);
     }
-    scores.events_per_bin[static_cast<std::size_t>(channel % shape.bins)] += sum / pixels;
+    scores.events_per_channel.push_back(sum / pixels);
     if (channel < shape.bins) positive += sum;
     total += sum;
   }
@@ -274,22 +273,45 @@ RealismScores field_by_field(std::span<const RealismScores> scores, Reduce reduc
     result.*field = reduce([&, field](std::size_t i) { return scores[i].*field; });
   }
   if (scores.empty()) return result;
-  const std::size_t bins = scores.front().events_per_bin.size();
+  const std::size_t channels = scores.front().events_per_channel.size();
   for (const RealismScores& pair : scores) {
-    if (pair.events_per_bin.size() != bins) {
-      throw std::invalid_argument("expected scores with one number of time bins, got " +
-                                  std::to_string(bins) + " and " +
-                                  std::to_string(pair.events_per_bin.size()));
+    if (pair.events_per_channel.size() != channels) {
+      throw std::invalid_argument("expected scores with one number of channels, got " +
+                                  std::to_string(channels) + " and " +
+                                  std::to_string(pair.events_per_channel.size()));
     }
   }
-  for (std::size_t bin = 0; bin < bins; ++bin) {
-    result.events_per_bin.push_back(
-        reduce([&, bin](std::size_t i) { return scores[i].events_per_bin[bin]; }));
+  for (std::size_t channel = 0; channel < channels; ++channel) {
+    result.events_per_channel.push_back(
+        reduce([&, channel](std::size_t i) { return scores[i].events_per_channel[channel]; }));
   }
   return result;
 }
 
 }  // namespace
+
+std::vector<double> RealismScores::events_per_bin() const {
+  const std::size_t bins = events_per_channel.size() / 2;
+  std::vector<double> sums(events_per_channel.begin(),
+                           events_per_channel.begin() + static_cast<std::ptrdiff_t>(bins));
+  for (std::size_t bin = 0; bin < bins; ++bin) sums[bin] += events_per_channel[bins + bin];
+  return sums;
+}
+
+double share_distance(const RealismScores& scores, const RealismScores& real) {
+  const std::size_t channels = real.events_per_channel.size();
+  if (scores.events_per_channel.size() != channels) {
+    throw std::invalid_argument("expected scores with one number of channels, got " +
+                                std::to_string(channels) + " and " +
+                                std::to_string(scores.events_per_channel.size()));
+  }
+  double distance = 0;
+  for (std::size_t i = 0; i < channels; ++i) {
+    distance += std::abs(scores.events_per_channel[i] / scores.events_per_pixel -
+                         real.events_per_channel[i] / real.events_per_pixel);
+  }
+  return channels > 0 ? distance : std::numeric_limits<double>::quiet_NaN();
+}
 
 RealismScores mean_scores(std::span<const RealismScores> scores) {
   return field_by_field(scores, [&](const auto& value_of) {

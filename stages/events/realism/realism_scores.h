@@ -32,8 +32,16 @@ struct RealismScores {
                                     ///< log intensity ln((next + 1)/(previous + 1)), u in 0..255
   double events_per_pixel = 0;      ///< Σ V̂ / (H W)
   double positive_share = 0;        ///< Σ positive / Σ both; NaN if empty
-  std::vector<double> events_per_bin;  ///< Σ V̂ per time bin, both polarities, / (H W)
+  std::vector<double> events_per_channel;  ///< Σ V̂ per time bin / (H W), positive ones first
+
+  /// Both polarities.
+  std::vector<double> events_per_bin() const;
 };
+
+/// Σ over the channels of |share of the events - share of the real events|, 0..2: how differently
+/// two cameras spread their events over time and polarity. NaN where either has none. Throws
+/// std::invalid_argument if the numbers of channels differ.
+double share_distance(const RealismScores& scores, const RealismScores& real);
 
 /// volume, real: [2 bins, y, x] float32, C order, ≥ 0, dimensionless; what is above 1 counts as 1.
 /// Counts of events are to be divided by their η98 first; a generator trained on such volumes gives
