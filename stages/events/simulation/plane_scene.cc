@@ -49,8 +49,8 @@ PlaneTexture draw_texture(std::size_t texture_count, Draws& draws) {
 
 /// A motion by `shift_px` of what lies within `radius_px` of its centre.
 PlaneMotion draw_motion(PlanePoint centre, double radius_px, double shift_px, Draws& draws) {
-  // What turns and grows moves a point at the radius by no more than the whole moves.
-  const double turn = std::min(shift_px * draws.uniform(0, 1) / radius_px, 0.3);
+  // Each of turning and growing moves a point at the radius by less than the whole moves.
+  const double turn = std::min(shift_px * draws.uniform(0, 0.7) / radius_px, 0.3);
   const double rotation = draws.uniform(-turn, turn);
   const double zoom = draws.uniform(-turn, turn);
   const double stretch = draws.uniform(-turn, turn) / 3;

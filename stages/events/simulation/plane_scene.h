@@ -17,7 +17,8 @@ struct PlanePoint {
 };
 
 /// What is to be seen on a plane: a part of a photograph, u in 0..255, as linear intensity
-///   I = scale (u/255)^exponent,  with the scale that gives the part the mean `mean_intensity`.
+///   I = scale (u/255)^exponent,  with the scale that gives the part the mean `mean_intensity`;
+/// a part whose mean is below 0.01 before is scaled like one of 0.01, so that black stays dark.
 struct PlaneTexture {
   std::size_t image = 0;   ///< which of the textures
   double x_place = 0.5;    ///< where in it the part lies, 0 = at its left end, 1 = at its right
