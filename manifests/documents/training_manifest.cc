@@ -92,7 +92,12 @@ RecordingSpec read_recording(const StrictValue& value) {
     }
   }
   if (const auto threshold = object.find("threshold")) {
-    spec.threshold = threshold->number(0.01, 5);
+    spec.threshold = ContrastThreshold{threshold->number(0.01, 5)};
+  }
+  if (const auto ratio = object.find("threshold_ratio")) {
+    if (!spec.threshold) ratio->fault("threshold beside it", "none");
+    spec.threshold =
+        ContrastThreshold{spec.threshold.value_or(ContrastThreshold{}).mean, ratio->number(0.2, 5)};
   }
   object.finish();
   return spec;

@@ -6,6 +6,17 @@
 
 namespace eventgan {
 
+/// How far a sensor's log intensity moves between two events of a pixel: C₊ = C/√ρ for positive
+/// events, C₋ = C√ρ for negative ones.
+struct ContrastThreshold {
+  double mean = 0;   ///< C, the geometric mean of both, > 0
+  double ratio = 1;  ///< ρ, of the negative one to the positive one, > 0
+
+  double positive() const { return mean / std::sqrt(ratio); }
+  double negative() const { return mean * std::sqrt(ratio); }
+  bool operator==(const ContrastThreshold&) const = default;
+};
+
 /// Contrast thresholds that something was made for, log units: 0 < lowest ≤ highest.
 struct ThresholdRange {
   double lowest = 0;
@@ -24,10 +35,10 @@ inline constexpr double kMostThresholds = 10;
 /// What a network that knows its sensor sees, [plane, y, x] float32, C order, in [-1, 1]: the
 /// two frames, and between them the change of log intensity in contrast thresholds C,
 ///   clamp((L(next) - L(previous)) / C, -m, m) / m,  L = ln(u/255 + ε), u the nearest of 0..255,
-/// ε = kFrameLogEpsilon, m = kMostThresholds. A pixel that is not a number in either frame is none
-/// in the third plane.
+/// C = C₊ where it rises and C₋ where it falls, ε = kFrameLogEpsilon, m = kMostThresholds. A pixel
+/// that is not a number in either frame is none in the third plane.
 ///
-/// frames: [frame, y, x] float32, previous then next, in [-1, 1]. threshold: > 0. Thread safe.
-std::vector<float> sensor_input(std::span<const float> frames, double threshold);
+/// frames: [frame, y, x] float32, previous then next, in [-1, 1]. Thread safe.
+std::vector<float> sensor_input(std::span<const float> frames, const ContrastThreshold& threshold);
 
 }  // namespace eventgan

@@ -10,6 +10,7 @@
 
 #include "manifests/values/frames.h"
 #include "manifests/values/job.h"
+#include "manifests/values/sensor_input.h"
 
 namespace eventgan {
 
@@ -33,9 +34,9 @@ struct RecordingSpec {
   double weight = 1;                       ///< relative chance of a sample to come from here, > 0
   std::int64_t first_frame = 0;            ///< frames before are not used
   std::optional<std::int64_t> last_frame;  ///< frames after are not used; none: to the end
-  /// The sensor's contrast threshold in the frames' log intensity, 0.01..5; NetworkSpec::sensor
+  /// The sensor's in the frames' log intensity, mean 0.01..5, ratio 0.2..5; NetworkSpec::sensor
   /// needs it.
-  std::optional<double> threshold;
+  std::optional<ContrastThreshold> threshold;
   bool operator==(const RecordingSpec&) const = default;
 };
 

@@ -70,10 +70,13 @@ std::optional<FlowField> flow_path(const Recording& recording, const FrameInterv
 namespace {
 
 IntervalFrames frames_of(const Recording& recording, const FrameInterval& interval,
-                         std::size_t event_count) {
-  return {interval, recording.frame_time_s(interval.last) - recording.frame_time_s(interval.first),
-          recording.frame(interval.first), recording.frame(interval.last),
-          static_cast<std::int64_t>(event_count)};
+                         const std::vector<Event>& events) {
+  return {interval,
+          recording.frame_time_s(interval.last) - recording.frame_time_s(interval.first),
+          recording.frame(interval.first),
+          recording.frame(interval.last),
+          std::ssize(events),
+          std::ranges::count(events, true, &Event::positive)};
 }
 
 void check_range(const Recording& recording, std::int64_t first, std::int64_t last) {
@@ -125,13 +128,12 @@ std::vector<float> network_input(const IntervalFrames& frames) {
 }
 
 IntervalFrames read_frames(const Recording& recording, const FrameInterval& interval) {
-  return frames_of(recording, interval,
-                   recording.events_between(interval.first, interval.last).size());
+  return frames_of(recording, interval, recording.events_between(interval.first, interval.last));
 }
 
 RealInterval read_interval(const Recording& recording, const FrameInterval& interval, int bins) {
   const std::vector<Event> events = recording.events_between(interval.first, interval.last);
-  return {frames_of(recording, interval, events.size()),
+  return {frames_of(recording, interval, events),
           normalized(event_volume(events, {bins, recording.size()})),
           flow_path(recording, interval)};
 }

@@ -30,6 +30,7 @@ struct IntervalFrames {
   GreyImage previous;
   GreyImage next;
   std::int64_t event_count = 0;
+  std::int64_t positive_count = 0;  ///< of these
 };
 
 /// An interval with what the camera saw in it.

@@ -89,9 +89,9 @@ class MethodMaker {
   }
 
   std::unique_ptr<VolumeMethod> network(std::unique_ptr<Generator> generator) {
-    std::optional<double> threshold;
+    std::optional<ContrastThreshold> threshold;
     if (generator->thresholds()) {
-      threshold = options_.threshold ? *options_.threshold
+      threshold = options_.threshold ? ContrastThreshold{*options_.threshold}
                                      : fitted_threshold(*generator, fitted_frames(), threads_);
     }
     return make_network_method(std::move(generator), options_.weights, threshold,

@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <array>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -24,7 +25,7 @@ namespace eventgan {
 namespace {
 
 std::vector<float> network_volume(const Generator& generator, const IntervalFrames& frames,
-                                  std::optional<double> threshold) {
+                                  std::optional<ContrastThreshold> threshold) {
   const ImageSize size = frames.previous.size;
   std::vector<float> volume(VolumeShape{generator.bins(), size}.value_count());
   generator.generate({network_input(frames), size, threshold}, volume);
@@ -48,7 +49,7 @@ std::string threshold_text(double threshold, bool fitted, double log_epsilon) {
 class NetworkMethod final : public VolumeMethod {
  public:
   NetworkMethod(std::unique_ptr<Generator> generator, std::string weights,
-                std::optional<double> threshold, bool fitted, std::uint64_t seed)
+                std::optional<ContrastThreshold> threshold, bool fitted, std::uint64_t seed)
       : generator_(std::move(generator)),
         weights_(std::move(weights)),
         threshold_(threshold),
@@ -59,8 +60,9 @@ class NetworkMethod final : public VolumeMethod {
   std::string settings() const override {
     const std::string text = "weights " + weights_;
     if (!threshold_) return text;
-    return fmt::format("{}, {}, mean of {} draws of events", text,
-                       threshold_text(*threshold_, fitted_, kFrameLogEpsilon), draws());
+    return fmt::format("{}, {}, negative ÷ positive {:.3g}, mean of {} draws of events", text,
+                       threshold_text(threshold_->mean, fitted_, kFrameLogEpsilon),
+                       threshold_->ratio, draws());
   }
   int draws() const override { return threshold_ ? 5 : 1; }
 
@@ -75,7 +77,7 @@ class NetworkMethod final : public VolumeMethod {
  private:
   std::unique_ptr<Generator> generator_;
   std::string weights_;
-  std::optional<double> threshold_;
+  std::optional<ContrastThreshold> threshold_;
   bool fitted_;
   std::uint64_t seed_;
 };
@@ -94,8 +96,8 @@ Weights named_weights(const std::string& name) {
 
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
                                                   const std::string& weights,
-                                                  std::optional<double> threshold, bool fitted,
-                                                  std::uint64_t seed) {
+                                                  std::optional<ContrastThreshold> threshold,
+                                                  bool fitted, std::uint64_t seed) {
   return std::make_unique<NetworkMethod>(std::move(generator), weights, threshold, fitted, seed);
 }
 
@@ -182,32 +184,36 @@ std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const 
 
 namespace {
 
-/// Bisects: `made` gives the events at a threshold, fewer the higher it is.
-template <class Made>
-double bisect_threshold(std::span<const IntervalFrames> frames, const ThresholdRange& range,
-                        const Made& made) {
-  double wanted = 0;
-  for (const IntervalFrames& interval : frames) {
-    wanted += static_cast<double>(interval.event_count);
+/// Looks for the threshold that gives as many events as are wanted, fewer the higher it is.
+class Bisection {
+ public:
+  Bisection(double wanted, const ThresholdRange& range) : wanted_(wanted), range_(range) {}
+
+  double threshold() const { return range_.geometric_mean(); }
+  /// Within 0.5 %.
+  bool is_near(double count) const {
+    return wanted_ > 0 && std::abs(count - wanted_) <= 0.005 * wanted_;
   }
-  constexpr int kMostSteps = 16;  // 500^(1/2^16): far below the tolerance
-  constexpr double kTolerance = 0.005;
-  double low = range.lowest;
-  double high = range.highest;
-  for (int step = 0; step < kMostSteps; ++step) {
-    const double middle = std::sqrt(low * high);
-    const double count = made(middle);
-    if (wanted > 0 && std::abs(count - wanted) <= kTolerance * wanted) return middle;
-    (count > wanted ? low : high) = middle;
-  }
-  return std::sqrt(low * high);
+  void take(double count) { (count > wanted_ ? range_.lowest : range_.highest) = threshold(); }
+
+ private:
+  double wanted_;
+  ThresholdRange range_;
+};
+
+constexpr int kMostSteps = 16;  // 500^(1/2^16): far below the tolerance
+
+double event_count(std::span<const IntervalFrames> frames, std::int64_t IntervalFrames::*member) {
+  double count = 0;
+  for (const IntervalFrames& interval : frames) count += static_cast<double>(interval.*member);
+  return count;
 }
 
 }  // namespace
 
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
                         double log_epsilon, std::uint64_t seed, int threads) {
-  return bisect_threshold(frames, {kLeastThreshold, kLargestThreshold}, [&](double threshold) {
+  const auto made = [&](double threshold) {
     const SensorSpec sensor = realism_sensor(threshold, log_epsilon);
     const auto draws = static_cast<std::size_t>(scene.draws);
     std::vector<std::size_t> counts(frames.size() * draws);
@@ -218,19 +224,45 @@ double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFra
     });
     return static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0})) /
            scene.draws;
-  });
+  };
+  Bisection bisection(event_count(frames, &IntervalFrames::event_count),
+                      {kLeastThreshold, kLargestThreshold});
+  for (int step = 0; step < kMostSteps; ++step) {
+    const double count = made(bisection.threshold());
+    if (bisection.is_near(count)) break;
+    bisection.take(count);
+  }
+  return bisection.threshold();
 }
 
-double fitted_threshold(const Generator& generator, std::span<const IntervalFrames> frames,
-                        int threads) {
-  return bisect_threshold(frames, generator.thresholds().value(), [&](double threshold) {
-    std::vector<double> sums(frames.size());
+ContrastThreshold fitted_threshold(const Generator& generator,
+                                   std::span<const IntervalFrames> frames, int threads) {
+  const double positive_count = event_count(frames, &IntervalFrames::positive_count);
+  const double all = event_count(frames, &IntervalFrames::event_count);
+  const ThresholdRange range = generator.thresholds().value();
+  Bisection positive(positive_count, range);
+  Bisection negative(all - positive_count, range);
+  ContrastThreshold threshold;
+  for (int step = 0; step < kMostSteps; ++step) {
+    threshold = {std::sqrt(positive.threshold() * negative.threshold()),
+                 negative.threshold() / positive.threshold()};
+    std::vector<std::array<double, 2>> sums(frames.size());
     for_each_index(frames.size(), threads, [&](std::size_t i) {
       const std::vector<float> rates = network_volume(generator, frames[i], threshold);
-      sums[i] = std::accumulate(rates.begin(), rates.end(), 0.0);
+      const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
+      sums[i] = {std::accumulate(rates.begin(), middle, 0.0),
+                 std::accumulate(middle, rates.end(), 0.0)};
     });
-    return std::accumulate(sums.begin(), sums.end(), 0.0);
-  });
+    std::array<double, 2> counts{};
+    for (const auto& sum : sums) {
+      counts[0] += sum[0];
+      counts[1] += sum[1];
+    }
+    if (positive.is_near(counts[0]) && negative.is_near(counts[1])) break;
+    positive.take(counts[0]);
+    negative.take(counts[1]);
+  }
+  return threshold;
 }
 
 }  // namespace eventgan

@@ -33,8 +33,8 @@ class VolumeMethod {
 /// or not, and gives events drawn by the seed (draw_events); others are told none.
 std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> generator,
                                                   const std::string& weights,
-                                                  std::optional<double> threshold, bool fitted,
-                                                  std::uint64_t seed);
+                                                  std::optional<ContrastThreshold> threshold,
+                                                  bool fitted, std::uint64_t seed);
 
 /// The generator of a safetensors file, of "shipped" or of "shipped:WIDTH". Throws InputError if
 /// the weights cannot be read or are not shipped, UsageError for another WIDTH than 1..64 and for
@@ -70,8 +70,8 @@ double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFra
                         double log_epsilon, std::uint64_t seed, int threads);
 
 /// The same through a network that knows its sensor: with which its rates add up to the camera's
-/// events.
-double fitted_threshold(const Generator& generator, std::span<const IntervalFrames> frames,
-                        int threads);
+/// events of either polarity.
+ContrastThreshold fitted_threshold(const Generator& generator,
+                                   std::span<const IntervalFrames> frames, int threads);
 
 }  // namespace eventgan

@@ -64,10 +64,10 @@ namespace {
 /// as the threshold of more or less contrast.
 std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest) {
   if (!manifest.network.sensor) return std::nullopt;
-  const auto [low, high] = std::ranges::minmax(manifest.recordings, {},
-                                               [](const auto& spec) { return *spec.threshold; });
-  ThresholdRange range{*low.threshold * manifest.augmentation.gamma[0],
-                       *high.threshold * manifest.augmentation.gamma[1]};
+  const auto [low, high] = std::ranges::minmax(
+      manifest.recordings, {}, [](const auto& spec) { return spec.threshold->mean; });
+  ThresholdRange range{low.threshold->mean * manifest.augmentation.gamma[0],
+                       high.threshold->mean * manifest.augmentation.gamma[1]};
   if (manifest.simulated) {
     range.lowest = std::min(range.lowest, kPlaneThresholds.lowest);
     range.highest = std::max(range.highest, kPlaneThresholds.highest);

@@ -23,10 +23,10 @@ namespace eventgan {
 struct TrainingRecording {
   std::filesystem::path file;  ///< absolute
   std::shared_ptr<const Recording> recording;
-  double weight = 1;                ///< relative chance of a sample to come from here
-  std::int64_t first_frame = 0;     ///< of the part in use
-  std::int64_t last_frame = 0;      ///< of the part in use, itself included; > first_frame
-  std::optional<double> threshold;  ///< its sensor's, for a network that knows it
+  double weight = 1;             ///< relative chance of a sample to come from here
+  std::int64_t first_frame = 0;  ///< of the part in use
+  std::int64_t last_frame = 0;   ///< of the part in use, itself included; > first_frame
+  std::optional<ContrastThreshold> threshold;  ///< its sensor's, for a network that knows it
 };
 
 /// Opens the recordings of a manifest; relative paths start at `directory`. Throws InputError if

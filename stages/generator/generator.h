@@ -24,9 +24,8 @@ struct GeneratorInput {
   /// [frame, y, x] float32, C order, previous then next, in [-1, 1].
   std::span<const float> frames;
   ImageSize size;
-  /// Contrast threshold of the sensor, log units, > 0, for a generator that has thresholds();
-  /// none: the generator's own.
-  std::optional<double> threshold = std::nullopt;
+  /// Of the sensor, for a generator that has thresholds(); none: the generator's own.
+  std::optional<ContrastThreshold> threshold = std::nullopt;
 };
 
 /// What an engine noticed while it made a volume.

@@ -49,13 +49,15 @@ std::string describe_training_gaps(const std::optional<GapRange>& gaps) {
 std::span<const float> network_planes(const GeneratorInput& pair,
                                       const std::optional<ThresholdRange>& thresholds,
                                       std::vector<float>& kept) {
-  if (pair.threshold && !(thresholds && *pair.threshold > 0)) {
+  const ContrastThreshold told = pair.threshold.value_or(
+      ContrastThreshold{thresholds.value_or(ThresholdRange{1, 1}).geometric_mean()});
+  if ((pair.threshold && !thresholds) || !(told.mean > 0 && told.ratio > 0)) {
     throw std::invalid_argument(
         "expected " + std::string(thresholds ? "a contrast threshold above 0" : "none") +
-        " for these weights, got a contrast threshold of " + std::to_string(*pair.threshold));
+        " for these weights, got a contrast threshold of " + std::to_string(told.mean));
   }
   if (!thresholds) return pair.frames;
-  return kept = sensor_input(pair.frames, pair.threshold.value_or(thresholds->geometric_mean()));
+  return kept = sensor_input(pair.frames, told);
 }
 
 std::size_t activation_bytes(ImageSize size, int base_channels, std::size_t value_bytes) {

@@ -117,7 +117,10 @@ TrainingSample augment(const TrainingSample& sample, const Augmentation& augment
     for (float& x : result.network_frames)
       x = with_gain_and_gamma(x, augmentation.gain, augmentation.gamma);
   }
-  if (sample.threshold) result.threshold = *sample.threshold * augmentation.gamma;
+  if (const auto& told = sample.threshold) {
+    result.threshold = ContrastThreshold{told->mean * augmentation.gamma,
+                                         augmentation.reverse ? 1 / told->ratio : told->ratio};
+  }
   result.origin =
       sample.origin + ", crop " + to_string(augmentation.crop) + " at row " +
       std::to_string(augmentation.top) + ", column " + std::to_string(augmentation.left) +

@@ -7,6 +7,7 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/events.h"
 #include "manifests/values/frames.h"
+#include "manifests/values/sensor_input.h"
 #include "manifests/values/training.h"
 
 namespace eventgan {
@@ -23,7 +24,7 @@ struct TrainingSample {
   /// sensor, as it is.
   std::vector<float> volume;
   /// The sensor's in the network frames' log intensity; none unless the network knows its sensor.
-  std::optional<double> threshold = std::nullopt;
+  std::optional<ContrastThreshold> threshold = std::nullopt;
   std::string origin;  ///< for messages: recording, frames, crop
 };
 
@@ -52,7 +53,8 @@ Augmentation draw_augmentation(ImageSize image, ImageSize crop, const Augmentati
 ///
 ///   u' = min(1, gain · u^gamma),  u = (x + 1) / 2 in [0, 1],  x' = 2 u' - 1,
 ///
-/// exactly the frames where gain and gamma are 1; a threshold grows by gamma, as contrasts do.
+/// exactly the frames where gain and gamma are 1; a threshold grows by gamma, as contrasts do, and
+/// in reversed time the ratio of its polarities is turned over.
 /// `network_frames` of the input are not looked at.
 /// A NaN stays one. The origin names the crop. Throws std::invalid_argument if the crop is empty or
 /// leaves the sample, or the sample's arrays do not have its shape. Thread safe.

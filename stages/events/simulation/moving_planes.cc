@@ -310,7 +310,8 @@ class Renderer {
 /// dV/dt = (I - V) / τ for an intensity that is linear from one image to the next.
 class LowPass {
  public:
-  /// As if the first image had been seen `lag` late: V(t) ≈ I(t - τ).
+  /// Starts at `image` with `late`, what was seen about τ before: V(t) = I(t - τ) for a steady
+  /// change.
   LowPass(double cutoff_hz, Image image, Image late)
       : tau_s_(1 / (2 * std::numbers::pi * cutoff_hz)),
         image_(std::move(image)),
@@ -438,8 +439,9 @@ SimulatedPair simulate(const PlaneScene& scene, std::span<const GreyImage> textu
   }
   pair.previous = previous.frame(scene, random.keyed("previous"));
   pair.next = next.frame(scene, random.keyed("next"));
-  pair.threshold =
-      scene.gamma * std::sqrt(scene.sensor.positive_threshold * scene.sensor.negative_threshold);
+  const double positive = scene.sensor.positive_threshold;
+  const double negative = scene.sensor.negative_threshold;
+  pair.threshold = {scene.gamma * std::sqrt(positive * negative), negative / positive};
   return pair;
 }
 

@@ -17,14 +17,16 @@ struct SimulatedPair {
   GreyImage next;             ///< at duration_s
   std::vector<Event> events;  ///< in (0, duration_s], ordered as Sensor::step orders them
   double duration_s = 0;
-  /// The sensor's contrast threshold in units of the frames' log intensity. A frame shows
+  /// The sensor's contrast thresholds in units of the frames' log intensity. A frame shows
   /// u = 255 gain I^gamma of the light I, so ln u moves gamma times as far as ln I, and
-  ///   threshold = gamma √(C₊ C₋).
-  double threshold = 0;
+  ///   threshold = gamma √(C₊ C₋), of a ratio C₋/C₊.
+  ContrastThreshold threshold;
+
+  bool operator==(const SimulatedPair&) const = default;
 };
 
-/// Where SimulatedPair::threshold lies in the scenes that draw_plane_scene draws.
-inline constexpr ThresholdRange kPlaneThresholds{0.045, 0.88};
+/// Where the mean of SimulatedPair::threshold lies in the scenes that draw_plane_scene draws.
+inline constexpr ThresholdRange kPlaneThresholds{0.0675, 0.88};
 
 /// Renders a scene and shows it to a Sensor, in steps in which nothing moves much farther than
 /// 0.7 px (up to 64 of them from frame to frame).

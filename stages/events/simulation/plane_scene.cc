@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <numbers>
 #include <stdexcept>
-#include <string_view>
+#include <string>
 
 namespace eventgan {
 namespace {
@@ -39,7 +39,7 @@ PlaneTexture draw_texture(std::size_t texture_count, Draws& draws) {
   return {.image = draws.below(texture_count),
           .x_place = draws.uniform(0, 1),
           .y_place = draws.uniform(0, 1),
-          .pixel_ratio = draws.log_uniform(0.4, 2.5),
+          .pixel_ratio = draws.log_uniform(0.3, 1.8),
           .flip_x = draws.chance(0.5),
           .flip_y = draws.chance(0.5),
           .inverted = draws.chance(0.15),
@@ -49,8 +49,8 @@ PlaneTexture draw_texture(std::size_t texture_count, Draws& draws) {
 
 /// A motion by `shift_px` of what lies within `radius_px` of its centre.
 PlaneMotion draw_motion(PlanePoint centre, double radius_px, double shift_px, Draws& draws) {
-  // What turns and grows moves a point at the radius by no more than the whole moves.
-  const double turn = std::min(shift_px * draws.uniform(0, 1) / radius_px, 0.3);
+  // Each of turning and growing moves a point at the radius by less than the whole moves.
+  const double turn = std::min(shift_px * draws.uniform(0, 0.7) / radius_px, 0.3);
   const double rotation = draws.uniform(-turn, turn);
   const double zoom = draws.uniform(-turn, turn);
   const double stretch = draws.uniform(-turn, turn) / 3;
@@ -114,8 +114,8 @@ Plane draw_foreground(std::size_t texture_count, ImageSize size, double shift_px
 }
 
 SensorSpec draw_sensor(Draws& draws) {
-  const double threshold = draws.log_uniform(0.1, 0.8);
-  const double asymmetry = std::sqrt(draws.log_uniform(0.8, 1.25));
+  const double threshold = draws.log_uniform(0.15, 0.8);
+  const double asymmetry = std::sqrt(draws.log_uniform(0.5, 2));
   SensorSpec sensor;
   sensor.positive_threshold = threshold * asymmetry;
   sensor.negative_threshold = threshold / asymmetry;
@@ -143,10 +143,10 @@ PlaneScene draw_plane_scene(std::size_t texture_count, ImageSize size, CounterRa
   Draws draws(random.keyed("scene"));
   scene.duration_s = draws.log_uniform(0.005, 0.2);
   const bool is_static = draws.chance(0.05);
-  const bool camera_rests = is_static || draws.chance(0.25);
+  const bool camera_rests = is_static || draws.chance(0.3);
   if (!is_static && draws.chance(0.1)) scene.light_change = draws.uniform(-0.3, 0.3);
   const int foregrounds = draws.between(camera_rests ? 1 : 0, 4);
-  scene.optics_blur_px = draws.uniform(0, 1);
+  scene.optics_blur_px = draws.uniform(0.2, 1.4);
 
   Draws planes(random.keyed("planes"));
   scene.planes.push_back(
@@ -162,7 +162,10 @@ PlaneScene draw_plane_scene(std::size_t texture_count, ImageSize size, CounterRa
   scene.level_spread = 1;
   scene.exposure = camera.chance(0.5) ? camera.uniform(0.05, 0.6) : 0;
   scene.gamma = camera.uniform(0.45, 1.1);
-  scene.gain = camera.log_uniform(0.5, 1.6);
+  // As an automatic exposure sets it, within limits: the background's mean is some grey.
+  const double grey = camera.uniform(0.06, 0.65);
+  const double background = scene.planes.front().texture.mean_intensity;
+  scene.gain = std::clamp(grey / std::pow(background, scene.gamma), 0.3, 1.6);
   scene.read_noise_levels = camera.uniform(0, 2);
   return scene;
 }

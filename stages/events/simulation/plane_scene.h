@@ -2,7 +2,6 @@
 
 #include <array>
 #include <cstddef>
-#include <span>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -18,7 +17,8 @@ struct PlanePoint {
 };
 
 /// What is to be seen on a plane: a part of a photograph, u in 0..255, as linear intensity
-///   I = scale (u/255)^exponent,  with the scale that gives the part the mean `mean_intensity`.
+///   I = scale (u/255)^exponent,  with the scale that gives the part the mean `mean_intensity`;
+/// a part whose mean is below 0.01 before is scaled like one of 0.01, so that black stays dark.
 struct PlaneTexture {
   std::size_t image = 0;   ///< which of the textures
   double x_place = 0.5;    ///< where in it the part lies, 0 = at its left end, 1 = at its right
@@ -38,7 +38,8 @@ struct PlaneTexture {
 ///   s = u + a u (u - 1),  u = t / duration.
 ///
 /// So it is where it was drawn at the previous frame's time, u = 0, and d px away at the next
-/// one's, u = 1.
+/// one's, u = 1. The denominator must stay above 0 on the image. A background is rendered as far as
+/// it is seen: memory grows with the way.
 struct PlaneMotion {
   PlanePoint centre;                  ///< c
   PlanePoint shift_px;                ///< d
