@@ -6,30 +6,83 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 #include "stages/base/processor_clones.h"
 
 namespace eventgan {
 namespace {
 
-/// Of one polarity [bin, pixel]; the pixels' random numbers begin at `first_random`.
+constexpr std::size_t kTogether = 256;  ///< pixels, so that memory is read in its order
+constexpr float kMostApart = 64;
+
+/// Pixels of one polarity, [bin, pixel] with room for kTogether of each bin.
+struct Piece {
+  std::size_t bins = 0;
+  std::size_t pixels = 0;
+  std::array<float, kTogether> phases{};  ///< u
+  std::vector<float> rates, sums, counts;
+
+  explicit Piece(std::size_t bin_count)
+      : bins(bin_count), rates(bins * kTogether), sums(rates.size()), counts(rates.size()) {}
+};
+
+/// counts: how many whole numbers the sum passes in each bin; sums: how far it is beyond the last
+/// one when the bin begins, in [0, 1).
 EVENTGAN_CLONES
-void draw_polarity(float* volume, std::size_t bins, std::size_t plane, const CounterRandom& random,
-                   std::size_t first_random) {
-  constexpr std::size_t kTogether = 256;  // bin after bin, so that memory is read in its order
-  std::array<float, kTogether> sums;  // u + Λ, without the whole part: that keeps its precision
-  for (std::size_t first = 0; first < plane; first += kTogether) {
-    const std::size_t count = std::min(kTogether, plane - first);
-    for (std::size_t i = 0; i < count; ++i) {
-      // 24 bits, of which float32 rounds none up to 1.
-      sums[i] = static_cast<float>(random.bits(first_random + first + i) >> 40) * 0x1p-24f;
+void count_events(Piece& piece) {
+  std::array<float, kTogether> sums = piece.phases;
+  for (std::size_t first = 0; first < piece.rates.size(); first += kTogether) {
+    for (std::size_t i = 0; i < kTogether; ++i) {
+      const float sum = sums[i] + piece.rates[first + i];
+      piece.sums[first + i] = sums[i];
+      piece.counts[first + i] = std::floor(sum);
+      sums[i] = sum - piece.counts[first + i];
     }
-    for (std::size_t bin = 0; bin < bins; ++bin) {
+  }
+}
+
+/// Adds the events of a bin to a pixel whose bins lie `plane` apart.
+void add_events(std::size_t bin, std::size_t bins, float rate, float sum, float count,
+                std::size_t plane, float* pixel) {
+  const auto last = static_cast<float>(bins - 1);
+  const float begin = std::max(static_cast<float>(bin) - 0.5f, 0.0f);
+  const float end = std::min(static_cast<float>(bin) + 0.5f, last);
+  if (!(count <= kMostApart)) {
+    pixel[bin * plane] += count;
+    return;
+  }
+  for (float event = 1; event <= count; ++event) {
+    const float part = std::min((event - sum) / rate, 1.0f);
+    const float star = begin + part * (end - begin);
+    const auto before = static_cast<std::size_t>(star);
+    const float after = star - static_cast<float>(before);
+    pixel[before * plane] += 1 - after;
+    if (after > 0) pixel[(before + 1) * plane] += after;
+  }
+}
+
+/// Of one polarity [bin, pixel]; the pixels' random numbers begin at `first_random`.
+void draw_polarity(float* volume, std::size_t plane, const CounterRandom& random,
+                   std::size_t first_random, Piece& piece) {
+  for (std::size_t first = 0; first < plane; first += kTogether) {
+    piece.pixels = std::min(kTogether, plane - first);
+    for (std::size_t i = 0; i < piece.pixels; ++i) {
+      // 24 bits, of which float32 rounds none up to 1.
+      piece.phases[i] = static_cast<float>(random.bits(first_random + first + i) >> 40) * 0x1p-24f;
+    }
+    for (std::size_t bin = 0; bin < piece.bins; ++bin) {
       float* const values = volume + bin * plane + first;
-      for (std::size_t i = 0; i < count; ++i) {
-        const float sum = sums[i] + values[i];
-        values[i] = std::floor(sum);
-        sums[i] = sum - values[i];
+      std::copy_n(values, piece.pixels, piece.rates.data() + bin * kTogether);
+      std::fill_n(values, piece.pixels, 0.0f);
+    }
+    count_events(piece);
+    for (std::size_t bin = 0; bin < piece.bins; ++bin) {
+      for (std::size_t i = 0; i < piece.pixels; ++i) {
+        const std::size_t at = bin * kTogether + i;
+        if (piece.counts[at] == 0) continue;
+        add_events(bin, piece.bins, piece.rates[at], piece.sums[at], piece.counts[at], plane,
+                   volume + first + i);
       }
     }
   }
@@ -44,8 +97,9 @@ void draw_events(std::span<float> volume, const VolumeShape& shape, const Counte
   }
   const std::size_t plane = shape.size.pixel_count();
   const auto bins = static_cast<std::size_t>(shape.bins);
-  draw_polarity(volume.data(), bins, plane, random, 0);
-  draw_polarity(volume.data() + bins * plane, bins, plane, random, plane);
+  Piece piece(bins);
+  draw_polarity(volume.data(), plane, random, 0, piece);
+  draw_polarity(volume.data() + bins * plane, plane, random, plane, piece);
 }
 
 }  // namespace eventgan

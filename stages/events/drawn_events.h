@@ -7,19 +7,19 @@
 
 namespace eventgan {
 
-/// Puts whole events in the place of the numbers that are to be expected: a volume of rates [2
-/// bins, y, x] float32, C order, ≥ 0, becomes one of counts, in place.
+/// Draws events from the numbers that are to be expected: a volume of rates [2 bins, y, x] float32,
+/// C order, ≥ 0, becomes, in place, the volume of whole events (event_volume).
 ///
 /// An event camera's pixel adds up what changes and fires each time that this reaches a threshold;
 /// how far it is when the frames' interval begins nobody knows. So does this, for each pixel and
-/// polarity: with a phase u, uniform in [0, 1), and the sum of rates Λ_b up to and with bin b,
+/// polarity: from a phase u, uniform in [0, 1), the sum of the rates grows evenly within each bin
+/// b, from t* = b - 1/2 to b + 1/2 and not beyond 0 and bins - 1, and there is an event whenever it
+/// passes a whole number. The mean number of events in a bin is its rate. Their sum over time is
+/// within 1 of the rates' sum, where Poisson counts would scatter by its root. Polarities and
+/// pixels are independent. Of more than 64 events in a bin all lie in its middle.
 ///
-///   n_b = floor(u + Λ_b) - floor(u + Λ_(b-1)),  Λ_(-1) = 0.
-///
-/// The mean of n_b is the rate. The sum over time is within 1 of the sum of rates, where Poisson
-/// counts would scatter by its root. Polarities and pixels are independent. A value that is not
-/// finite stays one. `random` numbers: 2 y x. Throws std::invalid_argument if the volume does not
-/// have its shape's size. Thread safe.
+/// A value that is not finite stays one. Throws std::invalid_argument if the volume does not have
+/// its shape's size. Thread safe.
 void draw_events(std::span<float> volume, const VolumeShape& shape, const CounterRandom& random);
 
 }  // namespace eventgan

@@ -25,25 +25,53 @@ TEST(DrawEvents, NothingComesOfNothing) {
   EXPECT_TRUE(drawn({}, {9, {0, 0}}, 1).empty());
 }
 
-TEST(DrawEvents, WholeRatesAreTheEvents) {
-  const VolumeShape shape{3, {7, 301}};
-  EXPECT_THAT(drawn(std::vector<float>(shape.value_count(), 2.0f), shape, 1), Each(2.0f));
+/// Of pixel 0's polarity, over time.
+double sum_of(const std::vector<float>& volume, const VolumeShape& shape, std::size_t pixel,
+              int polarity) {
+  double sum = 0;
+  for (int bin = 0; bin < shape.bins; ++bin) {
+    const auto channel = static_cast<std::size_t>(polarity * shape.bins + bin);
+    sum += volume[channel * shape.size.pixel_count() + pixel];
+  }
+  return sum;
 }
 
-TEST(DrawEvents, MeanIsTheRate) {
-  const VolumeShape shape{2, {100, 100}};
+TEST(DrawEvents, AnEventLiesWhereTheSumPassesAWholeNumber) {
+  // All of a rate of 1 in one bin: one event, anywhere in it, shared by the bins next to its time.
+  const VolumeShape shape{3, {40, 40}};
   const std::size_t plane = shape.size.pixel_count();
-  const std::vector<float> rates{0.3f, 1.25f, 0.0f, 0.01f};  // by channel
-  std::vector<float> volume;
-  for (const float rate : rates) volume.insert(volume.end(), plane, rate);
-  const std::vector<float> events = drawn(volume, shape, 3);
-  for (std::size_t channel = 0; channel < rates.size(); ++channel) {
+  std::vector<float> rates(shape.value_count());
+  std::fill_n(rates.begin() + static_cast<std::ptrdiff_t>(plane), plane, 1.0f);
+  const std::vector<float> events = drawn(rates, shape, 1);
+  double early = 0, late = 0;
+  for (std::size_t i = 0; i < plane; ++i) {
+    ASSERT_NEAR(sum_of(events, shape, i, 0), 1, 1e-6);
+    ASSERT_EQ(sum_of(events, shape, i, 1), 0);
+    ASSERT_GE(events[plane + i], 0.5f);
+    early += events[i];
+    late += events[2 * plane + i];
+  }
+  // Times are uniform in 0.5..1.5, so an eighth goes to either side: ∫ (1/2 - s) ds over 0..1/2.
+  const double bound = 4 * std::sqrt(0.0260 / double(plane));  // the variance of max(0, 1/2 - s)
+  EXPECT_NEAR(early / double(plane), 0.125, bound);
+  EXPECT_NEAR(late / double(plane), 0.125, bound);
+}
+
+TEST(DrawEvents, EvenRatesStayEven) {
+  // What a camera sees of a steady change: end bins get half of what others do.
+  const VolumeShape shape{5, {100, 100}};
+  const std::size_t plane = shape.size.pixel_count();
+  std::vector<float> rates(shape.value_count(), 0.4f);
+  for (const std::size_t channel : {0, 4, 5, 9}) {
+    std::fill_n(rates.begin() + static_cast<std::ptrdiff_t>(channel * plane), plane, 0.2f);
+  }
+  const std::vector<float> events = drawn(rates, shape, 3);
+  for (std::size_t channel = 0; channel < 10; ++channel) {
     const auto first = events.begin() + static_cast<std::ptrdiff_t>(channel * plane);
     const double mean =
         std::accumulate(first, first + static_cast<std::ptrdiff_t>(plane), 0.0) / double(plane);
-    // The variance of a number between two whole ones is at most p (1 - p), twice that of two sums.
-    const double part = rates[channel] - std::floor(rates[channel]);
-    EXPECT_NEAR(mean, rates[channel], 4 * std::sqrt((part * (1 - part) + 0.25) / double(plane)));
+    // At most one event a bin, of at most 1: the variance is at most p (1 - p).
+    EXPECT_NEAR(mean, rates[channel * plane], 4 * std::sqrt(0.24 / double(plane))) << channel;
   }
 }
 
@@ -56,17 +84,19 @@ TEST(DrawEvents, SumOverTimeIsWithinOneOfTheRates) {
     rates[i] = static_cast<float>(3 * std::pow(random.uniform(i), 4));
   }
   const std::vector<float> events = drawn(rates, shape, 7);
-  for (std::size_t i = 0; i < 2 * plane; ++i) {
-    double expected = 0, made = 0;
-    for (std::size_t bin = 0; bin < 9; ++bin) {
-      const std::size_t at = (i / plane * 9 + bin) * plane + i % plane;
-      expected += rates[at];
-      made += events[at];
-      ASSERT_EQ(events[at], std::floor(events[at]));
-      ASSERT_GE(events[at], 0);
+  for (std::size_t i = 0; i < plane; ++i) {
+    for (const int polarity : {0, 1}) {
+      const double made = sum_of(events, shape, i, polarity);
+      ASSERT_NEAR(made, std::round(made), 1e-5);
+      ASSERT_LT(std::abs(made - sum_of(rates, shape, i, polarity)), 1 + 1e-4) << i;
     }
-    ASSERT_LT(std::abs(made - expected), 1 + 1e-4) << i;
   }
+  for (const float value : events) ASSERT_GE(value, 0);
+}
+
+TEST(DrawEvents, OneBinCounts) {
+  const VolumeShape shape{1, {3, 3}};
+  EXPECT_THAT(drawn(std::vector<float>(18, 2.0f), shape, 1), Each(2.0f));
 }
 
 TEST(DrawEvents, SeedDecides) {
