@@ -11,6 +11,7 @@
 #include "manifests/values/frames.h"
 #include "pipeline/runtime/memory.h"
 #include "stages/base/files/sha256.h"
+#include "stages/base/processor_clones.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/generator/generator.h"
@@ -18,24 +19,32 @@
 namespace eventgan {
 namespace {
 
+/// Grey values of [-1, 1], rounded to whole ones and half ones up; black of what is not a number.
+EVENTGAN_CLONES void round_grey(std::span<const float> frame, std::span<std::uint8_t> grey) {
+  for (std::size_t i = 0; i < frame.size(); ++i) {
+    const float u = (frame[i] / 2 + 0.5f) * 255;
+    const float inside = std::min(std::max(0.0f, u), 255.0f);  // 0 for NaN
+    // In halves, which are exact: a sum with 1/2 would round the number below 1/2 up.
+    grey[i] = static_cast<std::uint8_t>((static_cast<int>(2 * inside) + 1) / 2);
+  }
+}
+
 /// A frame in [-1, 1] as an image; what is not a number becomes black.
 GreyImage grey_image(std::span<const float> frame, ImageSize size) {
   GreyImage image{size, std::vector<std::uint8_t>(frame.size())};
-  std::ranges::transform(frame, image.pixels.begin(), [](float x) {
-    const float u = (x / 2 + 0.5f) * 255;
-    return u > 0 ? static_cast<std::uint8_t>(std::lround(std::min(u, 255.0f))) : std::uint8_t{0};
-  });
+  round_grey(frame, image.pixels);
   return image;
 }
 
 /// A key of the two frames' content. Both have one size, and with it the key tells apart images
 /// of the same bytes and another shape.
 std::string content_key(const GreyImage& previous, const GreyImage& next) {
-  std::string content = std::to_string(previous.size.width) + '\n';
+  Sha256 content;
+  content.update(std::to_string(previous.size.width) + '\n');
   for (const GreyImage* frame : {&previous, &next}) {
-    content.append(frame->pixels.begin(), frame->pixels.end());
+    content.update(std::as_bytes(std::span(frame->pixels)));
   }
-  return sha256_hex(content);
+  return content.hex();
 }
 
 class SimulatedGenerator final : public Generator {
@@ -57,8 +66,7 @@ class SimulatedGenerator final : public Generator {
     const std::size_t pixels = pair.size.pixel_count();
     const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
-    const std::vector<float> values = event_volume(events(previous, next), {bins_, pair.size});
-    std::ranges::copy(values, volume.begin());
+    pixel_event_volume(events(previous, next), {bins_, pair.size}, volume);
     return {};
   }
 
@@ -77,9 +85,10 @@ class SimulatedGenerator final : public Generator {
     const CounterRandom random = random_.keyed(content_key(previous, next));
     if (spec_.kind == GeneratorKind::kEsim) {
       return simulate_affine(previous, spec_.max_displacement_px, spec_.sensor, spec_.duration_s,
-                             random);
+                             random, EventOrder::kPixel);
     }
-    return simulate_difference(previous, next, spec_.sensor, spec_.duration_s, random);
+    return simulate_difference(previous, next, spec_.sensor, spec_.duration_s, random,
+                               EventOrder::kPixel);
   }
 
   GeneratorSpec spec_;

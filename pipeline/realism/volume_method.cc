@@ -136,8 +136,10 @@ class SimulatedMethod final : public VolumeMethod {
   int draws() const override { return scene_.draws; }
 
   std::vector<float> volume(const IntervalFrames& frames, int draw) const override {
-    return normalized(event_volume(simulated_events(scene_, frames, draw, sensor_, seed_),
-                                   {bins_, frames.previous.size}));
+    const VolumeShape shape{bins_, frames.previous.size};
+    std::vector<float> volume(shape.value_count());
+    pixel_event_volume(simulated_events(scene_, frames, draw, sensor_, seed_), shape, volume);
+    return normalized(std::move(volume));
   }
 
  private:
@@ -154,7 +156,7 @@ SimulatedScene difference_scene() {
   return {"difference",
           [](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
             return simulate_difference(frames.previous, frames.next, sensor, frames.duration_s,
-                                       random);
+                                       random, EventOrder::kPixel);
           },
           1};
 }
@@ -163,7 +165,7 @@ SimulatedScene esim_scene(double displacement_px, int draws) {
   return {"esim",
           [=](const IntervalFrames& frames, const SensorSpec& sensor, CounterRandom random) {
             return simulate_affine(frames.previous, displacement_px * frames.interval.gap(), sensor,
-                                   frames.duration_s, random);
+                                   frames.duration_s, random, EventOrder::kPixel);
           },
           draws};
 }

@@ -44,6 +44,7 @@ std::unique_ptr<Generator> open_realism_generator(const std::string& weights);
 /// A model of a moving scene that a simulated sensor looks at.
 struct SimulatedScene {
   std::string name;
+  /// Pixel by pixel (EventOrder::kPixel).
   std::function<std::vector<Event>(const IntervalFrames&, const SensorSpec&, CounterRandom)> events;
   int draws = 1;
 };

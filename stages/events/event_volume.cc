@@ -6,23 +6,28 @@
 #include <iterator>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 namespace eventgan {
 namespace {
 
-void check_event(const Event& event, std::size_t number, const VolumeShape& shape) {
+[[noreturn]] void refuse_event(const Event& event, std::size_t number,
+                               const std::string& expected) {
+  throw std::invalid_argument("expected " + expected + ", got x=" + std::to_string(event.x) +
+                              " y=" + std::to_string(event.y) + " t=" + std::to_string(event.t_s) +
+                              " as event " + std::to_string(number));
+}
+
+inline void check_event(const Event& event, std::size_t number, const VolumeShape& shape) {
   const bool inside =
       event.x >= 0 && event.x < shape.size.width && event.y >= 0 && event.y < shape.size.height;
   if (!inside || !std::isfinite(event.t_s)) {
-    throw std::invalid_argument(
-        "expected an event with a finite time inside " + to_string(shape.size) +
-        " pixels, got x=" + std::to_string(event.x) + " y=" + std::to_string(event.y) +
-        " t=" + std::to_string(event.t_s) + " as event " + std::to_string(number));
+    refuse_event(event, number,
+                 "an event with a finite time inside " + to_string(shape.size) + " pixels");
   }
 }
 
-void check_times(std::span<const Event> events, const std::array<double, 2>& times_s,
-                 int last_bin) {
+void check_order(std::span<const Event> events, const std::array<double, 2>& times_s) {
   const auto unsorted = std::ranges::is_sorted_until(events, {}, &Event::t_s);
   if (unsorted != events.end()) {
     throw std::invalid_argument(
@@ -36,12 +41,44 @@ void check_times(std::span<const Event> events, const std::array<double, 2>& tim
                                 ", got t=" + std::to_string(events.front().t_s) + " to " +
                                 std::to_string(events.back().t_s));
   }
+}
+
+void check_span(const std::array<double, 2>& times_s, int last_bin) {
   // Beyond it the scaled times below are infinite.
   if (!std::isfinite(last_bin * (times_s[1] - times_s[0]))) {
     throw std::invalid_argument("expected times whose differences are finite, got t=" +
                                 std::to_string(times_s[0]) + " to " + std::to_string(times_s[1]));
   }
 }
+
+std::size_t pixel_of(const Event& event, ImageSize size) {
+  return static_cast<std::size_t>(event.y) * static_cast<std::size_t>(size.width) +
+         static_cast<std::size_t>(event.x);
+}
+
+/// Adds an event at t* to its bin and the one above it; the bins of its pixel and polarity lie
+/// `stride` apart.
+void add_event(double star, int last_bin, double* bins, std::size_t stride) {
+  // Rounding may carry t* of the last event past the last bin, for which there is no plane.
+  const int bin = std::min(static_cast<int>(star), last_bin);
+  const double above = star - bin;
+  double* place = bins + static_cast<std::size_t>(bin) * stride;
+  place[0] += 1 - above;
+  if (above > 0) place[stride] += above;
+}
+
+/// t* of times from t_1 to t_N.
+struct ScaledTime {
+  double first_s;
+  double duration_s;
+  int last_bin;
+
+  double star(double t_s) const {
+    return duration_s > 0
+               ? std::clamp(last_bin * (t_s - first_s) / duration_s, 0.0, double(last_bin))
+               : 0.0;
+  }
+};
 
 }  // namespace
 
@@ -53,23 +90,74 @@ std::vector<float> event_volume(std::span<const Event> events, const VolumeShape
 
   const std::size_t plane = shape.size.pixel_count();
   const auto [first, last] = times_s.value_or(std::array{events.front().t_s, events.back().t_s});
-  const double duration = last - first;
   const int last_bin = shape.bins - 1;
   for (std::size_t i = 0; i < events.size(); ++i) check_event(events[i], i, shape);
-  check_times(events, {first, last}, last_bin);
+  check_order(events, {first, last});
+  check_span({first, last}, last_bin);
+  const ScaledTime time{first, last - first, last_bin};
   for (const Event& event : events) {
-    const double star =
-        duration > 0 ? std::clamp(last_bin * (event.t_s - first) / duration, 0.0, double(last_bin))
-                     : 0.0;
-    // Rounding may carry t* of the last event past the last bin, for which there is no plane.
-    const int bin = std::min(static_cast<int>(star), last_bin);
-    const double above = star - bin;
-    double* pixel = volume.data() + (event.positive ? 0 : shape.bins * plane) + bin * plane +
+    double* pixel = volume.data() + (event.positive ? 0 : shape.bins * plane) +
                     static_cast<std::size_t>(event.y) * shape.size.width + event.x;
-    pixel[0] += 1 - above;
-    if (above > 0) pixel[plane] += above;
+    add_event(time.star(event.t_s), last_bin, pixel, plane);
   }
   return {volume.begin(), volume.end()};
+}
+
+void pixel_event_volume(std::span<const Event> events, const VolumeShape& shape,
+                        std::span<float> volume) {
+  if (events.empty()) {
+    std::ranges::fill(volume, 0.0f);
+    return;
+  }
+
+  double first = events.front().t_s;
+  double last = first;
+  check_event(events.front(), 0, shape);
+  for (std::size_t i = 1; i < events.size(); ++i) {
+    const Event& before = events[i - 1];
+    const Event& event = events[i];
+    check_event(event, i, shape);
+    const bool same_pixel = event.y == before.y && event.x == before.x;
+    const bool ordered = same_pixel
+                             ? event.t_s >= before.t_s
+                             : event.y > before.y || (event.y == before.y && event.x > before.x);
+    if (!ordered) {
+      refuse_event(event, i, "events pixel by pixel, each pixel's in time order");
+    }
+    first = std::min(first, event.t_s);
+    last = std::max(last, event.t_s);
+  }
+  check_span({first, last}, shape.bins - 1);
+
+  const ScaledTime time{first, last - first, shape.bins - 1};
+  const auto bins = static_cast<std::size_t>(shape.bins);
+  const std::size_t plane = shape.size.pixel_count();
+  std::vector<double> sums(2 * bins, 0.0);      // of a pixel
+  constexpr std::size_t kBlock = 256;           // pixels whose values the cache holds
+  std::vector<float> block(2 * bins * kBlock);  // [bin, pixel]
+  auto event = events.begin();
+  for (std::size_t start = 0; start < plane; start += kBlock) {
+    const std::size_t count = std::min(kBlock, plane - start);
+    std::ranges::fill(block, 0.0f);
+    while (event != events.end() && pixel_of(*event, shape.size) < start + count) {
+      const int x = event->x;
+      const int y = event->y;
+      float* place = block.data() + pixel_of(*event, shape.size) - start;
+      for (; event != events.end() && event->x == x && event->y == y; ++event) {
+        add_event(time.star(event->t_s), time.last_bin, sums.data() + (event->positive ? 0 : bins),
+                  1);
+      }
+      for (double& sum : sums) {
+        *place = static_cast<float>(sum);
+        sum = 0;
+        place += kBlock;
+      }
+    }
+    for (std::size_t bin = 0; bin < 2 * bins; ++bin) {
+      std::ranges::copy(std::span(block).subspan(bin * kBlock, count),
+                        volume.subspan(bin * plane + start).begin());
+    }
+  }
 }
 
 namespace {

@@ -19,6 +19,12 @@ namespace eventgan {
 std::vector<float> event_volume(std::span<const Event> events, const VolumeShape& shape,
                                 std::optional<std::array<double, 2>> times_s = std::nullopt);
 
+/// The same volume of events that come pixel by pixel in C order, each pixel's in time order, as
+/// EventOrder::kPixel has them: t_1 and t_N are the earliest and the latest time. Written to
+/// `volume`, shape.value_count() values. Throws std::invalid_argument as above. Thread safe.
+void pixel_event_volume(std::span<const Event> events, const VolumeShape& shape,
+                        std::span<float> volume);
+
 /// Takes events of an image into the volume that it is placed in: an event comes to the pixel that
 /// the centre of its own falls in, x' = floor((x + 0.5) s) + offset, whatever `s`; none is added or
 /// spread. Those that a crop cuts away are removed. Order and times stay. Thread safe.

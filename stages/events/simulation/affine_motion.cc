@@ -2,14 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <numbers>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 #include "stages/events/simulation/sensor.h"
 
@@ -93,43 +91,129 @@ double largest_displacement(const AffineMotion& motion, ImageSize size) {
                    cv::norm(displacement_at(motion, right, bottom))});
 }
 
-std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u) {
-  std::vector<float> still = linear_intensity(image);
-  const cv::Mat source(image.size.height, image.size.width, CV_32FC1, still.data());
-  std::vector<float> intensity(still.size());
-  cv::Mat target(source.size(), source.type(), intensity.data());
+namespace {
+
+// OpenCV's fixed point: places are summed in 1/1024 px and rounded to 1/32 px.
+constexpr int kPlaceBits = 10;
+constexpr int kPartBits = 5;
+constexpr int kParts = 1 << kPartBits;
+
+using Four = std::array<float, 4>;
+
+/// Weights of the four pixels around a place by its part of a pixel: [32 y + x].
+struct Weights {
+  std::array<Four, kParts * kParts> of;
+};
+
+constexpr Weights bilinear_weights() {
+  Weights weights{};
+  for (int i = 0; i < kParts * kParts; ++i) {
+    const float y = static_cast<float>(i / kParts) / kParts;
+    const float x = static_cast<float>(i % kParts) / kParts;
+    weights.of[static_cast<std::size_t>(i)] = {(1 - y) * (1 - x), (1 - y) * x, y * (1 - x), y * x};
+  }
+  return weights;
+}
+
+constexpr Weights kWeights = bilinear_weights();
+
+float blend(const Four& weights, const Four& values) {
+  return values[0] * weights[0] + values[1] * weights[1] + values[2] * weights[2] +
+         values[3] * weights[3];
+}
+
+int to_place(double px) { return cv::saturate_cast<int>(px * (1 << kPlaceBits)); }
+
+}  // namespace
+
+AffinePlaces::AffinePlaces(ImageSize size, const AffineMotion& motion, double u) : size_(size) {
   const auto& m = motion.matrix;
-  const cv::Matx23d forward(1 + u * (m[0] - 1), u * m[1], u * m[2],  //
-                            u * m[3], 1 + u * (m[4] - 1), u * m[5]);
-  try {
-    cv::warpAffine(source, target, forward, target.size(), cv::INTER_LINEAR,
-                   cv::BORDER_REFLECT_101);
-  } catch (const cv::Exception&) {
-    std::throw_with_nested(std::runtime_error("the affine motion failed in OpenCV"));
+  const std::array<double, 6> forward = {1 + u * (m[0] - 1), u * m[1],           u * m[2],
+                                         u * m[3],           1 + u * (m[4] - 1), u * m[5]};
+  const double determinant = forward[0] * forward[4] - forward[1] * forward[3];
+  const double scale = determinant != 0 ? 1 / determinant : 0;
+  const double xx = forward[4] * scale;
+  const double xy = forward[1] * -scale;
+  const double yx = forward[3] * -scale;
+  const double yy = forward[0] * scale;
+  inverse_ = {xx, xy, -xx * forward[2] - xy * forward[5],
+              yx, yy, -yx * forward[2] - yy * forward[5]};
+  for (int x = 0; x < size.width; ++x) {
+    column_x_.push_back(to_place(xx * x));
+    column_y_.push_back(to_place(yx * x));
+  }
+}
+
+void AffinePlaces::row(std::span<const float> still, int y, std::span<float> intensity) const {
+  constexpr int kShift = kPlaceBits - kPartBits;
+  constexpr int kHalfPart = 1 << (kShift - 1);
+  const int row_x = to_place(inverse_[1] * y + inverse_[2]) + kHalfPart;
+  const int row_y = to_place(inverse_[4] * y + inverse_[5]) + kHalfPart;
+  const auto width = static_cast<std::size_t>(size_.width);
+  const auto right = static_cast<unsigned>(size_.width - 1);
+  const auto bottom = static_cast<unsigned>(size_.height - 1);
+  for (std::size_t i = 0; i < intensity.size(); ++i) {
+    const int place_x = (row_x + column_x_[i]) >> kShift;
+    const int place_y = (row_y + column_y_[i]) >> kShift;
+    const int from_x = place_x >> kPartBits;
+    const int from_y = place_y >> kPartBits;
+    const Four& weights = kWeights.of[static_cast<std::size_t>((place_y & (kParts - 1)) * kParts +
+                                                               (place_x & (kParts - 1)))];
+    if (static_cast<unsigned>(from_x) < right && static_cast<unsigned>(from_y) < bottom) {
+      const float* from = still.data() + static_cast<std::size_t>(from_y) * width + from_x;
+      intensity[i] = blend(weights, {from[0], from[1], from[width], from[width + 1]});
+    } else {
+      const auto at = [&](int at_y, int at_x) {
+        const int inside_y = cv::borderInterpolate(at_y, size_.height, cv::BORDER_REFLECT_101);
+        const int inside_x = cv::borderInterpolate(at_x, size_.width, cv::BORDER_REFLECT_101);
+        return still[static_cast<std::size_t>(inside_y) * width +
+                     static_cast<std::size_t>(inside_x)];
+      };
+      intensity[i] = blend(weights, {at(from_y, from_x), at(from_y, from_x + 1),
+                                     at(from_y + 1, from_x), at(from_y + 1, from_x + 1)});
+    }
+  }
+}
+
+std::vector<float> AffinePlaces::image(std::span<const float> still) const {
+  const auto width = static_cast<std::size_t>(size_.width);
+  std::vector<float> intensity(still.size());
+  for (int y = 0; y < size_.height; ++y) {
+    row(still, y, std::span(intensity).subspan(static_cast<std::size_t>(y) * width, width));
   }
   return intensity;
 }
 
-AffineInterval::AffineInterval(GreyImage image, const AffineMotion& motion)
-    : image_(std::move(image)), motion_(motion) {}
+std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u) {
+  const std::vector<float> still = linear_intensity(image);
+  return AffinePlaces(image.size, motion, u).image(still);
+}
 
-int AffineInterval::steps() const {
+AffineInterval::AffineInterval(const GreyImage& image, const AffineMotion& motion)
+    : size_(image.size), still_(linear_intensity(image)), motion_(motion) {
   // A drawn displacement of 6 px that rounds to just above 6 is 6 steps, not 7.
   constexpr double kRoundingPx = 1e-9;
-  return std::max(
-      1, static_cast<int>(std::ceil(largest_displacement(motion_, image_.size) - kRoundingPx)));
+  const int steps =
+      std::max(1, static_cast<int>(std::ceil(largest_displacement(motion, size_) - kRoundingPx)));
+  for (int step = 0; step <= steps; ++step) {
+    places_.emplace_back(size_, motion, static_cast<double>(step) / steps);
+  }
 }
 
 std::vector<float> AffineInterval::render(int step) const {
-  return render_affine(image_, motion_, static_cast<double>(step) / steps());
+  return places_[static_cast<std::size_t>(step)].image(still_);
+}
+
+void AffineInterval::render_row(int step, int y, std::span<float> intensity) const {
+  places_[static_cast<std::size_t>(step)].row(still_, y, intensity);
 }
 
 FlowDisplacement AffineInterval::flow() const {
-  FlowDisplacement flow{.size = image_.size, .x_px = {}, .y_px = {}};
-  flow.x_px.reserve(image_.size.pixel_count());
-  flow.y_px.reserve(image_.size.pixel_count());
-  for (int y = 0; y < image_.size.height; ++y) {
-    for (int x = 0; x < image_.size.width; ++x) {
+  FlowDisplacement flow{.size = size_, .x_px = {}, .y_px = {}};
+  flow.x_px.reserve(size_.pixel_count());
+  flow.y_px.reserve(size_.pixel_count());
+  for (int y = 0; y < size_.height; ++y) {
+    for (int x = 0; x < size_.width; ++x) {
       const cv::Vec2d displacement = displacement_at(motion_, x, y);
       flow.x_px.push_back(static_cast<float>(displacement[0]));
       flow.y_px.push_back(static_cast<float>(displacement[1]));

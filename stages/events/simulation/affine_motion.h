@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <span>
 #include <vector>
 
 #include "manifests/values/counter_random.h"
@@ -29,25 +30,46 @@ AffineMotion random_affine_motion(ImageSize size, double displacement_px, Counte
 /// the corner pixels' centres.
 double largest_displacement(const AffineMotion& motion, ImageSize size);
 
-/// The image at u in [0, 1], bilinear with places rounded to 1/32 px (cv::warpAffine). Intensity:
-/// [y, x] float32 in [0, 1], C order. Throws std::invalid_argument if the image is empty,
-/// std::runtime_error if OpenCV fails. Thread safe.
+/// The image at u in [0, 1], bilinear with places rounded to 1/32 px, bit for bit as OpenCV 4.6 to
+/// 4.10 have it in cv::warpAffine. Intensity: [y, x] float32 in [0, 1], C order. Throws
+/// std::invalid_argument if the image is empty. Thread safe.
 std::vector<float> render_affine(const GreyImage& image, const AffineMotion& motion, double u);
+
+/// Where the pixels of a moved image come from, in 1/1024 px of the still one: column + row, of x
+/// and of y.
+class AffinePlaces {
+ public:
+  AffinePlaces(ImageSize size, const AffineMotion& motion, double u);
+
+  /// The moved image, [y, x], and its row y, [x], of the intensity at u = 0. Thread safe.
+  std::vector<float> image(std::span<const float> still) const;
+  void row(std::span<const float> still, int y, std::span<float> intensity) const;
+
+ private:
+  ImageSize size_;
+  std::array<double, 6> inverse_;  ///< A(u)⁻¹, as AffineMotion::matrix
+  std::vector<int> column_x_;
+  std::vector<int> column_y_;
+};
 
 /// Motion of one image as an interval of images in which no point moves more than 1 px from one
 /// to the next: steps = max(1, ceil(largest displacement)).
 class AffineInterval : public Interval {
  public:
-  /// The image must not be empty: rendering throws std::invalid_argument otherwise.
-  AffineInterval(GreyImage image, const AffineMotion& motion);
-  ImageSize size() const override { return image_.size; }
-  int steps() const override;
+  /// Throws std::invalid_argument if the image is empty.
+  AffineInterval(const GreyImage& image, const AffineMotion& motion);
+  ImageSize size() const override { return size_; }
+  int steps() const override { return static_cast<int>(places_.size()) - 1; }
   std::vector<float> render(int step) const override;
+  /// Row y of render(step): [x].
+  void render_row(int step, int y, std::span<float> intensity) const;
   FlowDisplacement flow() const override;  ///< exactly A₁ x - x, rounded to float
 
  private:
-  GreyImage image_;
+  ImageSize size_;
+  std::vector<float> still_;  ///< intensity at u = 0
   AffineMotion motion_;
+  std::vector<AffinePlaces> places_;  ///< of images 0..steps()
 };
 
 }  // namespace eventgan

@@ -3,13 +3,16 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 
 #include "manifests/values/gaussian_random.h"
+#include "stages/base/processor_clones.h"
 
 namespace eventgan {
 
@@ -25,13 +28,45 @@ std::vector<float> linear_intensity(const GreyImage& image) {
   return intensity;
 }
 
+namespace {
+
+EVENTGAN_CLONES void draw_near_gaussians(const CounterRandom& random,
+                                         std::span<const std::size_t> pixels,
+                                         std::span<double> drawn) {
+  for (std::size_t i = 0; i < pixels.size(); ++i) drawn[i] = near_gaussian(random, pixels[i]);
+}
+
+/// The thresholds of some pixels; `drawn` is memory for as many.
+void draw_thresholds_of(std::span<const std::size_t> pixels, double mean, double spread,
+                        const CounterRandom& random, std::vector<double>& drawn,
+                        std::span<float> thresholds) {
+  const auto at_least = [](float threshold) { return std::max(threshold, kSmallestThreshold); };
+  if (!(spread > 0)) {
+    std::ranges::fill(thresholds, at_least(static_cast<float>(mean)));
+    return;
+  }
+  drawn.resize(pixels.size());
+  draw_near_gaussians(random, pixels, drawn);
+  const double error = spread * kNearGaussianError + mean * 1e-15;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const double near = mean + spread * drawn[i];
+    const auto threshold = static_cast<float>(near - error);
+    // Nearly always all that is as near is one float.
+    thresholds[i] = at_least(threshold == static_cast<float>(near + error)
+                                 ? threshold
+                                 : static_cast<float>(mean + spread * gaussian(random, pixels[i])));
+  }
+}
+
+}  // namespace
+
 std::vector<float> draw_thresholds(double mean, double spread, std::size_t pixel_count,
                                    CounterRandom random) {
+  std::vector<std::size_t> pixels(pixel_count);
+  std::iota(pixels.begin(), pixels.end(), std::size_t{0});
   std::vector<float> thresholds(pixel_count);
-  for (std::size_t pixel = 0; pixel < pixel_count; ++pixel) {
-    const double drawn = spread > 0 ? mean + spread * gaussian(random, pixel) : mean;
-    thresholds[pixel] = std::max(static_cast<float>(drawn), kSmallestThreshold);
-  }
+  std::vector<double> drawn;
+  draw_thresholds_of(pixels, mean, spread, random, drawn, thresholds);
   return thresholds;
 }
 
@@ -51,6 +86,10 @@ PixelNoise::PixelNoise(const SensorSpec& spec, std::size_t pixel_count, double s
     }
     draw_wait(pixel);
   }
+}
+
+bool PixelNoise::any(const SensorSpec& spec) {
+  return spec.shot_noise_rate_hz > 0 || (spec.hot_pixel_fraction > 0 && spec.hot_pixel_rate_hz > 0);
 }
 
 bool PixelNoise::take(std::size_t pixel) {
@@ -96,11 +135,6 @@ double idle_rate_hz(const SensorSpec& spec) {
   return rate_hz / (1 + rate_hz * spec.refractory_s);
 }
 
-bool comes_before(const Event& left, const Event& right) {
-  return std::tie(left.t_s, left.y, left.x, left.positive) <
-         std::tie(right.t_s, right.y, right.x, right.positive);
-}
-
 bool is_intensity(float value) {
   return value >= 0 && value <= std::numeric_limits<float>::max();  // false for NaN
 }
@@ -126,24 +160,115 @@ void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
       spec.leak_rate_hz, spec.refractory_s));
 }
 
+bool comes_before(const Event& left, const Event& right) {
+  return std::tie(left.t_s, left.y, left.x, left.positive) <
+         std::tie(right.t_s, right.y, right.x, right.positive);
+}
+
+namespace {
+
+CounterRandom positive_random(CounterRandom random) { return random.keyed("positive threshold"); }
+CounterRandom negative_random(CounterRandom random) { return random.keyed("negative threshold"); }
+CounterRandom noise_random(CounterRandom random) { return random.keyed("noise"); }
+
 /// The time from one image to the next. Times within are parts of it, 0..1, so that neither a
 /// recording's absolute time nor a tiny step costs precision.
-struct Sensor::Step {
+struct Step {
+  Step(double from_s, double to_s, const SensorSpec& spec)
+      : start_s(from_s),
+        end_s(to_s),
+        duration_s(to_s - from_s),
+        earliest_s(std::nextafter(from_s, to_s)),
+        leak(spec.leak_rate_hz * duration_s),
+        refractory_s(spec.refractory_s),
+        refractory(spec.refractory_s / duration_s) {}
+
   double start_s;
   double end_s;
   double duration_s;
   double earliest_s;  ///< smallest time after start_s: events lie in (start_s, end_s]
+  double leak;        ///< in positive thresholds
+  double refractory_s;
+  double refractory;  ///< as part of the step
 };
+
+[[noreturn]] void refuse_time(double t_s, double before_s) {
+  throw std::invalid_argument("expected a time after " + std::to_string(before_s) + " s, got " +
+                              std::to_string(t_s) + " s");
+}
+
+struct Pixel {
+  std::size_t number;
+  int x;
+  int y;
+  double positive_threshold;
+  double negative_threshold;
+};
+
+double next_noise_s(const PixelNoise* noise, std::size_t pixel) {
+  return noise ? noise->next_s(pixel) : std::numeric_limits<double>::infinity();
+}
+
+void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, PixelNoise* noise,
+                        PixelState& state, std::vector<Event>& events);
+
+/// Takes a pixel through a step in which its log intensity moves by `log_change`.
+inline void run_pixel(const Pixel& pixel, float log_change, const Step& step, PixelNoise* noise,
+                      PixelState& state, std::vector<Event>& events) {
+  const double change = log_change + step.leak * pixel.positive_threshold;
+  // Most pixels: a line between the thresholds at both ends crosses neither.
+  const double end = state.difference + change;
+  if (end < pixel.positive_threshold && end > -pixel.negative_threshold &&
+      next_noise_s(noise, pixel.number) > step.end_s && state.held_until_s <= step.start_s) {
+    state.difference = end;
+  } else {
+    run_eventful_pixel(pixel, change, step, noise, state, events);
+  }
+}
+
+void run_eventful_pixel(const Pixel& pixel, double change, const Step& step, PixelNoise* noise,
+                        PixelState& state, std::vector<Event>& events) {
+  const double positive = pixel.positive_threshold;
+  const double negative = pixel.negative_threshold;
+  // d is known at `now`: the step's start, the last reset, or the end of a refractory time.
+  double now = state.held_until_s > step.start_s
+                   ? (state.held_until_s - step.start_s) / step.duration_s
+                   : 0.0;
+  double difference = state.difference;
+  for (;;) {
+    const double crossing = now + until_crossing(difference, change, positive, negative);
+    const double noise_at = noise ? (noise->next_s(pixel.number) - step.start_s) / step.duration_s
+                                  : std::numeric_limits<double>::infinity();
+    if (std::min(crossing, noise_at) > 1) break;
+    bool is_positive = change > 0;
+    if (noise_at <= crossing) {
+      const bool held = noise->next_s(pixel.number) < state.held_until_s;
+      is_positive = noise->take(pixel.number);
+      if (held) continue;
+    }
+    const double event = std::min(crossing, noise_at);
+    const double event_s = step.start_s + event * step.duration_s;
+    events.push_back({.x = pixel.x,
+                      .y = pixel.y,
+                      .t_s = std::clamp(event_s, step.earliest_s, step.end_s),
+                      .positive = is_positive});
+    difference = 0;
+    now = event + step.refractory;
+    state.held_until_s = event_s + step.refractory_s;
+  }
+  state.difference = difference + change * std::max(1 - now, 0.0);
+}
+
+}  // namespace
 
 Sensor::Sensor(const SensorSpec& spec, ImageSize size, CounterRandom random)
     : spec_(spec),
       size_(size),
       random_(random),
       positive_threshold_(draw_thresholds(spec.positive_threshold, spec.threshold_spread,
-                                          size.pixel_count(), random.keyed("positive threshold"))),
+                                          size.pixel_count(), positive_random(random))),
       negative_threshold_(draw_thresholds(spec.negative_threshold, spec.threshold_spread,
-                                          size.pixel_count(), random.keyed("negative threshold"))) {
-}
+                                          size.pixel_count(), negative_random(random))) {}
 
 std::vector<Event> Sensor::step(std::span<const float> intensity, double t_s) {
   check(intensity, t_s);
@@ -151,21 +276,17 @@ std::vector<Event> Sensor::step(std::span<const float> intensity, double t_s) {
     start(intensity, t_s);
     return {};
   }
-  const Step step{time_s_, t_s, t_s - time_s_, std::nextafter(time_s_, t_s)};
-  const double leak = spec_.leak_rate_hz * step.duration_s;  // in positive thresholds
+  const Step step(time_s_, t_s, spec_);
   const auto epsilon = static_cast<float>(spec_.log_epsilon);
   std::vector<Event> events;
-  for (std::size_t pixel = 0; pixel < intensity.size(); ++pixel) {
-    const float after = std::log(intensity[pixel] + epsilon);
-    const float log_change = after - log_intensity_[pixel];
-    log_intensity_[pixel] = after;
-    // Most pixels: a line between the thresholds at both ends crosses neither.
-    const double end = difference_[pixel] + log_change + leak * positive_threshold_[pixel];
-    if (end < positive_threshold_[pixel] && end > -negative_threshold_[pixel] &&
-        noise_->next_s(pixel) > t_s && held_until_s_[pixel] <= step.start_s) {
-      difference_[pixel] = end;
-    } else {
-      run_pixel(pixel, log_change, step, events);
+  std::size_t number = 0;
+  for (int y = 0; y < size_.height; ++y) {
+    for (int x = 0; x < size_.width; ++x, ++number) {
+      const float after = std::log(intensity[number] + epsilon);
+      const float log_change = after - log_intensity_[number];
+      log_intensity_[number] = after;
+      run_pixel({number, x, y, positive_threshold_[number], negative_threshold_[number]},
+                log_change, step, &*noise_, pixels_[number], events);
     }
   }
   time_s_ = t_s;
@@ -178,10 +299,7 @@ void Sensor::check(std::span<const float> intensity, double t_s) const {
     throw std::invalid_argument("expected " + std::to_string(size_.pixel_count()) +
                                 " intensities, got " + std::to_string(intensity.size()));
   }
-  if (!std::isfinite(t_s) || (noise_ && !(t_s > time_s_))) {
-    throw std::invalid_argument("expected a time after " + std::to_string(time_s_) + " s, got " +
-                                std::to_string(t_s) + " s");
-  }
+  if (!std::isfinite(t_s) || (noise_ && !(t_s > time_s_))) refuse_time(t_s, time_s_);
   const auto unsound = std::ranges::find_if_not(intensity, is_intensity);
   if (unsound != intensity.end()) {
     throw std::invalid_argument("expected intensities >= 0, got " + std::to_string(*unsound) +
@@ -194,41 +312,202 @@ void Sensor::start(std::span<const float> intensity, double t_s) {
   log_intensity_.resize(intensity.size());
   std::ranges::transform(intensity, log_intensity_.begin(),
                          [epsilon](float value) { return std::log(value + epsilon); });
-  difference_.assign(intensity.size(), 0.0);
-  held_until_s_.assign(intensity.size(), t_s);
-  noise_.emplace(spec_, intensity.size(), t_s, random_.keyed("noise"));
+  pixels_.assign(intensity.size(), {.difference = 0, .held_until_s = t_s});
+  noise_.emplace(spec_, intensity.size(), t_s, noise_random(random_));
   time_s_ = t_s;
 }
 
-void Sensor::run_pixel(std::size_t pixel, float log_change, const Step& step,
-                       std::vector<Event>& events) {
-  const double positive = positive_threshold_[pixel];
-  const double negative = negative_threshold_[pixel];
-  const double change = log_change + spec_.leak_rate_hz * step.duration_s * positive;
-  // d is known at `now`: the step's start, the last reset, or the end of a refractory time.
-  double now = std::max((held_until_s_[pixel] - step.start_s) / step.duration_s, 0.0);
-  double difference = difference_[pixel];
-  for (;;) {
-    const double crossing = now + until_crossing(difference, change, positive, negative);
-    const double noise = (noise_->next_s(pixel) - step.start_s) / step.duration_s;
-    if (std::min(crossing, noise) > 1) break;
-    bool is_positive = change > 0;
-    if (noise <= crossing) {
-      const bool held = noise_->next_s(pixel) < held_until_s_[pixel];
-      is_positive = noise_->take(pixel);
-      if (held) continue;
-    }
-    const double event = std::min(crossing, noise);
-    const double event_s = step.start_s + event * step.duration_s;
-    events.push_back({.x = static_cast<int>(pixel % static_cast<std::size_t>(size_.width)),
-                      .y = static_cast<int>(pixel / static_cast<std::size_t>(size_.width)),
-                      .t_s = std::clamp(event_s, step.earliest_s, step.end_s),
-                      .positive = is_positive});
-    difference = 0;
-    now = event + spec_.refractory_s / step.duration_s;
-    held_until_s_[pixel] = event_s + spec_.refractory_s;
+namespace {
+
+EVENTGAN_CLONES void first_bytes(const CounterRandom& random, std::size_t first_pixel,
+                                 std::span<std::uint8_t> bytes) {
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    bytes[i] = static_cast<std::uint8_t>(random.bits(2 * (first_pixel + i)) >> 56);
   }
-  difference_[pixel] = difference + change * std::max(1 - now, 0.0);
+}
+
+EVENTGAN_CLONES void widen(std::span<const float> values, std::span<float> lowest,
+                           std::span<float> highest) {
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    lowest[i] = std::min(lowest[i], values[i]);
+    highest[i] = std::max(highest[i], values[i]);
+  }
+}
+
+/// The least or greatest light that pixels see, and the ratio to the first that it must reach.
+struct Extreme {
+  std::span<const float> light;
+  std::span<const float> ratio;
+};
+
+/// Whether pixels that first saw `first` may have an event.
+EVENTGAN_CLONES void compare(std::span<const float> first, float epsilon, Extreme lowest,
+                             Extreme highest, std::span<std::uint8_t> may) {
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const float seen = first[i] + epsilon;
+    const bool rises = highest.light[i] + epsilon > seen * highest.ratio[i];
+    const bool falls = seen > (lowest.light[i] + epsilon) * lowest.ratio[i];
+    may[i] = static_cast<std::uint8_t>(rises | falls);
+  }
+}
+
+/// The thresholds of one polarity, of which few are drawn: the first byte of the number that gives
+/// a Gaussian's radius says already what a pixel's threshold is at least.
+class ThresholdDraws {
+ public:
+  /// `error`: how far a change of the logarithm may be from that of the intensity.
+  ThresholdDraws(double mean, double spread, double error, CounterRandom random)
+      : mean_(mean), spread_(spread), random_(random) {
+    for (std::size_t byte = 0; byte < ratios_.size(); ++byte) {
+      const double radius =
+          gaussian_radius(static_cast<double>(byte + 1) / static_cast<double>(ratios_.size()));
+      const double least = spread > 0 ? mean - spread * radius : mean;
+      ratios_[byte] =
+          static_cast<float>(std::exp(std::max(least, double{kSmallestThreshold}) - error));
+    }
+  }
+
+  /// What the light of a pixel and the next ones must be multiplied or divided by, at least, for an
+  /// event.
+  void least_ratios(std::size_t first_pixel, std::span<float> ratios) {
+    bytes_.resize(ratios.size());
+    first_bytes(random_, first_pixel, bytes_);
+    for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] = ratios_[bytes_[i]];
+  }
+
+  void draw(std::span<const std::size_t> pixels, std::vector<float>& thresholds) {
+    thresholds.resize(pixels.size());
+    draw_thresholds_of(pixels, mean_, spread_, random_, gaussians_, thresholds);
+  }
+
+ private:
+  double mean_;
+  double spread_;
+  CounterRandom random_;
+  std::array<float, 256> ratios_;
+  std::vector<std::uint8_t> bytes_;
+  std::vector<double> gaussians_;
+};
+
+/// Takes the pixels of a row at a time through all images.
+class RowRuns {
+ public:
+  RowRuns(const SensorSpec& spec, ImageSize size, std::span<const double> times_s,
+          CounterRandom random)
+      : width_(static_cast<std::size_t>(size.width)),
+        epsilon_(static_cast<float>(spec.log_epsilon)),
+        positive_(spec.positive_threshold, spec.threshold_spread, log_error(times_s.size()),
+                  positive_random(random)),
+        negative_(spec.negative_threshold, spec.threshold_spread, log_error(times_s.size()),
+                  negative_random(random)),
+        start_s_(times_s.front()),
+        changes_(times_s.size() - 1) {
+    for (std::size_t i = 1; i < times_s.size(); ++i)
+      steps_.emplace_back(times_s[i - 1], times_s[i], spec);
+    if (PixelNoise::any(spec)) {
+      noise_.emplace(spec, size.pixel_count(), start_s_, noise_random(random));
+    }
+    only_light_ = !noise_ && !(spec.leak_rate_hz > 0);
+  }
+
+  /// intensity: [image, x] of row y.
+  void run(std::span<const float> intensity, int y, std::vector<Event>& events) {
+    const std::size_t row = static_cast<std::size_t>(y) * width_;
+    find_pixels(intensity, row);
+    positive_.draw(pixels_, positive_thresholds_);
+    negative_.draw(pixels_, negative_thresholds_);
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      const std::size_t x = pixels_[i] - row;
+      const Pixel pixel{pixels_[i], static_cast<int>(x), y, positive_thresholds_[i],
+                        negative_thresholds_[i]};
+      look(intensity.subspan(x));
+      PixelState state{.difference = 0, .held_until_s = start_s_};
+      for (std::size_t k = 0; k < steps_.size(); ++k) {
+        run_pixel(pixel, changes_[k], steps_[k], noise_ ? &*noise_ : nullptr, state, events);
+      }
+    }
+  }
+
+ private:
+  /// A float32 logarithm is good to a millionth, and so is each change from image to image.
+  static double log_error(std::size_t images) { return 1e-5 * static_cast<double>(images); }
+
+  /// Those that may have an event, of a row whose first pixel has the number `row`.
+  void find_pixels(std::span<const float> intensity, std::size_t row) {
+    may_.assign(width_, true);
+    if (only_light_) {
+      rise_.resize(width_);
+      fall_.resize(width_);
+      positive_.least_ratios(row, rise_);
+      negative_.least_ratios(row, fall_);
+      lowest_.assign(intensity.begin(), intensity.begin() + static_cast<std::ptrdiff_t>(width_));
+      highest_ = lowest_;
+      for (std::size_t i = width_; i < intensity.size(); i += width_) {
+        widen(intensity.subspan(i, width_), lowest_, highest_);
+      }
+      compare(intensity.first(width_), epsilon_, {lowest_, fall_}, {highest_, rise_}, may_);
+    }
+    pixels_.resize(width_);
+    std::size_t count = 0;
+    for (std::size_t x = 0; x < width_; ++x) {
+      pixels_[count] = row + x;
+      count += may_[x];
+    }
+    pixels_.resize(count);
+  }
+
+  /// Computes the changes of a pixel's logarithm.
+  void look(std::span<const float> intensity) {
+    float before = std::log(intensity[0] + epsilon_);
+    for (std::size_t k = 0; k < changes_.size(); ++k) {
+      const float after = std::log(intensity[(k + 1) * width_] + epsilon_);
+      changes_[k] = after - before;
+      before = after;
+    }
+  }
+
+  std::size_t width_;
+  float epsilon_;
+  ThresholdDraws positive_;
+  ThresholdDraws negative_;
+  double start_s_;
+  std::vector<Step> steps_;
+  std::optional<PixelNoise> noise_;
+  bool only_light_;  ///< neither noise nor leak: only changes of intensity give events
+
+  // Of the row at hand.
+  std::vector<float> lowest_;
+  std::vector<float> highest_;
+  std::vector<float> rise_;
+  std::vector<float> fall_;
+  std::vector<std::uint8_t> may_;
+  std::vector<std::size_t> pixels_;
+  std::vector<float> positive_thresholds_;
+  std::vector<float> negative_thresholds_;
+  std::vector<float> changes_;  ///< of a pixel, by step
+};
+
+}  // namespace
+
+std::vector<Event> pixel_events(const SensorSpec& spec, ImageSize size, const IntensityRow& images,
+                                std::span<const double> times_s, CounterRandom random) {
+  double before_s = std::numeric_limits<double>::lowest();
+  for (const double t_s : times_s) {
+    if (!std::isfinite(t_s) || !(t_s > before_s)) refuse_time(t_s, before_s);
+    before_s = t_s;
+  }
+  RowRuns runs(spec, size, times_s, random);
+  const auto width = static_cast<std::size_t>(size.width);
+  std::vector<float> rows(times_s.size() * width);
+  std::vector<Event> events;
+  events.reserve(size.pixel_count());
+  for (int y = 0; y < size.height; ++y) {
+    for (std::size_t i = 0; i < times_s.size(); ++i) {
+      images(i, y, std::span(rows).subspan(i * width, width));
+    }
+    runs.run(rows, y, events);
+  }
+  return events;
 }
 
 }  // namespace eventgan

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <span>
 #include <vector>
@@ -36,6 +37,9 @@ class PixelNoise {
   /// No arrivals before start_s.
   PixelNoise(const SensorSpec& spec, std::size_t pixel_count, double start_s, CounterRandom random);
 
+  /// Whether any pixel's rate is above 0.
+  static bool any(const SensorSpec& spec);
+
   /// Time of the pixel's next arrival; infinity where its rate is 0.
   double next_s(std::size_t pixel) const { return next_s_[pixel]; }
 
@@ -64,6 +68,12 @@ double idle_event_bytes(const SensorSpec& spec, std::size_t pixel_count, double 
 /// into `memory_bytes`.
 void check_events_fit(const SensorSpec& spec, ImageSize size, double duration_s,
                       std::size_t memory_bytes);
+
+/// What a pixel of a Sensor remembers beside its log intensity.
+struct PixelState {
+  double difference = 0;    ///< d; 0 where the pixel is still held
+  double held_until_s = 0;  ///< end of the last refractory time
+};
 
 /// The pixels of a simulated event camera, fed with intensity images at rising times. A pixel
 /// remembers a level ℓ and compares with it the log intensity L = ln(I + ε), which moves on a
@@ -94,11 +104,8 @@ class Sensor {
   std::vector<Event> step(std::span<const float> intensity, double t_s);
 
  private:
-  struct Step;
-
   void check(std::span<const float> intensity, double t_s) const;
   void start(std::span<const float> intensity, double t_s);
-  void run_pixel(std::size_t pixel, float log_change, const Step& step, std::vector<Event>& events);
 
   SensorSpec spec_;
   ImageSize size_;
@@ -110,8 +117,21 @@ class Sensor {
   double time_s_ = 0;
   std::optional<PixelNoise> noise_;
   std::vector<float> log_intensity_;
-  std::vector<double> difference_;    ///< d; 0 where the pixel is still held
-  std::vector<double> held_until_s_;  ///< end of the last refractory time
+  std::vector<PixelState> pixels_;
 };
+
+/// Whether an event comes before another: by time, then y, x, polarity (negative first). Pure.
+bool comes_before(const Event& left, const Event& right);
+
+/// Writes row `row` of image number `image`: [x] float32, as Sensor::step takes it.
+using IntensityRow = std::function<void(std::size_t image, int row, std::span<float> intensity)>;
+
+/// The events of a Sensor that is shown images at `times_s`, two or more, one after the other:
+/// the same events, but pixel by pixel in C order, and each pixel's by time. Nothing is kept for
+/// pixels or sorted, and without leak and noise a pixel whose intensity stays within what its
+/// threshold surely is above costs neither a logarithm nor a drawn threshold. Throws
+/// std::invalid_argument if a time is not finite or does not rise. Thread safe.
+std::vector<Event> pixel_events(const SensorSpec& spec, ImageSize size, const IntensityRow& images,
+                                std::span<const double> times_s, CounterRandom random);
 
 }  // namespace eventgan

@@ -1,5 +1,9 @@
 #include "stages/events/simulation/simulate_pair.h"
 
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <span>
 #include <stdexcept>
 
 #include "stages/events/simulation/affine_motion.h"
@@ -7,13 +11,27 @@
 
 namespace eventgan {
 
+namespace {
+
+/// When image `step` of an interval is seen.
+double step_time_s(int step, int steps, double from_s, double to_s) {
+  const double part = static_cast<double>(step) / steps;
+  return step == steps ? to_s : from_s + (to_s - from_s) * part;
+}
+
+std::vector<Event> ordered(std::vector<Event> events, EventOrder order) {
+  if (order == EventOrder::kTime) std::ranges::sort(events, comes_before);
+  return events;
+}
+
+}  // namespace
+
 void feed_interval(Sensor& sensor, const Interval& interval, double from_s, double to_s,
                    std::vector<Event>& events) {
   const int steps = interval.steps();
   for (int step = 1; step <= steps; ++step) {
-    const double part = static_cast<double>(step) / steps;
-    const double t_s = step == steps ? to_s : from_s + (to_s - from_s) * part;
-    const std::vector<Event> seen = sensor.step(interval.render(step), t_s);
+    const std::vector<Event> seen =
+        sensor.step(interval.render(step), step_time_s(step, steps, from_s, to_s));
     events.insert(events.end(), seen.begin(), seen.end());
   }
 }
@@ -29,23 +47,34 @@ std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec&
 
 std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,
                                    const SensorSpec& sensor, double duration_s,
-                                   CounterRandom random) {
+                                   CounterRandom random, EventOrder order) {
   const double displacement_px = max_displacement_px * random.keyed("displacement").uniform(0);
-  const AffineMotion motion =
-      random_affine_motion(image.size, displacement_px, random.keyed("motion"));
-  return simulate_interval(AffineInterval(image, motion), sensor, duration_s,
-                           random.keyed("sensor"));
+  const AffineInterval interval(
+      image, random_affine_motion(image.size, displacement_px, random.keyed("motion")));
+  std::vector<double> times_s;
+  for (int step = 0; step <= interval.steps(); ++step) {
+    times_s.push_back(step_time_s(step, interval.steps(), 0, duration_s));
+  }
+  const auto row = [&](std::size_t step, int y, std::span<float> intensity) {
+    interval.render_row(static_cast<int>(step), y, intensity);
+  };
+  return ordered(pixel_events(sensor, image.size, row, times_s, random.keyed("sensor")), order);
 }
 
 std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
-                                       const SensorSpec& spec, double duration_s,
-                                       CounterRandom random) {
+                                       const SensorSpec& sensor, double duration_s,
+                                       CounterRandom random, EventOrder order) {
   if (previous.size != next.size) {
     throw std::invalid_argument("expected two frames of one size");
   }
-  Sensor sensor(spec, previous.size, random);
-  sensor.step(linear_intensity(previous), 0);
-  return sensor.step(linear_intensity(next), duration_s);
+  const std::array images = {linear_intensity(previous), linear_intensity(next)};
+  const auto row = [&](std::size_t image, int y, std::span<float> intensity) {
+    const std::size_t start = static_cast<std::size_t>(y) * intensity.size();
+    std::copy_n(images[image].begin() + static_cast<std::ptrdiff_t>(start), intensity.size(),
+                intensity.begin());
+  };
+  return ordered(pixel_events(sensor, previous.size, row, std::array{0.0, duration_s}, random),
+                 order);
 }
 
 }  // namespace eventgan

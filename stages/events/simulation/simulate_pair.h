@@ -22,18 +22,22 @@ void feed_interval(Sensor& sensor, const Interval& interval, double from_s, doub
 std::vector<Event> simulate_interval(const Interval& interval, const SensorSpec& sensor,
                                      double duration_s, CounterRandom random);
 
+/// How the events of a pair are ordered: by time, then y, x, polarity (negative first), or pixel by
+/// pixel in C order and each pixel's by time, which takes no sorting.
+enum class EventOrder { kTime, kPixel };
+
 /// ESIM as the EventGAN paper compares with: one image (the previous frame) under a random affine
 /// motion whose largest displacement is drawn uniformly from [0, max_displacement_px); the next
 /// frame is not looked at. Throws std::invalid_argument if max_displacement_px is below 0.
 std::vector<Event> simulate_affine(const GreyImage& image, double max_displacement_px,
                                    const SensorSpec& sensor, double duration_s,
-                                   CounterRandom random);
+                                   CounterRandom random, EventOrder order = EventOrder::kTime);
 
 /// The earlier works in the paper: each pixel's log intensity moves on a line from its value in the
 /// previous frame to that in the next, whatever moved in between: floor(|L1 - L0| / C) events a
 /// pixel, evenly spaced. Throws std::invalid_argument if the frames differ in size.
 std::vector<Event> simulate_difference(const GreyImage& previous, const GreyImage& next,
                                        const SensorSpec& sensor, double duration_s,
-                                       CounterRandom random);
+                                       CounterRandom random, EventOrder order = EventOrder::kTime);
 
 }  // namespace eventgan

@@ -36,5 +36,16 @@ TEST(Gaussian, HasMean0AndItsDeviation) {
   EXPECT_NEAR(squares / kDraws, 4, 0.2);
 }
 
+TEST(NearGaussian, IsAsNearAsItSays) {
+  const CounterRandom random(5);
+  double largest = 0;
+  for (std::uint64_t i = 0; i < 300000; ++i) {
+    largest = std::max(largest, std::abs(near_gaussian(random, i) - gaussian(random, i)));
+  }
+  // The sine's first term left out is (pi/2)^17/17! = 6e-12, at a radius of 5.
+  EXPECT_LT(largest, 1e-10);
+  EXPECT_LT(largest, kNearGaussianError);
+}
+
 }  // namespace
 }  // namespace eventgan

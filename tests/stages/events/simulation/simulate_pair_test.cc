@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "stages/events/simulation/affine_motion.h"
@@ -81,6 +82,27 @@ TEST(RenderAffine, MovesTheWayOfTheMatrix) {
 TEST(RenderAffine, TakesAnImageOfOnePixel) {
   EXPECT_EQ(render_affine({{1, 1}, {51}}, shift(3, 2), 1), std::vector<float>{0.2f});
 }
+
+// Later versions of OpenCV compute warpAffine in another way.
+#if CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR <= 10
+TEST(RenderAffine, IsWarpAffineOfOpenCvToTheLastBit) {
+  for (const ImageSize size : {ImageSize{1, 9}, ImageSize{7, 1}, ImageSize{61, 143}}) {
+    const GreyImage image = textured_image(size);
+    std::vector<float> still = linear_intensity(image);
+    const cv::Mat source(size.height, size.width, CV_32FC1, still.data());
+    for (std::uint64_t seed = 0; seed < 40; ++seed) {
+      const AffineMotion motion =
+          random_affine_motion(size, 0.5 * static_cast<double>(seed), CounterRandom(seed));
+      std::vector<float> expected(still.size());
+      cv::Mat target(source.size(), source.type(), expected.data());
+      const auto& m = motion.matrix;
+      cv::warpAffine(source, target, cv::Matx23d(m[0], m[1], m[2], m[3], m[4], m[5]), target.size(),
+                     cv::INTER_LINEAR, cv::BORDER_REFLECT_101);
+      ASSERT_EQ(render_affine(image, motion, 1), expected) << seed;
+    }
+  }
+}
+#endif
 
 TEST(AffineInterval, TakesStepsOfAPixelAtMost) {
   const auto steps = [](const AffineMotion& motion) {
