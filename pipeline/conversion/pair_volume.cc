@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "manifests/values/counter_random.h"
 #include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
@@ -25,9 +24,8 @@ bool add_pair_noise(const GeneratorSpec& spec, const PairKey& key, double gap_s,
                     const VolumeShape& content, std::span<float> volume) {
   if (!spec.noise) return false;
   const double duration_s = gap_s > 0 && std::isfinite(gap_s) ? gap_s : spec.duration_s;
-  const CounterRandom random = CounterRandom(key.seed).keyed("noise").keyed(key.dataset);
-  const NoiseRandom draws{random.keyed("hot pixels"), random.keyed("pair").keyed(key.sample_id)};
-  return add_noise(*spec.noise, duration_s, content, draws, volume) > 0;
+  const NoiseRandom random{key.camera().keyed("hot pixels"), key.pair().keyed("noise")};
+  return add_noise(*spec.noise, duration_s, content, random, volume) > 0;
 }
 
 std::optional<VolumeStatistics> finish_volume(const Generator& generator,

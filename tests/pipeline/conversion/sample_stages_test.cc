@@ -365,7 +365,7 @@ TEST_F(NoiseTest, FollowsFromSeedDatasetAndSampleAlone) {
   const std::vector<std::byte> chunk = run().chunk;
   shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
   EXPECT_EQ(run().chunk, chunk) << "another shard";
-  manifest_.sources.insert(manifest_.sources.begin(), SourceSpec{.dataset = DatasetKind::kMpii});
+  manifest_.sources.emplace(manifest_.sources.begin())->dataset = DatasetKind::kMpii;
   datasets_.insert(datasets_.begin(), std::make_unique<testing::FakeDataset>("other", 2));
   shard_.source = 1;
   EXPECT_EQ(run().chunk, chunk) << "another source before it";

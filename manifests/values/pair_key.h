@@ -1,0 +1,24 @@
+#pragma once
+
+#include <cstdint>
+#include <string_view>
+
+#include "manifests/values/counter_random.h"
+
+namespace eventgan {
+
+/// What a pair's random numbers are keyed by, as the plan's are: they depend on no other sample, on
+/// no worker and on no shard.
+struct PairKey {
+  std::uint64_t seed = 0;
+  std::string_view dataset;
+  std::string_view sample_id;
+
+  /// The pair's own; keyed on by a word for each thing that is drawn.
+  CounterRandom pair() const { return CounterRandom(seed).keyed(dataset).keyed(sample_id); }
+
+  /// Those of the camera, which all pairs of a kind of dataset share.
+  CounterRandom camera() const { return CounterRandom(seed).keyed("camera").keyed(dataset); }
+};
+
+}  // namespace eventgan
