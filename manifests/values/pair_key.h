@@ -1,9 +1,13 @@
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <string_view>
 
 #include "manifests/values/counter_random.h"
+#include "manifests/values/job.h"
 
 namespace eventgan {
 
@@ -20,5 +24,14 @@ struct PairKey {
   /// Those of the camera, which all pairs of a kind of dataset share.
   CounterRandom camera() const { return CounterRandom(seed).keyed("camera").keyed(dataset); }
 };
+
+/// The contrast threshold of a pair's sensor, log units, drawn log-uniformly from the range that
+/// the manifest tells; none if it tells none. Pure.
+inline std::optional<double> pair_threshold(const GeneratorSpec& spec, const PairKey& key) {
+  if (!spec.threshold) return std::nullopt;
+  const auto [least, most] = spec.threshold->range;
+  const double share = key.pair().keyed("threshold").uniform(0);
+  return std::min(least * std::pow(most / least, share), most);
+}
 
 }  // namespace eventgan

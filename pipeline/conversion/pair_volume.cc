@@ -9,14 +9,13 @@
 namespace eventgan {
 
 GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
-                              const PreparedPair& pair, const VolumeLabels& labels,
-                              std::span<float> volume) {
-  if (scope.scope == Scope::kWhole) {
-    return {generator.generate({pair.input, pair.content}, volume), {}};
-  }
+                              const PreparedPair& pair, std::optional<double> threshold,
+                              const VolumeLabels& labels, std::span<float> volume) {
+  const GeneratorInput input{pair.input, pair.content, threshold};
+  if (scope.scope == Scope::kWhole) return {generator.generate(input, volume), {}};
   const TileMask wanted =
       wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
-  return {generator.generate_tiles({pair.input, pair.content}, wanted, volume),
+  return {generator.generate_tiles(input, wanted, volume),
           tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
 }
 

@@ -138,6 +138,14 @@ TEST_F(ShardCheck, AValueOutsideTheGeneratedTilesIsAFault) {
   EXPECT_THAT(faults(), IsEmpty()) << "noise is everywhere";
 }
 
+TEST_F(ShardCheck, AThresholdIsANumberAboveZero) {
+  write(testing::example_shard());
+  for (const double wrong : {0.0, -0.2, HUGE_VAL}) {
+    overwrite<double>("/pairs/threshold", H5T_NATIVE_DOUBLE, {NAN, NAN, NAN, NAN, wrong});
+    EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected a finite threshold > 0")));
+  }
+}
+
 TEST_F(ShardCheck, NormalizedVolumesAreSound) {
   testing::ExampleShard example = testing::example_shard(StoredType::kFloat32);
   example.header.normalization = Normalization::kEta98;
