@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
@@ -383,6 +384,7 @@ ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& so
 namespace {
 
 constexpr double kLargestRate_hz = 1e6;
+constexpr double kLeastThreshold = 0.01, kMostThreshold = 5;
 
 /// Reads what the simulators share; find(key) is a key's value, or none.
 template <class Find>
@@ -391,8 +393,8 @@ SensorSpec read_sensor_keys(const Find& find) {
   const auto read = [&](const char* key, double& number, double lowest, double highest) {
     if (const std::optional<StrictValue> found = find(key)) number = found->number(lowest, highest);
   };
-  read("positive_threshold", spec.positive_threshold, 0.01, 5);
-  read("negative_threshold", spec.negative_threshold, 0.01, 5);
+  read("positive_threshold", spec.positive_threshold, kLeastThreshold, kMostThreshold);
+  read("negative_threshold", spec.negative_threshold, kLeastThreshold, kMostThreshold);
   read("threshold_spread", spec.threshold_spread, 0, 1);
   read("refractory_s", spec.refractory_s, 0, 1);
   read("leak_rate_hz", spec.leak_rate_hz, 0, kLargestRate_hz);
@@ -457,6 +459,18 @@ NoiseSpec read_noise(const StrictValue& value) {
   return spec;
 }
 
+/// Reads a sensor's `threshold`, which stands in place of `own`, the sensor's other keys of it.
+void read_threshold(const StrictValue& value, const std::optional<StrictValue>& spread,
+                    std::initializer_list<std::optional<StrictValue>> own, GeneratorSpec& spec) {
+  ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
+  if (spread) threshold.spread = spec.sensor.threshold_spread;
+  for (const std::optional<StrictValue>& key : own) {
+    if (key) key->fault("no such key together with threshold, which sets it");
+  }
+  spec.sensor = threshold.applied(spec.sensor, std::sqrt(threshold.range[0] * threshold.range[1]));
+  spec.threshold = threshold;
+}
+
 /// Reads a generator's `sensor`: what is asked of any, and of a simulator its settings.
 void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind> kind,
                            GeneratorSpec& spec) {
@@ -467,6 +481,10 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
   spec.sensor = read_sensor_keys([&](const char* key) {
     return keys.find(key, {kEsim, kDifference});
   });
+  if (const auto threshold = object.find("threshold")) {
+    read_threshold(*threshold, object.find("threshold_spread"),
+                   {object.find("positive_threshold"), object.find("negative_threshold")}, spec);
+  }
   object.finish();
 }
 

@@ -37,6 +37,25 @@ struct SensorSpec {
   bool operator==(const SensorSpec&) const = default;
 };
 
+/// A contrast threshold that is drawn for each pair, for both polarities.
+struct ThresholdSpec {
+  /// Least and most, log units, 0.01..5; drawn log-uniformly.
+  std::array<double, 2> range{0.2, 0.2};
+  /// Standard deviation over the pixels, 0..1; none: the share of the threshold that it is of
+  /// SensorSpec's defaults.
+  std::optional<double> spread = std::nullopt;
+  bool operator==(const ThresholdSpec&) const = default;
+
+  static constexpr double kSpreadShare = 0.15;
+
+  /// The sensor with a threshold.
+  SensorSpec applied(SensorSpec sensor, double threshold) const {
+    sensor.positive_threshold = sensor.negative_threshold = threshold;
+    sensor.threshold_spread = spread.value_or(kSpreadShare * threshold);
+    return sensor;
+  }
+};
+
 /// Noise of an event camera, added to finished volumes (stages/events/noise.h), whatever made them.
 /// Each number is drawn uniformly from [least, most] for each pair; zeros: no noise.
 struct NoiseSpec {

@@ -219,8 +219,9 @@ struct GeneratorSpec {
   Device device = Device::kCpu;               ///< kNetwork
   Precision precision = Precision::kFloat32;  ///< kNetwork
   ScopeSpec scope;                            ///< kNetwork
-  SensorSpec sensor;                          ///< kEsim, kDifference
-  std::optional<NoiseSpec> noise = {};        ///< of any kind but kEvents
+  SensorSpec sensor;                          ///< kEsim, kDifference; at the middle of `threshold`
+  std::optional<ThresholdSpec> threshold = {};  ///< of any kind but kEvents (pair_threshold)
+  std::optional<NoiseSpec> noise = {};          ///< of any kind but kEvents
   double duration_s = 0.1;          ///< time between the two frames, 1e-4..10. kEsim, kDifference:
                                     ///< for the sensor. `noise`: of pairs whose times are unknown
   double max_displacement_px = 10;  ///< kEsim: of the random motion, 0.1..100

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,8 @@ struct ShardSample {
   FramePair pair;
   ImageSize source_size;                     ///< {0, 0} if unknown (quarantined)
   std::array<double, 6> source_to_volume{};  ///< NaN if unknown (quarantined)
+  /// The sensor's, if the manifest tells it (pair_threshold) and there is a volume.
+  std::optional<double> threshold = {};
   VolumeStatistics statistics;
   /// [row, column] of the volume's tiles: 1 generated, 0 left at zero. Empty: all is generated.
   std::vector<std::uint8_t> tiles;

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "manifests/values/counter_random.h"
 #include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
@@ -10,14 +9,13 @@
 namespace eventgan {
 
 GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
-                              const PreparedPair& pair, const VolumeLabels& labels,
-                              std::span<float> volume) {
-  if (scope.scope == Scope::kWhole) {
-    return {generator.generate({pair.input, pair.content}, volume), {}};
-  }
+                              const PreparedPair& pair, std::optional<double> threshold,
+                              const VolumeLabels& labels, std::span<float> volume) {
+  const GeneratorInput input{pair.input, pair.content, threshold};
+  if (scope.scope == Scope::kWhole) return {generator.generate(input, volume), {}};
   const TileMask wanted =
       wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
-  return {generator.generate_tiles({pair.input, pair.content}, wanted, volume),
+  return {generator.generate_tiles(input, wanted, volume),
           tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
 }
 
@@ -25,9 +23,8 @@ bool add_pair_noise(const GeneratorSpec& spec, const PairKey& key, double gap_s,
                     const VolumeShape& content, std::span<float> volume) {
   if (!spec.noise) return false;
   const double duration_s = gap_s > 0 && std::isfinite(gap_s) ? gap_s : spec.duration_s;
-  const CounterRandom random = CounterRandom(key.seed).keyed("noise").keyed(key.dataset);
-  const NoiseRandom draws{random.keyed("hot pixels"), random.keyed("pair").keyed(key.sample_id)};
-  return add_noise(*spec.noise, duration_s, content, draws, volume) > 0;
+  const NoiseRandom random{key.camera().keyed("hot pixels"), key.pair().keyed("noise")};
+  return add_noise(*spec.noise, duration_s, content, random, volume) > 0;
 }
 
 std::optional<VolumeStatistics> finish_volume(const Generator& generator,

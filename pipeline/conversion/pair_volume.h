@@ -3,12 +3,12 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "manifests/values/events.h"
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
+#include "manifests/values/pair_key.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/generator/generator.h"
 
@@ -24,20 +24,12 @@ struct GeneratedPart {
   std::vector<std::uint8_t> tiles;
 };
 
-/// Generates what `scope` wants of a pair's volume, zeros elsewhere. `volume`: [2 bins, y, x] of
-/// pair.content, overwritten whole. `labels` are in pixels of the whole volume. Throws as
-/// Generator::generate. Thread safe.
+/// Generates what `scope` wants of a pair's volume, zeros elsewhere. `threshold`: GeneratorInput's.
+/// `volume`: [2 bins, y, x] of pair.content, overwritten whole. `labels` are in pixels of the whole
+/// volume. Throws as Generator::generate. Thread safe.
 GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
-                              const PreparedPair& pair, const VolumeLabels& labels,
-                              std::span<float> volume);
-
-/// What a pair's random numbers are keyed by, as the plan's are: they do not depend on the other
-/// samples, on workers or on shards.
-struct PairKey {
-  std::uint64_t seed = 0;
-  std::string_view dataset;
-  std::string_view sample_id;
-};
+                              const PreparedPair& pair, std::optional<double> threshold,
+                              const VolumeLabels& labels, std::span<float> volume);
 
 /// Adds the noise that a manifest may ask for (stages/events/noise.h) to the volume of a pair's
 /// content, [2 bins, y, x], whatever part of it was generated; over the pair's gap_s, or where that

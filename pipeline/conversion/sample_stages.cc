@@ -188,6 +188,11 @@ std::vector<float> SampleStages::take_volume(std::size_t value_count) const {
   return volume;
 }
 
+PairKey SampleStages::key_of(const SampleMessage& message) const {
+  const auto source = static_cast<std::size_t>(message.shard->source);
+  return {manifest_.seed, to_string(manifest_.sources[source].dataset), message.sample.sample_id};
+}
+
 void SampleStages::generate(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kGenerate);
@@ -199,8 +204,10 @@ void SampleStages::generate(SampleMessage& message) const try {
     return;
   }
   message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
-  GeneratedPart part = generate_volume(generator_, manifest_.generator.scope, prepared,
-                                       message.sample.labels, message.volume);
+  message.sample.threshold = pair_threshold(manifest_.generator, key_of(message));
+  GeneratedPart part =
+      generate_volume(generator_, manifest_.generator.scope, prepared, message.sample.threshold,
+                      message.sample.labels, message.volume);
   message.notes = part.notes;
   message.sample.tiles = std::move(part.tiles);
   free_memory(message.prepared.input);
@@ -213,11 +220,8 @@ void SampleStages::finish(SampleMessage& message) const try {
   const Stopwatch stopwatch(message, Stage::kFinish);
   const PreparedPair& prepared = message.prepared;
   const FramePair& pair = message.planned().pair;
-  const auto source = static_cast<std::size_t>(message.shard->source);
-  const bool has_noise = add_pair_noise(
-      manifest_.generator,
-      {manifest_.seed, to_string(manifest_.sources[source].dataset), message.sample.sample_id},
-      pair.gap_s(), {generator_.bins(), prepared.content}, message.volume);
+  const bool has_noise = add_pair_noise(manifest_.generator, key_of(message), pair.gap_s(),
+                                        {generator_.bins(), prepared.content}, message.volume);
   const std::optional<VolumeStatistics> found =
       finish_volume(generator_, message.notes, pair.gap_frames, manifest_.volume.normalize,
                     prepared, message.volume);

@@ -10,6 +10,7 @@
 
 #include "manifests/documents/plan.h"
 #include "manifests/values/job.h"
+#include "manifests/values/pair_key.h"
 #include "manifests/values/shard.h"
 #include "stages/frames/dataset.h"
 #include "stages/frames/decoding/pair_reader.h"
@@ -79,6 +80,8 @@ class SampleStages {
   /// Keeps where the source lies in the volume; fails if that is not what was planned.
   void take_placement(SampleMessage& message) const;
   void read_labels(SampleMessage& message, const Dataset& dataset) const;
+  /// Of views into the manifest and the message.
+  PairKey key_of(const SampleMessage& message) const;
   /// A volume that went through `finish`, as large as that, to be overwritten; else a new one. A
   /// new vector is set to zero first, which of a large volume costs as much as a stage of ours.
   std::vector<float> take_volume(std::size_t value_count) const;

@@ -17,6 +17,7 @@
 #include <variant>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
@@ -197,6 +198,8 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
+  expected.threshold =
+      pair_threshold(manifest_.generator, {manifest_.seed, to_string(kind), planned.sample_id});
   expected.tiles = stored.tiles;
   expected.annotation = std::move(annotation);
   expected.labels = std::move(std::get<VolumeLabels>(mapped));

@@ -138,6 +138,7 @@ std::string labels_json(const OutgoingSample& sample) {
                {"camera", unless(none, labels.origin.camera)},
                {"drive", unless(none, labels.origin.drive)},
                {"motion", json_of(pair.motion)},
+               {"threshold", labels.threshold ? Json(*labels.threshold) : Json()},
                {"source_size", {labels.source_size.height, labels.source_size.width}},
                {"source_to_volume",
                 Json::array({Json{map[0], map[1], map[2]}, Json{map[3], map[4], map[5]}})},

@@ -66,7 +66,7 @@ class SimulatedGenerator final : public Generator {
     const std::size_t pixels = pair.size.pixel_count();
     const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
-    pixel_event_volume(events(previous, next), {bins_, pair.size}, volume);
+    pixel_event_volume(events(previous, next, sensor_of(pair)), {bins_, pair.size}, volume);
     return {};
   }
 
@@ -77,17 +77,24 @@ class SimulatedGenerator final : public Generator {
     if (spec_.kind == GeneratorKind::kEsim) {
       json["max_displacement_px"] = spec_.max_displacement_px;
     }
+    if (spec_.threshold) json["threshold"] = spec_.threshold->range;
     return "simulation " + json.dump();
   }
 
  private:
-  std::vector<Event> events(const GreyImage& previous, const GreyImage& next) const {
+  SensorSpec sensor_of(const GeneratorInput& pair) const {
+    if (!pair.threshold) return spec_.sensor;
+    return spec_.threshold.value_or(ThresholdSpec()).applied(spec_.sensor, *pair.threshold);
+  }
+
+  std::vector<Event> events(const GreyImage& previous, const GreyImage& next,
+                            const SensorSpec& sensor) const {
     const CounterRandom random = random_.keyed(content_key(previous, next));
     if (spec_.kind == GeneratorKind::kEsim) {
-      return simulate_affine(previous, spec_.max_displacement_px, spec_.sensor, spec_.duration_s,
+      return simulate_affine(previous, spec_.max_displacement_px, sensor, spec_.duration_s,
                              random, EventOrder::kPixel);
     }
-    return simulate_difference(previous, next, spec_.sensor, spec_.duration_s, random,
+    return simulate_difference(previous, next, sensor, spec_.duration_s, random,
                                EventOrder::kPixel);
   }
 

@@ -11,6 +11,7 @@ namespace eventgan {
 /// kEsim or kDifference. Its volumes are event_volume() of the simulated events: counts, not
 /// normalised. Frames are rounded to 8-bit grey again, which they were before they were prepared.
 ///
+/// A pair's threshold, if it has one, is that of both polarities, with spec.threshold's spread.
 /// Random numbers come from the seed and the content of the two frames, so a volume depends on
 /// these alone. description() names the model and every parameter. Throws std::invalid_argument for
 /// kNetwork.

@@ -17,6 +17,7 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
 #include "manifests/values/text.h"
 #include "pipeline/planning/fingerprint.h"
@@ -118,8 +119,7 @@ PairChoiceResult choose_one(const Dataset& dataset, const LabelledFrame& frame,
   }
   auto& choices = present.empty() ? damaged : present;
   if (choices.empty()) return result;
-  const CounterRandom random =
-      CounterRandom(seed).keyed(to_string(source.dataset)).keyed(frame.sample_id);
+  const CounterRandom random = PairKey{seed, to_string(source.dataset), frame.sample_id}.pair();
   result.samples.push_back(std::move(choices[random.below(0, choices.size())]));
   if (source.pairs.stills) {
     FramePair& pair = result.samples.back().pair;

@@ -152,6 +152,7 @@ struct Labels {
 /// A pair's volume but for its values.
 struct MadeVolume {
   GeneratedPart part;
+  std::optional<double> threshold;
   VolumeStatistics statistics;
   Placement placement;
   VolumeLabels labels;
@@ -253,7 +254,9 @@ class PairGenerator {
         prepared(pairs.previous.at(index), job_.image, pairs.previous.name());
     const PreparedFrame following =
         prepared(pairs.following.at(index), job_.image, pairs.following.name());
-    const std::string name = job_.generator.noise ? content_name(previous, following) : "";
+    const bool draws = job_.generator.noise || job_.generator.threshold;
+    const std::string name = draws ? content_name(previous, following) : "";
+    const PairKey key{job_.seed, to_string(DatasetKind::kFrames), name};
     const PreparedPair pair = prepare_pair(previous, following);
     MadeVolume made;
     made.placement = pair.placement;
@@ -268,10 +271,12 @@ class PairGenerator {
       content.resize(VolumeShape{bins(), pair.content}.value_count());
       values = content;
     }
-    made.part = generate_volume(generator(), job_.generator.scope, pair, made.labels, values);
+    made.threshold = pair_threshold(job_.generator, key);
+    made.part = generate_volume(generator(), job_.generator.scope, pair, made.threshold,
+                                made.labels, values);
     const bool has_noise =
-        add_pair_noise(job_.generator, {job_.seed, to_string(DatasetKind::kFrames), name},
-                       std::numeric_limits<double>::quiet_NaN(), {bins(), pair.content}, values);
+        add_pair_noise(job_.generator, key, std::numeric_limits<double>::quiet_NaN(),
+                       {bins(), pair.content}, values);
     // A fifth of the time of a network of width 8 in bfloat16: only for who wants them.
     bool is_sound = made.part.notes.sound;
     if (labels || job_.volume.normalize != Normalization::kNone) {
@@ -413,6 +418,7 @@ py::dict PairGenerator::sample(const py::array& previous, const py::array& follo
   sample["volume"] = std::move(volume).to_python();
   sample["statistics"] = statistics;
   sample["source_to_volume"] = matrix(made.placement);
+  if (made.threshold) sample["threshold"] = *made.threshold;
   if (labels.has_boxes) {
     py::dict rows;
     rows["xyxy"] = rectangles(made.labels.boxes, &VolumeBox::clipped);

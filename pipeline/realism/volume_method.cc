@@ -112,7 +112,6 @@ namespace {
 
 constexpr double kLeastThreshold = 0.01;
 constexpr double kLargestThreshold = 5;
-constexpr double kSpreadShare = 0.15;
 
 std::vector<Event> simulated_events(const SimulatedScene& scene, const IntervalFrames& frames,
                                     int draw, const SensorSpec& sensor, std::uint64_t seed) {
@@ -171,12 +170,7 @@ SimulatedScene esim_scene(double displacement_px, int draws) {
 }
 
 SensorSpec realism_sensor(double threshold, double log_epsilon) {
-  SensorSpec sensor;
-  sensor.positive_threshold = threshold;
-  sensor.negative_threshold = threshold;
-  sensor.threshold_spread = kSpreadShare * threshold;
-  sensor.log_epsilon = log_epsilon;
-  return sensor;
+  return ThresholdSpec().applied({.log_epsilon = log_epsilon}, threshold);
 }
 
 std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const SensorSpec& sensor,

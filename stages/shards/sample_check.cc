@@ -174,6 +174,9 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
         "expected a motion of scale > 0, label_position 0 or 1, and one image as prev_path, "
         "prev_index, prev_video_frame and next_path, next_index, next_video_frame, got others");
   }
+  if (sample.threshold && !(std::isfinite(*sample.threshold) && *sample.threshold > 0)) {
+    faults.push_back("expected a finite threshold > 0, got " + std::to_string(*sample.threshold));
+  }
   const SourceToVolume map(sample.source_to_volume);
   const auto expect_mapped = [&](const std::string& name, const std::string& of, const auto& mapped,
                                  const auto& source) {

@@ -111,6 +111,7 @@ void append_pair(const ShardHeader& header, const ShardSample& sample, PairColum
   put(to.camera, origin.camera, row);
   put(to.drive, origin.drive, row);
   put(to.motion, pair.motion, row);
+  put(to.threshold, sample.threshold.value_or(kNan), row);
 }
 
 void append_events(const ShardSample& sample, EventColumns& to) {
@@ -376,6 +377,9 @@ ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, in
   sample.sample_id = tables.pairs.sample_id[row];
   sample.sequence = tables.pairs.sequence[row];
   sample.origin = origin_at(tables.pairs, row);
+  if (const double* threshold = row_if_any(tables.pairs.threshold, 1, row)) {
+    sample.threshold = *threshold;
+  }
   sample.pair = pair_at(tables.pairs, row);
   sample.source_size = {tables.pairs.source_size[2 * row], tables.pairs.source_size[2 * row + 1]};
   for (std::size_t i = 0; i < sample.source_to_volume.size(); ++i) {

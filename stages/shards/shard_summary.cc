@@ -164,6 +164,7 @@ std::string describe_sample(const ShardReader& reader, int slot) {
     line("motion", "of a still: ({:.4g} {:.4g}) px, {:.4g} degrees, scale {:.6g}", motion->x_px,
          motion->y_px, motion->angle_deg, motion->scale);
   }
+  if (sample.threshold) line("threshold", "{:.4g} of the sensor", *sample.threshold);
   line("source size", "{} pixels", to_string(sample.source_size));
   if (sample.valid) {
     const VolumeStatistics& statistics = sample.statistics;
@@ -328,6 +329,7 @@ std::string sample_json(const ShardReader& reader, int slot) {
                {"label_index", sample.pair.label_index},
                {"label_position", sample.pair.label_position},
                {"motion", json(sample.pair.motion)},
+               {"threshold", sample.threshold ? Json(*sample.threshold) : Json()},
                {"source_size", json(sample.source_size)},
                {"source_to_volume", sample.source_to_volume},
                {"scale", sample.scale},

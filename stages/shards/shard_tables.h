@@ -24,7 +24,7 @@ struct EventColumns {
   std::vector<float> generated_fraction;
 };
 
-/// `/pairs/*`, one row a sample. The last three lines are empty as long as no sample has such a
+/// `/pairs/*`, one row a sample. The last four lines are empty as long as no sample has such a
 /// thing.
 struct PairColumns {
   std::vector<std::string> sample_id, dataset, sequence;
@@ -40,6 +40,7 @@ struct PairColumns {
   std::vector<double> prev_time_s, next_time_s;
   std::vector<std::string> subject, action, camera, drive;
   std::vector<double> motion;
+  std::vector<double> threshold;
 };
 
 /// `/labels/boxes/*`, rows offsets[i] to offsets[i + 1] for sample i.
@@ -141,6 +142,7 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/pairs/camera", Rows::kSamples, {}, true}, p.camera);
   visit(ColumnSpec{"/pairs/drive", Rows::kSamples, {}, true}, p.drive);
   visit(ColumnSpec{"/pairs/motion", Rows::kSamples, {4}, true}, p.motion);
+  visit(ColumnSpec{"/pairs/threshold", Rows::kSamples, {}, true}, p.threshold);
 
   visit(ColumnSpec{"/labels/original", Rows::kSamples, {}}, tables.original);
   visit(ColumnSpec{"/labels/projection", Rows::kSamples, {3, 4}, true}, tables.projection);

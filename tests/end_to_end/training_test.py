@@ -307,7 +307,7 @@ class TrainedWeights(program.InFolder):
         self.assertEqual(len(report["pairs"]), count)
         for method in report["methods"]:
             self.assertEqual(len(method["pairs"]), count)
-            self.assertEqual(len(method["mean"]["events_per_bin"]), 9)
+            self.assertEqual(len(method["mean"]["events_per_channel"]), 18)
             for scores in [method["mean"], *method["pairs"]]:
                 self.assertLessEqual(set(SCORES), set(scores), method["name"])
                 self.assertIn("direction", scores)

@@ -20,6 +20,8 @@ class FakeGenerator final : public Generator {
   /// As if it computed in 8 bits, with this share of them at the end of their range.
   void saturate(double share) { saturated_share_ = share; }
   int calls() const { return calls_; }
+  /// Of the last pair; 0: it had none.
+  double threshold() const { return threshold_; }
 
   int bins() const override { return bins_; }
   GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override;
@@ -31,6 +33,7 @@ class FakeGenerator final : public Generator {
   double saturated_share_ = 0;
   float failing_value_ = -100;
   mutable std::atomic<int> calls_ = 0;
+  mutable std::atomic<double> threshold_ = 0;
 };
 
 }  // namespace eventgan::testing

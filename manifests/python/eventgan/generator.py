@@ -62,7 +62,7 @@ class Generator:
     normalize : {"none", "eta98"}
         Whether a volume is divided by its 98th percentile and clipped.
     seed : int, default 0
-        Of the models' random numbers, of noise (sensor={"noise": {...}}), and of untrained weights.
+        Of the models' random numbers, of what sensor={"threshold": [0.1, 0.6], "noise": {...}} draws for each pair, and of untrained weights.
     **settings
         Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
         sensor (a dictionary), duration_s, max_displacement_px, bins. manifest.schema.json has their meanings and ranges.
@@ -183,6 +183,7 @@ class Generator:
             volume : float32 [2B, H, W]
             statistics : dict, as in `Shards`: nonzero_fraction, max, sum_positive, sum_negative, flags, eta98; where scope computes a part,
                 generated_fraction and tiles
+            threshold : float, what was drawn for the pair, if sensor={"threshold": ...} was given
             source_to_volume : float64 [2, 3], the map of points (pixel centres are whole numbers)
             boxes : dict with xyxy, clipped to the volume, and xyxy_unclipped, if boxes were given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given

@@ -165,6 +165,23 @@ TEST(JobManifest, HoldsASimulatorsSettings) {
   EXPECT_EQ(spec.sensor, sensor);
 }
 
+TEST(JobManifest, HoldsThresholdsAndTheSensorAtTheirMiddle) {
+  const auto read = [](const char* sensor) {
+    const std::string generator = R"({"kind": "esim", "sensor": )" + std::string(sensor) + "}";
+    return parse(testing::edited(kSoundManifest, {{"/generator", generator}})).generator;
+  };
+  EXPECT_EQ(read("{}").threshold, std::nullopt);
+  const GeneratorSpec one = read(R"({"threshold": 0.5, "threshold_spread": 0.1})");
+  EXPECT_EQ(one.threshold, (ThresholdSpec{.range = {0.5, 0.5}, .spread = 0.1}));
+  const GeneratorSpec range = read(R"({"threshold": [0.1, 0.4], "refractory_s": 1})");
+  EXPECT_EQ(range.threshold, (ThresholdSpec{.range = {0.1, 0.4}}));
+  // The middle is sqrt(0.1 x 0.4) = 0.2, which the defaults have.
+  EXPECT_NEAR(range.sensor.positive_threshold, 0.2, 1e-12);
+  EXPECT_NEAR(range.sensor.negative_threshold, 0.2, 1e-12);
+  EXPECT_NEAR(range.sensor.threshold_spread, 0.03, 1e-12);
+  EXPECT_EQ(range.sensor.refractory_s, 1);
+}
+
 TEST(JobManifest, HoldsNoiseAsRanges) {
   EXPECT_EQ(parse(kSoundManifest).generator.noise, std::nullopt);
   const GeneratorSpec spec = parse(testing::edited(kSoundManifest, {{"/generator/sensor", R"({

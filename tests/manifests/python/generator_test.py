@@ -226,6 +226,37 @@ def test_one_pixel_and_very_wide(generator):
         assert generator(image, image).shape == (18, *shape)
 
 
+# ---- The sensor
+
+
+def test_noise_is_added_and_follows_from_seed_and_images(images):
+    """Over 0.1 s 100 Hz are 10 events a pixel, of which a standard deviation is 1 / sqrt(pixels) of them."""
+    pixels, sensor = images[0].shape[0] * images[0].shape[1], {"noise": {"shot_hz": 100}}
+    noisy = eventgan.Generator(kind="difference", sensor=sensor)
+    still = noisy.sample(images[0], images[0])
+    assert still["statistics"]["flags"] == 32 and "threshold" not in still
+    assert abs(still["volume"].sum() / pixels - 10) < 5 * (10 / pixels) ** 0.5
+    np.testing.assert_array_equal(noisy(images[0], images[0]), still["volume"])
+    assert (noisy(images[1], images[1]) != still["volume"]).any()
+    assert (eventgan.Generator(kind="difference", sensor=sensor, seed=1)(images[0], images[0]) != still["volume"]).any()
+    clean, network = (eventgan.Generator("shipped:8", sensor=given) for given in (None, sensor))
+    noise = network(*images[:2]) - clean(*images[:2])
+    np.testing.assert_allclose(noise, np.round(noise), atol=1e-5)
+    assert abs(noise.sum() / pixels - 10) < 5 * (10 / pixels) ** 0.5
+
+
+def test_a_threshold_is_drawn_for_each_pair(images):
+    generator = eventgan.Generator(kind="difference", sensor={"threshold": [0.1, 0.9]})
+    samples = [generator.sample(images[i], images[i + 1]) for i in range(3)]
+    thresholds = [sample["threshold"] for sample in samples]
+    assert len(set(thresholds)) == 3 and all(0.1 <= threshold <= 0.9 for threshold in thresholds)
+    for i in range(3):
+        one = eventgan.Generator(kind="difference", sensor={"threshold": thresholds[i]})
+        np.testing.assert_array_equal(one(images[i], images[i + 1]), samples[i]["volume"])
+    with pytest.raises(ValueError, match="sensor.positive_threshold: expected no such key together with threshold"):
+        eventgan.Generator(kind="difference", sensor={"threshold": 1, "positive_threshold": 1})
+
+
 # ---- Labels
 
 

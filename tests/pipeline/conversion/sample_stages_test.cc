@@ -280,6 +280,19 @@ TEST_F(SampleStagesTest, AStaticPairIsEmptyAndStaysEmptyWhenNormalised) {
   EXPECT_EQ(message.sample.statistics.eta98, 0.0f);
 }
 
+TEST_F(SampleStagesTest, AThresholdIsDrawnForEachPair) {
+  EXPECT_EQ(run().sample.threshold, std::nullopt);
+  EXPECT_EQ(generator_.threshold(), 0);
+  manifest_.generator.threshold = ThresholdSpec{.range = {0.1, 0.9}};
+  const double threshold = run().sample.threshold.value();
+  EXPECT_EQ(generator_.threshold(), threshold);
+  EXPECT_EQ(threshold, pair_threshold(manifest_.generator, {0, "frames", "0001"}));
+  shard_.samples[0].sample_id = "0002";
+  EXPECT_NE(run().sample.threshold, threshold);
+  shard_.samples[0].pair.next.path = "clip/absent.png";
+  EXPECT_EQ(run().sample.threshold, std::nullopt) << "no volume, no threshold";
+}
+
 class NoiseTest : public SampleStagesTest {
  protected:
   /// 4 x 6 pixels, or what the shard has.
@@ -365,7 +378,7 @@ TEST_F(NoiseTest, FollowsFromSeedDatasetAndSampleAlone) {
   const std::vector<std::byte> chunk = run().chunk;
   shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
   EXPECT_EQ(run().chunk, chunk) << "another shard";
-  manifest_.sources.insert(manifest_.sources.begin(), SourceSpec{.dataset = DatasetKind::kMpii});
+  manifest_.sources.emplace(manifest_.sources.begin())->dataset = DatasetKind::kMpii;
   datasets_.insert(datasets_.begin(), std::make_unique<testing::FakeDataset>("other", 2));
   shard_.source = 1;
   EXPECT_EQ(run().chunk, chunk) << "another source before it";

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <stdexcept>
 
 #include "manifests/values/events.h"
@@ -63,6 +64,29 @@ TEST(SimulatedGenerator, DifferenceCountsThresholdsPassed) {
   EXPECT_NEAR(positive_left, 6 * pixels, 1e-3);
 }
 
+/// Events of the difference of 1.382 (as above) with a threshold told by the pair.
+double events_at(const GeneratorSpec& spec, std::optional<double> threshold) {
+  std::vector<float> frames = halves(50, 100);
+  const std::vector<float> next = halves(200, 100);
+  frames.insert(frames.end(), next.begin(), next.end());
+  std::vector<float> volume(VolumeShape{9, kSize}.value_count());
+  make_simulated_generator(spec, 9, 1)->generate({frames, kSize, threshold}, volume);
+  return sum(volume) / (kSize.height * kSize.width / 2);
+}
+
+TEST(SimulatedGenerator, APairsThresholdIsInPlaceOfItsOwn) {
+  GeneratorSpec spec = quiet(GeneratorKind::kDifference);
+  spec.threshold = ThresholdSpec{.range = {0.1, 2}, .spread = 0};
+  EXPECT_NEAR(events_at(spec, std::nullopt), 6, 1e-4);  // sensor's 0.2
+  EXPECT_NEAR(events_at(spec, 0.5), 2, 1e-4);
+  EXPECT_NEAR(events_at(spec, 1.3), 1, 1e-4);
+  EXPECT_NEAR(events_at(spec, 1.4), 0, 1e-4);
+  // 15 % of 1.38, the change, is one standard deviation: half of the pixels reach theirs, of 96
+  // within five deviations.
+  spec.threshold->spread.reset();
+  EXPECT_NEAR(events_at(spec, 1.382), 0.5, 5 * 0.5 / std::sqrt(96));
+}
+
 TEST(SimulatedGenerator, AStaticPairIsEmptyForTheDifference) {
   const auto generator = make_simulated_generator(quiet(GeneratorKind::kDifference), 9, 1);
   EXPECT_EQ(sum(volume_of(*generator, halves(0, 255), halves(0, 255))), 0);
@@ -93,6 +117,10 @@ TEST(SimulatedGenerator, IsDescribedWithAllItsParameters) {
   EXPECT_THAT(before, ::testing::AllOf(::testing::HasSubstr("\"model\":\"esim\""),
                                        ::testing::HasSubstr("\"max_displacement_px\":10.0"),
                                        ::testing::HasSubstr("\"positive_threshold\":0.2")));
+  spec.threshold = ThresholdSpec{.range = {0.25, 0.5}};
+  EXPECT_THAT(make_simulated_generator(spec, 9, 1)->description(),
+              ::testing::HasSubstr("\"threshold\":[0.25,0.5]"));
+  spec.threshold.reset();
   spec.sensor.hot_pixel_rate_hz = 3;
   EXPECT_NE(make_simulated_generator(spec, 9, 1)->description(), before);
 }

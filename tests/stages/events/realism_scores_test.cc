@@ -264,7 +264,8 @@ TEST(RealismScores, AmountsAreOfTheComparedVolume) {
   ours.at(3, 0, 0) = 3;
   ours.at(3, 0, 1) = 3;
   const RealismScores scores = scores_of(ours.values, Voxels(ours.shape).values, ours.shape);
-  EXPECT_THAT(scores.events_per_bin, ElementsAre(0.5, 1.0));
+  EXPECT_THAT(scores.events_per_channel, ElementsAre(0.5, 0.0, 0.0, 1.0));
+  EXPECT_THAT(scores.events_per_bin(), ElementsAre(0.5, 1.0));
   EXPECT_DOUBLE_EQ(scores.events_per_pixel, 1.5);
   EXPECT_DOUBLE_EQ(scores.positive_share, 1.0 / 3);
 }
@@ -347,9 +348,9 @@ TEST(MeanScores, AreFieldByField) {
   first.polarity_correlation = 7;
   first.events_per_pixel = 8;
   first.positive_share = 9;
-  first.events_per_bin = {10, 20};
+  first.events_per_channel = {10, 20};
   RealismScores second;
-  second.events_per_bin = {0, 2};
+  second.events_per_channel = {0, 2};
   const std::vector<RealismScores> scores{first, second};
   const RealismScores mean = mean_scores(scores);
   EXPECT_EQ(mean.f1_raw, 0.5);
@@ -361,7 +362,7 @@ TEST(MeanScores, AreFieldByField) {
   EXPECT_EQ(mean.polarity_correlation, 3.5);
   EXPECT_EQ(mean.events_per_pixel, 4);
   EXPECT_EQ(mean.positive_share, 4.5);
-  EXPECT_THAT(mean.events_per_bin, ElementsAre(5, 11));
+  EXPECT_THAT(mean.events_per_channel, ElementsAre(5, 11));
 }
 
 TEST(MeanScores, LeaveOutWhatHasNoMeaning) {
@@ -378,13 +379,30 @@ TEST(MeanScores, LeaveOutWhatHasNoMeaning) {
 TEST(MeanScores, OfNoPairsAreNaN) {
   const RealismScores mean = mean_scores({});
   EXPECT_THAT(mean.f1_raw, IsNan());
-  EXPECT_THAT(mean.events_per_bin, IsEmpty());
+  EXPECT_THAT(mean.events_per_channel, IsEmpty());
 }
 
-TEST(MeanScores, RefuseDifferentNumbersOfBins) {
+TEST(MeanScores, RefuseDifferentNumbersOfChannels) {
   std::vector<RealismScores> scores(2);
-  scores[1].events_per_bin = {1};
+  scores[1].events_per_channel = {1};
   EXPECT_THROW(mean_scores(scores), std::invalid_argument);
+}
+
+TEST(ShareDistance, IsOfTheSharesAlone) {
+  RealismScores scores, real;
+  scores.events_per_channel = {0.3, 0.1};
+  scores.events_per_pixel = 0.4;
+  real.events_per_channel = {0.2, 0.2};
+  real.events_per_pixel = 0.4;
+  EXPECT_DOUBLE_EQ(share_distance(scores, real), 0.5);  // |3/4 - 1/2| + |1/4 - 1/2|
+  real.events_per_channel = {30, 10};
+  real.events_per_pixel = 40;
+  EXPECT_NEAR(share_distance(scores, real), 0, 1e-15);
+  real.events_per_channel = {0, 0};
+  real.events_per_pixel = 0;
+  EXPECT_THAT(share_distance(scores, real), IsNan());
+  EXPECT_THAT(share_distance({}, {}), IsNan());
+  EXPECT_THROW(share_distance(scores, {}), std::invalid_argument);
 }
 
 TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
@@ -394,7 +412,7 @@ TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
     scores[i].pool_mse_2 = 0.25;
     scores[i].time_correlation = i < 2 ? 0.5 : kNoScore;
     scores[i].positive_share = kNoScore;
-    scores[i].events_per_bin = {1, i % 2 == 0 ? 3.0 : 1.0};
+    scores[i].events_per_channel = {1, i % 2 == 0 ? 3.0 : 1.0};
   }
   const ScoreBounds bounds = mean_bounds(scores);
   EXPECT_NEAR(bounds.low.f1_time, 0.5 - 1.96 * 0.025, 0.006);
@@ -403,9 +421,26 @@ TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
   EXPECT_EQ(bounds.high.pool_mse_2, 0.25);
   EXPECT_EQ(bounds.high.time_correlation, 0.5);  // draws without a number are left out
   EXPECT_THAT(bounds.high.positive_share, IsNan());
-  ASSERT_EQ(bounds.low.events_per_bin.size(), 2u);
-  EXPECT_EQ(bounds.low.events_per_bin[0], 1);
-  EXPECT_NEAR(bounds.high.events_per_bin[1], 2 + 1.96 * 0.05, 0.012);
+  ASSERT_EQ(bounds.low.events_per_channel.size(), 2u);
+  EXPECT_EQ(bounds.low.events_per_channel[0], 1);
+  EXPECT_NEAR(bounds.high.events_per_channel[1], 2 + 1.96 * 0.05, 0.012);
+}
+
+TEST(ShareDistance, IsOfTheSharesAlone) {
+  RealismScores scores, real;
+  scores.events_per_channel = {0.3, 0.1};
+  scores.events_per_pixel = 0.4;
+  real.events_per_channel = {0.2, 0.2};
+  real.events_per_pixel = 0.4;
+  EXPECT_DOUBLE_EQ(share_distance(scores, real), 0.5);  // |3/4 - 1/2| + |1/4 - 1/2|
+  real.events_per_channel = {30, 10};
+  real.events_per_pixel = 40;
+  EXPECT_NEAR(share_distance(scores, real), 0, 1e-15);
+  real.events_per_channel = {0, 0};
+  real.events_per_pixel = 0;
+  EXPECT_THAT(share_distance(scores, real), IsNan());
+  EXPECT_THAT(share_distance({}, {}), IsNan());
+  EXPECT_THROW(share_distance(scores, {}), std::invalid_argument);
 }
 
 TEST(MeanBounds, AreNotToldOfTwoPairs) {

@@ -181,6 +181,7 @@ ExampleShard example_shard(StoredType type, int deflate_level) {
   add(shard, cut, volume(3, size));
 
   ShardSample person = sample(4);  // of a still
+  person.threshold = 0.3125;
   person.pair.previous = person.pair.next;
   person.pair.previous.time_s = kNan;
   person.pair.motion = ImageMotion{-1.5, 0.25, 0.75, 1.0078125};

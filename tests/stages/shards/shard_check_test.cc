@@ -134,6 +134,16 @@ TEST_F(ShardCheck, AValueOutsideTheGeneratedTilesIsAFault) {
   overwrite<float>("/events/statistics/generated_fraction", H5T_NATIVE_FLOAT, {0.75f, 1, 0, 1, 1});
   EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("zeros outside the tiles"),
                                           HasSubstr("(sample 0, 000000)"))));
+  overwrite<std::uint32_t>("/events/statistics/flags", H5T_NATIVE_UINT32, {kFlagNoise, 1, 0, 0, 0});
+  EXPECT_THAT(faults(), IsEmpty()) << "noise is everywhere";
+}
+
+TEST_F(ShardCheck, AThresholdIsANumberAboveZero) {
+  write(testing::example_shard());
+  for (const double wrong : {0.0, -0.2, HUGE_VAL}) {
+    overwrite<double>("/pairs/threshold", H5T_NATIVE_DOUBLE, {NAN, NAN, NAN, NAN, wrong});
+    EXPECT_THAT(faults(), ElementsAre(HasSubstr("expected a finite threshold > 0")));
+  }
 }
 
 TEST_F(ShardCheck, NormalizedVolumesAreSound) {

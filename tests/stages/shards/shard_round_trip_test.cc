@@ -79,6 +79,7 @@ void expect_same(const ShardSample& got, const ShardSample& expected) {
   EXPECT_EQ(got.pair.label_index, expected.pair.label_index);
   EXPECT_EQ(got.pair.label_position, expected.pair.label_position);
   EXPECT_EQ(got.pair.motion, expected.pair.motion);
+  EXPECT_EQ(got.threshold, expected.threshold);
   EXPECT_EQ(got.source_size, expected.source_size);
   for (std::size_t i = 0; i < 6; ++i) {
     EXPECT_THAT(got.source_to_volume[i],

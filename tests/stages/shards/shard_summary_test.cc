@@ -43,7 +43,7 @@ TEST(ShardContents, AreWhatTheWriterHasStored) {
       record.contents.optional_columns,
       ElementsAre("/events/tiles", "/events/statistics/generated_fraction", "/pairs/prev_time_s",
                   "/pairs/next_time_s", "/pairs/subject", "/pairs/action", "/pairs/camera",
-                  "/pairs/drive", "/pairs/motion", "/labels/projection",
+                  "/pairs/drive", "/pairs/motion", "/pairs/threshold", "/labels/projection",
                   "/labels/projection_source", "/labels/boxes/difficulty", "/labels/poses/box",
                   "/labels/poses/box_source", "/labels/poses/joints3d_mm", "/labels/poses/camera",
                   "/labels/poses/camera_source", "/labels/poses/camera_distortion"));
@@ -187,6 +187,7 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
   EXPECT_EQ(first["persons"][1]["joints3d_mm"],
             nlohmann::json::parse("[null, [4, 5, 3001], [7, 8, 3002]]"));
   EXPECT_TRUE(first["motion"].is_null());
+  EXPECT_TRUE(first["threshold"].is_null());
   EXPECT_EQ(nlohmann::json::parse(sample_json(reader_, 4))["motion"],
             nlohmann::json::parse(
                 R"({"x_px": -1.5, "y_px": 0.25, "angle_deg": 0.75, "scale": 1.0078125})"));

@@ -1,0 +1,63 @@
+#include "manifests/values/pair_key.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+
+namespace eventgan {
+namespace {
+
+double threshold(std::array<double, 2> range, const PairKey& key) {
+  GeneratorSpec spec;
+  spec.threshold = ThresholdSpec{.range = range};
+  return pair_threshold(spec, key).value();
+}
+
+TEST(PairThreshold, IsNoneUnlessTold) {
+  EXPECT_EQ(pair_threshold({}, {1, "mpii", "a"}), std::nullopt);
+}
+
+TEST(PairThreshold, OfOneNumberIsThatNumber) {
+  for (const double told : {0.01, 0.25, 0.3, 5.0}) {
+    EXPECT_EQ(threshold({told, told}, {1, "mpii", "a"}), told);
+  }
+}
+
+TEST(PairThreshold, IsLogUniform) {
+  // ln of it is uniform from ln 0.1 to ln 0.9, about ln 0.3, with a deviation of ln 9 / sqrt(12).
+  constexpr int kDraws = 4000;
+  double sum = 0, least = 1, most = 0;
+  for (int i = 0; i < kDraws; ++i) {
+    const std::string id = std::to_string(i);
+    const double drawn = threshold({0.1, 0.9}, {1, "mpii", id});
+    least = std::min(least, drawn);
+    most = std::max(most, drawn);
+    sum += std::log(drawn);
+  }
+  EXPECT_NEAR(sum / kDraws, std::log(0.3), 5 * std::log(9) / std::sqrt(12.0 * kDraws));
+  EXPECT_GE(least, 0.1);
+  EXPECT_LT(least, 0.102);
+  EXPECT_LE(most, 0.9);
+  EXPECT_GT(most, 0.88);
+}
+
+TEST(PairThreshold, FollowsFromSeedDatasetAndSample) {
+  const double drawn = threshold({0.1, 0.9}, {1, "mpii", "a"});
+  EXPECT_EQ(threshold({0.1, 0.9}, {1, "mpii", "a"}), drawn);
+  EXPECT_NE(threshold({0.1, 0.9}, {2, "mpii", "a"}), drawn);
+  EXPECT_NE(threshold({0.1, 0.9}, {1, "frames", "a"}), drawn);
+  EXPECT_NE(threshold({0.1, 0.9}, {1, "mpii", "b"}), drawn);
+}
+
+TEST(ThresholdSpec, IsOfBothPolaritiesAndSpreadAsTheDefaultsAre) {
+  EXPECT_EQ(ThresholdSpec().applied({}, 0.2), SensorSpec());
+  const SensorSpec wide = ThresholdSpec{.spread = 0.5}.applied({.leak_rate_hz = 1}, 0.4);
+  EXPECT_EQ(wide, (SensorSpec{.positive_threshold = 0.4,
+                              .negative_threshold = 0.4,
+                              .threshold_spread = 0.5,
+                              .leak_rate_hz = 1}));
+}
+
+}  // namespace
+}  // namespace eventgan
