@@ -460,14 +460,18 @@ NoiseSpec read_noise(const StrictValue& value) {
 }
 
 /// Reads a sensor's `threshold`, which stands in place of `own`, the sensor's other keys of it.
-void read_threshold(const StrictValue& value, const std::optional<StrictValue>& spread,
+void read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio,
+                    const std::optional<StrictValue>& spread,
                     std::initializer_list<std::optional<StrictValue>> own, GeneratorSpec& spec) {
   ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
+  if (ratio) threshold.ratio = ratio->number(0.2, 5);
   if (spread) threshold.spread = spec.sensor.threshold_spread;
   for (const std::optional<StrictValue>& key : own) {
     if (key) key->fault("no such key together with threshold, which sets it");
   }
-  spec.sensor = threshold.applied(spec.sensor, std::sqrt(threshold.range[0] * threshold.range[1]));
+  spec.sensor = threshold.applied(
+      spec.sensor,
+      {std::sqrt(threshold.range[0] * threshold.range[1]), threshold.ratio});
   spec.threshold = threshold;
 }
 
@@ -481,9 +485,12 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
   spec.sensor = read_sensor_keys([&](const char* key) {
     return keys.find(key, {kEsim, kDifference});
   });
+  const auto ratio = object.find("threshold_ratio");
   if (const auto threshold = object.find("threshold")) {
-    read_threshold(*threshold, object.find("threshold_spread"),
+    read_threshold(*threshold, ratio, object.find("threshold_spread"),
                    {object.find("positive_threshold"), object.find("negative_threshold")}, spec);
+  } else if (ratio) {
+    ratio->fault("threshold beside it", "none");
   }
   object.finish();
 }
@@ -513,6 +520,7 @@ GeneratorSpec read_generator(const StrictValue& value) {
   if (const auto precision = keys.find("precision", {kNetwork})) {
     spec.precision = precision->choice(kPrecisionWords);
   }
+  if (const auto sample = keys.find("sample", {kNetwork})) spec.sample = sample->boolean();
   if (const auto scope = keys.find("scope", {kNetwork})) {
     spec.scope.scope = scope->choice(kScopeWords);
   }

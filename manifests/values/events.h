@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "manifests/values/frames.h"
+#include "manifests/values/sensor_input.h"
 
 namespace eventgan {
 
@@ -41,6 +42,7 @@ struct SensorSpec {
 struct ThresholdSpec {
   /// Least and most, log units, 0.01..5; drawn log-uniformly.
   std::array<double, 2> range{0.2, 0.2};
+  double ratio = 1;  ///< of the negative threshold to the positive one, 0.2..5
   /// Standard deviation over the pixels, 0..1; none: the share of the threshold that it is of
   /// SensorSpec's defaults.
   std::optional<double> spread = std::nullopt;
@@ -49,9 +51,10 @@ struct ThresholdSpec {
   static constexpr double kSpreadShare = 0.15;
 
   /// The sensor with a threshold.
-  SensorSpec applied(SensorSpec sensor, double threshold) const {
-    sensor.positive_threshold = sensor.negative_threshold = threshold;
-    sensor.threshold_spread = spread.value_or(kSpreadShare * threshold);
+  SensorSpec applied(SensorSpec sensor, const ContrastThreshold& threshold) const {
+    sensor.positive_threshold = threshold.positive();
+    sensor.negative_threshold = threshold.negative();
+    sensor.threshold_spread = spread.value_or(kSpreadShare * threshold.mean);
     return sensor;
   }
 };

@@ -219,6 +219,7 @@ struct GeneratorSpec {
   Device device = Device::kCpu;               ///< kNetwork
   Precision precision = Precision::kFloat32;  ///< kNetwork
   ScopeSpec scope;                            ///< kNetwork
+  bool sample = true;  ///< kNetwork: events are drawn of rates, if the weights give rates
   SensorSpec sensor;                          ///< kEsim, kDifference; at the middle of `threshold`
   std::optional<ThresholdSpec> threshold = {};  ///< of any kind but kEvents (pair_threshold)
   std::optional<NoiseSpec> noise = {};          ///< of any kind but kEvents

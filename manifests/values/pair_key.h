@@ -25,13 +25,14 @@ struct PairKey {
   CounterRandom camera() const { return CounterRandom(seed).keyed("camera").keyed(dataset); }
 };
 
-/// The contrast threshold of a pair's sensor, log units, drawn log-uniformly from the range that
-/// the manifest tells; none if it tells none. Pure.
-inline std::optional<double> pair_threshold(const GeneratorSpec& spec, const PairKey& key) {
+/// The contrast threshold of a pair's sensor, its mean drawn log-uniformly from the range that the
+/// manifest tells; none if it tells none. Pure.
+inline std::optional<ContrastThreshold> pair_threshold(const GeneratorSpec& spec, const PairKey& key) {
   if (!spec.threshold) return std::nullopt;
   const auto [least, most] = spec.threshold->range;
   const double share = key.pair().keyed("threshold").uniform(0);
-  return std::min(least * std::pow(most / least, share), most);
+  return ContrastThreshold{std::min(least * std::pow(most / least, share), most),
+                           spec.threshold->ratio};
 }
 
 }  // namespace eventgan

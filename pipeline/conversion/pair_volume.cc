@@ -2,21 +2,31 @@
 
 #include <cmath>
 
+#include "stages/events/drawn_events.h"
 #include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/generator/wanted_tiles.h"
 
 namespace eventgan {
 
-GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
-                              const PreparedPair& pair, std::optional<double> threshold,
+GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& spec,
+                              const PairKey& key, const PreparedPair& pair,
                               const VolumeLabels& labels, std::span<float> volume) {
-  const GeneratorInput input{pair.input, pair.content, threshold};
-  if (scope.scope == Scope::kWhole) return {generator.generate(input, volume), {}};
-  const TileMask wanted =
-      wanted_tiles(scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
-  return {generator.generate_tiles(input, wanted, volume),
-          tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume)};
+  GeneratedPart part;
+  part.threshold = pair_threshold(spec, key);
+  const GeneratorInput input{pair.input, pair.content, part.threshold};
+  if (spec.scope.scope == Scope::kWhole) {
+    part.notes = generator.generate(input, volume);
+  } else {
+    const TileMask wanted = wanted_tiles(spec.scope, pair.input, pair.content, pair.content_y,
+                                         pair.content_x, labels);
+    part.notes = generator.generate_tiles(input, wanted, volume);
+    part.tiles = tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume);
+  }
+  if (spec.sample && generator.thresholds()) {
+    draw_events(volume, {generator.bins(), pair.content}, key.pair().keyed("events"));
+  }
+  return part;
 }
 
 bool add_pair_noise(const GeneratorSpec& spec, const PairKey& key, double gap_s,

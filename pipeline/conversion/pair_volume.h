@@ -22,13 +22,15 @@ struct GeneratedPart {
   /// [row, column] of the whole volume's tiles, 1 or 0: those that the scope wants. Empty: all is
   /// generated.
   std::vector<std::uint8_t> tiles;
+  std::optional<ContrastThreshold> threshold;  ///< pair_threshold()
 };
 
-/// Generates what `scope` wants of a pair's volume, zeros elsewhere. `threshold`: GeneratorInput's.
+/// Generates what the scope wants of a pair's volume, zeros elsewhere, by the sensor that the
+/// manifest tells; and draws events if it gives rates and the manifest wants events (draw_events).
 /// `volume`: [2 bins, y, x] of pair.content, overwritten whole. `labels` are in pixels of the whole
 /// volume. Throws as Generator::generate. Thread safe.
-GeneratedPart generate_volume(const Generator& generator, const ScopeSpec& scope,
-                              const PreparedPair& pair, std::optional<double> threshold,
+GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& spec,
+                              const PairKey& key, const PreparedPair& pair,
                               const VolumeLabels& labels, std::span<float> volume);
 
 /// Adds the noise that a manifest may ask for (stages/events/noise.h) to the volume of a pair's

@@ -204,10 +204,9 @@ void SampleStages::generate(SampleMessage& message) const try {
     return;
   }
   message.volume = take_volume(VolumeShape{generator_.bins(), prepared.content}.value_count());
-  message.sample.threshold = pair_threshold(manifest_.generator, key_of(message));
-  GeneratedPart part =
-      generate_volume(generator_, manifest_.generator.scope, prepared, message.sample.threshold,
-                      message.sample.labels, message.volume);
+  GeneratedPart part = generate_volume(generator_, manifest_.generator, key_of(message), prepared,
+                                       message.sample.labels, message.volume);
+  if (part.threshold) message.sample.threshold = part.threshold->mean;
   message.notes = part.notes;
   message.sample.tiles = std::move(part.tiles);
   free_memory(message.prepared.input);

@@ -198,8 +198,10 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   }
   expected.source_size = placement.source;
   expected.source_to_volume = map;
-  expected.threshold =
-      pair_threshold(manifest_.generator, {manifest_.seed, to_string(kind), planned.sample_id});
+  const PairKey key{manifest_.seed, to_string(kind), planned.sample_id};
+  if (const auto threshold = pair_threshold(manifest_.generator, key)) {
+    expected.threshold = threshold->mean;
+  }
   expected.tiles = stored.tiles;
   expected.annotation = std::move(annotation);
   expected.labels = std::move(std::get<VolumeLabels>(mapped));

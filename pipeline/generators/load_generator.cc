@@ -1,5 +1,7 @@
 #include "pipeline/generators/load_generator.h"
 
+#include <fmt/core.h>
+
 #include <cstddef>
 #include <exception>
 #include <memory>
@@ -101,6 +103,24 @@ LoadedGenerator load_without_weights(const JobManifest& manifest) {
   return loaded;
 }
 
+/// A sensor that the weights have not learnt would give volumes of another one.
+void check_threshold(const Weights& weights, const GeneratorSpec& spec) {
+  if (!spec.threshold) return;
+  const auto [least, most] = spec.threshold->range;
+  if (!weights.thresholds) {
+    throw UsageError(
+        "$.generator.sensor.threshold: expected weights that have learnt a sensor's threshold, got "
+        "others: " +
+        spec.weights);
+  }
+  const ThresholdRange learnt = *weights.thresholds;
+  if (learnt.contains(least) && learnt.contains(most)) return;
+  throw UsageError(fmt::format(
+      "$.generator.sensor.threshold: expected {:.3g}..{:.3g} as the weights have learnt, got "
+      "{:.3g}..{:.3g}",
+      learnt.lowest, learnt.highest, least, most));
+}
+
 std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,
                         const EngineSupport& support, const std::optional<GapRange>& gaps) {
   std::string text = "generator: ";
@@ -129,6 +149,7 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   const GeneratorSpec& spec = manifest.generator;
   if (spec.kind != GeneratorKind::kNetwork) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
+  check_threshold(loaded.weights, spec);
   const EngineSupport support = engine_support(spec.precision, spec.device);
   const EngineChoice choice =
       choose_engine({spec.engine, spec.precision, loaded.weights.calibration != nullptr,

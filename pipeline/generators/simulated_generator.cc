@@ -77,7 +77,10 @@ class SimulatedGenerator final : public Generator {
     if (spec_.kind == GeneratorKind::kEsim) {
       json["max_displacement_px"] = spec_.max_displacement_px;
     }
-    if (spec_.threshold) json["threshold"] = spec_.threshold->range;
+    if (spec_.threshold) {
+      json["threshold"] = spec_.threshold->range;
+      json["threshold_ratio"] = spec_.threshold->ratio;
+    }
     return "simulation " + json.dump();
   }
 

@@ -152,7 +152,6 @@ struct Labels {
 /// A pair's volume but for its values.
 struct MadeVolume {
   GeneratedPart part;
-  std::optional<double> threshold;
   VolumeStatistics statistics;
   Placement placement;
   VolumeLabels labels;
@@ -254,7 +253,8 @@ class PairGenerator {
         prepared(pairs.previous.at(index), job_.image, pairs.previous.name());
     const PreparedFrame following =
         prepared(pairs.following.at(index), job_.image, pairs.following.name());
-    const bool draws = job_.generator.noise || job_.generator.threshold;
+    const bool draws =
+        job_.generator.noise || job_.generator.threshold || generator().thresholds();
     const std::string name = draws ? content_name(previous, following) : "";
     const PairKey key{job_.seed, to_string(DatasetKind::kFrames), name};
     const PreparedPair pair = prepare_pair(previous, following);
@@ -271,9 +271,7 @@ class PairGenerator {
       content.resize(VolumeShape{bins(), pair.content}.value_count());
       values = content;
     }
-    made.threshold = pair_threshold(job_.generator, key);
-    made.part = generate_volume(generator(), job_.generator.scope, pair, made.threshold,
-                                made.labels, values);
+    made.part = generate_volume(generator(), job_.generator, key, pair, made.labels, values);
     const bool has_noise =
         add_pair_noise(job_.generator, key, std::numeric_limits<double>::quiet_NaN(),
                        {bins(), pair.content}, values);
@@ -418,7 +416,7 @@ py::dict PairGenerator::sample(const py::array& previous, const py::array& follo
   sample["volume"] = std::move(volume).to_python();
   sample["statistics"] = statistics;
   sample["source_to_volume"] = matrix(made.placement);
-  if (made.threshold) sample["threshold"] = *made.threshold;
+  if (const auto& threshold = made.part.threshold) sample["threshold"] = threshold->mean;
   if (labels.has_boxes) {
     py::dict rows;
     rows["xyxy"] = rectangles(made.labels.boxes, &VolumeBox::clipped);

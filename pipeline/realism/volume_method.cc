@@ -170,7 +170,7 @@ SimulatedScene esim_scene(double displacement_px, int draws) {
 }
 
 SensorSpec realism_sensor(double threshold, double log_epsilon) {
-  return ThresholdSpec().applied({.log_epsilon = log_epsilon}, threshold);
+  return ThresholdSpec().applied({.log_epsilon = log_epsilon}, {threshold});
 }
 
 std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const SensorSpec& sensor,
