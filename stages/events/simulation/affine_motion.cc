@@ -205,6 +205,11 @@ std::vector<float> AffineInterval::render(int step) const {
 }
 
 void AffineInterval::render_row(int step, int y, std::span<float> intensity) const {
+  if (step == 0) {
+    const auto first = static_cast<std::size_t>(y) * intensity.size();
+    std::ranges::copy(std::span(still_).subspan(first, intensity.size()), intensity.begin());
+    return;
+  }
   places_[static_cast<std::size_t>(step)].row(still_, y, intensity);
 }
 

@@ -41,7 +41,7 @@ class AffinePlaces {
  public:
   AffinePlaces(ImageSize size, const AffineMotion& motion, double u);
 
-  /// The moved image, [y, x], and its row y, [x], of the intensity at u = 0. Thread safe.
+  /// The moved image, [y, x], or its row y, [x], of the intensity at u = 0. Thread safe.
   std::vector<float> image(std::span<const float> still) const;
   void row(std::span<const float> still, int y, std::span<float> intensity) const;
 

@@ -402,8 +402,9 @@ class RowRuns {
                   negative_random(random)),
         start_s_(times_s.front()),
         changes_(times_s.size() - 1) {
-    for (std::size_t i = 1; i < times_s.size(); ++i)
+    for (std::size_t i = 1; i < times_s.size(); ++i) {
       steps_.emplace_back(times_s[i - 1], times_s[i], spec);
+    }
     if (PixelNoise::any(spec)) {
       noise_.emplace(spec, size.pixel_count(), start_s_, noise_random(random));
     }

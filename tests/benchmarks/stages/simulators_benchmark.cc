@@ -24,9 +24,9 @@ cv::Mat street(int moved) {
   cv::Mat image(kShape.size.height, kShape.size.width, CV_32FC1);
   for (int y = 0; y < image.rows; ++y) image.row(y).setTo(200 - 0.4 * y);
   cv::RNG houses(7);
-  for (int i = 0; i < 400; ++i) {
+  for (int i = 0; i < 1500; ++i) {
     const cv::Point corner(houses.uniform(-50, 1000) - moved, houses.uniform(20, 240));
-    const cv::Size side(houses.uniform(3, 80), houses.uniform(3, 40));
+    const cv::Size side(houses.uniform(2, 40), houses.uniform(2, 25));
     cv::rectangle(image, cv::Rect(corner, side), houses.uniform(10.0, 240.0), cv::FILLED);
   }
   cv::Mat noise(image.size(), image.type());
@@ -43,7 +43,7 @@ void simulate(benchmark::State& state, GeneratorKind kind) {
   std::vector<std::vector<float>> pairs;
   for (int i = 0; i < kPairs; ++i) {
     pairs.emplace_back();
-    for (const int moved : {3 * i, 3 * i + 3}) {
+    for (const int moved : {5 * i, 5 * i + 5}) {
       const cv::Mat frame = street(moved);
       pairs.back().insert(pairs.back().end(), frame.begin<float>(), frame.end<float>());
     }
