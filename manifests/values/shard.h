@@ -20,7 +20,9 @@ inline constexpr int kShardFormatVersion = 1;
 /// What the values of a volume, as generated, are.
 enum class VolumeUnit {
   kLearned,  ///< a network's: dimensionless, as the volumes of its training were normalised
-  kEvents    ///< a simulator's: a count of events, each spread over the two bins nearest in time
+  kEvents,   ///< a simulator's: a count of events, each spread over the two bins nearest in time
+  kDrawn,    ///< the same of events drawn from a network's rates, between the frames' times
+  kRates     ///< a network's: the number of events to be expected
 };
 
 /// What is true of a whole shard; manifests/guides/shard_format.md says where each field is.

@@ -17,6 +17,12 @@
 namespace eventgan {
 namespace {
 
+VolumeUnit unit_of(const GeneratorSpec& spec, const Generator& generator) {
+  if (spec.kind != GeneratorKind::kNetwork) return VolumeUnit::kEvents;
+  if (!generator.thresholds()) return VolumeUnit::kLearned;
+  return spec.sample ? VolumeUnit::kDrawn : VolumeUnit::kRates;
+}
+
 ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   const JobManifest& manifest = job.manifest;
   const auto source = static_cast<std::size_t>(shard.source);
@@ -29,8 +35,7 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   header.dtype = manifest.output.dtype;
   header.deflate_level = manifest.output.deflate_level;
   header.normalization = manifest.volume.normalize;
-  header.unit = manifest.generator.kind == GeneratorKind::kNetwork ? VolumeUnit::kLearned
-                                                                   : VolumeUnit::kEvents;
+  header.unit = unit_of(manifest.generator, job.generator);
   header.label_schema = job.datasets[source]->label_schema();
   header.preprocessing = preprocessing_json(manifest.image);
   header.plan_hash = job.frozen.hash;

@@ -227,7 +227,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
           to_string(header.volume.size),
           manifest.image.size ? "" : " (of the first shard, each image has its own)",
           to_string(header.dtype), header.scope.empty() ? "" : ", scope " + escaped(header.scope),
-          header.unit == VolumeUnit::kEvents ? "count events" : "are dimensionless, about 0–1"));
+          header.unit == VolumeUnit::kLearned ? "are dimensionless, about 0–1" : "count events"));
   html += fact("preprocessing", "<code>" + escaped(header.preprocessing) + "</code>");
   html += fact("plan", "<code>" + escaped(header.plan_hash) + "</code>, seed " +
                            std::to_string(manifest.seed));
@@ -327,7 +327,7 @@ std::string of_volumes(const Survey& survey) {
 }
 
 std::string histograms(const Survey& survey) {
-  const bool is_counted = survey.header.unit == VolumeUnit::kEvents;
+  const bool is_counted = survey.header.unit != VolumeUnit::kLearned;
   const std::string unit = is_counted ? "events per pixel, mean over the volume"
                                       : "sum of a pixel's values, mean over the volume";
   std::string html = "<section><h2>Distributions</h2><div class=charts>";

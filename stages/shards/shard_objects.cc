@@ -11,16 +11,28 @@
 namespace eventgan {
 
 std::string unit_text(VolumeUnit unit, Normalization normalization) {
-  if (unit == VolumeUnit::kLearned) return "dimensionless, >= 0; not a count of events";
-  return normalization == Normalization::kNone
-             ? "events, >= 0; each spread over the two bins nearest to it in time"
-             : "share of eta98 events, 0..1";
+  const bool whole = normalization == Normalization::kNone;
+  switch (unit) {
+    case VolumeUnit::kLearned:
+      return "dimensionless, >= 0; not a count of events";
+    case VolumeUnit::kEvents:
+      return whole ? "events, >= 0; each spread over the two bins nearest to it in time"
+                   : "share of eta98 events, 0..1";
+    case VolumeUnit::kDrawn:
+      return whole ? "events drawn from a network's rates, >= 0; each spread over the two bins "
+                     "nearest to it in time"
+                   : "share of eta98 events drawn from a network's rates, 0..1";
+    case VolumeUnit::kRates:
+      return whole ? "number of events to be expected, >= 0"
+                   : "share of eta98 events to be expected, 0..1";
+  }
+  throw std::logic_error("unknown unit of a volume");
 }
 
 std::string time_axis_text(VolumeUnit unit) {
   const std::string bins = "bin b of a polarity is centred at time b / (bins - 1), where 0 is the ";
-  return bins + (unit == VolumeUnit::kLearned ? "previous frame and 1 the next one"
-                                              : "first event and 1 the last one");
+  return bins + (unit == VolumeUnit::kEvents ? "first event and 1 the last one"
+                                             : "previous frame and 1 the next one");
 }
 
 namespace {
@@ -192,7 +204,8 @@ Normalization normalization(hid_t volume) {
 
 VolumeUnit unit(hid_t volume, Normalization normalization) {
   const std::string text = read_text_attribute(volume, "unit");
-  for (const VolumeUnit candidate : {VolumeUnit::kLearned, VolumeUnit::kEvents}) {
+  for (const VolumeUnit candidate :
+       {VolumeUnit::kLearned, VolumeUnit::kEvents, VolumeUnit::kDrawn, VolumeUnit::kRates}) {
     if (text == unit_text(candidate, normalization)) return candidate;
   }
   throw Hdf5Error("expected a known unit, got " + text);
