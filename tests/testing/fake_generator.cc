@@ -7,7 +7,7 @@ namespace eventgan::testing {
 
 GenerationNotes FakeGenerator::generate(const GeneratorInput& pair, std::span<float> volume) const {
   ++calls_;
-  threshold_ = pair.threshold.value_or(0);
+  threshold_ = pair.threshold ? pair.threshold->mean : 0;
   const auto& frames = pair.frames;
   const std::size_t plane = pair.size.pixel_count();
   for (int bin = 0; bin < bins_; ++bin) {

@@ -11,7 +11,7 @@ namespace {
 double threshold(std::array<double, 2> range, const PairKey& key) {
   GeneratorSpec spec;
   spec.threshold = ThresholdSpec{.range = range};
-  return pair_threshold(spec, key).value();
+  return pair_threshold(spec, key).value().mean;
 }
 
 TEST(PairThreshold, IsNoneUnlessTold) {
@@ -50,10 +50,11 @@ TEST(PairThreshold, FollowsFromSeedDatasetAndSample) {
   EXPECT_NE(threshold({0.1, 0.9}, {1, "mpii", "b"}), drawn);
 }
 
-TEST(ThresholdSpec, IsOfBothPolaritiesAndSpreadAsTheDefaultsAre) {
-  EXPECT_EQ(ThresholdSpec().applied({}, 0.2), SensorSpec());
-  const SensorSpec wide = ThresholdSpec{.spread = 0.5}.applied({.leak_rate_hz = 1}, 0.4);
-  EXPECT_EQ(wide, (SensorSpec{.positive_threshold = 0.4,
+TEST(ThresholdSpec, IsOfItsPolaritiesAndSpreadAsTheDefaultsAre) {
+  EXPECT_EQ(ThresholdSpec().applied({}, ContrastThreshold{0.2}), SensorSpec());
+  // The negative one is a quarter of the positive one: 0.8 / sqrt(0.25) and 0.8 sqrt(0.25).
+  const SensorSpec wide = ThresholdSpec{.spread = 0.5}.applied({.leak_rate_hz = 1}, {0.8, 0.25});
+  EXPECT_EQ(wide, (SensorSpec{.positive_threshold = 1.6,
                               .negative_threshold = 0.4,
                               .threshold_spread = 0.5,
                               .leak_rate_hz = 1}));

@@ -286,7 +286,7 @@ TEST_F(SampleStagesTest, AThresholdIsDrawnForEachPair) {
   manifest_.generator.threshold = ThresholdSpec{.range = {0.1, 0.9}};
   const double threshold = run().sample.threshold.value();
   EXPECT_EQ(generator_.threshold(), threshold);
-  EXPECT_EQ(threshold, pair_threshold(manifest_.generator, {0, "frames", "0001"}));
+  EXPECT_EQ(threshold, pair_threshold(manifest_.generator, {0, "frames", "0001"}).value().mean);
   shard_.samples[0].sample_id = "0002";
   EXPECT_NE(run().sample.threshold, threshold);
   shard_.samples[0].pair.next.path = "clip/absent.png";

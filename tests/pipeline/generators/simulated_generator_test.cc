@@ -65,7 +65,7 @@ TEST(SimulatedGenerator, DifferenceCountsThresholdsPassed) {
 }
 
 /// Events of the difference of 1.382 (as above) with a threshold told by the pair.
-double events_at(const GeneratorSpec& spec, std::optional<double> threshold) {
+double events_at(const GeneratorSpec& spec, std::optional<ContrastThreshold> threshold) {
   std::vector<float> frames = halves(50, 100);
   const std::vector<float> next = halves(200, 100);
   frames.insert(frames.end(), next.begin(), next.end());
@@ -78,13 +78,15 @@ TEST(SimulatedGenerator, APairsThresholdIsInPlaceOfItsOwn) {
   GeneratorSpec spec = quiet(GeneratorKind::kDifference);
   spec.threshold = ThresholdSpec{.range = {0.1, 2}, .spread = 0};
   EXPECT_NEAR(events_at(spec, std::nullopt), 6, 1e-4);  // sensor's 0.2
-  EXPECT_NEAR(events_at(spec, 0.5), 2, 1e-4);
-  EXPECT_NEAR(events_at(spec, 1.3), 1, 1e-4);
-  EXPECT_NEAR(events_at(spec, 1.4), 0, 1e-4);
+  EXPECT_NEAR(events_at(spec, ContrastThreshold{0.5}), 2, 1e-4);
+  EXPECT_NEAR(events_at(spec, ContrastThreshold{1.3}), 1, 1e-4);
+  EXPECT_NEAR(events_at(spec, ContrastThreshold{1.4}), 0, 1e-4);
+  // The left half becomes lighter: of a ratio of 4 the positive one is half of the mean.
+  EXPECT_NEAR(events_at(spec, ContrastThreshold{1, 4}), 2, 1e-4);
   // 15 % of 1.38, the change, is one standard deviation: half of the pixels reach theirs, of 96
   // within five deviations.
   spec.threshold->spread.reset();
-  EXPECT_NEAR(events_at(spec, 1.382), 0.5, 5 * 0.5 / std::sqrt(96));
+  EXPECT_NEAR(events_at(spec, ContrastThreshold{1.382}), 0.5, 5 * 0.5 / std::sqrt(96));
 }
 
 TEST(SimulatedGenerator, AStaticPairIsEmptyForTheDifference) {
