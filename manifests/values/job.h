@@ -211,7 +211,8 @@ struct ScopeSpec {
 
 struct GeneratorSpec {
   GeneratorKind kind = GeneratorKind::kNetwork;
-  /// kNetwork: path of a .safetensors file, "shipped" or "shipped:WIDTH" (manifests/weights), or
+  /// kNetwork: path of a .safetensors file, "shipped", "shipped:WIDTH" or "shipped:sensor"
+  /// (manifests/weights), or
   /// "untrained:WIDTH", WIDTH 1..64.
   std::string weights = "shipped";
   /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
@@ -220,7 +221,7 @@ struct GeneratorSpec {
   Precision precision = Precision::kFloat32;  ///< kNetwork
   ScopeSpec scope;                            ///< kNetwork
   bool sample = true;  ///< kNetwork: events are drawn of rates, if the weights give rates
-  SensorSpec sensor;                          ///< kEsim, kDifference; at the middle of `threshold`
+  SensorSpec sensor;   ///< kEsim, kDifference; at the middle of `threshold`
   std::optional<ThresholdSpec> threshold = {};  ///< of any kind but kEvents (pair_threshold)
   std::optional<NoiseSpec> noise = {};          ///< of any kind but kEvents
   double duration_s = 0.1;          ///< time between the two frames, 1e-4..10. kEsim, kDifference:

@@ -7,6 +7,7 @@ namespace eventgan {
 namespace {
 
 constexpr std::string_view kShipped = "shipped";
+constexpr std::string_view kShippedSensor = "shipped:sensor";
 constexpr std::string_view kShippedWidth = "shipped:";
 constexpr std::string_view kUntrainedWidth = "untrained:";
 
@@ -23,6 +24,7 @@ std::optional<int> parse_width(std::string_view text) {
 
 std::optional<WeightsName> parse_weights_name(std::string_view text) {
   if (text == kShipped) return WeightsName{WeightsOrigin::kShipped, {}, std::nullopt};
+  if (text == kShippedSensor) return WeightsName{WeightsOrigin::kShipped, {}, kSensorWeights};
   for (const auto& [word, origin] : {std::pair(kShippedWidth, WeightsOrigin::kShipped),
                                      std::pair(kUntrainedWidth, WeightsOrigin::kUntrained)}) {
     if (!text.starts_with(word)) continue;

@@ -14,15 +14,19 @@ inline constexpr int kLargestNamedWidth = 64;
 /// Where a generator's weights come from.
 enum class WeightsOrigin {
   kFile,      ///< PATH of a .safetensors file
-  kShipped,   ///< "shipped" or "shipped:WIDTH": a part of the program
+  kShipped,   ///< "shipped", "shipped:WIDTH" or "shipped:sensor": a part of the program
   kUntrained  ///< "untrained:WIDTH": random numbers
 };
+
+/// In place of a width: the shipped weights that know their sensor, "shipped:sensor".
+inline constexpr int kSensorWeights = 0;
 
 /// What manifests and options name weights by.
 struct WeightsName {
   WeightsOrigin origin = WeightsOrigin::kFile;
   std::string path;          ///< kFile
-  std::optional<int> width;  ///< base width, 1..64; kShipped without one means the default
+  std::optional<int> width;  ///< base width, 1..64, or kSensorWeights; kShipped without one means
+                             ///< the default
   bool operator==(const WeightsName&) const = default;
 };
 

@@ -166,7 +166,8 @@ void add_methods(CLI::App& command, RealismArguments& arguments) {
       ->option_text("METHOD,...");
   command.add_option(
       "--weights", options.weights,
-      "Weights of the network: FILE.safetensors, shipped or shipped:WIDTH; default: shipped");
+      "Weights of the network: FILE.safetensors, shipped, shipped:WIDTH or shipped:sensor; "
+      "default: shipped");
   command.add_option("--threshold", arguments.threshold,
                      "Contrast threshold of difference and esim, 0.01..5; default: fit, the one "
                      "that gives as many events as the camera");

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/weights.h"
 #include "stages/generator/weights_file.h"
 
 namespace eventgan {
@@ -40,7 +41,9 @@ std::string width_list() {
 
 std::vector<int> shipped_widths() {
   std::vector<int> widths;
-  for (const ShippedFile& file : shipped_files()) widths.push_back(static_cast<int>(file.width));
+  for (const ShippedFile& file : shipped_files()) {
+    if (file.width != kSensorWeights) widths.push_back(static_cast<int>(file.width));
+  }
   return widths;
 }
 
@@ -70,7 +73,9 @@ std::span<const std::byte> shipped_weights_bytes(int width) {
 Weights read_shipped_weights(int width) {
   const std::span<const std::byte> bytes = shipped_weights_bytes(width);
   return parse_weights({reinterpret_cast<const char*>(bytes.data()), bytes.size()},
-                       "the shipped weights of base width " + std::to_string(width));
+                       width == kSensorWeights
+                           ? "the shipped weights of a sensor"
+                           : "the shipped weights of base width " + std::to_string(width));
 }
 
 }  // namespace eventgan

@@ -1,16 +1,18 @@
-# Embeds the repository's weights, manifests/weights/eventgan-WIDTH.safetensors, in the program: writes the assembly
-# that shipped_weights.cc reads, widths ascending. None is well too. The files' paths are in the assembly alone,
+# Embeds the repository's weights, manifests/weights/eventgan-WIDTH.safetensors and eventgan-sensor.safetensors, in the
+# program: writes the assembly that shipped_weights.cc reads, widths ascending, then the sensor's as width 0. None is
+# well too. The files' paths are in the assembly alone,
 # not in the object, so the program's bytes depend on the files' content only.
 enable_language(ASM)
 
 file(GLOB weights_files CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/manifests/weights/eventgan-*.safetensors)
-list(FILTER weights_files INCLUDE REGEX "/eventgan-[1-9][0-9]*\\.safetensors$")
+list(FILTER weights_files INCLUDE REGEX "/eventgan-([1-9][0-9]*|sensor)\\.safetensors$")
 list(SORT weights_files COMPARE NATURAL)
 
 set(table "")
 set(content "")
 foreach(file IN LISTS weights_files)
-  string(REGEX REPLACE "^.*/eventgan-([0-9]+)\\.safetensors$" "\\1" width ${file})
+  string(REGEX REPLACE "^.*/eventgan-([0-9]+|sensor)\\.safetensors$" "\\1" width ${file})
+  string(REPLACE "sensor" "0" width ${width})
   string(APPEND table "  .quad ${width}, .Lbegin_${width}, .Lend_${width}\n")
   string(APPEND content "  .balign 16\n.Lbegin_${width}:\n  .incbin \"${file}\"\n.Lend_${width}:\n")
 endforeach()

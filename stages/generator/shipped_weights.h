@@ -10,8 +10,8 @@
 namespace eventgan {
 
 // The weights that are part of the program: the repository's files
-// manifests/weights/eventgan-WIDTH.safetensors, embedded when the program is built. All functions
-// are thread safe.
+// manifests/weights/eventgan-WIDTH.safetensors and eventgan-sensor.safetensors, embedded when the
+// program is built. All functions are thread safe. A width may be kSensorWeights where it is given.
 
 /// Base widths of the shipped weights, ascending; empty if the program was built without any.
 std::vector<int> shipped_widths();

@@ -99,6 +99,14 @@ def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     return first, second
 
 
+# A sensor that is another one for each pair, in place of the detector's augmentation.
+DRAWN = {"threshold": [0.15, 0.6], "noise": {"shot_hz": [0.1, 1.5], "leak_hz": 0.1, "hot_pixels": 1e-4}}
+SENSORS = {
+    "EventGAN, drawn sensor": Source({"weights": "shipped:sensor", "sensor": DRAWN}),
+    "EventGAN, drawn threshold": Source({"weights": "shipped:sensor", "sensor": {"threshold": DRAWN["threshold"]}}),
+    "difference, drawn sensor": Source({"kind": "difference", "sensor": DRAWN}),
+    "ESIM, drawn sensor": Source({"kind": "esim", "sensor": DRAWN}),
+}
 SHIPPED = {width: {"weights": f"shipped:{width}"} for width in (16, 8)}
 METHODS = {  # of the main table
     "EventGAN 16": Source(SHIPPED[16]),
@@ -110,7 +118,7 @@ METHODS = {  # of the main table
     "ESIM": Source({"kind": "esim"}),
     "v2e": Source(of_pair=v2e),
 }
-SOURCES = METHODS | {
+SOURCES = METHODS | SENSORS | {
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
     "ESIM, eta98": Source({"kind": "esim"}, normalize="eta98"),

@@ -32,12 +32,13 @@ from eventgan import Shards, drawing
 from eventgan.detection_scores import Detections, GroundTruth, detection_scores, overlapping
 from eventgan.evaluate import Samples, evaluate_detections
 from eventgan.torch import EventAugmentation
-from labelled_events import CLASSES, METHODS, SIZE, SOURCES, Item, file_name, items_of, key_of, recordings_in, replace, test_items, windows_folder, windows_of
+from labelled_events import CLASSES, METHODS, SENSORS, SIZE, SOURCES, Item, file_name, items_of, key_of, recordings_in, replace, test_items, windows_folder, windows_of
 from torch import nn
 
 STEPS, YOLO_STEPS, BATCH, RATE = 300, 200, 16, 2e-3
 ABLATION_SEEDS = 3
 COUNTS = (50, 100, 200, 400)  # of labelled images
+SENSOR_STEPS = 900
 LONGER = (3000, 1000)  # steps; the longest first, so that all processors are busy to the end
 DEVELOPMENT = {"obaid_d1": 26, "pedro": 1}  # the first windows of a recording: settings are chosen on these, which are in no table
 PLAIN = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15)
@@ -70,6 +71,12 @@ def rows(recordings_of_cameras: Sequence[str]) -> list[Row]:
     learnt |= {"EventGAN 16 and difference": ("EventGAN 16", "difference")}
     learnt |= {name: (name,) for name in real} | {f"EventGAN 16 and {name}": ("EventGAN 16", name) for name in real}
     return [Row(name + suffix, sources, augmentation) for suffix, augmentation in (("", PLAIN), (", augmented", FULL)) for name, sources in learnt.items()]
+
+
+def drawn_sensors() -> list[Row]:
+    """Sensors that are drawn while events are made, and nothing else, against what is drawn in the detector's training; with more steps for both."""
+    return [*(Row(f"{name}, {SENSOR_STEPS} steps", (name,), PLAIN, SENSOR_STEPS) for name in (*SENSORS, "gradient", "difference", "EventGAN 16")),
+            *(Row(f"{name}, augmented, {SENSOR_STEPS} steps", (name,), FULL, SENSOR_STEPS) for name in ("EventGAN 16", "difference", "gradient"))]
 
 
 def ablations() -> list[Row]:
@@ -280,11 +287,11 @@ def run(args: argparse.Namespace) -> None:
     args.frames, args.test = args.frames.resolve(), (args.test or args.real).resolve()
     args.steps = None
     names = [folder.name for folder in recordings_in(args.real)]
-    main, extra = [row for row in rows(names) if args.peers or row.sources != ("v2e",)], ablations()
+    main, drawn, extra = [row for row in rows(names) if args.peers or row.sources != ("v2e",)], drawn_sensors(), ablations()
     if args.quick:
         args.out = args.out / "quick"
-        args.steps, args.seeds, main, extra = 60, 1, [row for row in main if row.name == "EventGAN 16, augmented"], []
-    tasks = [(args, row, seed) for seed in range(args.seeds) for row in main]
+        args.steps, args.seeds, main, drawn, extra = 60, 1, [row for row in main if row.name == "EventGAN 16, augmented"], [], []
+    tasks = [(args, row, seed) for seed in range(args.seeds) for row in (*main, *drawn)]
     tasks += [(args, row, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for row in extra]
     if args.trainer and not args.quick:
         tasks += [(args, name, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for name in SOURCES if name.endswith(", eta98")]
@@ -305,6 +312,7 @@ def run(args: argparse.Namespace) -> None:
     text = conditions(args, len(items_of(args, "EventGAN 16")))
     text += tables(results, [row.name for row in main if row.augmentation == PLAIN], "Plain", "EventGAN 16")
     text += tables(results, [row.name for row in main if row.augmentation == FULL], "Augmented", "EventGAN 16, augmented")
+    text += tables(results, [row.name for row in drawn], "Drawn sensors", f"EventGAN 16, augmented, {SENSOR_STEPS} steps")
     text += tables(results, ["EventGAN 16", "EventGAN 16, augmented", *(row.name for row in extra)], "One thing changed")
     text += tables(results, [name for name in results if name.startswith("YOLO")], "YOLOv3-tiny")
     print(text)
