@@ -11,6 +11,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/pair_key.h"
 #include "manifests/values/weights.h"
 #include "pipeline/conversion/sample_stages.h"
 #include "pipeline/generators/choose_engine.h"
@@ -94,9 +95,17 @@ class Watch {
   std::unique_ptr<Progress> progress_;
 };
 
-std::vector<float> volume_of(const Generator& generator, const PreparedPair& pair) {
-  std::vector<float> volume(VolumeShape{generator.bins(), pair.content}.value_count());
-  generator.generate({pair.input, pair.content}, volume);
+/// A pair with the sensor that the manifest tells for it.
+struct ToldPair {
+  PreparedPair prepared;
+  std::optional<ContrastThreshold> threshold;
+
+  GeneratorInput input() const { return {prepared.input, prepared.content, threshold}; }
+};
+
+std::vector<float> volume_of(const Generator& generator, const ToldPair& pair) {
+  std::vector<float> volume(VolumeShape{generator.bins(), pair.prepared.content}.value_count());
+  generator.generate(pair.input(), volume);
   return volume;
 }
 
@@ -105,10 +114,10 @@ std::string origin_text(const JobManifest& manifest) {
 }
 
 /// Reads the samples; what is not held out goes into the calibrator. Returns the held-out pairs.
-std::vector<PreparedPair> collect(const SampleStages& stages,
-                                  const std::vector<CalibrationSample>& samples, const Watch& watch,
-                                  Calibrator& calibrator, std::vector<std::string>& skipped) {
-  std::vector<PreparedPair> held_out;
+std::vector<ToldPair> collect(const JobManifest& manifest, const SampleStages& stages,
+                                const std::vector<CalibrationSample>& samples, const Watch& watch,
+                                Calibrator& calibrator, std::vector<std::string>& skipped) {
+  std::vector<ToldPair> held_out;
   for (const CalibrationSample& sample : samples) {
     watch.before_pair();
     SampleMessage message;
@@ -118,10 +127,16 @@ std::vector<PreparedPair> collect(const SampleStages& stages,
     if (message.failed()) {
       skipped.push_back(sample.planned().sample_id + ": " + message.sample.fault);
       watch.after_pair(/*skipped=*/true);
-    } else if (sample.held_out) {
-      held_out.push_back(std::move(message.prepared));
+      continue;
+    }
+    const auto source = static_cast<std::size_t>(sample.shard->source);
+    const PairKey key{manifest.seed, to_string(manifest.sources[source].dataset),
+                      message.sample.sample_id};
+    ToldPair pair{std::move(message.prepared), pair_threshold(manifest.generator, key)};
+    if (sample.held_out) {
+      held_out.push_back(std::move(pair));
     } else {
-      calibrator.add({message.prepared.input, message.prepared.content});
+      calibrator.add(pair.input());
       watch.after_pair(/*skipped=*/false);
     }
   }
@@ -129,9 +144,9 @@ std::vector<PreparedPair> collect(const SampleStages& stages,
 }
 
 std::vector<double> int8_distances(const Generator& int8, const Generator& reference,
-                                   const std::vector<PreparedPair>& pairs, const Watch& watch) {
+                                   const std::vector<ToldPair>& pairs, const Watch& watch) {
   std::vector<double> distances;
-  for (const PreparedPair& pair : pairs) {
+  for (const ToldPair& pair : pairs) {
     watch.before_pair();
     distances.push_back(relative_distance(volume_of(int8, pair), volume_of(reference, pair)));
     watch.after_pair(/*skipped=*/false);
@@ -140,7 +155,7 @@ std::vector<double> int8_distances(const Generator& int8, const Generator& refer
 }
 
 /// Pairs that were read to be measured, and are not.
-void leave(const std::vector<PreparedPair>& pairs, const Watch& watch) {
+void leave(const std::vector<ToldPair>& pairs, const Watch& watch) {
   for (std::size_t i = 0; i < pairs.size(); ++i) watch.after_pair(/*skipped=*/false);
 }
 
@@ -163,8 +178,8 @@ CalibrationOutcome calibrate(const JobManifest& manifest, const PlannedJob& job,
   const SampleStages stages(manifest, job.datasets, *reference, /*in_flight=*/1);
   Calibrator calibrator(weights);
   CalibrationOutcome outcome;
-  const std::vector<PreparedPair> held_out =
-      collect(stages, samples, watch, calibrator, outcome.skipped);
+  const std::vector<ToldPair> held_out =
+      collect(manifest, stages, samples, watch, calibrator, outcome.skipped);
   if (calibrator.pairs() == 0) {
     throw InputError("expected readable pairs to calibrate on, got none of " +
                      std::to_string(samples.size()) + ", in " + manifest.name +
