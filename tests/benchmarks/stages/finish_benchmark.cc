@@ -1,7 +1,7 @@
-// From the generator's volume to the chunk that the writer gets: noise, statistics, codes, shuffle,
-// deflate, checksum, each alone and all together. Items are volumes, so items a second are pairs a
-// second; bytes are what the step reads. Names that begin with `plain_` are what the step next to
-// them replaced, for the ratio.
+// From the generator's volume to the chunk that the writer gets: drawn events, noise, statistics,
+// codes, shuffle, deflate, checksum, each alone and all together. Items are volumes, so items a
+// second are pairs a second; bytes are what the step reads. Names that begin with `plain_` are what
+// the step next to them replaced, for the ratio.
 
 #include <benchmark/benchmark.h>
 
@@ -15,6 +15,8 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/sensor_input.h"
+#include "stages/events/drawn_events.h"
 #include "stages/events/noise.h"
 #include "stages/events/volume_statistics.h"
 #include "stages/shards/codec/chunk_filters.h"
@@ -77,6 +79,26 @@ std::vector<std::byte> planes_of(const std::vector<float>& values, StoredType ty
   std::vector<std::byte> planes(values.size() * stored_size(type));
   quantize(values, quantization(type, largest(values)), planes.data(), values.size());
   return planes;
+}
+
+/// Events of rates, a copy of which is a part of the time.
+void draw(benchmark::State& state) {
+  std::uint64_t pair = 0;
+  for (auto _ : state) {
+    std::vector<float> values = volume();
+    draw_events(values, kShape, CounterRandom(++pair));
+    benchmark::DoNotOptimize(values.data());
+  }
+  count(state, kShape.value_count() * sizeof(float));
+}
+
+/// The third input of a network that knows its sensor.
+void third_input(benchmark::State& state) {
+  std::vector<float> frames(2 * kShape.size.pixel_count());
+  std::mt19937 random(5);
+  for (float& x : frames) x = static_cast<float>(random() % 256) / 127.5f - 1;
+  for (auto _ : state) benchmark::DoNotOptimize(sensor_input(frames, {0.25, 1.2}));
+  count(state, frames.size() * sizeof(float));
 }
 
 /// Shot noise of tenths of a hertz over 0.1 s; 15 are 34,000 events.
@@ -208,6 +230,8 @@ void deflate_levels(benchmark::internal::Benchmark* benchmark) {
 void all_levels(benchmark::internal::Benchmark* benchmark) { deflate_levels(benchmark->Arg(0)); }
 
 constexpr auto kMilliseconds = benchmark::kMillisecond;
+BENCHMARK(draw)->Unit(kMilliseconds);
+BENCHMARK(third_input)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(noise, shot, 0)->Arg(1)->Arg(15)->Arg(10000)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(noise, hot_pixels, 1e-4)->Arg(0)->Arg(15)->Unit(kMilliseconds);
 BENCHMARK_CAPTURE(statistics, sparse, false)->Unit(kMilliseconds);
