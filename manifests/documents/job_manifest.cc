@@ -470,8 +470,7 @@ void read_threshold(const StrictValue& value, const std::optional<StrictValue>& 
     if (key) key->fault("no such key together with threshold, which sets it");
   }
   spec.sensor = threshold.applied(
-      spec.sensor,
-      {std::sqrt(threshold.range[0] * threshold.range[1]), threshold.ratio});
+      spec.sensor, {std::sqrt(threshold.range[0] * threshold.range[1]), threshold.ratio});
   spec.threshold = threshold;
 }
 

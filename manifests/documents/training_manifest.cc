@@ -95,9 +95,11 @@ RecordingSpec read_recording(const StrictValue& value) {
     spec.threshold = ContrastThreshold{threshold->number(0.01, 5)};
   }
   if (const auto ratio = object.find("threshold_ratio")) {
-    if (!spec.threshold) ratio->fault("threshold beside it", "none");
-    spec.threshold =
-        ContrastThreshold{spec.threshold.value_or(ContrastThreshold{}).mean, ratio->number(0.2, 5)};
+    if (spec.threshold) {
+      spec.threshold->ratio = ratio->number(0.2, 5);
+    } else {
+      ratio->fault("threshold beside it", "none");
+    }
   }
   object.finish();
   return spec;
@@ -255,7 +257,8 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   } else if (!manifest.network.sensor && factor.likelihood != 0) {
     losses.fault("likelihood 0, unless network.sensor", "another");
   } else if (!of_volumes && !manifest.network.sensor) {
-    losses.fault("one of adversarial, flow, reconstruction, volume, count above 0", "all 0");
+    losses.fault("one of adversarial, flow, reconstruction, volume, count, overlap above 0",
+                 "all 0");
   }
 }
 

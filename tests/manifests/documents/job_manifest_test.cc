@@ -180,6 +180,18 @@ TEST(JobManifest, HoldsThresholdsAndTheSensorAtTheirMiddle) {
   EXPECT_NEAR(range.sensor.negative_threshold, 0.2, 1e-12);
   EXPECT_NEAR(range.sensor.threshold_spread, 0.03, 1e-12);
   EXPECT_EQ(range.sensor.refractory_s, 1);
+  // Of a middle of 0.2 and a ratio of 4 the polarities' are 0.1 and 0.4.
+  const GeneratorSpec ratio = read(R"({"threshold": [0.1, 0.4], "threshold_ratio": 4})");
+  EXPECT_EQ(ratio.threshold, (ThresholdSpec{.range = {0.1, 0.4}, .ratio = 4}));
+  EXPECT_NEAR(ratio.sensor.positive_threshold, 0.1, 1e-12);
+  EXPECT_NEAR(ratio.sensor.negative_threshold, 0.4, 1e-12);
+  EXPECT_NEAR(ratio.sensor.threshold_spread, 0.03, 1e-12);
+}
+
+TEST(JobManifest, DrawsEventsUnlessTold) {
+  EXPECT_TRUE(parse(kSoundManifest).generator.sample);
+  const auto rates = testing::edited(kSoundManifest, {{"/generator/sample", "false"}});
+  EXPECT_FALSE(parse(rates).generator.sample);
 }
 
 TEST(JobManifest, HoldsNoiseAsRanges) {

@@ -115,6 +115,8 @@ TEST(ManifestSchema, StatesTheDefaultsOfTheProgram) {
   EXPECT_EQ(stated("/properties/generator/properties/label_margin_px"),
             generator.scope.label_margin_px);
   EXPECT_EQ(stated("/properties/generator/properties/tile_px"), generator.scope.tile_px);
+  EXPECT_EQ(stated("/properties/generator/properties/sample"), generator.sample);
+  EXPECT_EQ(stated("/definitions/pair_sensor/properties/threshold_ratio"), ThresholdSpec().ratio);
   EXPECT_EQ(stated("/properties/generator/properties/duration_s"), generator.duration_s);
   EXPECT_EQ(stated("/properties/generator/properties/max_displacement_px"),
             generator.max_displacement_px);

@@ -94,8 +94,9 @@ const ManifestCase kTrainingCases[] = {
       "$.losses.smoothness: expected a number 0..1e+06, got -0.5"}},
     {"no losses",
      {{"/losses", R"({"adversarial": 0, "flow": 0, "reconstruction": 0, "smoothness": 1})"}},
-     {"$.losses: expected one of adversarial, flow, reconstruction, volume, count above 0, got all "
-      "0"},
+     {"$.losses: expected one of adversarial, flow, reconstruction, volume, count, overlap above "
+      "0, "
+      "got all 0"},
      true},
     {"a volume loss alone",
      {{"/losses", R"({"adversarial": 0, "flow": 0, "reconstruction": 0, "volume": 1})"},
@@ -146,6 +147,82 @@ const ManifestCase kTrainingCases[] = {
       R"($.output.picture_minutes: expected a number 0..1e+06, got "1")"}},
 };
 
+/// What makes the sound training that of a network that knows its sensor.
+const std::vector<testing::Edit> kWithSensor = {
+    {"/network", R"({"sensor": true})"},
+    {"/recordings/0/threshold", "0.25"},
+    {"/losses", R"({"adversarial": 0, "flow": 0, "reconstruction": 0, "likelihood": 1})"}};
+
+ManifestCase with_sensor(std::string name, std::vector<testing::Edit> edits,
+                         std::vector<std::string> faults = {}) {
+  std::vector<testing::Edit> all = kWithSensor;
+  all.insert(all.end(), edits.begin(), edits.end());
+  return {std::move(name), std::move(all), std::move(faults)};
+}
+
+const std::string kLikelihoodAlone =
+    "$.losses: expected likelihood above 0 and all others 0, since network.sensor, got others";
+
+const ManifestCase kSensorCases[] = {
+    with_sensor("a network that knows its sensor", {}),
+    with_sensor("thresholds of the polarities", {{"/recordings/0/threshold_ratio", "0.2"},
+                                                 {"/validation", R"([{"path": "b", "format": "ecd",
+                                                    "threshold": 5, "threshold_ratio": 5}])"}}),
+    with_sensor("simulated samples",
+                {{"/simulated", R"({"textures": ["a", "b"], "fraction": 1})"}}),
+    with_sensor("simulated samples by default", {{"/simulated", R"({"textures": ["a"]})"}}),
+    with_sensor("simulated samples of no kind",
+                {{"/simulated", R"({"textures": [], "fraction": 1.5, "planes": 3})"}},
+                {"$.simulated.textures: expected an array of 1 or more, got an array of 0",
+                 "$.simulated.fraction: expected a number 0..1, got 1.5",
+                 "$.simulated.planes: expected one of the keys textures, fraction, got an unknown "
+                 "key"}),
+    with_sensor("simulated samples of nothing", {{"/simulated", R"({"textures": [""]})"}},
+                {R"($.simulated.textures[0]: expected a path, got "")"}),
+    with_sensor("simulated samples without textures", {{"/simulated", "{}"}},
+                {"$.simulated.textures: expected an array of 1 or more, got nothing"}),
+    with_sensor("thresholds out of range",
+                {{"/recordings/0/threshold", "0.009"}, {"/recordings/0/threshold_ratio", "5.1"}},
+                {"$.recordings[0].threshold: expected a number 0.01..5, got 0.009",
+                 "$.recordings[0].threshold_ratio: expected a number 0.2..5, got 5.1"}),
+    with_sensor("a ratio without threshold",
+                {{"/recordings/0/threshold", ""}, {"/recordings/0/threshold_ratio", "1"}},
+                {"$.recordings[0].threshold_ratio: expected threshold beside it, got none",
+                 "$.recordings: expected a threshold of each recording, since network.sensor, got "
+                 "none of a.hdf5"}),
+    with_sensor("a recording without threshold",
+                {{"/recordings/1", R"({"path": "b", "format": "ecd"})"}},
+                {"$.recordings: expected a threshold of each recording, since network.sensor, got "
+                 "none of b"}),
+    with_sensor("a validation without threshold",
+                {{"/validation", R"([{"path": "c", "format": "ecd"}])"}},
+                {"$.validation: expected a threshold of each recording, since network.sensor, got "
+                 "none of c"}),
+    with_sensor("no likelihood", {{"/losses/likelihood", "0"}}, {kLikelihoodAlone}),
+    with_sensor("another loss than likelihood", {{"/losses/volume", "1"}}, {kLikelihoodAlone}),
+    with_sensor("an overlap beside likelihood", {{"/losses/overlap", "1e-3"}}, {kLikelihoodAlone}),
+    with_sensor("the published losses beside likelihood", {{"/losses", R"({"likelihood": 1})"}},
+                {kLikelihoodAlone}),
+    with_sensor("no losses of a network that knows its sensor", {{"/losses", ""}},
+                {"$.steps: expected likelihood above 0 and all others 0, since network.sensor, got "
+                 "others"}),
+    {"a sensor of no kind",
+     {{"/network", R"({"sensor": 1})"}},
+     {"$.network.sensor: expected true or false, got 1"}},
+    {"a threshold that nobody learns",
+     {{"/recordings/0/threshold", "0.25"}, {"/network", R"({"sensor": false})"}},
+     {"$.recordings: expected no threshold, unless network.sensor, got that of a.hdf5"}},
+    {"a validations threshold that nobody learns",
+     {{"/validation", R"([{"path": "c", "format": "ecd", "threshold": 0.25}])"}},
+     {"$.validation: expected no threshold, unless network.sensor, got that of c"}},
+    {"simulated samples that nobody needs",
+     {{"/simulated", R"({"textures": ["a"]})"}},
+     {"$.simulated: expected network.sensor with it, got none"}},
+    {"a likelihood of normalised volumes",
+     {{"/losses", R"({"likelihood": 1})"}},
+     {"$.losses: expected likelihood 0, unless network.sensor, got another"}},
+};
+
 class TrainingFaults : public ::testing::TestWithParam<ManifestCase> {};
 
 TEST_P(TrainingFaults, AreAllReportedAndSeenByTheSchema) {
@@ -165,6 +242,8 @@ TEST_P(TrainingFaults, AreAllReportedAndSeenByTheSchema) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Table, TrainingFaults, ::testing::ValuesIn(kTrainingCases),
+                         [](const auto& entry) { return testing::test_name(entry.param); });
+INSTANTIATE_TEST_SUITE_P(Sensors, TrainingFaults, ::testing::ValuesIn(kSensorCases),
                          [](const auto& entry) { return testing::test_name(entry.param); });
 
 TEST(TrainingManifest, HoldsEveryValueGiven) {
@@ -186,11 +265,11 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
     "precision": "bfloat16", "steps": {"flow": 1, "reconstruction": 2, "generator": 3},
     "output": {"directory": "o", "checkpoint_minutes": 0, "picture_minutes": 0.5}})");
   EXPECT_EQ(manifest.seed, 9u);
-  RecordingSpec first{"a", RecordingFormat::kMvsec, {}, 2.5, 3, 8};
+  RecordingSpec first{"a", RecordingFormat::kMvsec, {}, 2.5, 3, 8, std::nullopt};
   first.options.camera = "right";
   EXPECT_EQ(manifest.recordings.at(0), first);
   EXPECT_EQ(manifest.recordings.at(1),
-            (RecordingSpec{"b", RecordingFormat::kEcd, {}, 1, 0, std::nullopt}));
+            (RecordingSpec{"b", RecordingFormat::kEcd, {}, 1, 0, std::nullopt, std::nullopt}));
   EXPECT_EQ(manifest.validation.at(0).format, RecordingFormat::kEventgan);
   EXPECT_THAT(manifest.gaps, ::testing::ElementsAre(1, 3));
   EXPECT_EQ(manifest.crop, (ImageSize{.height = 64, .width = 96}));
@@ -233,6 +312,27 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(resolve(manifest, "a"), "/data/a");
 }
 
+TEST(TrainingManifest, HoldsWhatANetworkThatKnowsItsSensorNeeds) {
+  const TrainingManifest plain = parse_training(kSoundTraining);
+  EXPECT_FALSE(plain.network.sensor);
+  EXPECT_EQ(plain.losses.likelihood, 0);
+  EXPECT_FALSE(plain.simulated.has_value());
+  EXPECT_EQ(plain.recordings.at(0).threshold, std::nullopt);
+
+  std::vector<testing::Edit> edits = kWithSensor;
+  edits.push_back({"/recordings/1", R"({"path": "b", "format": "ecd", "threshold": 0.4,
+                                        "threshold_ratio": 1.5})"});
+  edits.push_back({"/simulated", R"({"textures": ["t/a", "b"], "fraction": 0.75})"});
+  const TrainingManifest manifest = parse_training(testing::edited(kSoundTraining, edits));
+  EXPECT_TRUE(manifest.network.sensor);
+  EXPECT_EQ(manifest.losses.likelihood, 1);
+  EXPECT_EQ(manifest.recordings.at(0).threshold, ContrastThreshold{0.25});
+  EXPECT_EQ(manifest.recordings.at(1).threshold, (ContrastThreshold{0.4, 1.5}));
+  ASSERT_TRUE(manifest.simulated.has_value());
+  EXPECT_THAT(manifest.simulated->textures, ::testing::ElementsAre("t/a", "b"));
+  EXPECT_EQ(manifest.simulated->fraction, 0.75);
+}
+
 TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(testing::open_or_undescribed(kTrainingSchema), "");
   const TrainingManifest manifest = parse_training(kSoundTraining);
@@ -258,8 +358,11 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("losses", "volume"), manifest.losses.volume);
   EXPECT_EQ(section("losses", "count"), manifest.losses.count);
   EXPECT_EQ(section("losses", "overlap"), manifest.losses.overlap);
+  EXPECT_EQ(section("losses", "likelihood"), manifest.losses.likelihood);
   EXPECT_EQ(section("losses", "quantile"), manifest.losses.quantile);
   EXPECT_EQ(section("losses", "smoothness"), manifest.losses.smoothness);
+  EXPECT_EQ(section("network", "sensor"), manifest.network.sensor);
+  EXPECT_EQ(section("simulated", "fraction"), SimulatedSpec().fraction);
   EXPECT_EQ(section("augmentation", "flip"), manifest.augmentation.flip);
   EXPECT_EQ(section("augmentation", "reverse"), manifest.augmentation.reverse);
   EXPECT_EQ(section("augmentation", "static_fraction"), manifest.augmentation.static_fraction);
@@ -271,6 +374,7 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("output", "checkpoint_minutes"), manifest.checkpoint_minutes);
   EXPECT_EQ(section("output", "picture_minutes"), manifest.picture_minutes);
   EXPECT_EQ(stated("/definitions/recording/properties/weight"), RecordingSpec().weight);
+  EXPECT_EQ(stated("/definitions/recording/properties/threshold_ratio"), ContrastThreshold().ratio);
 }
 
 }  // namespace

@@ -426,23 +426,6 @@ TEST(MeanBounds, AreTwoStandardErrorsFromTheMean) {
   EXPECT_NEAR(bounds.high.events_per_channel[1], 2 + 1.96 * 0.05, 0.012);
 }
 
-TEST(ShareDistance, IsOfTheSharesAlone) {
-  RealismScores scores, real;
-  scores.events_per_channel = {0.3, 0.1};
-  scores.events_per_pixel = 0.4;
-  real.events_per_channel = {0.2, 0.2};
-  real.events_per_pixel = 0.4;
-  EXPECT_DOUBLE_EQ(share_distance(scores, real), 0.5);  // |3/4 - 1/2| + |1/4 - 1/2|
-  real.events_per_channel = {30, 10};
-  real.events_per_pixel = 40;
-  EXPECT_NEAR(share_distance(scores, real), 0, 1e-15);
-  real.events_per_channel = {0, 0};
-  real.events_per_pixel = 0;
-  EXPECT_THAT(share_distance(scores, real), IsNan());
-  EXPECT_THAT(share_distance({}, {}), IsNan());
-  EXPECT_THROW(share_distance(scores, {}), std::invalid_argument);
-}
-
 TEST(MeanBounds, AreNotToldOfTwoPairs) {
   const ScoreBounds bounds = mean_bounds(std::vector<RealismScores>(2));
   EXPECT_THAT(bounds.low.f1_time, IsNan());
