@@ -61,6 +61,30 @@ TEST_P(BatchedGenerator, EqualsTheReferenceOfEachPairAlone) {
   }
 }
 
+TEST_P(BatchedGenerator, TellsEachPairItsThreshold) {
+  const Weights weights = testing::untrained_sensor_weights(4, 3, 5);
+  const auto reference = make_torch_generator(weights);
+  const auto generator = make(weights);
+  EXPECT_EQ(generator->thresholds(), weights.thresholds);
+  const ImageSize size{33, 46};
+  const auto frames = natural_frames(size, 1);
+  const auto volume_of = [&](const Generator& asked, double threshold) {
+    std::vector<float> volume(6 * size.pixel_count(), -1.0f);
+    asked.generate({frames, size, ContrastThreshold{threshold}}, volume);
+    return volume;
+  };
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < 5; ++i) {
+    threads.emplace_back([&, threshold = 0.1 + 0.05 * i] {
+      const auto expected = volume_of(*reference, threshold);
+      EXPECT_LE(largest_difference(volume_of(*generator, threshold), expected),
+                1e-4f * std::ranges::max(expected));
+    });
+  }
+  threads.clear();
+  EXPECT_THROW(volume_of(*make(untrained_weights(4, 3, 5)), 0.2), std::invalid_argument);
+}
+
 TEST_P(BatchedGenerator, GivesTheSameBytesWhateverElseIsInTheBatch) {
   const auto generator = make(untrained_weights(4, 3, 5));
   const ImageSize size{33, 46};

@@ -114,11 +114,11 @@ Weights with_calibration(Weights weights, Calibration calibration) {
   return weights;
 }
 
-TEST(Calibrator, SeesWhatThePlainNetworkHolds) {
-  const Weights weights = untrained_weights(2, 3, 5);
+/// What the calibrator says is what the plain network holds.
+void expect_the_plain_networks(const Weights& weights) {
   std::map<std::string, std::vector<double>> tensors;
   testing::plain_network(
-      weights, frames(1), kCalibratedSize,
+      weights, testing::planes_of(weights, frames(1), kCalibratedSize), kCalibratedSize,
       [&](const std::string& name, const std::vector<double>& values) { tensors[name] = values; });
   const Calibration calibration = calibrate_on(weights, {1});
   EXPECT_EQ(calibration.pairs, 1);
@@ -135,6 +135,30 @@ TEST(Calibrator, SeesWhatThePlainNetworkHolds) {
       EXPECT_NEAR(statistics.mean[c], sum / double(plane), 1e-5 * (1 + highest)) << statistics.name;
     }
   }
+}
+
+TEST(Calibrator, SeesWhatThePlainNetworkHolds) {
+  expect_the_plain_networks(untrained_weights(2, 3, 5));
+}
+
+TEST(Calibrator, SeesWhatANetworkThatKnowsItsSensorHolds) {
+  for (const int base_channels : {2, 8}) {
+    expect_the_plain_networks(testing::untrained_sensor_weights(base_channels, 3, 5));
+  }
+}
+
+TEST(Calibrator, TakesTheThresholdThatAPairTells) {
+  const auto calibration = [](const Weights& weights, std::optional<ContrastThreshold> threshold) {
+    Calibrator calibrator(weights);
+    calibrator.add({frames(1), kCalibratedSize, threshold});
+    return calibrator.calibration("frames").tensors.front().highest;
+  };
+  const Weights weights = testing::untrained_sensor_weights(2, 3, 5);
+  EXPECT_EQ(calibration(weights, ContrastThreshold{weights.thresholds->geometric_mean()}),
+            calibration(weights, std::nullopt));
+  EXPECT_NE(calibration(weights, ContrastThreshold{0.1}), calibration(weights, std::nullopt));
+  EXPECT_THROW(calibration(untrained_weights(2, 3, 5), ContrastThreshold{0.1}),
+               std::invalid_argument);
 }
 
 TEST(Calibrator, TheSamePairsGiveTheSameCalibration) {

@@ -57,6 +57,31 @@ float largest_difference(const std::vector<float>& a, const std::vector<float>& 
   return largest;
 }
 
+Weights untrained_sensor_weights(int base_channels, int bins, std::uint64_t seed) {
+  Weights weights = untrained_weights(base_channels, bins, seed);
+  weights.thresholds = ThresholdRange{0.1, 0.4};
+  // The third input's kernels are as large as the others', of numbers of their own.
+  Convolution& head = weights.convolutions.front();
+  const Convolution more = untrained_weights(base_channels, bins, seed + 1).convolutions.front();
+  std::vector<float> kernels;
+  for (int out = 0; out < base_channels; ++out) {
+    const auto frames = head.weight.cbegin() + out * 2 * 9;
+    const auto change = more.weight.cbegin() + out * 2 * 9;
+    kernels.insert(kernels.end(), frames, frames + 2 * 9);
+    kernels.insert(kernels.end(), change, change + 9);
+  }
+  head.in_channels = 3;
+  head.weight = kernels;
+  return weights;
+}
+
+std::vector<float> planes_of(const Weights& weights, const std::vector<float>& frames,
+                             ImageSize size) {
+  std::vector<float> kept;
+  const auto planes = network_planes({frames, size}, weights.thresholds, kept);
+  return {planes.begin(), planes.end()};
+}
+
 Weights calibrated(const Weights& weights, ImageSize size) {
   Calibrator calibrator(weights);
   for (std::uint64_t pair = 0; pair < 4; ++pair) {

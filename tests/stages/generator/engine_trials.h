@@ -26,7 +26,12 @@ double relative_error(const std::vector<float>& a, const std::vector<float>& exp
 
 float largest_difference(const std::vector<float>& a, const std::vector<float>& b);
 
-/// "37x1", width first.
+/// Random weights of a network that knows its sensor, of thresholds 0.1 to 0.4.
+Weights untrained_sensor_weights(int base_channels, int bins, std::uint64_t seed);
+
+/// What a network of these weights sees of the frames, told no threshold: network_planes().
+std::vector<float> planes_of(const Weights& weights, const std::vector<float>& frames,
+                             ImageSize size);
 
 /// The weights with a calibration from a few natural_frames of this size.
 Weights calibrated(const Weights& weights, ImageSize size);

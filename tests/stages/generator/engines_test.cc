@@ -30,6 +30,7 @@ using testing::calibrated;
 using testing::generated;
 using testing::largest_difference;
 using testing::natural_frames;
+using testing::planes_of;
 using testing::relative_error;
 
 struct EngineCase {
@@ -84,19 +85,26 @@ TEST_P(Engines, EqualsThePlainNetworkAtEverySize) {
   const bool whole_numbers = GetParam().precision == Precision::kInt8;
   const ImageSize usual{48, 64};
   // Layers of width 8 have kernels of their own.
-  for (const int base_channels : {2, 8}) {
-    const Weights weights = untrained_weights(base_channels, 3, 5);
+  for (const Weights& weights :
+       {untrained_weights(2, 3, 5), untrained_weights(8, 3, 5),
+        testing::untrained_sensor_weights(2, 3, 5), testing::untrained_sensor_weights(8, 3, 5),
+        testing::untrained_sensor_weights(16, 3, 5)}) {
     const auto generator = engine(weights);
-    const float usual_largest =
-        std::ranges::max(testing::plain_network(weights, natural_frames(usual, 11), usual));
+    EXPECT_EQ(generator->thresholds(), weights.thresholds);
+    const auto expected_of = [&](const std::vector<float>& frames, ImageSize size) {
+      return testing::plain_network(weights, planes_of(weights, frames, size), size);
+    };
+    const float usual_largest = std::ranges::max(expected_of(natural_frames(usual, 11), usual));
     for (const ImageSize size :
          {ImageSize{16, 32}, ImageSize{17, 23}, ImageSize{1, 1}, ImageSize{1, 37}, ImageSize{33, 1},
           ImageSize{31, 18}, ImageSize{2, 2}, ImageSize{3, 50}, ImageSize{18, 31}, ImageSize{4, 64},
           ImageSize{5, 95}, ImageSize{2, 97}}) {
       const auto frames = natural_frames(size, 11);
       const auto volume = generated(*generator, frames, size);
-      const auto expected = testing::plain_network(weights, frames, size);
-      const std::string what = to_string(size) + ", width " + std::to_string(base_channels);
+      const auto expected = expected_of(frames, size);
+      const std::string what = to_string(size) + ", width " +
+                               std::to_string(weights.base_channels) + ", " +
+                               std::to_string(weights.inputs()) + " inputs";
       if (whole_numbers) {
         EXPECT_LE(largest_difference(volume, expected), 0.1f * usual_largest) << what;
       } else {
@@ -158,8 +166,10 @@ TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
   const std::map<Precision, float> largest = {
       {Precision::kFloat32, 1e-5f}, {Precision::kBfloat16, 0.02f}, {Precision::kInt8, 1e-5f}};
   std::uint64_t seed = 0;
-  for (const int base_channels : {4, 8}) {
-    const auto generator = engine(untrained_weights(base_channels, 3, 5));
+  for (const Weights& weights :
+       {untrained_weights(4, 3, 5), untrained_weights(8, 3, 5),
+        testing::untrained_sensor_weights(4, 3, 5), testing::untrained_sensor_weights(8, 3, 5)}) {
+    const auto generator = engine(weights);
     for (const ImageSize size : {ImageSize{320, 480}, ImageSize{255, 401}, ImageSize{64, 700},
                                  ImageSize{49, 33}, ImageSize{1, 37}, ImageSize{5, 1}}) {
       for (const int origin : {0, 5}) {
@@ -173,11 +183,59 @@ TEST_P(Engines, GivesTheTilesThatAreWantedAndZerosElsewhere) {
         EXPECT_EQ(notes.sound, GetParam().engine == Engine::kOnednn);
         EXPECT_LE(largest_difference(volume, expected),
                   largest.at(GetParam().precision) * std::ranges::max(expected))
-            << to_string(size) << " " << origin << ", width " << base_channels;
+            << to_string(size) << " " << origin << ", width " << weights.base_channels << ", "
+            << weights.inputs() << " inputs";
         for (std::size_t i = 0; i < volume.size(); ++i) ASSERT_GE(volume[i], 0.0f) << i;
       }
     }
   }
+}
+
+TEST_P(Engines, IsToldAThreshold) {
+  const ImageSize size{97, 130};
+  const auto frames = natural_frames(size, 11);
+  TileMask wanted{size, 16, 0, 0, {}};
+  wanted.wanted.assign(static_cast<std::size_t>(wanted.rows()) * wanted.columns(), 0);
+  wanted.wanted[9] = 1;
+  for (const int base_channels : {4, 8}) {
+    const Weights weights = testing::untrained_sensor_weights(base_channels, 3, 5);
+    const auto generator = engine(weights);
+    const auto told = [&](std::optional<ContrastThreshold> threshold) {
+      std::vector<float> volume(2 * 3 * size.pixel_count(), -1.0f);
+      generator->generate({frames, size, threshold}, volume);
+      return volume;
+    };
+    const auto middle = told(std::nullopt);
+    EXPECT_EQ(told(ContrastThreshold{weights.thresholds->geometric_mean()}), middle);
+    for (const ContrastThreshold threshold : {ContrastThreshold{0.1}, {0.35, 2}, {0.35, 0.5}}) {
+      const auto volume = told(threshold);
+      EXPECT_NE(volume, middle);
+      expect_near(volume, testing::plain_network(weights, sensor_input(frames, threshold), size),
+                  "told");
+      auto expected = volume;
+      clear_unwanted(wanted, expected);
+      std::vector<float> tiles(volume.size(), -1.0f);
+      generator->generate_tiles({frames, size, threshold}, wanted, tiles);
+      EXPECT_LE(largest_difference(tiles, expected), 0.02f * std::ranges::max(volume));
+    }
+  }
+}
+
+TEST_P(Engines, RefusesAThresholdThatItDoesNotKnow) {
+  const ImageSize size{40, 50};
+  const auto frames = natural_frames(size, 1);
+  std::vector<float> volume(2 * 3 * size.pixel_count());
+  TileMask wanted{size, 16, 0, 0, std::vector<std::uint8_t>(3 * 4)};
+  wanted.wanted[0] = 1;
+  const auto two = engine(untrained_weights(2, 3, 5));
+  const auto three = engine(testing::untrained_sensor_weights(2, 3, 5));
+  EXPECT_EQ(two->thresholds(), std::nullopt);
+  EXPECT_THROW(two->generate({frames, size, ContrastThreshold{0.2}}, volume),
+               std::invalid_argument);
+  EXPECT_THROW(two->generate_tiles({frames, size, ContrastThreshold{0.2}}, wanted, volume),
+               std::invalid_argument);
+  EXPECT_THROW(three->generate({frames, size, ContrastThreshold{0}}, volume),
+               std::invalid_argument);
 }
 
 TEST_P(Engines, GivesZerosIfNothingIsWanted) {
@@ -243,8 +301,10 @@ TEST_P(Engines, IsTheSameWhateverTheCallersOpenmpSettingIs) {
 
 TEST_P(Engines, LosesNoNan) {
   const ImageSize size{20, 21};
-  for (const int base_channels : {4, 8}) {
-    const auto generator = engine(untrained_weights(base_channels, 9, 1));
+  for (const Weights& weights :
+       {untrained_weights(4, 9, 1), untrained_weights(8, 9, 1),
+        testing::untrained_sensor_weights(4, 9, 1), testing::untrained_sensor_weights(8, 9, 1)}) {
+    const auto generator = engine(weights);
     for (const float bad :
          {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
       auto frames = natural_frames(size, 1);

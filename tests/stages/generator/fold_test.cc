@@ -13,9 +13,9 @@ namespace {
 /// A state dict of the published names whose folding is easy to compute by hand: weights all
 /// `weight`, batch norm with γ = 2, β = 3, mean = 5, variance = 4 - 1e-5 (so that √(variance + ε) =
 /// 2).
-StateDict plain_state(int base, float weight) {
+StateDict plain_state(int base, float weight, int inputs = 2) {
   StateDict state;
-  for (const Convolution& layer : network_layout(base, 9)) {
+  for (const Convolution& layer : network_layout(base, 9, inputs)) {
     const bool ends = layer.name == "head" || layer.name == "pred";
     const bool residual = layer.name.starts_with("resblocks");
     const std::string module = residual ? layer.name : layer.name + ".conv2d";
@@ -126,6 +126,24 @@ TEST(FoldGenerator, RefusesWhatBelongsToNoLayer) {
                                          std::string(key) + ", in FILE")))
         << key;
   }
+}
+
+TEST(FoldGenerator, OfANetworkThatKnowsItsSensorHasThreeInputs) {
+  const Weights weights =
+      fold_generator(plain_state(2, 0.25f, 3), "test", ThresholdRange{0.1, 0.4});
+  EXPECT_EQ(weights.thresholds, (ThresholdRange{0.1, 0.4}));
+  EXPECT_EQ(layer(weights, "head").in_channels, 3);
+  EXPECT_THAT(layer(weights, "head").weight, ::testing::Each(0.25f));
+  EXPECT_EQ(layer(weights, "head").weight.size(), 2u * 3 * 9);
+  EXPECT_THAT(
+      [&] {
+        fold_generator(plain_state(2, 0.25f), "FILE", ThresholdRange{0.1, 0.4});
+      },
+      ::testing::ThrowsMessage<std::runtime_error>(
+          ::testing::HasSubstr("expected a generator of 3 inputs to 2 x bins channels")));
+  EXPECT_THAT([&] { fold_generator(plain_state(2, 0.25f, 3), "FILE"); },
+              ::testing::ThrowsMessage<std::runtime_error>(
+                  ::testing::HasSubstr("expected a generator of 2 inputs to 2 x bins channels")));
 }
 
 TEST(FoldGenerator, NamesWhatIsMissing) {

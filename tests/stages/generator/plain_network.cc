@@ -100,13 +100,13 @@ Planes joined(const Planes& x, const Planes& skip) {
 
 }  // namespace
 
-std::vector<float> plain_network(const Weights& weights, const std::vector<float>& frames,
+std::vector<float> plain_network(const Weights& weights, const std::vector<float>& planes,
                                  ImageSize size, const TensorChange& change) {
   constexpr double kSlope = 0.01;
   const auto leaky = [&](const std::string& name, const Planes& in) {
     return changed(name, activated(convolve(weights, name, in), kSlope), change);
   };
-  Planes x{2, size, {frames.begin(), frames.end()}};
+  Planes x{int(planes.size() / size.pixel_count()), size, {planes.begin(), planes.end()}};
   x = leaky("head", x);
   std::vector<Planes> skips;
   for (int level = 0; level < 4; ++level) {
@@ -147,7 +147,7 @@ void round_weights(Convolution& layer, const TensorUse& use, const TensorQuantiz
 
 }  // namespace
 
-std::vector<float> plain_int8_network(const Weights& weights, const std::vector<float>& frames,
+std::vector<float> plain_int8_network(const Weights& weights, const std::vector<float>& planes,
                                       ImageSize size, int largest_weight) {
   const QuantizableNetwork network = quantize_network(weights, *weights.calibration);
   Weights rounded{weights.base_channels, weights.bins, network.convolutions, {}, {}};
@@ -166,7 +166,7 @@ std::vector<float> plain_int8_network(const Weights& weights, const std::vector<
       value = scale * std::clamp(std::nearbyint(value / scale), 0.0, 255.0);
     }
   };
-  return plain_network(rounded, frames, size, store);
+  return plain_network(rounded, planes, size, store);
 }
 
 }  // namespace eventgan::testing

@@ -153,6 +153,50 @@ TEST(WeightsFile, TakesTheGapsOfAnEarlierFileFromItsTrainingManifest) {
   EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").training_gaps, std::nullopt);
 }
 
+TEST(WeightsFile, TellsWhatThresholdsItKnows) {
+  Weights weights = testing::untrained_sensor_weights(2, 3, 1);
+  for (const ThresholdRange range : {ThresholdRange{0.1, 0.4},
+                                     {0.2, 0.2},
+                                     {0.0675, 0.88},
+                                     {1e-7, 1.0 / 3},
+                                     {0.1 * 0.7, 1234.5}}) {
+    weights.thresholds = range;
+    const std::string bytes = serialize_weights(weights);
+    const Weights back = parse_weights(bytes, "NAME");
+    EXPECT_EQ(back.thresholds, range);
+    EXPECT_EQ(back.convolutions.front().in_channels, 3);
+    EXPECT_EQ(back.metadata, weights.metadata);
+    EXPECT_EQ(serialize_weights(back), bytes);
+  }
+  weights.thresholds = ThresholdRange{0.1, 0.4};
+  EXPECT_EQ(parse_safetensors(serialize_weights(weights), "").metadata.at("thresholds"), "0.1-0.4");
+  EXPECT_EQ(parse_weights(serialize_weights(untrained_weights(1, 9, 3)), "NAME").thresholds,
+            std::nullopt);
+}
+
+TEST(WeightsFile, RefusesThresholdsThatAreNone) {
+  SafetensorsFile content =
+      parse_safetensors(serialize_weights(testing::untrained_sensor_weights(1, 3, 1)), "");
+  for (const char* wrong : {"", "some", "0.1", "0.1-", "-0.4", "0.4-0.1", "0-0.4", "-0.1-0.4",
+                            "0.1--0.4", "nan-0.4", "0.1-nan", "0.1-inf", "inf-inf", "0.1-0.4x",
+                            " 0.1-0.4", "0.1..0.4", "0.1-1e400", "0.1-1e6"}) {
+    content.metadata["thresholds"] = wrong;
+    EXPECT_THAT([&] { parse_weights(serialize_safetensors(content), "NAME"); },
+                ::testing::Throws<InputError>())
+        << wrong;
+  }
+}
+
+TEST(WeightsFile, RefusesANetworkOfOtherInputsThanItsThresholdsSay) {
+  SafetensorsFile content =
+      parse_safetensors(serialize_weights(testing::untrained_sensor_weights(1, 3, 1)), "");
+  content.metadata.erase("thresholds");
+  EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError);
+  content = parse_safetensors(serialize_weights(untrained_weights(1, 3, 1)), "");
+  content.metadata["thresholds"] = "0.1-0.4";
+  EXPECT_THROW(parse_weights(serialize_safetensors(content), "NAME"), InputError);
+}
+
 TEST(WeightsFile, SaysOfAPyTorchCheckpointHowItIsImported) {
   const testing::TemporaryFolder folder;
   const std::filesystem::path file = folder / "EventGAN.pt";

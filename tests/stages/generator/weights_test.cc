@@ -1,5 +1,6 @@
 #include "stages/generator/weights.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +10,7 @@
 #include "manifests/values/counter_random.h"
 #include "stages/generator/decoder_kernels.h"
 #include "stages/generator/generator.h"
+#include "tests/stages/generator/engine_trials.h"
 
 namespace eventgan {
 namespace {
@@ -35,6 +37,61 @@ TEST(NetworkLayout, ScalesWithTheBaseWidth) {
   EXPECT_EQ(layout.back().out_channels, 18);
 }
 
+TEST(NetworkLayout, OfThreeInputsHasAnotherHeadAndNoMore) {
+  const auto two = network_layout(8, 9), three = network_layout(8, 9, 3);
+  EXPECT_EQ(two.front().in_channels, 2);
+  EXPECT_EQ(three.front().in_channels, 3);
+  ASSERT_EQ(three.size(), two.size());
+  for (std::size_t i = 1; i < two.size(); ++i) {
+    EXPECT_EQ(three[i].name, two[i].name);
+    EXPECT_EQ(three[i].in_channels, two[i].in_channels) << two[i].name;
+  }
+}
+
+TEST(NetworkPlanes, AreTheFramesThemselvesWithoutThresholds) {
+  const std::vector<float> frames(2 * 6, 0.5f);
+  std::vector<float> kept;
+  const auto planes = network_planes({frames, {2, 3}}, std::nullopt, kept);
+  EXPECT_EQ(planes.data(), frames.data());
+  EXPECT_EQ(planes.size(), frames.size());
+  EXPECT_TRUE(kept.empty());
+}
+
+TEST(NetworkPlanes, AreTheSensorsInputOfTheThresholdThatIsToldOrTheMiddleOne) {
+  const std::vector<float> frames{-0.5f, 0.25f, 0.5f, -0.75f};
+  const ThresholdRange range{0.1, 0.4};
+  const auto planes = [&](std::optional<ContrastThreshold> told) {
+    std::vector<float> kept;
+    const auto planes = network_planes({frames, {1, 2}, told}, range, kept);
+    EXPECT_EQ(planes.data(), kept.data());
+    return std::vector<float>(planes.begin(), planes.end());
+  };
+  EXPECT_EQ(planes(std::nullopt), sensor_input(frames, {range.geometric_mean()}));
+  EXPECT_EQ(planes(ContrastThreshold{0.3, 2}), sensor_input(frames, {0.3, 2}));
+  // What the weights have not learnt is for those who choose it to refuse.
+  EXPECT_EQ(planes(ContrastThreshold{4}), sensor_input(frames, {4}));
+}
+
+TEST(NetworkPlanes, RefuseAThresholdThatIsNoneOrThatNobodyLearnt) {
+  const std::vector<float> frames(2 * 6);
+  std::vector<float> kept;
+  const auto planes = [&](ContrastThreshold told, std::optional<ThresholdRange> range) {
+    network_planes({frames, {2, 3}, told}, range, kept);
+  };
+  for (const ContrastThreshold wrong :
+       {ContrastThreshold{0}, {-0.2}, {NAN}, {0.2, 0}, {0.2, -1}, {0.2, NAN}}) {
+    EXPECT_THAT(
+        [&] {
+          planes(wrong, ThresholdRange{0.1, 0.4});
+        },
+        ::testing::ThrowsMessage<std::invalid_argument>(
+            ::testing::HasSubstr("expected a contrast threshold above 0")))
+        << wrong.mean << " " << wrong.ratio;
+  }
+  EXPECT_THAT([&] { planes({0.2}, std::nullopt); }, ::testing::ThrowsMessage<std::invalid_argument>(
+                                                        ::testing::HasSubstr("expected none")));
+}
+
 TEST(HalfSize, RoundsUp) {
   EXPECT_EQ(half_size({260, 861}), (ImageSize{130, 431}));
   EXPECT_EQ(half_size({1, 2}), (ImageSize{1, 1}));
@@ -49,6 +106,18 @@ TEST(CheckWeights, FindsAMissingLayerAndNan) {
   EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
   weights = untrained_weights(1, 9, 1);
   std::swap(weights.convolutions[2], weights.convolutions[3]);
+  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+}
+
+TEST(CheckWeights, WantsAsManyInputsAsTheThresholdsSay) {
+  Weights weights = testing::untrained_sensor_weights(2, 3, 1);
+  EXPECT_EQ(weights.inputs(), 3);
+  EXPECT_NO_THROW(check_weights(weights, "test"));
+  weights.thresholds.reset();
+  EXPECT_EQ(weights.inputs(), 2);
+  EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
+  weights = untrained_weights(2, 3, 1);
+  weights.thresholds = ThresholdRange{0.1, 0.4};
   EXPECT_THROW(check_weights(weights, "test"), std::runtime_error);
 }
 

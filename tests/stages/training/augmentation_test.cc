@@ -33,7 +33,7 @@ TrainingSample marked_sample(int bins, ImageSize size) {
 
 /// A sample of one bin and one pixel with these two frames.
 TrainingSample pixel_sample(float previous, float next) {
-  return {{1, {1, 1}}, {previous, next}, {}, {0.25f, 0.75f}, ""};
+  return {{1, {1, 1}}, {previous, next}, {}, {0.25f, 0.75f}, std::nullopt, ""};
 }
 
 TEST(DrawAugmentation, ReachesEveryPlaceAboutEquallyOften) {
@@ -180,6 +180,23 @@ TEST(Augment, ChangesTheLightOfTheNetworkFramesAlone) {
   EXPECT_EQ(result.volume, sample.volume);
   EXPECT_NEAR(result.network_frames[0], -0.9f, 1e-6f);
   EXPECT_NEAR(result.network_frames[1], -0.1f, 1e-6f);
+}
+
+TEST(Augment, TellsTheThresholdAsTheNetworkSeesIt) {
+  TrainingSample sample = pixel_sample(-0.5f, 0.5f);
+  EXPECT_EQ(augment(sample, {.crop = {1, 1}, .gamma = 2}).threshold, std::nullopt);
+  sample.threshold = ContrastThreshold{0.25, 4};
+  const auto told = [&](const Augmentation& augmentation) {
+    return augment(sample, augmentation).threshold.value();
+  };
+  EXPECT_EQ(told({.crop = {1, 1}}), *sample.threshold);
+  // A gain moves no contrast; ln u^2 moves twice as far as ln u.
+  EXPECT_EQ(told({.crop = {1, 1}, .flip_x = true, .gain = 0.5f}), *sample.threshold);
+  EXPECT_EQ(told({.crop = {1, 1}, .gamma = 2}), (ContrastThreshold{0.5, 4}));
+  // What rises in time falls in reversed time.
+  EXPECT_EQ(told({.crop = {1, 1}, .reverse = true}), (ContrastThreshold{0.25, 0.25}));
+  EXPECT_EQ(told({.crop = {1, 1}, .reverse = true, .gamma = 0.5f}),
+            (ContrastThreshold{0.125, 0.25}));
 }
 
 TEST(Augment, KeepsLightInItsRange) {

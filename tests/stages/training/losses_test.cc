@@ -358,6 +358,70 @@ TEST(OverlapLoss, HasTheGradientOfDifferences) {
       random_tensor({2, 4, 3, 2}, 4));
 }
 
+/// One term of the likelihood loss.
+double unlikelihood(double expected, double real) {
+  return expected + 0.02 - (real + 0.02) * std::log(expected + 0.02);
+}
+
+TEST(LikelihoodLoss, IsTheMeanOfItsTerms) {
+  const at::Tensor generated = tensor_of({1, 2, 1, 2}, {0, 1, 0.5f, 3});
+  const at::Tensor real = tensor_of({1, 2, 1, 2}, {0, 0, 0.75f, 5});
+  EXPECT_NEAR(
+      likelihood_loss(generated, real).item<double>(),
+      (unlikelihood(0, 0) + unlikelihood(1, 0) + unlikelihood(0.5, 0.75) + unlikelihood(3, 5)) / 4,
+      1e-6);
+}
+
+TEST(LikelihoodLoss, IsLeastWhereTheMeanOfTheCountsIsExpected) {
+  // Four voxels of a mean of 1.
+  const at::Tensor real = tensor_of({1, 4, 1, 1}, {0, 0, 0.5f, 3.5f});
+  const auto of_constant = [&](double rate) {
+    const at::Tensor generated = at::full({1, 4, 1, 1}, rate).requires_grad_();
+    const at::Tensor loss = likelihood_loss(generated, real);
+    loss.backward();
+    return std::pair(loss.item<double>(), generated.grad().sum().item<double>());
+  };
+  const auto [least, slope] = of_constant(1);
+  EXPECT_NEAR(slope, 0, 1e-6);
+  for (const double rate : {0.0, 0.5, 0.9, 1.1, 2.0, 10.0}) {
+    EXPECT_GT(of_constant(rate).first, least) << rate;
+    EXPECT_EQ(of_constant(rate).second > 0, rate > 1) << rate;
+  }
+}
+
+TEST(LikelihoodLoss, HasItsGradientAtZeroAndBelow) {
+  // (λ - real) / (λ + 0.02) of each of the voxels, of which there are six; below zero as at zero.
+  const at::Tensor generated = tensor_of({1, 6, 1, 1}, {0, 0, -0.3f, -50, 1, 1});
+  generated.set_requires_grad(true);
+  const at::Tensor real = tensor_of({1, 6, 1, 1}, {0, 2, 2, 0, 0, 1});
+  const at::Tensor loss = likelihood_loss(generated, real);
+  EXPECT_NEAR(
+      loss.item<double>(),
+      (2 * unlikelihood(0, 0) + 2 * unlikelihood(0, 2) + unlikelihood(1, 0) + unlikelihood(1, 1)) /
+          6,
+      1e-6);
+  loss.backward();
+  const at::Tensor expected =
+      tensor_of({1, 6, 1, 1}, {0, -2 / 0.02f, -2 / 0.02f, 0, 1 / 1.02f, 0}) / 6;
+  EXPECT_LT((generated.grad() - expected).abs().max().item<double>(), 1e-5);
+}
+
+TEST(LikelihoodLoss, HasTheGradientOfDifferences) {
+  const at::Tensor real = random_tensor({2, 4, 3, 2}, 1) + 1;
+  testing::expect_gradient_of_differences(
+      [&](const at::Tensor& generated) { return likelihood_loss(generated, real); },
+      random_tensor({2, 4, 3, 2}, 2) + 1.1);
+}
+
+TEST(LikelihoodLoss, LetsNanThroughAndRefusesOtherShapes) {
+  const at::Tensor nan = tensor_of({1, 2, 1, 1}, {std::numeric_limits<float>::quiet_NaN(), 1});
+  const at::Tensor zero = at::zeros({1, 2, 1, 1});
+  EXPECT_TRUE(std::isnan(likelihood_loss(nan, zero).item<float>()));
+  EXPECT_TRUE(std::isnan(likelihood_loss(zero, nan).item<float>()));
+  EXPECT_THROW(likelihood_loss(at::zeros({2, 18, 4, 5}), at::zeros({1, 18, 4, 5})),
+               std::invalid_argument);
+}
+
 TEST(VolumeLoss, HasTheGradientOfDifferences) {
   const at::Tensor real = random_tensor({2, 4, 3, 2}, 1);
   testing::expect_gradient_of_differences(

@@ -45,6 +45,9 @@ TEST(CheckTrainable, RefusesAGeneratorWithoutLoss) {
   TrainingManifest manifest = testing::small_training();
   manifest.losses = {.adversarial = 0, .flow = 0, .reconstruction = 0};
   EXPECT_THROW(check_trainable(manifest), UsageError);
+  manifest.losses.likelihood = 1;
+  EXPECT_NO_THROW(check_trainable(manifest));
+  manifest.losses.likelihood = 0;
   manifest.steps.generator = 0;
   EXPECT_NO_THROW(check_trainable(manifest));
 }
@@ -298,27 +301,43 @@ TEST(Trainer, LoadNamesWhatIsMissing) {
   }
 }
 
-class TrainedGenerator : public ::testing::TestWithParam<std::pair<SpectralNormPlace, double>> {};
+struct TrainedCase {
+  std::string name;
+  SpectralNormPlace spectral_norm = SpectralNormPlace::kNone;
+  double difference_gain = 0;
+  bool sensor = false;
+};
+
+class TrainedGenerator : public ::testing::TestWithParam<TrainedCase> {};
 
 TEST_P(TrainedGenerator, FoldedEqualsItsOwnImageWhichChangesNothing) {
   TrainingManifest manifest = testing::small_training();
-  manifest.network.spectral_norm = GetParam().first;
-  manifest.network.difference_gain = GetParam().second;
+  manifest.network.spectral_norm = GetParam().spectral_norm;
+  manifest.network.difference_gain = GetParam().difference_gain;
+  manifest.network.sensor = GetParam().sensor;
+  const auto told = [](std::vector<TrainingSample> samples) {
+    for (TrainingSample& sample : samples) {
+      if (GetParam().sensor) sample.threshold = ContrastThreshold{0.4, 1.5};
+    }
+    return samples;
+  };
   Trainer trainer(manifest, "cpu");
   for (int step = 0; step < 6; ++step) {
-    trainer.step(TrainingPhase::kGenerator, step, testing::edge_batch(manifest, step));
+    trainer.step(TrainingPhase::kGenerator, step, told(testing::edge_batch(manifest, step)));
   }
   const StateDict before = trainer.state();
   // Another size than the crop's, odd.
-  const TrainingSample sample = testing::moving_edges(1, {3, {37, 50}}, 9)[0];
+  const TrainingSample sample = told(testing::moving_edges(1, {3, {37, 50}}, 9))[0];
   const std::vector<float> volume = trainer.generate(sample);
   EXPECT_EQ(trainer.generate(sample), volume);
   EXPECT_THAT(changed_parts(before, trainer.state()), ElementsAre());
 
-  const auto engine =
-      make_torch_generator(fold_generator(trainer.generator_state(), "the trained generator"));
+  const std::optional<ThresholdRange> thresholds =
+      GetParam().sensor ? std::optional(ThresholdRange{0.1, 1}) : std::nullopt;
+  const auto engine = make_torch_generator(
+      fold_generator(trainer.generator_state(), "the trained generator", thresholds));
   std::vector<float> folded(volume.size());
-  engine->generate(sample.network_frames, sample.shape.size, folded);
+  engine->generate({sample.network_frames, sample.shape.size, sample.threshold}, folded);
   const float largest = *std::max_element(volume.begin(), volume.end());
   ASSERT_GT(largest, 0);
   for (std::size_t i = 0; i < volume.size(); ++i) {
@@ -326,15 +345,15 @@ TEST_P(TrainedGenerator, FoldedEqualsItsOwnImageWhichChangesNothing) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(SpectralNormAndDifferenceGain, TrainedGenerator,
-                         ::testing::Values(std::pair(SpectralNormPlace::kDecoders, 0.0),
-                                           std::pair(SpectralNormPlace::kEncoders, 0.0),
-                                           std::pair(SpectralNormPlace::kNone, 0.0),
-                                           std::pair(SpectralNormPlace::kNone, 8.0)),
-                         [](const auto& each) {
-                           return std::string(to_string(each.param.first)) +
-                                  (each.param.second > 0 ? "OfDifferences" : "");
-                         });
+INSTANTIATE_TEST_SUITE_P(
+    Networks, TrainedGenerator,
+    ::testing::Values(TrainedCase{"decoders", SpectralNormPlace::kDecoders},
+                      TrainedCase{"encoders", SpectralNormPlace::kEncoders}, TrainedCase{"none"},
+                      TrainedCase{"difference_gain", SpectralNormPlace::kNone, 8},
+                      TrainedCase{"sensor", SpectralNormPlace::kNone, 0, true},
+                      TrainedCase{"sensor_and_difference_gain", SpectralNormPlace::kDecoders, 8,
+                                  true}),
+    [](const auto& each) { return each.param.name; });
 
 }  // namespace
 }  // namespace eventgan

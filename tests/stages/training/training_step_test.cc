@@ -1,9 +1,11 @@
 #include <ATen/Functions.h>
 #include <ATen/TensorOperators.h>
 #include <ATen/core/grad_mode.h>
+#include <ATen/ops/from_blob.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numeric>
 #include <stdexcept>
 
@@ -42,6 +44,37 @@ TEST(TrainingBatch, KeepsSamplesFramesAndChannelsApart) {
   EXPECT_EQ(batch.volume[0][1][0][1].item<float>(), 9);
   EXPECT_FALSE(batch.has_events()[0][0][0][0].item<bool>());
   EXPECT_TRUE(batch.has_events()[0][0][0][1].item<bool>());
+}
+
+TEST(TrainingBatch, ShowsTheGeneratorTheNetworkFramesOrTheSensorsInputOfThem) {
+  std::vector<TrainingSample> samples = testing::moving_edges(2, {1, {5, 7}}, 1);
+  for (TrainingSample& sample : samples) {
+    for (float& value : sample.network_frames) value *= 0.5f;  // as if by a gain
+  }
+  const TrainingBatch plain = make_training_batch(samples, 1, c10::kCPU);
+  EXPECT_TRUE(plain.generator_input.equal(plain.network_frames));
+  EXPECT_TRUE(generator_input_tensor(samples[1], c10::kCPU)[0].equal(plain.network_frames[1]));
+
+  samples[0].threshold = ContrastThreshold{0.2};
+  samples[1].threshold = ContrastThreshold{0.3, 2};
+  const TrainingBatch told = make_training_batch(samples, 1, c10::kCPU);
+  ASSERT_EQ(told.generator_input.sizes(), (at::IntArrayRef{2, 3, 5, 7}));
+  EXPECT_TRUE(told.network_frames.equal(plain.network_frames));
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    std::vector<float> planes = sensor_input(samples[i].network_frames, *samples[i].threshold);
+    const at::Tensor expected = at::from_blob(planes.data(), {3, 5, 7});
+    EXPECT_TRUE(told.generator_input[std::int64_t(i)].equal(expected)) << i;
+    EXPECT_TRUE(generator_input_tensor(samples[i], c10::kCPU)[0].equal(expected)) << i;
+  }
+}
+
+TEST(TrainingBatch, RefusesThresholdsOfSomeSamples) {
+  for (const std::size_t told : {0, 1}) {
+    std::vector<TrainingSample> samples{sample_from(0), sample_from(0)};
+    samples[told].threshold = ContrastThreshold{0.2};
+    EXPECT_THAT([&] { make_training_batch(samples, 1, c10::kCPU); },
+                ThrowsMessage<std::invalid_argument>(HasSubstr("all with a threshold or none")));
+  }
 }
 
 TEST(TrainingBatch, RefusesWhatDoesNotFit) {
@@ -190,6 +223,33 @@ TEST(TrainerLearning, LowersTheVolumeLoss) {
   const auto losses = curves(trainer, manifest, TrainingPhase::kGenerator);
   const std::vector<double>& loss = losses.at("volume");
   EXPECT_LT(change(loss), -0.2 * loss.front());
+}
+
+TEST(TrainerLearning, LowersTheLikelihoodLossOfANetworkThatKnowsItsSensor) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.network.sensor = true;
+  manifest.network.difference_gain = 4;
+  manifest.network.output_slope = 0.25;
+  manifest.losses = {.adversarial = 0, .flow = 0, .reconstruction = 0, .likelihood = 1};
+  Trainer trainer(manifest, "cpu");
+  std::vector<double> curve;
+  double events = 0, voxels = 0;
+  for (int step = 0; step < kSteps; ++step) {
+    auto batch = testing::edge_batch(manifest, step % 3);
+    for (TrainingSample& sample : batch) {
+      sample.threshold = ContrastThreshold{0.5, 1.5};
+      events += std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0);
+      voxels += double(sample.volume.size());
+    }
+    const StepLosses losses = trainer.step(TrainingPhase::kGenerator, step, batch);
+    EXPECT_EQ(losses.at("likelihood"), losses.at("generator.total"));
+    curve.push_back(losses.at("likelihood"));
+  }
+  // Of all networks that look at nothing the best expects the same everywhere: the mean.
+  const double everywhere = events / voxels + 0.02;
+  const double of_the_mean = everywhere - everywhere * std::log(everywhere);
+  EXPECT_LT(mean(curve.end() - 6, curve.end()), 0.95 * of_the_mean);
+  EXPECT_LT(change(curve), 0);
 }
 
 TEST(TrainerLearning, LowersTheCycleLossesOfTheGenerator) {
