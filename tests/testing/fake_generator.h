@@ -17,6 +17,10 @@ class FakeGenerator final : public Generator {
   /// As if it had been trained.
   void train_on(GapRange gaps) { training_gaps_ = gaps; }
   std::optional<GapRange> training_gaps() const override { return training_gaps_; }
+  /// As if it knew its sensor: then all values are divided by the contrast threshold of their
+  /// polarity that it is told, or else by the middle of these, and are rates.
+  void know(ThresholdRange thresholds) { thresholds_ = thresholds; }
+  std::optional<ThresholdRange> thresholds() const override { return thresholds_; }
   /// As if it computed in 8 bits, with this share of them at the end of their range.
   void saturate(double share) { saturated_share_ = share; }
   int calls() const { return calls_; }
@@ -30,6 +34,7 @@ class FakeGenerator final : public Generator {
  private:
   int bins_;
   std::optional<GapRange> training_gaps_;
+  std::optional<ThresholdRange> thresholds_;
   double saturated_share_ = 0;
   float failing_value_ = -100;
   mutable std::atomic<int> calls_ = 0;

@@ -59,6 +59,27 @@ TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(shards("one"), shards("five"));
 }
 
+TEST_F(Convert, SaysWhetherVolumesAreRatesOrEventsDrawnOfThem) {
+  generator_.know({0.01, 0.04});
+  const auto first_shard = [&](const std::string& folder) {
+    run(folder);
+    EXPECT_THAT(verify_folder(folder_ / folder).faults, ::testing::IsEmpty());
+    return ShardReader(out("job-train-00000-of-00003.h5", folder));
+  };
+  const auto events_of = [](const ShardReader& shard) {
+    return double(shard.sample(1).statistics.sum_positive);
+  };
+  const ShardReader drawn = first_shard("drawn");
+  EXPECT_EQ(drawn.header().unit, VolumeUnit::kDrawn);
+  EXPECT_NEAR(events_of(drawn), std::round(events_of(drawn)), 1e-2);
+  change(R"("weights": "untrained:1")", R"("weights": "untrained:1", "sample": false)");
+  const ShardReader rates = first_shard("rates");
+  EXPECT_EQ(rates.header().unit, VolumeUnit::kRates);
+  EXPECT_GT(events_of(rates), 0);
+  // 20x30 pixels, each within 1 of its rates' sum.
+  EXPECT_NEAR(events_of(drawn), events_of(rates), 5 * std::sqrt(600 / 4.0));
+}
+
 TEST_F(Convert, InBatchesGivesTheSameBytesForAnyNumberOfThreads) {
   const auto generator =
       make_batched_generator(load_weights(manifest_).weights, Precision::kFloat32, Device::kCpu);

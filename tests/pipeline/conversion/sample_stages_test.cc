@@ -48,6 +48,14 @@ class SampleStagesTest : public ::testing::Test {
     return message;
   }
 
+  /// What is stored of it, in float32.
+  std::vector<float> volume(const SampleMessage& message) {
+    EXPECT_FALSE(message.failed()) << message.sample.fault;
+    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
+    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
+    return dequantize(stored.value(), StoredType::kFloat32, 1);
+  }
+
   testing::TemporaryFolder folder_;
   JobManifest manifest_;
   testing::FakeDataset* dataset_;
@@ -114,12 +122,6 @@ class CameraStagesTest : public SampleStagesTest {
     shard_.volume_size = {2, 4};
     const double unknown = std::nan("");
     shard_.samples = {{"r/1", "r", "r/1", {{"r.h5", 0, 0, unknown}, {"r.h5", 1, 1, unknown}}, ""}};
-  }
-
-  std::vector<float> volume(const SampleMessage& message) {
-    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
-    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
-    return dequantize(stored.value(), StoredType::kFloat32, 1);
   }
 
   CameraDataset* camera_;
@@ -293,16 +295,84 @@ TEST_F(SampleStagesTest, AThresholdIsDrawnForEachPair) {
   EXPECT_EQ(run().sample.threshold, std::nullopt) << "no volume, no threshold";
 }
 
+/// A generator that gives rates: at each pixel 0.4 (b + 1)/9 / C in each positive channel, 2 / C in
+/// all.
+class RatesTest : public SampleStagesTest {
+ protected:
+  RatesTest() { generator_.know({0.1, 0.4}); }  // C = 0.2 unless told
+
+  /// Sums over time of the positive channels, of each pixel.
+  std::vector<float> positive_sums(const SampleMessage& message) {
+    const std::vector<float> values = volume(message);
+    const std::size_t plane = shard_.volume_size.pixel_count();
+    std::vector<float> sums(plane);
+    for (std::size_t i = 0; i < 9 * plane; ++i) sums[i % plane] += values[i];
+    return sums;
+  }
+};
+
+TEST_F(RatesTest, EventsAreDrawnOfThem) {
+  const SampleMessage message = run();
+  for (const float sum : positive_sums(message)) EXPECT_NEAR(sum, 10, 1e-4);  // 2 / 0.2, whole
+  EXPECT_EQ(message.sample.threshold, std::nullopt) << "the manifest tells none";
+  EXPECT_EQ(message.sample.statistics.sum_negative, 0);
+  manifest_.generator.threshold = ThresholdSpec{.range = {0.3, 0.3}};
+  double all = 0;
+  for (const float sum : positive_sums(run())) {
+    EXPECT_NEAR(sum, std::round(sum), 1e-4);  // 2 / 0.3 = 6.67: 6 or 7
+    EXPECT_NEAR(sum, 6.5, 0.51);
+    all += sum;
+  }
+  EXPECT_NEAR(all, 24 * 2 / 0.3, 5 * std::sqrt(24 * 2 / 9.0));
+}
+
+TEST_F(RatesTest, AreStoredAsTheyAreIfAsked) {
+  manifest_.generator.sample = false;
+  const SampleMessage message = run();
+  EXPECT_NEAR(message.sample.statistics.max, 2, 1e-6);
+  EXPECT_NEAR(message.sample.statistics.sum_positive, 24 * 10, 1e-3);
+  manifest_.generator.threshold = ThresholdSpec{.range = {0.4, 0.4}, .ratio = 0.25};
+  EXPECT_NEAR(run().sample.statistics.sum_positive, 24 * 2.0 / 0.8, 1e-3);  // C+ = 0.4 / 0.5
+}
+
+TEST_F(RatesTest, EventsFollowFromSeedDatasetAndSampleAlone) {
+  const std::vector<std::byte> chunk = run().chunk;
+  EXPECT_EQ(run().chunk, chunk);
+  shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
+  EXPECT_EQ(run().chunk, chunk) << "another shard";
+  shard_.samples[0].sample_id = "0002";
+  EXPECT_NE(run().chunk, chunk);
+  shard_.samples[0].sample_id = "0001";
+  manifest_.seed = 1;
+  EXPECT_NE(run().chunk, chunk);
+  manifest_.seed = 0;
+  manifest_.sources[0].dataset = DatasetKind::kMpiiList;
+  EXPECT_NE(run().chunk, chunk);
+}
+
+TEST_F(RatesTest, OfAStillSceneGiveNoEvents) {
+  shard_.samples[0].pair.next = shard_.samples[0].pair.previous;
+  EXPECT_EQ(run().sample.statistics.flags, kFlagEmpty);
+}
+
+TEST_F(RatesTest, OfTilesGiveEventsThereAlone) {
+  manifest_.image.size = shard_.volume_size = {24, 40};
+  manifest_.generator.scope.scope = Scope::kLabelsOnly;
+  manifest_.generator.scope.label_margin_px = 0;
+  manifest_.generator.scope.tile_px = 8;
+  const SampleMessage message = run();
+  const std::vector<float> sums = positive_sums(message);
+  ASSERT_EQ(message.sample.tiles.size(), 3u * 5);
+  EXPECT_THAT(message.sample.tiles,
+              ::testing::AllOf(::testing::Contains(0), ::testing::Contains(1)));
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    const std::size_t tile = i / 40 / 8 * 5 + i % 40 / 8;
+    ASSERT_NEAR(sums[i], message.sample.tiles[tile] == 1 ? 10 : 0, 1e-4) << i;
+  }
+}
+
 class NoiseTest : public SampleStagesTest {
  protected:
-  /// 4 x 6 pixels, or what the shard has.
-  std::vector<float> volume(const SampleMessage& message) {
-    EXPECT_FALSE(message.failed()) << message.sample.fault;
-    const std::size_t bytes = VolumeShape{9, shard_.volume_size}.value_count() * sizeof(float);
-    const auto stored = decode_chunk(message.chunk, StoredType::kFloat32, 1, bytes);
-    return dequantize(stored.value(), StoredType::kFloat32, 1);
-  }
-
   /// Whether pixels have an event in any channel.
   std::vector<bool> struck() {
     const std::vector<float> values = volume(run());

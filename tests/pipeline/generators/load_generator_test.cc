@@ -264,6 +264,62 @@ TEST(LoadGenerator, KnowsWhatGapsTheWeightsWereTrainedOn) {
   }
 }
 
+class LoadSensorGenerator : public ::testing::Test {
+ protected:
+  LoadSensorGenerator() {
+    Weights weights = testing::untrained_sensor_weights(1, 9, 1);  // of thresholds 0.1 to 0.4
+    weights.metadata["origin"] = "a test";
+    testing::write_file(folder_ / "w.safetensors", serialize_weights(weights));
+    manifest_.directory = folder_.path();
+    manifest_.generator.weights = "w.safetensors";
+  }
+
+  std::string refusal(std::array<double, 2> range) {
+    manifest_.generator.threshold = ThresholdSpec{.range = range};
+    try {
+      load_generator(manifest_);
+      return "";
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+  }
+
+  testing::TemporaryFolder folder_;
+  JobManifest manifest_;
+};
+
+TEST_F(LoadSensorGenerator, KnowsItsThresholds) {
+  for (const std::optional<Engine> engine : {std::optional<Engine>(), {Engine::kTorch}}) {
+    manifest_.generator.engine = engine;
+    const LoadedGenerator loaded = load_generator(manifest_);
+    EXPECT_EQ(loaded.generator->thresholds(), (ThresholdRange{0.1, 0.4}));
+    EXPECT_THAT(loaded.warnings, ::testing::IsEmpty());
+  }
+}
+
+TEST_F(LoadSensorGenerator, TakesThresholdsThatItLearntAndNoOthers) {
+  for (const std::array<double, 2> learnt :
+       {std::array{0.1, 0.4}, {0.1, 0.1}, {0.4, 0.4}, {0.2, 0.3}}) {
+    EXPECT_EQ(refusal(learnt), "");
+  }
+  EXPECT_EQ(refusal({0.0999, 0.3}),
+            "$.generator.sensor.threshold: expected 0.1..0.4 as the weights have learnt, got "
+            "0.0999..0.3");
+  EXPECT_EQ(refusal({0.2, 0.5}),
+            "$.generator.sensor.threshold: expected 0.1..0.4 as the weights have learnt, got "
+            "0.2..0.5");
+  EXPECT_NE(refusal({0.05, 5}), "");
+}
+
+TEST_F(LoadSensorGenerator, RefusesThresholdsForWeightsThatLearntNone) {
+  testing::write_file(folder_ / "w.safetensors", serialize_weights(trained_weights()));
+  EXPECT_EQ(refusal({0.2, 0.2}),
+            "$.generator.sensor.threshold: expected weights that have learnt a sensor's threshold, "
+            "got others: w.safetensors");
+  manifest_.generator.threshold.reset();
+  EXPECT_EQ(load_generator(manifest_).generator->thresholds(), std::nullopt);
+}
+
 TEST(LoadGenerator, MakesTheOneOnCudaOrRefusesIt) {
   JobManifest manifest;
   manifest.generator.weights = "untrained:1";

@@ -29,13 +29,15 @@ using testing::read_file;
 using testing::TemporaryFolder;
 using testing::unlabelled_shard;
 
+constexpr VolumeUnit kUnits[] = {VolumeUnit::kLearned, VolumeUnit::kEvents, VolumeUnit::kDrawn,
+                                 VolumeUnit::kRates};
+
 TEST(VolumeWords, NameEachUnitDifferently) {
   std::set<std::string> texts;
   for (const Normalization normalization : {Normalization::kNone, Normalization::kEta98}) {
-    texts.insert(unit_text(VolumeUnit::kLearned, normalization));
-    texts.insert(unit_text(VolumeUnit::kEvents, normalization));
+    for (const VolumeUnit unit : kUnits) texts.insert(unit_text(unit, normalization));
   }
-  EXPECT_EQ(texts.size(), 3u);  // a network's volumes are dimensionless either way
+  EXPECT_EQ(texts.size(), 7u);  // a network's normalised volumes are dimensionless either way
 }
 
 TEST(VolumeWords, AreThoseOfEarlierShards) {
@@ -45,16 +47,23 @@ TEST(VolumeWords, AreThoseOfEarlierShards) {
   EXPECT_EQ(time_axis_text(VolumeUnit::kLearned),
             "bin b of a polarity is centred at time b / (bins - 1), where 0 is the previous frame "
             "and 1 the next one");
+  // Only a simulator's first and last event span the bins.
+  for (const VolumeUnit unit : kUnits) {
+    EXPECT_EQ(time_axis_text(unit) == time_axis_text(VolumeUnit::kLearned),
+              unit != VolumeUnit::kEvents);
+  }
 }
 
 TEST(VolumeWords, GoThroughAShard) {
   for (const Normalization normalization : {Normalization::kNone, Normalization::kEta98}) {
-    const testing::TemporaryFolder folder;
-    testing::ExampleShard example = testing::example_shard();
-    example.header.unit = VolumeUnit::kEvents;
-    example.header.normalization = normalization;
-    testing::write_shard(folder.path(), example);
-    EXPECT_EQ(ShardReader(folder / example.header.name).header().unit, VolumeUnit::kEvents);
+    for (const VolumeUnit unit : kUnits) {
+      const testing::TemporaryFolder folder;
+      testing::ExampleShard example = testing::example_shard();
+      example.header.unit = unit;
+      example.header.normalization = normalization;
+      testing::write_shard(folder.path(), example);
+      EXPECT_EQ(ShardReader(folder / example.header.name).header().unit, unit);
+    }
   }
 }
 
