@@ -59,7 +59,7 @@ class SampleSource {
   /// read_textures.
   SampleSource(const TrainingManifest& manifest, std::vector<TrainingRecording> recordings);
 
-  /// With probability simulated.fraction a simulated one (simulate_planes), flipped and no more;
+  /// With probability simulated.fraction a simulated one (simulate_planes), without augmentation;
   /// else the sample drawn by draw_sample. As in the published code a pair whose first interval has
   /// fewer than 100 events in the whole image is drawn again (at most 10 times, from the same
   /// recording): η98 would blow its noise up to full scale. Throws InputError naming the recording

@@ -130,7 +130,7 @@ MethodSummary method_of(const std::string& name, double f1, double mse, double e
   method.mean.pool_mse_2 = mse;
   method.mean.events_per_pixel = events;
   method.mean.time_correlation = kNaN;
-  method.mean.events_per_channel = {events / 2, events / 2};
+  method.mean.events_per_channel = {events / 4, events / 4, events / 4, events / 4};
   method.intervals.push_back({method.mean, std::nullopt});
   return method;
 }
@@ -235,7 +235,7 @@ TEST(RealismJson, HasEverything) {
   EXPECT_EQ(network["mean"]["f1_time"], 0.5);
   EXPECT_EQ(network["bounds"]["f1_time"], nlohmann::json({0.44, 0.54}));
   EXPECT_TRUE(network["mean"]["time_correlation"].is_null());
-  EXPECT_EQ(network["mean"]["events_per_channel"].size(), 2u);
+  EXPECT_EQ(network["mean"]["events_per_channel"].size(), 4u);
   EXPECT_FALSE(network["mean"].contains("direction"));
   EXPECT_EQ(network["pairs"][0]["first_frame"], 3);
   EXPECT_EQ(network["pairs"][0]["direction"]["within_30_deg"], 3);

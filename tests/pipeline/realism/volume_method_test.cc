@@ -20,13 +20,52 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 TEST(NetworkMethod, GivesTheFramesToTheGenerator) {
-  const auto method = make_network_method(std::make_unique<testing::FakeGenerator>(1), "w.st");
+  const auto method = make_network_method(std::make_unique<testing::FakeGenerator>(1), "w.st",
+                                          std::nullopt, false, 0);
   // The fake's volume of one bin is max(next - previous, 0) and max(previous - next, 0).
   const IntervalFrames frames{{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, 0};
   EXPECT_THAT(method->volume(frames, 0), ElementsAre(2.0f, 0.0f, 0.0f, FloatEq(0.4f)));
   EXPECT_EQ(method->name(), "network");
   EXPECT_EQ(method->draws(), 1);
-  EXPECT_THAT(method->settings(), HasSubstr("w.st"));
+  EXPECT_EQ(method->settings(), "weights w.st");
+}
+
+/// A fake network that knows its sensor.
+std::unique_ptr<testing::FakeGenerator> sensor_generator(int bins = 1) {
+  auto generator = std::make_unique<testing::FakeGenerator>(bins);
+  generator->know({0.01, 5});
+  return generator;
+}
+
+TEST(NetworkMethod, DrawsEventsOfTheSensorItIsTold) {
+  const auto method_of = [](std::uint64_t seed) {
+    return make_network_method(sensor_generator(3), "w.st", ContrastThreshold{0.4, 0.25}, true,
+                               seed);
+  };
+  const auto method = method_of(1);
+  EXPECT_EQ(method->draws(), 5);
+  EXPECT_EQ(
+      method->settings(),
+      "weights w.st, contrast threshold 0.4 (fitted) of ln(u/255 + 0.02), negative ÷ positive "
+      "0.25, mean of 5 draws of events");
+  EXPECT_THAT(
+      make_network_method(sensor_generator(), "w", ContrastThreshold{0.4}, false, 1)->settings(),
+      Not(HasSubstr("fitted")));
+  // A rise of 0.1 at each of 64 pixels, of C+ = 0.4 / sqrt(0.25) = 0.8: rates 0.1 (b + 1)/3 / 0.8
+  // in the three bins, a quarter of an event in all.
+  IntervalFrames frames{{0, 1}, 0.1, {{8, 8}, std::vector<std::uint8_t>(64, 100)}, {}, 0};
+  frames.next = {{8, 8}, std::vector<std::uint8_t>(64, 113)};  // 26/255 = 0.102
+  const std::vector<float> first = method->volume(frames, 0);
+  EXPECT_EQ(method->volume(frames, 0), first);
+  EXPECT_NE(method->volume(frames, 1), first);
+  EXPECT_NE(method_of(2)->volume(frames, 0), first);
+  // An event's values add up to 1 and are normalised by at most 1: some pixels have one, some none.
+  int with_events = 0;
+  for (std::size_t i = 0; i < 64; ++i) {
+    with_events += first[i] + first[64 + i] + first[128 + i] > 0;
+    EXPECT_EQ(first[192 + i] + first[256 + i] + first[320 + i], 0) << "nothing falls";
+  }
+  EXPECT_NEAR(with_events, 64 * 0.255, 5 * std::sqrt(64 * 0.255 * 0.745));
 }
 
 TEST(OpenRealismGenerator, RefusesNamesAndFilesThatAreNoWeights) {
@@ -69,6 +108,35 @@ TEST(FittedThreshold, StaysInItsRange) {
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({0}), 0.02, 0, 2), 5, 0.01);
   EXPECT_NEAR(fitted_threshold(inverse_scene(1000), intervals_of({1}), 0.02, 0, 2), 5, 0.01);
   EXPECT_NEAR(fitted_threshold(inverse_scene(0), intervals_of({1000}), 0.02, 0, 2), 0.01, 1e-4);
+}
+
+/// One pixel that rises by 2 and one that falls by 0.4, with the camera's events of them.
+IntervalFrames rise_and_fall(std::int64_t positive, std::int64_t negative) {
+  return {{0, 1}, 0.1, {{1, 2}, {0, 255}}, {{1, 2}, {255, 204}}, positive + negative, positive};
+}
+
+TEST(FittedThreshold, OfANetworkIsThatOfEachPolarity) {
+  // Rates 2 / C+ and 0.4 / C-, of two intervals: 24 and 4 events are those of 0.1667 and 0.2.
+  const std::vector<IntervalFrames> frames{rise_and_fall(20, 1), rise_and_fall(4, 3)};
+  for (const int threads : {1, 3}) {
+    const ContrastThreshold fitted = fitted_threshold(*sensor_generator(4), frames, threads);
+    // Four bins: a quarter, a half, three quarters and one of the change, 2.5 times it.
+    EXPECT_NEAR(fitted.positive(), 2.5 * 2 * 2 / 24, 2.5 * 0.1667 * 0.006);
+    EXPECT_NEAR(fitted.negative(), 2.5 * 2 * 0.4 / 4, 2.5 * 0.2 * 0.006);
+  }
+}
+
+TEST(FittedThreshold, OfANetworkStaysInWhatItKnows) {
+  const ContrastThreshold silent =
+      fitted_threshold(*sensor_generator(), std::vector{rise_and_fall(0, 0)}, 1);
+  EXPECT_NEAR(silent.mean, 5, 0.01);
+  EXPECT_NEAR(silent.ratio, 1, 0.01);
+  const ContrastThreshold rising =
+      fitted_threshold(*sensor_generator(), std::vector{rise_and_fall(1'000'000, 0)}, 1);
+  EXPECT_NEAR(rising.positive(), 0.01, 1e-4);
+  EXPECT_NEAR(rising.negative(), 5, 0.01);
+  const ContrastThreshold of_nothing = fitted_threshold(*sensor_generator(), {}, 1);
+  EXPECT_TRUE(sensor_generator()->thresholds()->contains(of_nothing.mean)) << of_nothing.mean;
 }
 
 TEST(RealismSensor, IsWithoutNoise) {

@@ -31,6 +31,7 @@ TEST(OpenTrainingRecordings, KnowsThePartInUse) {
   part.first_frame = 2;
   part.last_frame = 5;
   part.weight = 4;
+  part.threshold = ContrastThreshold{0.3, 2};
   const auto opened =
       open_training_recordings(std::vector{whole, part}, folder.path(), {56, 64}, 1);
   ASSERT_EQ(opened.size(), 2u);
@@ -39,6 +40,8 @@ TEST(OpenTrainingRecordings, KnowsThePartInUse) {
   EXPECT_EQ(opened[1].first_frame, 2);
   EXPECT_EQ(opened[1].last_frame, 5);
   EXPECT_EQ(opened[1].weight, 4);
+  EXPECT_EQ(opened[0].threshold, std::nullopt);
+  EXPECT_EQ(opened[1].threshold, (ContrastThreshold{0.3, 2}));
 }
 
 TEST(OpenTrainingRecordings, ListsEveryRecordingOfNoUse) {
@@ -198,6 +201,56 @@ TEST(CropReader, CutsEventsBeforeItMakesTheVolume) {
   ASSERT_EQ(sample.volume.size(), expected.size());
   for (std::size_t i = 0; i < expected.size(); ++i) {
     EXPECT_NEAR(sample.volume[i], expected[i], 1e-5) << i;
+  }
+}
+
+CropReader sensor_reader_of(FakeRecording recording) {
+  std::vector<TrainingRecording> recordings;
+  recordings.push_back(testing::opened(std::move(recording)));
+  recordings[0].threshold = ContrastThreshold{0.25, 1.5};
+  return CropReader(std::move(recordings), kBins);
+}
+
+TEST(CropReader, CountsEventsBetweenTheFramesTimesWhereItKnowsTheThreshold) {
+  // Of frames at 0 and 1 s, t* = 2 t: 0.5 at 0.25 s, 1 at 0.5 s, 2 at 1 s; five at one pixel. One
+  // lies outside of the rectangle.
+  std::vector<Event> events(5, {2, 1, 0.25, true});
+  for (const Event& event : {Event{0, 0, 0.3, true}, {3, 1, 0.5, false}, {4, 2, 1, true}}) {
+    events.push_back(event);
+  }
+  const CropReader reader = sensor_reader_of(two_frames(events));
+  const TrainingSample sample = reader.read(0, 0, 1, {1, 2, {2, 3}});
+  EXPECT_EQ(sample.threshold, (ContrastThreshold{0.25, 1.5}));
+  std::vector<float> expected(sample.shape.value_count(), 0.0f);
+  const auto at = [&](int channel, int y, int x) -> float& {
+    return expected[static_cast<std::size_t>((channel * 2 + y) * 3 + x)];
+  };
+  at(0, 0, 0) = at(1, 0, 0) = 2.5f;
+  at(kBins + 1, 0, 1) = 1;
+  at(2, 1, 2) = 1;
+  EXPECT_THAT(sample.volume, ::testing::Pointwise(::testing::FloatNear(1e-6f), expected));
+}
+
+TEST(CropReader, OfOneEventAndAThresholdIsWhereTheEventIs) {
+  // Without a threshold it spans the bins alone, and lies in the first.
+  for (const bool known : {false, true}) {
+    const FakeRecording recording = two_frames({{0, 0, 0.75, true}});
+    const CropReader reader = known ? sensor_reader_of(recording) : reader_of(recording);
+    const TrainingSample sample = reader.read(0, 0, 1, {0, 0, {1, 1}});
+    EXPECT_EQ(sample.threshold.has_value(), known);
+    const std::vector<float> expected =
+        known ? std::vector<float>{0, 0.5f, 0.5f, 0, 0, 0} : std::vector<float>{1, 0, 0, 0, 0, 0};
+    EXPECT_EQ(sample.volume, expected);
+  }
+}
+
+TEST(CropReader, OfNoEventsAndAThresholdIsEmpty) {
+  const CropReader reader = sensor_reader_of(two_frames({{0, 0, 0.5, true}}));
+  for (const std::int64_t first : {0, 1}) {
+    const TrainingSample sample = reader.read(0, first, 1, {1, 1, {2, 2}});
+    EXPECT_THAT(sample.volume, ::testing::Each(0.0f));
+    EXPECT_EQ(sample.volume.size(), 2u * kBins * 4);
+    EXPECT_TRUE(sample.threshold.has_value());
   }
 }
 

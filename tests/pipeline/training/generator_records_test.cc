@@ -6,7 +6,9 @@
 #include <stdexcept>
 
 #include "stages/base/files/sha256.h"
+#include "stages/events/simulation/moving_planes.h"
 #include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/weights_file.h"
 #include "stages/training/trainer.h"
 #include "tests/pipeline/training/bar_training.h"
 #include "tests/pipeline/training/fake_training_recording.h"
@@ -66,6 +68,48 @@ TEST(TrainedWeights, EqualTheTrainersGenerator) {
   }
 }
 
+/// A training of a network that knows its sensor, of thresholds 0.2 and 0.5.
+TrainingManifest sensor_training(const std::filesystem::path& folder) {
+  TrainingManifest manifest = testing::small_training(folder);
+  manifest.network.sensor = true;
+  manifest.recordings.push_back(manifest.recordings[0]);
+  manifest.recordings[0].threshold = ContrastThreshold{0.5};
+  manifest.recordings[1].threshold = ContrastThreshold{0.2, 2};
+  return manifest;
+}
+
+TEST(TrainedWeights, SayWhichThresholdsTheyLearnt) {
+  const testing::TemporaryFolder folder;
+  TrainingManifest manifest = sensor_training(folder.path());
+  const StateDict state = Trainer(manifest, "cpu").generator_state();
+  const auto learnt = [&] {
+    return trained_weights(state, manifest, {TrainingPhase::kGenerator, 0}).thresholds.value();
+  };
+  EXPECT_EQ(learnt(), (ThresholdRange{0.2, 0.5}));
+  // Gamma turns a threshold into one of as much more or less contrast.
+  manifest.augmentation.gamma = {0.5, 1.5};
+  EXPECT_DOUBLE_EQ(learnt().lowest, 0.1);
+  EXPECT_DOUBLE_EQ(learnt().highest, 0.75);
+  manifest.simulated = SimulatedSpec{{"textures"}, 0.5};
+  EXPECT_EQ(learnt(), kPlaneThresholds) << "wider on either side";
+  manifest.augmentation.gamma = {0.1, 10};
+  EXPECT_DOUBLE_EQ(learnt().lowest, 0.02);
+  EXPECT_DOUBLE_EQ(learnt().highest, 5);
+
+  const Weights weights = trained_weights(state, manifest, {TrainingPhase::kGenerator, 0});
+  EXPECT_EQ(parse_weights(serialize_weights(weights), "NAME").thresholds, weights.thresholds);
+  EXPECT_EQ(make_torch_generator(weights)->thresholds(), weights.thresholds);
+}
+
+TEST(TrainedWeights, HaveNoThresholdsUnlessTheNetworkKnowsItsSensor) {
+  const testing::TemporaryFolder folder;
+  const TrainingManifest manifest = testing::small_training(folder.path());
+  const StateDict state = Trainer(manifest, "cpu").generator_state();
+  EXPECT_EQ(trained_weights(state, manifest, {}).thresholds, std::nullopt);
+  EXPECT_THROW(trained_weights(state, sensor_training(folder.path()), {}), std::runtime_error)
+      << "two inputs";
+}
+
 TEST(TrainedWeights, RefuseAStateThatIsNoGenerators) {
   const testing::TemporaryFolder folder;
   EXPECT_THROW(trained_weights({}, testing::small_training(folder.path()), {}), std::runtime_error);
@@ -107,6 +151,20 @@ TEST(ValidationPairs, AreJudgedByTheirMeans) {
   // The bar's columns that change have events, and the fake generator's volume is not zero where
   // the frames differ: the same pixels, the same polarity.
   EXPECT_DOUBLE_EQ(scores.realism.f1_time, 1);
+  EXPECT_GT(scores.volume_loss, 0);
+}
+
+TEST(ValidationPairs, TellTheirThresholdAndJudgeCounts) {
+  std::vector<TrainingRecording> recordings;
+  recordings.push_back(testing::opened(testing::moving_bar_recording({24, 32}, 3)));
+  recordings[0].threshold = ContrastThreshold{0.25};
+  const CropReader reader(std::move(recordings), 3);
+  const ValidationPairs pairs(reader, {24, 32});
+  testing::FakeGenerator generator(3);
+  generator.know({0.1, 0.4});
+  const ValidationScores scores = pairs.judge(generator);
+  EXPECT_EQ(generator.threshold(), 0.25);
+  EXPECT_DOUBLE_EQ(scores.realism.f1_time, 1);  // as AreJudgedByTheirMeans
   EXPECT_GT(scores.volume_loss, 0);
 }
 

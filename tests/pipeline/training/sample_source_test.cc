@@ -1,17 +1,25 @@
 #include "pipeline/training/sample_source.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <numeric>
 #include <stdexcept>
 #include <string>
 
+#include "manifests/values/faults.h"
+#include "pipeline/runtime/errors.h"
+#include "stages/base/images/image_file.h"
+#include "stages/events/simulation/moving_planes.h"
 #include "tests/pipeline/training/fake_training_recording.h"
 #include "tests/testing/fake_recording.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
@@ -246,6 +254,173 @@ TEST(SampleSource, EndsWhereNothingEverMoves) {
       source_of(source_manifest(), testing::FakeRecording({grey, grey}, {0, 1}, {}));
   const TrainingSample sample = source.sample({TrainingPhase::kFlow, 0, 0});
   EXPECT_EQ(std::accumulate(sample.volume.begin(), sample.volume.end(), 0.0f), 0);
+}
+
+/// A chequered grey image whose first pixel has this value.
+void write_texture(const std::filesystem::path& path, int value, ImageSize size = {48, 64}) {
+  ColourFrame image{size, {}};
+  for (int y = 0; y < size.height; ++y) {
+    for (int x = 0; x < size.width; ++x) {
+      const bool bright = (x / 4 + y / 4) % 2 == 1;
+      image.bgr.insert(image.bgr.end(), 3, static_cast<std::uint8_t>(bright ? 250 : value));
+    }
+  }
+  std::filesystem::create_directories(path.parent_path());
+  testing::write_file(path, encode_png({size, image.bgr.data()}));
+}
+
+std::vector<int> first_pixels(const std::vector<GreyImage>& images) {
+  std::vector<int> values;
+  for (const GreyImage& image : images) values.push_back(image.pixels.at(0));
+  return values;
+}
+
+TEST(ReadTextures, AreAllImagesBelowInTheOrderOfTheirPaths) {
+  const testing::TemporaryFolder folder;
+  write_texture(folder / "b" / "1.png", 40);
+  write_texture(folder / "a" / "z.PNG", 30, {3, 5});
+  write_texture(folder / "a" / "deep" / "er" / "2.png", 20);
+  write_texture(folder / "a" / "deep" / "1.png", 10);
+  testing::write_file(folder / "a" / "notes.txt", "no image");
+  const std::vector<std::filesystem::path> both{folder / "b", folder / "a"};
+  const std::vector<GreyImage> textures = read_textures(both, 10);
+  EXPECT_THAT(first_pixels(textures), ::testing::ElementsAre(10, 20, 30, 40));
+  EXPECT_EQ(textures[2].size, (ImageSize{3, 5}));
+  EXPECT_EQ(textures[2].pixels.size(), 15u);
+}
+
+TEST(ReadTextures, OfMoreThanWantedAreSpreadEvenly) {
+  const testing::TemporaryFolder folder;
+  for (int i = 0; i < 9; ++i) write_texture(folder / (std::to_string(i) + ".png"), 10 * i);
+  const std::vector<std::filesystem::path> folders{folder.path()};
+  EXPECT_THAT(first_pixels(read_textures(folders, 3)), ::testing::ElementsAre(0, 30, 60));
+  EXPECT_THAT(first_pixels(read_textures(folders, 1)), ::testing::ElementsAre(0));
+  EXPECT_EQ(read_textures(folders, 9).size(), 9u);
+}
+
+std::string textures_fault(const std::vector<std::filesystem::path>& folders) {
+  try {
+    read_textures(folders, 10);
+    return "";
+  } catch (const InputError& error) {
+    return error_text(error);
+  }
+}
+
+TEST(ReadTextures, SayWhatIsWrong) {
+  const testing::TemporaryFolder folder;
+  EXPECT_THAT(textures_fault({folder / "absent"}),
+              ::testing::HasSubstr("cannot list the textures in " + (folder / "absent").string()));
+  EXPECT_THAT(textures_fault({folder.path()}),
+              ::testing::HasSubstr("expected images for simulated.textures, got none, in " +
+                                   folder.path().string()));
+  EXPECT_THAT(textures_fault({}), ::testing::HasSubstr("got none, in no folder"));
+  write_texture(folder / "a.png", 10);
+  testing::write_file(folder / "b.png", testing::read_file(folder / "a.png").substr(0, 60));
+  EXPECT_THAT(textures_fault({folder.path()}),
+              ::testing::HasSubstr("cannot use the texture " + (folder / "b.png").string()));
+  testing::write_file(folder / "b.png", "");
+  EXPECT_THAT(textures_fault({folder.path()}), ::testing::HasSubstr("b.png"));
+}
+
+/// A source of a moving bar and of scenes with two textures.
+class SimulatedSamples : public ::testing::Test {
+ protected:
+  SimulatedSamples() {
+    write_texture(folder_ / "textures" / "a.png", 20);
+    write_texture(folder_ / "textures" / "b.png", 90, {100, 80});
+    manifest_ = source_manifest();
+    manifest_.directory = folder_.path();
+    manifest_.crop = {32, 40};
+    manifest_.network.sensor = true;
+  }
+
+  SampleSource source(double fraction) {
+    manifest_.simulated = SimulatedSpec{{"textures"}, fraction};
+    std::vector<TrainingRecording> recordings;
+    recordings.push_back(testing::opened(testing::moving_bar_recording({32, 40}, 9)));
+    recordings[0].threshold = ContrastThreshold{0.25};
+    return SampleSource(manifest_, std::move(recordings));
+  }
+
+  static bool is_simulated(const TrainingSample& sample) {
+    return sample.origin.starts_with("simulated sample ");
+  }
+
+  testing::TemporaryFolder folder_;
+  TrainingManifest manifest_;
+};
+
+TEST_F(SimulatedSamples, AreTheShareAskedFor) {
+  for (const double share : {0.0, 0.25, 1.0}) {
+    const SampleSource samples = source(share);
+    int simulated = 0;
+    for (int i = 0; i < 100; ++i) {
+      simulated += is_simulated(samples.sample({TrainingPhase::kGenerator, i, 0}));
+    }
+    EXPECT_NEAR(simulated, 100 * share, 5 * std::sqrt(100 * share * (1 - share)));
+  }
+}
+
+TEST_F(SimulatedSamples, CountTheEventsOfASensorWhoseThresholdTheyTell) {
+  const SampleSource samples = source(1);
+  double most = 0;
+  for (int i = 0; i < 20; ++i) {
+    const TrainingSample sample = samples.sample({TrainingPhase::kGenerator, 3, i});
+    EXPECT_EQ(sample.origin, "simulated sample " + std::to_string(i) + " of step 3");
+    EXPECT_EQ(sample.shape, (VolumeShape{3, {32, 40}}));
+    EXPECT_EQ(sample.frames.size(), 2u * 32 * 40);
+    EXPECT_EQ(sample.network_frames, sample.frames);
+    EXPECT_TRUE(std::ranges::all_of(sample.frames, [](float x) { return -1 <= x && x <= 1; }));
+    ASSERT_TRUE(sample.threshold.has_value());
+    EXPECT_TRUE(kPlaneThresholds.contains(sample.threshold->mean)) << sample.threshold->mean;
+    EXPECT_GT(sample.threshold->ratio, 0);
+    ASSERT_EQ(sample.volume.size(), sample.shape.value_count());
+    // Each event's values add up to 1, at its pixel and in its polarity.
+    const std::size_t plane = sample.shape.size.pixel_count();
+    for (std::size_t polarity : {0, 1}) {
+      for (std::size_t pixel = 0; pixel < plane; ++pixel) {
+        float count = 0;
+        for (std::size_t bin = 0; bin < 3; ++bin) {
+          count += sample.volume[(polarity * 3 + bin) * plane + pixel];
+        }
+        ASSERT_NEAR(count, std::round(count), 1e-4);
+        most = std::max(most, double(count));
+      }
+    }
+  }
+  EXPECT_GE(most, 2) << "no counts";
+}
+
+TEST_F(SimulatedSamples, AreFunctionsOfSeedAndPlace) {
+  const SampleSource asked = source(1), fresh = source(1);
+  asked.batch(TrainingPhase::kGenerator, 1);
+  const TrainingSample sample = asked.sample({TrainingPhase::kGenerator, 7, 2});
+  const TrainingSample again = fresh.sample({TrainingPhase::kGenerator, 7, 2});
+  EXPECT_TRUE(equal(sample, again));
+  EXPECT_EQ(sample.threshold, again.threshold);
+  EXPECT_NE(fresh.sample({TrainingPhase::kGenerator, 7, 3}).frames, sample.frames);
+  EXPECT_NE(fresh.sample({TrainingPhase::kGenerator, 8, 2}).frames, sample.frames);
+  manifest_.seed = 6;
+  EXPECT_NE(source(1).sample({TrainingPhase::kGenerator, 7, 2}).frames, sample.frames);
+}
+
+TEST_F(SimulatedSamples, LeaveTheOthersAsTheyAre) {
+  const SampleSource without = source(0), half = source(0.5);
+  int recorded = 0;
+  for (int i = 0; i < 20; ++i) {
+    const TrainingSample sample = half.sample({TrainingPhase::kGenerator, i, 0});
+    if (is_simulated(sample)) continue;
+    ++recorded;
+    EXPECT_TRUE(equal(sample, without.sample({TrainingPhase::kGenerator, i, 0})));
+    EXPECT_EQ(sample.threshold, ContrastThreshold{0.25});
+  }
+  EXPECT_GT(recorded, 2);
+}
+
+TEST_F(SimulatedSamples, NeedTheirTextures) {
+  manifest_.directory = folder_ / "absent";
+  EXPECT_THROW(source(0.5), InputError);
 }
 
 BatchPrefetch::Batch batch_of(std::int64_t step) {
