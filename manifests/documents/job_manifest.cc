@@ -12,7 +12,9 @@
 
 #include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/detail/manifest_file.h"
+#include "manifests/documents/detail/sensor_document.h"
 #include "manifests/documents/detail/strict_json.h"
+#include "manifests/documents/sensor_document.h"
 #include "manifests/values/job.h"
 #include "manifests/values/weights.h"
 #include "manifests/values/words.h"
@@ -446,6 +448,14 @@ std::array<double, 2> read_range(const StrictValue& value, double lowest, double
   return {number, number};
 }
 
+}  // namespace
+
+ThresholdSpec read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio) {
+  ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
+  if (ratio) threshold.ratio = ratio->number(0.2, 5);
+  return threshold;
+}
+
 NoiseSpec read_noise(const StrictValue& value) {
   NoiseSpec spec;
   StrictObject object = value.object();
@@ -459,35 +469,49 @@ NoiseSpec read_noise(const StrictValue& value) {
   return spec;
 }
 
-/// Reads a sensor's `threshold`, which stands in place of `own`, the sensor's other keys of it.
-void read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio,
-                    const std::optional<StrictValue>& spread,
-                    std::initializer_list<std::optional<StrictValue>> own, GeneratorSpec& spec) {
-  ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
-  if (ratio) threshold.ratio = ratio->number(0.2, 5);
-  if (spread) threshold.spread = spec.sensor.threshold_spread;
-  for (const std::optional<StrictValue>& key : own) {
-    if (key) key->fault("no such key together with threshold, which sets it");
-  }
-  spec.sensor = threshold.applied(
-      spec.sensor, {std::sqrt(threshold.range[0] * threshold.range[1]), threshold.ratio});
+namespace {
+
+void set_threshold(const ThresholdSpec& threshold, GeneratorSpec& spec) {
+  const auto [least, most] = threshold.range;
+  spec.sensor = threshold.applied(spec.sensor, {std::sqrt(least * most), threshold.ratio});
   spec.threshold = threshold;
+}
+
+/// Reads a document in place of a `sensor`. Its threshold is that of frames.
+void read_camera(const StrictValue& value, GeneratorSpec& spec) {
+  const CameraSensor camera = read_camera_sensor(value);
+  spec.camera = camera.name;
+  spec.noise = camera.noise;
+  spec.sensor.log_epsilon = kFrameLogEpsilon;
+  if (camera.threshold) set_threshold(*camera.threshold, spec);
 }
 
 /// Reads a generator's `sensor`: what is asked of any, and of a simulator its settings.
 void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind> kind,
                            GeneratorSpec& spec) {
   using enum GeneratorKind;
+  if (value.is_text()) {  // a document would be here in its place (with_sensor_document)
+    value.fault(fmt::format("{} or the path of a sensor's document (*.json)",
+                            fmt::join(shipped_sensors(), ", ")));
+    return;
+  }
   StrictObject object = value.object();
+  if (object.find("format")) return read_camera(value, spec);
   if (const auto noise = object.find("noise")) spec.noise = read_noise(*noise);
   KindKeys keys(object, kind);
   spec.sensor = read_sensor_keys([&](const char* key) {
     return keys.find(key, {kEsim, kDifference});
   });
   const auto ratio = object.find("threshold_ratio");
-  if (const auto threshold = object.find("threshold")) {
-    read_threshold(*threshold, ratio, object.find("threshold_spread"),
-                   {object.find("positive_threshold"), object.find("negative_threshold")}, spec);
+  if (const auto found = object.find("threshold")) {
+    ThresholdSpec threshold = read_threshold(*found, ratio);
+    if (object.find("threshold_spread")) threshold.spread = spec.sensor.threshold_spread;
+    for (const char* own : {"positive_threshold", "negative_threshold"}) {
+      if (const auto key = object.find(own)) {
+        key->fault("no such key together with threshold, which sets it");
+      }
+    }
+    set_threshold(threshold, spec);
   } else if (ratio) {
     ratio->fault("threshold beside it", "none");
   }
@@ -664,12 +688,14 @@ JobManifest read_pair_document(const StrictValue& document) {
 
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
-  return parse_manifest<JobManifest>(text, directory, name, read_document);
+  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
+                                     read_document);
 }
 
 JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,
                                 const std::string& name) {
-  return parse_manifest<JobManifest>(text, directory, name, read_pair_document);
+  return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
+                                     read_pair_document);
 }
 
 JobManifest read_job_manifest(const std::filesystem::path& file) {

@@ -11,9 +11,10 @@
 
 namespace eventgan {
 
-std::string read_manifest_text(const std::filesystem::path& file) {
+std::string read_manifest_text(const std::filesystem::path& file, std::string_view what) {
   const auto fail = [&](const std::string& why) {
-    throw InputError("expected a manifest, got \"" + why + "\", in " + file.string());
+    throw InputError("expected " + std::string(what) + ", got \"" + why + "\", in " +
+                     file.string());
   };
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);

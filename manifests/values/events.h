@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "manifests/values/frames.h"
 #include "manifests/values/sensor_input.h"
@@ -69,6 +70,15 @@ struct NoiseSpec {
   bool operator==(const NoiseSpec&) const = default;
 };
 inline constexpr double kMostNoise_hz = 1000;
+
+/// An event camera as a document tells it (manifests/schemas/sensor.schema.json).
+struct CameraSensor {
+  std::string name;                        ///< as JobManifest::name
+  std::optional<ThresholdSpec> threshold;  ///< of ln(u/255 + kFrameLogEpsilon), without a spread
+  std::optional<NoiseSpec> noise;
+  std::string origin;  ///< how the numbers were found, for people
+  bool operator==(const CameraSensor&) const = default;
+};
 
 /// Shape of an event volume: [2 bins, height, width], C order. Channels 0..bins-1 are the positive
 /// polarity in time order, bins..2 bins-1 the negative one.

@@ -16,7 +16,9 @@ namespace eventgan {
 
 /// Where a manifest came from; every kind of manifest has it.
 struct ManifestOrigin {
-  std::string text;                 ///< the manifest file, byte for byte
+  /// The manifest file, byte for byte; or, if it names a sensor's document, as JSON that holds this
+  /// document in place of its name, and no comments.
+  std::string text;
   std::filesystem::path directory;  ///< absolute folder of the manifest; relative paths start here
 };
 
@@ -222,6 +224,7 @@ struct GeneratorSpec {
   ScopeSpec scope;                            ///< kNetwork
   bool sample = true;  ///< kNetwork: events are drawn of rates, if the weights give rates
   SensorSpec sensor;   ///< kEsim, kDifference; at the middle of `threshold`
+  std::string camera;  ///< name of the document that `threshold` and `noise` are of; empty: none
   std::optional<ThresholdSpec> threshold = {};  ///< of any kind but kEvents (pair_threshold)
   std::optional<NoiseSpec> noise = {};          ///< of any kind but kEvents
   double duration_s = 0.1;          ///< time between the two frames, 1e-4..10. kEsim, kDifference:

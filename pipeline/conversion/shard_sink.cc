@@ -49,6 +49,9 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   }
   header.weights_hash = job.weights_hash;
   header.generator = job.generator.description();
+  if (const std::string& camera = manifest.generator.camera; !camera.empty()) {
+    header.generator += ", sensor " + camera;  // all of it is in manifest_text
+  }
   header.program_version = program_version();
   return header;
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,12 @@ ImageSize read_size(const StrictValue& value, int least, int most);
 
 /// Reads a recording's `columns`.
 EventFields read_columns(const StrictValue& value);
+
+/// Reads a contrast threshold, a number or [least, most], and beside it, if there, the ratio.
+ThresholdSpec read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio);
+
+/// Reads a sensor's `noise`.
+NoiseSpec read_noise(const StrictValue& value);
 
 /// Reads a manifest's `sensor`, whose keys are SensorSpec's.
 SensorSpec read_sensor(const StrictValue& value);

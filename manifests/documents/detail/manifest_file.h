@@ -25,8 +25,9 @@ bool is_name(std::string_view text);
 /// 0..2^63-1.
 std::uint64_t read_seed(const StrictValue& value);
 
-/// A manifest file, byte for byte. Throws InputError if it cannot be read.
-std::string read_manifest_text(const std::filesystem::path& file);
+/// A manifest file, byte for byte. Throws InputError if it cannot be read; `what` was expected then.
+std::string read_manifest_text(const std::filesystem::path& file,
+                               std::string_view what = "a manifest");
 
 /// Absolute folder that the relative paths of this manifest file start at.
 std::filesystem::path manifest_folder(const std::filesystem::path& file);

@@ -65,7 +65,8 @@ class Generator:
         Of the models' random numbers, of what sensor={"threshold": [0.1, 0.6], "noise": {...}} draws for each pair, and of untrained weights.
     **settings
         Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
-        sensor (a dictionary), duration_s, max_displacement_px, bins. manifest.schema.json has their meanings and ranges.
+        sensor (a dictionary, or a camera: the path of its document or a name that ships), duration_s, max_displacement_px, bins.
+        manifest.schema.json has their meanings and ranges.
 
     Raises
     ------

@@ -1,0 +1,219 @@
+#include "manifests/documents/sensor_document.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "manifests/documents/detail/sensor_document.h"
+#include "manifests/documents/job_manifest.h"
+#include "manifests/documents/manifest_fields.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/job.h"
+#include "manifests/values/pair_key.h"
+#include "tests/manifests/documents/json_schema.h"
+#include "tests/manifests/documents/manifest_cases.h"
+#include "tests/testing/temporary_folder.h"
+#include "tests/testing/text_file.h"
+
+namespace eventgan {
+namespace {
+
+using testing::edited;
+using ::testing::HasSubstr;
+using testing::kSoundManifest;
+using testing::ManifestCase;
+using ::testing::ThrowsMessage;
+
+constexpr char kSensorSchema[] = "sensor.schema.json";
+
+constexpr char kSoundSensor[] = R"({
+  "format": "eventgan-sensor", "version": 1, "name": "mine",
+  "threshold": [0.2, 0.4], "threshold_ratio": 1.1,
+  "noise": {"shot_hz": [0.5, 1], "leak_hz": 0.25, "hot_pixels": 1e-4},
+  "origin": "by eye"
+})";
+
+const ManifestCase kSensorCases[] = {
+    {"as it is", {}, {}},
+    {"nothing but a name",
+     {{"/threshold", ""}, {"/threshold_ratio", ""}, {"/noise", ""}, {"/origin", ""}},
+     {}},
+    {"another format",
+     {{"/format", R"("eventgan-manifest")"}},
+     {R"($.format: expected "eventgan-sensor", got "eventgan-manifest")"}},
+    {"another version",
+     {{"/version", "2"}},
+     {"$.version: expected 1 (the version that this program reads), got 2"}},
+    {"no name", {{"/name", ""}}, {"$.name: " + testing::kNameRule + "nothing"}},
+    {"a ratio of no threshold",
+     {{"/threshold", ""}},
+     {"$.threshold_ratio: expected threshold beside it, got none"}},
+    {"numbers out of range",
+     {{"/threshold", "5.1"}, {"/threshold_ratio", "0.1"}, {"/noise/shot_hz", "-1"}},
+     {"$.threshold: expected a number 0.01..5, got 5.1",
+      "$.threshold_ratio: expected a number 0.2..5, got 0.1",
+      "$.noise.shot_hz: expected a number 0..1000, got -1"}},
+    {"a range from more to less",
+     {{"/threshold", "[0.4, 0.2]"}},
+     {"$.threshold[1]: expected a number not below the previous one, got 0.2"},
+     true},
+    {"an origin that is no text", {{"/origin", "1"}}, {"$.origin: expected text, got 1"}},
+    {"a mistyped key",
+     {{"/orign", R"("")"}},
+     {R"($.orign: expected the key "origin" or none, got an unknown key)"}},
+};
+
+class SensorFaults : public ::testing::TestWithParam<ManifestCase> {};
+
+TEST_P(SensorFaults, AreAllReportedAndSeenByTheSchema) {
+  const std::string text = edited(kSoundSensor, GetParam().edits);
+  std::string expected, got;
+  for (const std::string& line : GetParam().faults) {
+    expected += (expected.empty() ? "s.json: " : "\ns.json: ") + line;
+  }
+  try {
+    parse_camera_sensor(text, "s.json");
+  } catch (const UsageError& error) {
+    got = error.what();
+  }
+  EXPECT_EQ(got, expected);
+  EXPECT_EQ(testing::schema_accepts(kSensorSchema, nlohmann::json::parse(text)),
+            GetParam().faults.empty() || GetParam().beyond_schema);
+}
+
+INSTANTIATE_TEST_SUITE_P(Table, SensorFaults, ::testing::ValuesIn(kSensorCases),
+                         [](const auto& entry) { return testing::test_name(entry.param); });
+
+CameraSensor sound_sensor() {
+  CameraSensor sensor;
+  sensor.name = "mine";
+  sensor.threshold = ThresholdSpec{{0.2, 0.4}, 1.1};
+  sensor.noise = NoiseSpec{{0.5, 1}, {0.25, 0.25}, {1e-4, 1e-4}};
+  sensor.origin = "by eye";
+  return sensor;
+}
+
+TEST(SensorDocument, HoldsEveryValueGiven) {
+  EXPECT_EQ(parse_camera_sensor(kSoundSensor, "s"), sound_sensor());
+}
+
+TEST(SensorDocument, IsReadAsItWasWritten) {
+  EXPECT_EQ(parse_camera_sensor(to_document(sound_sensor()), "s"), sound_sensor());
+  CameraSensor bare;
+  bare.name = "bare";
+  EXPECT_EQ(parse_camera_sensor(to_document(bare), "s"), bare);
+  EXPECT_TRUE(testing::schema_accepts(kSensorSchema, nlohmann::json::parse(to_document(bare))));
+}
+
+TEST(SensorSchema, IsClosedDescribedAndTheSameInManifests) {
+  EXPECT_EQ(testing::open_or_undescribed(kSensorSchema), "");
+  const nlohmann::json& alone = testing::schema_document(kSensorSchema);
+  const nlohmann::json& shared = testing::schema_document("manifest.schema.json")["definitions"];
+  for (const char* key :
+       {"type", "additionalProperties", "required", "properties", "dependencies"}) {
+    EXPECT_EQ(alone.at(key), shared.at("camera_sensor").at(key)) << key;
+  }
+  for (const char* key : {"name", "noise", "noise_rate"}) {
+    EXPECT_EQ(alone.at("definitions").at(key), shared.at(key)) << key;
+  }
+}
+
+TEST(ShippedSensors, AreThoseOfTheRepositoryAndOfTheSchema) {
+  const std::filesystem::path folder =
+      std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "sensors";
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    ++files;
+    const std::string name = entry.path().stem();
+    const CameraSensor sensor = open_camera_sensor(name);
+    EXPECT_EQ(sensor, open_camera_sensor(entry.path())) << name;
+    EXPECT_EQ(sensor.name, name);
+    EXPECT_TRUE(sensor.threshold && sensor.noise) << name;
+    EXPECT_NE(sensor.origin, "") << name;
+    const nlohmann::json manifest =
+        nlohmann::json::parse(edited(kSoundManifest, {{"/generator/sensor", '"' + name + '"'}}));
+    EXPECT_TRUE(testing::schema_accepts("manifest.schema.json", manifest)) << name;
+  }
+  EXPECT_EQ(shipped_sensors().size(), files);
+}
+
+TEST(OpenCameraSensor, SaysWhatThereIs) {
+  EXPECT_THAT([] { open_camera_sensor("davis"); },
+              ThrowsMessage<UsageError>("expected davis346, prophesee_gen4 or the path of a "
+                                        "sensor's document (*.json), got davis"));
+  EXPECT_THAT([] { open_camera_sensor("/none/s.json"); },
+              ThrowsMessage<InputError>("expected a sensor's document, got \"No such file or "
+                                        "directory\", in /none/s.json"));
+}
+
+class SensorOfAManifest : public ::testing::Test {
+ protected:
+  SensorOfAManifest() { testing::write_file(folder_ / "mine.json", kSoundSensor); }
+
+  JobManifest read(const std::string& sensor) {
+    testing::write_file(folder_ / "m.json",
+                        edited(kSoundManifest, {{"/generator/sensor", '"' + sensor + '"'}}));
+    return read_job_manifest(folder_ / "m.json");
+  }
+
+  testing::TemporaryFolder folder_;
+};
+
+TEST_F(SensorOfAManifest, IsThatOfTheDocument) {
+  const GeneratorSpec spec = read("mine.json").generator;
+  EXPECT_EQ(spec.camera, "mine");
+  EXPECT_EQ(spec.threshold, sound_sensor().threshold);
+  EXPECT_EQ(spec.noise, sound_sensor().noise);
+  // Of a simulator: the middle of the range by polarity, of the frames' log intensity.
+  EXPECT_EQ(spec.sensor.log_epsilon, kFrameLogEpsilon);
+  EXPECT_NEAR(spec.sensor.negative_threshold / spec.sensor.positive_threshold, 1.1, 1e-9);
+  EXPECT_NEAR(spec.sensor.negative_threshold * spec.sensor.positive_threshold, 0.08, 1e-9);
+}
+
+TEST_F(SensorOfAManifest, StaysInTheTextWithoutTheFile) {
+  const JobManifest manifest = read("mine.json");
+  std::filesystem::remove(folder_ / "mine.json");
+  const JobManifest later = parse_job_manifest(manifest.text, "/elsewhere", "plan.json");
+  EXPECT_EQ(later.text, manifest.text);
+  EXPECT_EQ(later.generator.threshold, manifest.generator.threshold);
+  EXPECT_EQ(later.generator.camera, "mine");
+  const auto fields = manifest_fields(manifest.text);
+  EXPECT_EQ(fields.at("$.generator.sensor.name"), R"("mine")");
+  EXPECT_EQ(fields.at("$.generator.sensor.threshold[1]"), "0.4");
+  EXPECT_EQ(fields.at("$.generator.sensor.origin"), R"("by eye")");
+}
+
+TEST_F(SensorOfAManifest, IsFoundByAShippedName) {
+  const GeneratorSpec spec = read("davis346").generator;
+  EXPECT_EQ(spec.camera, "davis346");
+  EXPECT_EQ(spec.threshold, open_camera_sensor("davis346").threshold);
+}
+
+TEST_F(SensorOfAManifest, HasFaultsOfItsOwnFile) {
+  testing::write_file(folder_ / "bad.json", edited(kSoundSensor, {{"/threshold", "0"}}));
+  const std::string file = (folder_ / "bad.json").string();
+  EXPECT_THAT([&] { read("bad.json"); },
+              ThrowsMessage<UsageError>(file + ": $.threshold: expected a number 0.01..5, got 0"));
+  EXPECT_THAT([&] { read("none.json"); },
+              ThrowsMessage<InputError>(HasSubstr("expected a sensor's document, got \"No such")));
+}
+
+TEST(SensorOfAPair, MayBeNamed) {
+  const JobManifest manifest =
+      parse_pair_manifest(R"({"generator": {"kind": "esim", "sensor": "davis346"}})", "", "pair");
+  EXPECT_EQ(manifest.generator.camera, "davis346");
+}
+
+TEST(WithSensorDocument, LeavesOtherTextsAsTheyAre) {
+  for (const char* text :
+       {"", "[]", "{", R"({"generator": 1})", R"({"generator": {"sensor": {"noise": {}}}} // a)",
+        R"({"generator": {"sensor": "davis"}})",
+        R"({"generator": {"sensor": "davis346"}, "generator": {}})"}) {
+    EXPECT_EQ(with_sensor_document(text, "/"), text);
+  }
+}
+
+}  // namespace
+}  // namespace eventgan
