@@ -392,6 +392,8 @@ class Draft {
   static constexpr std::string_view kNetwork =
       R"(  // Volumes are made by the generator that comes with the program, unless another is named:
   // "generator": { "weights": "my.safetensors" },
+  // Weights that know their sensor make those of a camera:
+  // "generator": { "weights": "shipped:sensor", "sensor": "davis346" },
 )";
   static constexpr std::string_view kEvents =
       R"(  // Volumes are made of the camera's own events.

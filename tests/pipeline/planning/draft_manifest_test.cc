@@ -74,6 +74,9 @@ TEST_F(DraftManifest, OfASequenceTakesPairsOfNeighboursAsTheyAre) {
   EXPECT_EQ(job.sources[0].root, "walk");
   EXPECT_FALSE(job.sources[0].pairs.stills);
   EXPECT_THAT(job.sources[0].pairs.gaps, ElementsAre(1));
+  EXPECT_THAT(
+      made.text,
+      HasSubstr(R"(// "generator": { "weights": "shipped:sensor", "sensor": "davis346" },)"));
   EXPECT_FALSE(job.image.size);
   EXPECT_TRUE(made.has_samples);
   EXPECT_THAT(made.findings, ElementsAre("what was found: 3 labelled frames, 0 annotation files",
