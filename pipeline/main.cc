@@ -70,6 +70,7 @@ int main(int argc, char** argv) {
   eventgan::add_import_weights_command(app, exit_code);
   eventgan::add_calibrate_command(app, exit_code);
   eventgan::add_realism_command(app, exit_code);
+  eventgan::add_fit_command(app, exit_code);
   eventgan::add_simulate_command(app, exit_code);
   eventgan::add_train_command(app, exit_code);
   eventgan::add_tradeoff_command(app, exit_code);

@@ -23,6 +23,7 @@ void add_make_demo_command(CLI::App& app, int& exit_code);
 void add_import_weights_command(CLI::App& app, int& exit_code);
 void add_calibrate_command(CLI::App& app, int& exit_code);
 void add_realism_command(CLI::App& app, int& exit_code);
+void add_fit_command(CLI::App& app, int& exit_code);
 void add_simulate_command(CLI::App& app, int& exit_code);
 void add_train_command(CLI::App& app, int& exit_code);
 void add_tradeoff_command(CLI::App& app, int& exit_code);

@@ -1,6 +1,9 @@
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -8,13 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "manifests/documents/training_manifest.h"
+#include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
-#include "manifests/values/job.h"
-#include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/detail/usage.h"
 #include "pipeline/commands/options.h"
+#include "pipeline/commands/recording_arguments.h"
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
@@ -24,11 +26,9 @@ namespace eventgan {
 namespace {
 
 struct RealismArguments {
-  std::vector<std::string> recordings;
-  std::string format;
-  std::string camera = "left";
-  std::string frames;
+  RecordingArguments recordings;
   std::string threshold = "fit";
+  std::string sensor;
   std::string out;
   RealismOptions options;
   ProgressStyle progress = ProgressStyle::kAuto;
@@ -39,64 +39,6 @@ const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::k
                                                     {"difference", RealismMethod::kDifference},
                                                     {"esim", RealismMethod::kEsim}};
 
-/// As told, else by what is there.
-RecordingFormat format_of(const RealismArguments& arguments, const std::string& recording) {
-  for (const auto& [word, format] : kRecordingFormatWords) {
-    if (arguments.format == word) return format;
-  }
-  const bool is_folder = std::filesystem::is_directory(recording);
-  RecordingOptions options;
-  options.camera = arguments.camera;
-  return find_recording_format(recording, options)
-      .value_or(is_folder ? RecordingFormat::kEcd : RecordingFormat::kMvsec);
-}
-
-template <class Number>
-Number number_in(const std::string& text, const std::string& expected) {
-  Number value{};
-  const char* const end = text.data() + text.size();
-  const auto [stop, error] = std::from_chars(text.data(), end, value);
-  if (error != std::errc() || stop != end) throw UsageError(expected + ", got \"" + text + "\"");
-  return value;
-}
-
-/// "3:8", "3:" or ":8".
-void read_frame_range(const std::string& text, RecordingSpec& spec) {
-  const std::string expected = "--frames: expected FIRST:LAST";
-  const std::size_t colon = text.find(':');
-  if (colon == std::string::npos) throw UsageError(expected + ", got \"" + text + "\"");
-  const std::string first = text.substr(0, colon);
-  const std::string last = text.substr(colon + 1);
-  if (!first.empty()) spec.first_frame = number_in<std::int64_t>(first, expected);
-  if (!last.empty()) spec.last_frame = number_in<std::int64_t>(last, expected);
-}
-
-/// The parts of recordings to compare: each argument is a recording, of which the options say which
-/// part, or a training's manifest, which has its validation's parts.
-std::vector<RecordingSpec> wanted_parts(const RealismArguments& arguments) {
-  std::vector<RecordingSpec> parts;
-  for (const std::string& argument : arguments.recordings) {
-    if (argument.ends_with(".json")) {
-      const TrainingManifest manifest = read_training_manifest(argument);
-      if (manifest.validation.empty()) {
-        throw UsageError("expected a training manifest with validation recordings, got none in " +
-                         argument);
-      }
-      for (RecordingSpec part : manifest.validation) {
-        part.path = resolve(manifest, part.path).string();
-        parts.push_back(std::move(part));
-      }
-      continue;
-    }
-    RecordingSpec& part = parts.emplace_back();
-    part.path = argument;
-    part.format = format_of(arguments, argument);
-    part.options.camera = arguments.camera;
-    if (!arguments.frames.empty()) read_frame_range(arguments.frames, part);
-  }
-  return parts;
-}
-
 /// Whether a part is too short for any of the gaps: among several recordings that is no error.
 bool is_too_short(const RecordingSpec& part, const Recording& recording,
                   const std::vector<int>& gaps) {
@@ -105,13 +47,33 @@ bool is_too_short(const RecordingSpec& part, const Recording& recording,
          std::ranges::all_of(gaps, [&](int gap) { return last - part.first_frame < gap; });
 }
 
+double number_in(const std::string& text, const std::string& expected) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  if (error != std::errc() || stop != end) throw UsageError(expected + ", got \"" + text + "\"");
+  return value;
+}
+
+/// The middle of the sensor's threshold, in place of a fitted one.
+void take_sensor(const std::string& path_or_name, RealismOptions& options) {
+  const CameraSensor sensor = open_camera_sensor(path_or_name);
+  if (!sensor.threshold) {
+    throw UsageError("--sensor: expected a sensor with a threshold, got one without, in " +
+                     path_or_name);
+  }
+  const auto [least, most] = sensor.threshold->range;
+  options.threshold = std::sqrt(least * most);
+  options.threshold_ratio = sensor.threshold->ratio;
+}
+
 int run_realism(const RealismArguments& arguments) {
   RealismOptions options = arguments.options;
   if (arguments.threshold != "fit") {
-    options.threshold =
-        number_in<double>(arguments.threshold, "--threshold: expected fit or a number");
+    options.threshold = number_in(arguments.threshold, "--threshold: expected fit or a number");
   }
-  const std::vector<RecordingSpec> parts = wanted_parts(arguments);
+  if (!arguments.sensor.empty()) take_sensor(arguments.sensor, options);
+  const std::vector<RecordingSpec> parts = wanted_parts(arguments.recordings);
   std::vector<RealismReport> reports;
   for (const RecordingSpec& part : parts) {
     options.first_frame = part.first_frame;
@@ -137,25 +99,6 @@ int run_realism(const RealismArguments& arguments) {
   return kComplete;
 }
 
-void add_choices(CLI::App& command, RealismArguments& arguments) {
-  command
-      .add_option("RECORDING", arguments.recordings,
-                  "Recordings of events and frames; a training manifest (*.json) stands for its "
-                  "validation recordings")
-      ->required();
-  command
-      .add_option("--format", arguments.format,
-                  "mvsec, eventgan, ecd, aedat4 or dsec; default: detected")
-      ->check(CLI::IsMember({"mvsec", "eventgan", "ecd", "aedat4", "dsec"}));
-  command.add_option("--camera", arguments.camera, "For mvsec: left (default) or right")
-      ->check(CLI::IsMember({"left", "right"}));
-  command.add_option("--frames", arguments.frames, "Range of frames, FIRST:LAST; default: all");
-  command
-      .add_option("--gaps", arguments.options.gaps,
-                  "Gaps between the two frames of a pair, such as 1,2; default: 1")
-      ->delimiter(',');
-}
-
 void add_methods(CLI::App& command, RealismArguments& arguments) {
   RealismOptions& options = arguments.options;
   take_one_of(command
@@ -168,9 +111,16 @@ void add_methods(CLI::App& command, RealismArguments& arguments) {
       "--weights", options.weights,
       "Weights of the network: FILE.safetensors, shipped, shipped:WIDTH or shipped:sensor; "
       "default: shipped");
-  command.add_option("--threshold", arguments.threshold,
-                     "Contrast threshold of difference and esim, 0.01..5; default: fit, the one "
-                     "that gives as many events as the camera");
+  auto* threshold =
+      command.add_option("--threshold", arguments.threshold,
+                         "Contrast threshold of difference and esim, 0.01..5; default: fit, the "
+                         "one that gives as many events as the camera");
+  command
+      .add_option("--sensor", arguments.sensor,
+                  "Take the threshold of a sensor: " +
+                      fmt::format("{}", fmt::join(shipped_sensors(), ", ")) +
+                      " or a document of eventgan fit (*.json)")
+      ->excludes(threshold);
   command
       .add_option("--log-epsilon", options.log_epsilon,
                   "Epsilon in the log intensity of difference and esim, ln(u/255 + epsilon), "
@@ -195,7 +145,10 @@ void add_realism_command(CLI::App& app, int& exit_code) {
       "events) of the network and of two sensor models with the events that a camera recorded for "
       "the same frames (manifests/guides/realism.md).");
   const auto arguments = std::make_shared<RealismArguments>();
-  add_choices(*command, *arguments);
+  add_recording_options(*command, arguments->recordings,
+                        "Recordings of events and frames; a training manifest (*.json) stands for "
+                        "its validation recordings");
+  add_gaps_option(*command, arguments->options.gaps);
   add_methods(*command, *arguments);
   command->add_option("--seed", arguments->options.seed, "Random seed; default: 0");
   command

@@ -67,8 +67,6 @@ std::optional<FlowField> flow_path(const Recording& recording, const FrameInterv
   return path;
 }
 
-namespace {
-
 IntervalFrames frames_of(const Recording& recording, const FrameInterval& interval,
                          const std::vector<Event>& events) {
   return {interval,
@@ -78,6 +76,8 @@ IntervalFrames frames_of(const Recording& recording, const FrameInterval& interv
           std::ssize(events),
           std::ranges::count(events, true, &Event::positive)};
 }
+
+namespace {
 
 void check_range(const Recording& recording, std::int64_t first, std::int64_t last) {
   if (first < 0 || last >= recording.frame_count() || first > last) {

@@ -44,7 +44,9 @@ struct RealInterval {
 /// own size.
 std::vector<float> network_input(const IntervalFrames& frames);
 
-/// Both throw InputError as Recording does. Thread safe.
+/// All throw InputError as Recording does. Thread safe. `events`: those of the interval.
+IntervalFrames frames_of(const Recording& recording, const FrameInterval& interval,
+                         const std::vector<Event>& events);
 IntervalFrames read_frames(const Recording& recording, const FrameInterval& interval);
 RealInterval read_interval(const Recording& recording, const FrameInterval& interval, int bins);
 

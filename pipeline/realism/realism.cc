@@ -91,8 +91,9 @@ class MethodMaker {
   std::unique_ptr<VolumeMethod> network(std::unique_ptr<Generator> generator) {
     std::optional<ContrastThreshold> threshold;
     if (generator->thresholds()) {
-      threshold = options_.threshold ? ContrastThreshold{*options_.threshold}
-                                     : fitted_threshold(*generator, fitted_frames(), threads_);
+      threshold = options_.threshold
+                      ? ContrastThreshold{*options_.threshold, options_.threshold_ratio}
+                      : fitted_threshold(*generator, fitted_frames(), threads_);
     }
     return make_network_method(std::move(generator), options_.weights, threshold,
                                !options_.threshold, options_.seed);

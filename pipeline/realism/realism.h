@@ -32,6 +32,9 @@ struct RealismOptions {
   /// Contrast threshold of the two models, 0.01..5; none: fitted, for each model, so that it makes
   /// as many events as the camera did.
   std::optional<double> threshold;
+  /// Of the negative threshold to the positive one, told with `threshold` to a network that knows
+  /// its sensor.
+  double threshold_ratio = 1;
   double log_epsilon = 0.02;        ///< ε of their log intensity ln(u/255 + ε), 1e-6..1
   int esim_draws = 5;               ///< motions for a pair; its scores are the means over them
   double esim_displacement_px = 5;  ///< largest displacement a frame of the motions

@@ -2,7 +2,7 @@
 
 #include <fmt/core.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <optional>
@@ -110,9 +110,6 @@ std::unique_ptr<Generator> open_realism_generator(const std::string& weights) {
 
 namespace {
 
-constexpr double kLeastThreshold = 0.01;
-constexpr double kLargestThreshold = 5;
-
 std::vector<Event> simulated_events(const SimulatedScene& scene, const IntervalFrames& frames,
                                     int draw, const SensorSpec& sensor, std::uint64_t seed) {
   return scene.events(frames, sensor, draw_random(scene.name, frames.interval, draw, seed));
@@ -207,26 +204,60 @@ double event_count(std::span<const IntervalFrames> frames, std::int64_t Interval
 
 }  // namespace
 
+std::vector<PolarityCounts> made_events(const SimulatedScene& scene,
+                                        std::span<const IntervalFrames> frames,
+                                        const SensorSpec& sensor, std::uint64_t seed, int threads) {
+  const auto draws = static_cast<std::size_t>(scene.draws);
+  std::vector<PolarityCounts> of_draws(frames.size() * draws);
+  for_each_index(of_draws.size(), threads, [&](std::size_t i) {
+    const std::vector<Event> events =
+        simulated_events(scene, frames[i / draws], static_cast<int>(i % draws), sensor, seed);
+    const auto positive = std::ranges::count(events, true, &Event::positive);
+    of_draws[i] = {static_cast<double>(positive),
+                   static_cast<double>(std::ssize(events) - positive)};
+  });
+  std::vector<PolarityCounts> counts(frames.size());
+  for (std::size_t i = 0; i < of_draws.size(); ++i) {
+    for (const std::size_t p : {0, 1}) counts[i / draws][p] += of_draws[i][p] / scene.draws;
+  }
+  return counts;
+}
+
+std::vector<PolarityCounts> made_events(const Generator& generator,
+                                        std::span<const IntervalFrames> frames,
+                                        const ContrastThreshold& threshold, int threads) {
+  std::vector<PolarityCounts> counts(frames.size());
+  for_each_index(frames.size(), threads, [&](std::size_t i) {
+    const std::vector<float> rates = network_volume(generator, frames[i], threshold);
+    const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
+    counts[i] = {std::accumulate(rates.begin(), middle, 0.0),
+                 std::accumulate(middle, rates.end(), 0.0)};
+  });
+  return counts;
+}
+
+namespace {
+
+PolarityCounts sum_of(const std::vector<PolarityCounts>& counts) {
+  PolarityCounts sum{};
+  for (const auto& [positive, negative] : counts) {
+    sum[0] += positive;
+    sum[1] += negative;
+  }
+  return sum;
+}
+
+}  // namespace
+
 double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFrames> frames,
                         double log_epsilon, std::uint64_t seed, int threads) {
-  const auto made = [&](double threshold) {
-    const SensorSpec sensor = realism_sensor(threshold, log_epsilon);
-    const auto draws = static_cast<std::size_t>(scene.draws);
-    std::vector<std::size_t> counts(frames.size() * draws);
-    for_each_index(counts.size(), threads, [&](std::size_t i) {
-      counts[i] =
-          simulated_events(scene, frames[i / draws], static_cast<int>(i % draws), sensor, seed)
-              .size();
-    });
-    return static_cast<double>(std::accumulate(counts.begin(), counts.end(), std::size_t{0})) /
-           scene.draws;
-  };
   Bisection bisection(event_count(frames, &IntervalFrames::event_count),
-                      {kLeastThreshold, kLargestThreshold});
+                      {kLeastFittedThreshold, kMostFittedThreshold});
   for (int step = 0; step < kMostSteps; ++step) {
-    const double count = made(bisection.threshold());
-    if (bisection.is_near(count)) break;
-    bisection.take(count);
+    const SensorSpec sensor = realism_sensor(bisection.threshold(), log_epsilon);
+    const auto [positive, negative] = sum_of(made_events(scene, frames, sensor, seed, threads));
+    if (bisection.is_near(positive + negative)) break;
+    bisection.take(positive + negative);
   }
   return bisection.threshold();
 }
@@ -242,18 +273,7 @@ ContrastThreshold fitted_threshold(const Generator& generator,
   for (int step = 0; step < kMostSteps; ++step) {
     threshold = {std::sqrt(positive.threshold() * negative.threshold()),
                  negative.threshold() / positive.threshold()};
-    std::vector<std::array<double, 2>> sums(frames.size());
-    for_each_index(frames.size(), threads, [&](std::size_t i) {
-      const std::vector<float> rates = network_volume(generator, frames[i], threshold);
-      const auto middle = rates.begin() + static_cast<std::ptrdiff_t>(rates.size() / 2);
-      sums[i] = {std::accumulate(rates.begin(), middle, 0.0),
-                 std::accumulate(middle, rates.end(), 0.0)};
-    });
-    std::array<double, 2> counts{};
-    for (const auto& sum : sums) {
-      counts[0] += sum[0];
-      counts[1] += sum[1];
-    }
+    const PolarityCounts counts = sum_of(made_events(generator, frames, threshold, threads));
     if (positive.is_near(counts[0]) && negative.is_near(counts[1])) break;
     positive.take(counts[0]);
     negative.take(counts[1]);

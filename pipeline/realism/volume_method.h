@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -63,6 +64,21 @@ SensorSpec realism_sensor(double threshold, double log_epsilon);
 /// by seed, name, interval and draw.
 std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const SensorSpec& sensor,
                                                     bool fitted, int bins, std::uint64_t seed);
+
+/// Events of a pair by polarity, positive first.
+using PolarityCounts = std::array<double, 2>;
+
+/// Of each pair of frames what the model makes, the mean of the draws; of a network that knows its
+/// sensor, the sum of its rates. They do not depend on `threads`.
+std::vector<PolarityCounts> made_events(const SimulatedScene& scene,
+                                        std::span<const IntervalFrames> frames,
+                                        const SensorSpec& sensor, std::uint64_t seed, int threads);
+std::vector<PolarityCounts> made_events(const Generator& generator,
+                                        std::span<const IntervalFrames> frames,
+                                        const ContrastThreshold& threshold, int threads);
+
+inline constexpr double kLeastFittedThreshold = 0.01;
+inline constexpr double kMostFittedThreshold = 5;
 
 /// The threshold in 0.01..5 with which the model makes as many events as the camera did, over all
 /// of `frames` and the mean of the draws, within 0.5 % or as near as it gets: by bisection, since

@@ -44,7 +44,8 @@ class CommandLine(program.InFolder):
     def test_every_command_has_help(self):
         out, _ = run("--help")
         for command in ["init", "convert", "plan", "status", "retry", "finalize", "verify", "inspect", "preview", "make-demo",
-                        "import-weights", "calibrate", "simulate", "train", "realism", "tradeoff", "export", "report"]:
+                        "import-weights", "calibrate", "simulate", "train", "realism", "fit", "tradeoff", "export",
+                        "report"]:
             self.assertIn(command, out)
             self.assertIn("Usage", run(command, "--help")[0])
 

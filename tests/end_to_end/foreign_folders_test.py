@@ -25,7 +25,8 @@ ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/pictures"]}
 # Those that are given a document.
 ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "calibrate": ["--out", "{scratch}/w.safetensors"],
                 "tradeoff": ["--out", "{scratch}/tradeoff"]}
-OTHERS = {"init": ["--out", "{scratch}/manifest.json"], "realism": [], "import-weights": ["{scratch}/weights.safetensors"]}
+OTHERS = {"init": ["--out", "{scratch}/manifest.json"], "realism": [], "fit": ["--out", "{scratch}/sensor.json"],
+          "import-weights": ["{scratch}/weights.safetensors"]}
 NOT_OF_FOLDERS = {"make-demo", "help"}
 
 

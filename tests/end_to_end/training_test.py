@@ -19,6 +19,7 @@ import program
 from moving_texture import write_images
 from program import PROGRAM, manifest, pairs, run
 from safetensors_rules import read_safetensors
+from small_job import small_job
 
 HEIGHT, WIDTH = 48, 64
 FRAMES = 8
@@ -340,6 +341,31 @@ class TrainedWeights(program.InFolder):
         self.assertIn("still-001.hdf5", err)
         run("realism", short, *gap, expect=64)
         run("realism", short, short, *gap, expect=64)
+
+    def test_a_fitted_sensor_is_taken_by_convert_and_realism(self):
+        clip, document = work / "recordings" / "clip.hdf5", self.folder / "sim.json"
+        out, err = run("fit", clip, "--name", "sim", "--out", document)
+        self.assertRegex(out, r"difference: 0\.\d+ ± ")
+        self.assertIn("do not know their sensor", err)
+        sensor = json.loads(document.read_text())
+        self.assertEqual(sensor["name"], "sim")
+        self.assertIn("fit of clip.hdf5", sensor["origin"])
+        folder = self.folder / "job"
+        run("convert", small_job(folder, people=0, generator={"kind": "difference", "sensor": "../sim.json"}), "--progress", "none")
+        document.unlink()
+        run("verify", folder / "out")
+        for path in folder.glob("out/*.h5"):
+            with h5py.File(path) as shard:
+                np.testing.assert_allclose(shard["pairs/threshold"][:], sensor["threshold"])
+            self.assertIn("sensor sim", run("inspect", path)[0])
+        fields = json.loads((folder / "out" / "plan.json").read_text())["fingerprint"]
+        self.assertEqual(fields["manifest $.generator.sensor.name"], '"sim"')
+        out, _ = run("realism", clip, "--with", "difference", "--sensor", "davis346", "--progress", "none")
+        self.assertNotIn("(fitted)", out)
+        run("realism", clip, "--sensor", "davis346", "--threshold", "0.2", expect=64)
+        run("fit", clip, "--name", "../x", expect=64)
+        run("fit", clip, "--out", "x.txt", expect=64)
+        run("fit", self.folder / "none.hdf5", expect=66)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,107 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "manifests/documents/sensor_document.h"
+#include "manifests/values/faults.h"
+#include "pipeline/commands/commands.h"
+#include "pipeline/commands/recording_arguments.h"
+#include "pipeline/commands/standard_streams.h"
+#include "pipeline/planning/fingerprint.h"
+#include "pipeline/realism/sensor_fit.h"
+#include "pipeline/realism/volume_method.h"
+#include "pipeline/runtime/errors.h"
+#include "pipeline/runtime/threads.h"
+#include "stages/base/files/atomic_file.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+namespace {
+
+struct FitArguments {
+  RecordingArguments recordings;
+  std::vector<int> gaps = {1};
+  std::string weights = "shipped";
+  std::string name = "camera";
+  std::string out;
+  int threads = 0;
+};
+
+/// The network, or null if it cannot be told a sensor.
+std::unique_ptr<Generator> open_told_generator(const std::string& weights) {
+  std::unique_ptr<Generator> generator = open_realism_generator(weights);
+  if (generator->thresholds()) return generator;
+  tell_note("the weights " + weights + " do not know their sensor: no threshold through them");
+  return nullptr;
+}
+
+/// What would be a fault of the document, once all is computed.
+void check_names(const FitArguments& arguments) {
+  CameraSensor named;
+  named.name = arguments.name;
+  parse_camera_sensor(to_document(named), "--name");
+  if (!arguments.out.empty() && !arguments.out.ends_with(".json")) {
+    throw UsageError("--out: expected a path of *.json, got " + arguments.out);
+  }
+}
+
+int run_fit(const FitArguments& arguments) {
+  check_names(arguments);
+  std::vector<std::unique_ptr<Recording>> recordings;
+  std::vector<FitPart> parts;
+  std::string names;
+  for (const RecordingSpec& part : wanted_parts(arguments.recordings)) {
+    recordings.push_back(open_recording(part.path, part.format, part.options));
+    parts.push_back({recordings.back().get(), part.first_frame, part.last_frame});
+    names += (names.empty() ? "" : ", ") + std::filesystem::path(part.path).filename().string();
+  }
+  const std::unique_ptr<Generator> network = open_told_generator(arguments.weights);
+  const SensorFit fit =
+      fit_sensor(parts, network.get(), arguments.gaps, thread_count(arguments.threads));
+  for (const auto& recording : recordings) {
+    for (const std::string& note : recording->notes()) tell_note(note);
+  }
+  for (const std::string& warning : fit.warnings) tell_warning(warning);
+  const CameraSensor sensor = fit.sensor(
+      arguments.name, program_version() + " fit of " + names + ": " +
+                          origin_text(fit, std::filesystem::path(arguments.weights).filename()));
+  const std::string document = to_document(sensor);
+  std::cout << to_text(fit);
+  if (arguments.out.empty()) {
+    std::cout << document;
+  } else {
+    write_file_atomically(arguments.out, document);
+    std::cout << "sensor: " << arguments.out << '\n';
+  }
+  std::cout << std::flush;
+  return kComplete;
+}
+
+}  // namespace
+
+void add_fit_command(CLI::App& app, int& exit_code) {
+  auto* command = app.add_subcommand(
+      "fit",
+      "Find a camera's thresholds and noise\nFinds out of recordings of one event camera what "
+      "convert needs to be told of it: the contrast threshold with which the model difference, and "
+      "a network that knows its sensor, make as many events as the camera, and the noise of pixels "
+      "that stay still. Writes a sensor's document (manifests/guides/sensor.md).");
+  const auto arguments = std::make_shared<FitArguments>();
+  add_recording_options(*command, arguments->recordings,
+                        "Recordings of events and frames of one camera; a training manifest "
+                        "(*.json) stands for its validation recordings");
+  add_gaps_option(*command, arguments->gaps);
+  command->add_option("--weights", arguments->weights,
+                      "Weights of the network: FILE.safetensors, shipped, shipped:WIDTH or "
+                      "shipped:sensor; default: shipped");
+  command->add_option("--name", arguments->name, "Name of the sensor; default: camera");
+  command->add_option("--out", arguments->out, "The document to write, *.json; default: print it");
+  command->add_option("--threads", arguments->threads, "Number of threads; default: all cores")
+      ->check(CLI::Range(1, 4096));
+  command->callback([arguments, &exit_code] { exit_code = run_fit(*arguments); });
+}
+
+}  // namespace eventgan

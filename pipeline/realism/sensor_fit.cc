@@ -1,0 +1,301 @@
+#include "pipeline/realism/sensor_fit.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <initializer_list>
+#include <numeric>
+#include <utility>
+
+#include "pipeline/planning/spread.h"
+#include "pipeline/realism/real_interval.h"
+#include "pipeline/realism/volume_method.h"
+
+namespace eventgan {
+namespace {
+
+constexpr std::size_t kMostPairs = 64;
+constexpr std::uint64_t kSeed = 0;
+
+struct ChosenPairs {
+  std::vector<FrameInterval> fitted;
+  std::vector<FrameInterval> kept;
+};
+
+std::vector<FrameInterval> some_of(std::span<const FrameInterval> all, std::size_t most) {
+  std::vector<FrameInterval> some;
+  for (const std::size_t i : spread(most, all.size())) some.push_back(all[i]);
+  return some;
+}
+
+ChosenPairs choose_pairs_of(const FitPart& part, const std::vector<int>& gaps, std::size_t most) {
+  std::vector<FrameInterval> all =
+      choose_intervals(*part.recording, part.first_frame, part.last_frame, gaps);
+  std::ranges::sort(all, {}, [](const FrameInterval& interval) {
+    return std::pair(interval.last, interval.first);
+  });
+  const std::size_t fitted = all.size() - all.size() / 4;
+  const std::int64_t end = all[fitted - 1].last;
+  const auto later =
+      std::ranges::partition(std::span(all).subspan(fitted),
+                             [&](const FrameInterval& interval) { return interval.first >= end; });
+  const std::size_t kept = all.size() - fitted - later.size();
+  return {some_of(std::span(all).first(fitted), most),
+          some_of(std::span(all).subspan(fitted, kept), most)};
+}
+
+double pixel_seconds(const IntervalFrames& frames) {
+  return static_cast<double>(frames.previous.size.pixel_count()) * frames.duration_s;
+}
+
+/// The events that are not noise, as far as rates tell.
+IntervalFrames without_noise(IntervalFrames frames, const NoiseFit& noise) {
+  const auto less = [&](std::int64_t count, double rate_hz) {
+    const double rest = static_cast<double>(count) - rate_hz * pixel_seconds(frames);
+    return static_cast<std::int64_t>(std::llround(std::max(rest, 0.0)));
+  };
+  const std::int64_t negative = less(frames.event_count - frames.positive_count, noise.negative_hz);
+  frames.positive_count = less(frames.positive_count, noise.positive_hz);
+  frames.event_count = frames.positive_count + negative;
+  return frames;
+}
+
+/// What is made of pairs with thresholds around one: how it would be fitted to some of them.
+class Sensitivity {
+ public:
+  using Made = std::function<std::vector<PolarityCounts>(double factor)>;
+
+  /// `made(factor)`: of each pair what is made with a threshold so many times the fitted one.
+  explicit Sensitivity(const Made& made) {
+    for (int step = -kSteps; step <= kSteps; ++step) {
+      factors_.push_back(std::exp2(static_cast<double>(step) / kSteps));
+      counts_.push_back(made(factors_.back()));
+    }
+  }
+
+  /// The factor with which as many events of the polarities are made of the drawn pairs as wanted.
+  double factor(std::span<const std::size_t> draw, double wanted,
+                std::initializer_list<std::size_t> polarities) const {
+    double last = 0;
+    for (std::size_t step = 0; step < factors_.size(); ++step) {
+      double made = 0;
+      for (const std::size_t pair : draw) {
+        for (const std::size_t polarity : polarities) made += counts_[step][pair][polarity];
+      }
+      if (made <= wanted) {
+        if (step == 0) break;
+        const double share = last > made ? (last - wanted) / (last - made) : 1;
+        return factors_[step - 1] * std::pow(factors_[step] / factors_[step - 1], share);
+      }
+      last = made;
+    }
+    return last > wanted ? factors_.back() : factors_.front();
+  }
+
+ private:
+  static constexpr int kSteps = 6;  // from half the threshold to twice of it
+  std::vector<double> factors_;
+  std::vector<std::vector<PolarityCounts>> counts_;  // by factor, then pair
+};
+
+bool is_at_end(double threshold, const ThresholdRange& range) {
+  constexpr double kNear = 1.01;
+  return threshold <= range.lowest * kNear || threshold >= range.highest / kNear;
+}
+
+class Fitter {
+ public:
+  Fitter(std::span<const IntervalFrames> frames, int threads, SensorFit& fit)
+      : frames_(frames), threads_(threads), fit_(fit) {}
+
+  std::optional<FittedThreshold> difference() const {
+    const double threshold =
+        fitted_threshold(difference_scene(), frames_, kFrameLogEpsilon, kSeed, threads_);
+    if (is_at_end(threshold, {kLeastFittedThreshold, kMostFittedThreshold})) {
+      warn(fmt::format("no threshold of difference in {}..{} makes as many events as the camera",
+                       kLeastFittedThreshold, kMostFittedThreshold));
+      return std::nullopt;
+    }
+    const Sensitivity sensitivity([&](double factor) {
+      return made_events(difference_scene(), frames_,
+                         realism_sensor(factor * threshold, kFrameLogEpsilon), kSeed, threads_);
+    });
+    FittedThreshold fitted{{threshold}, {}, {}};
+    fitted.mean = bootstrap_bounds(frames_.size(), [&](std::span<const std::size_t> draw) {
+      const auto [positive, negative] = wanted(draw);
+      return threshold * sensitivity.factor(draw, positive + negative, {0, 1});
+    });
+    return fitted;
+  }
+
+  std::optional<FittedThreshold> network(const Generator& generator) const {
+    const ThresholdRange range = generator.thresholds().value();
+    const ContrastThreshold threshold = fitted_threshold(generator, frames_, threads_);
+    if (is_at_end(threshold.positive(), range) || is_at_end(threshold.negative(), range)) {
+      warn(
+          fmt::format("no threshold in {:.3g}..{:.3g}, which the network has learnt, makes as "
+                      "many events as the camera",
+                      range.lowest, range.highest));
+      return std::nullopt;
+    }
+    const Sensitivity sensitivity([&](double factor) {
+      return made_events(generator, frames_, {factor * threshold.mean, threshold.ratio}, threads_);
+    });
+    const auto factors = [&](std::span<const std::size_t> draw) {
+      const auto [positive, negative] = wanted(draw);
+      return std::pair(sensitivity.factor(draw, positive, {0}),
+                       sensitivity.factor(draw, negative, {1}));
+    };
+    FittedThreshold fitted{threshold, {}, {}};
+    fitted.mean = bootstrap_bounds(frames_.size(), [&](std::span<const std::size_t> draw) {
+      const auto [positive, negative] = factors(draw);
+      return threshold.mean * std::sqrt(positive * negative);
+    });
+    fitted.ratio = bootstrap_bounds(frames_.size(), [&](std::span<const std::size_t> draw) {
+      const auto [positive, negative] = factors(draw);
+      return threshold.ratio * negative / positive;
+    });
+    return fitted;
+  }
+
+ private:
+  PolarityCounts wanted(std::span<const std::size_t> draw) const {
+    PolarityCounts counts{};
+    for (const std::size_t pair : draw) {
+      counts[0] += static_cast<double>(frames_[pair].positive_count);
+      counts[1] += static_cast<double>(frames_[pair].event_count - frames_[pair].positive_count);
+    }
+    return counts;
+  }
+
+  void warn(std::string text) const { fit_.warnings.push_back(std::move(text)); }
+
+  std::span<const IntervalFrames> frames_;
+  int threads_;
+  SensorFit& fit_;
+};
+
+double event_sum(const std::vector<PolarityCounts>& counts) {
+  double sum = 0;
+  for (const auto& [positive, negative] : counts) sum += positive + negative;
+  return sum;
+}
+
+/// The camera's events of the kept pairs beside those that are made of them, a pixel.
+std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Generator* network,
+                              const SensorFit& fit, int threads) {
+  double pixels = 0, camera = 0, noise = 0;
+  for (const IntervalFrames& frames : kept) {
+    pixels += static_cast<double>(frames.previous.size.pixel_count());
+    camera += static_cast<double>(frames.event_count);
+    if (fit.noise) {
+      noise += (fit.noise->positive_hz + fit.noise->negative_hz) * pixel_seconds(frames);
+    }
+  }
+  std::vector<EventRow> rows{{"camera", camera / pixels}};
+  const auto difference = [&](double threshold) {
+    return event_sum(made_events(difference_scene(), kept, realism_sensor(threshold, kFrameLogEpsilon),
+                              kSeed, threads));
+  };
+  const auto through_network = [&](const ContrastThreshold& threshold) {
+    return event_sum(made_events(*network, kept, threshold, threads));
+  };
+  if (fit.difference) {
+    rows.push_back(
+        {"difference, fitted", (difference(fit.difference->threshold.mean) + noise) / pixels});
+  }
+  rows.push_back({"difference, default", difference(SensorSpec().positive_threshold) / pixels});
+  if (!network) return rows;
+  if (fit.network) {
+    rows.push_back({"network, fitted", (through_network(fit.network->threshold) + noise) / pixels});
+  }
+  const double middle = network->thresholds()->geometric_mean();
+  rows.push_back({"network, default", through_network({middle}) / pixels});
+  return rows;
+}
+
+double mean_level(const GreyImage& image) {
+  return std::accumulate(image.pixels.begin(), image.pixels.end(), 0.0) /
+         static_cast<double>(image.pixels.size());
+}
+
+void describe_light(const std::vector<IntervalFrames>& frames, SensorFit& fit) {
+  std::vector<double> levels;
+  for (const IntervalFrames& pair : frames) levels.push_back(mean_level(pair.previous));
+  fit.grey_level =
+      std::accumulate(levels.begin(), levels.end(), 0.0) / static_cast<double>(levels.size());
+  fit.grey_levels = {quantile(levels, 0.1), quantile(levels, 0.9)};
+}
+
+}  // namespace
+
+SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
+                     const std::vector<int>& gaps, int threads) {
+  SensorFit fit;
+  std::vector<IntervalFrames> fitted, kept;
+  std::vector<std::vector<StillPixels>> still;
+  const std::size_t most = std::max<std::size_t>(kMostPairs / parts.size(), 1);
+  for (const FitPart& part : parts) {
+    const ChosenPairs pairs = choose_pairs_of(part, gaps, most);
+    still.emplace_back();
+    for (const FrameInterval& interval : pairs.fitted) {
+      const auto events = part.recording->events_between(interval.first, interval.last);
+      const auto& frames = fitted.emplace_back(frames_of(*part.recording, interval, events));
+      still.back().push_back(
+          find_still_pixels(frames.previous, frames.next, events, frames.duration_s));
+    }
+    for (const FrameInterval& interval : pairs.kept) {
+      kept.push_back(read_frames(*part.recording, interval));
+    }
+  }
+  fit.fitted_pairs = fitted.size();
+  fit.kept_pairs = kept.size();
+  describe_light(fitted, fit);
+  fit.noise = fit_noise(still);
+  if (fit.noise) {
+    for (IntervalFrames& frames : fitted) frames = without_noise(std::move(frames), *fit.noise);
+  } else {
+    fit.warnings.emplace_back("no noise, since no pair of frames has 100 pixels that stay still");
+  }
+  const bool has_events = std::ranges::any_of(
+      fitted, [](const IntervalFrames& frames) { return frames.event_count > 0; });
+  if (has_events) {
+    const Fitter fitter(fitted, threads, fit);
+    fit.difference = fitter.difference();
+    if (network) fit.network = fitter.network(*network);
+    if (fitted.size() < 3) {
+      fit.warnings.emplace_back("how sure a threshold is takes 3 pairs of frames to tell");
+    }
+  } else {
+    fit.warnings.emplace_back("no threshold, since the camera has no events but noise");
+  }
+  if (!kept.empty()) fit.rows = compare(kept, network, fit, threads);
+  return fit;
+}
+
+namespace {
+
+double three_digits(double number) { return std::stod(fmt::format("{:.3g}", number)); }
+
+std::array<double, 2> three_digits(const std::array<double, 2>& range) {
+  return {three_digits(range[0]), three_digits(range[1])};
+}
+
+}  // namespace
+
+CameraSensor SensorFit::sensor(const std::string& name, const std::string& origin) const {
+  CameraSensor sensor{name, std::nullopt, std::nullopt, origin};
+  if (const auto& fitted = network ? network : difference) {
+    const double mean = three_digits(fitted->threshold.mean);
+    sensor.threshold = ThresholdSpec{{mean, mean}, three_digits(fitted->threshold.ratio)};
+  }
+  if (noise) {
+    sensor.noise = NoiseSpec{three_digits(noise->noise.shot_hz), three_digits(noise->noise.leak_hz),
+                             three_digits(noise->noise.hot_pixels)};
+  }
+  return sensor;
+}
+
+}  // namespace eventgan

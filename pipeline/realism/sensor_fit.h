@@ -1,0 +1,72 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "manifests/values/events.h"
+#include "manifests/values/sensor_input.h"
+#include "pipeline/realism/still_pixels.h"
+#include "stages/events/realism/realism_scores.h"
+#include "stages/generator/generator.h"
+#include "stages/recordings/recording.h"
+
+namespace eventgan {
+
+/// A part of a recording of the camera that is to be fitted.
+struct FitPart {
+  const Recording* recording = nullptr;
+  std::int64_t first_frame = 0;
+  std::optional<std::int64_t> last_frame;  ///< none: to the end
+};
+
+/// A threshold with which as many events are made as the camera saw, less its noise.
+struct FittedThreshold {
+  ContrastThreshold threshold;
+  Bounds mean;   ///< of the threshold (bootstrap_bounds)
+  Bounds ratio;  ///< of its ratio; not told of `difference`, whose ratio is 1
+};
+
+/// How many events something made of the pairs that were kept aside.
+struct EventRow {
+  std::string name;
+  double events_per_pixel = 0;
+};
+
+/// What was found of a camera.
+struct SensorFit {
+  std::size_t fitted_pairs = 0;
+  std::size_t kept_pairs = 0;                 ///< kept aside, for `rows`
+  double grey_level = 0;                      ///< mean of the frames
+  std::array<double, 2> grey_levels{};        ///< the middle 80 % of the frames' means
+  std::optional<NoiseFit> noise;              ///< none: no pixel is still
+  std::optional<FittedThreshold> difference;  ///< of the model `difference`; none: cannot be told
+  std::optional<FittedThreshold> network;     ///< through the network that was given
+  std::vector<EventRow> rows;                 ///< the camera's first; empty without kept pairs
+  std::vector<std::string> warnings;          ///< what could not be told, and why
+
+  /// What goes into a document: the network's threshold, else the model's, and the noise, rounded
+  /// to three digits.
+  CameraSensor sensor(const std::string& name, const std::string& origin) const;
+};
+
+/// Fits one camera's noise (fit_noise) and thresholds (fitted_threshold; of the frames' log
+/// intensity, kFrameLogEpsilon) to the first three quarters of each part's pairs (i, i + gap), and
+/// compares on those of the rest that share no time with them. At most 64 pairs of either, spread
+/// evenly. `network`: one that knows its sensor, or null. The result does not depend on `threads`.
+///
+/// Throws UsageError as choose_intervals does, InputError as Recording does.
+SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
+                     const std::vector<int>& gaps, int threads);
+
+/// The fit for people: what was found, how sure it is, and the kept pairs as a table.
+std::string to_text(const SensorFit& fit);
+
+/// How its numbers were found, a sentence for a document's origin. `weights` are the network's.
+std::string origin_text(const SensorFit& fit, const std::string& weights);
+
+}  // namespace eventgan

@@ -1,0 +1,288 @@
+#include "pipeline/realism/sensor_fit.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "manifests/values/counter_random.h"
+#include "manifests/values/faults.h"
+#include "manifests/values/poisson_random.h"
+#include "stages/events/simulation/simulate_pair.h"
+#include "tests/testing/fake_recording.h"
+
+namespace eventgan {
+namespace {
+
+using testing::FakeRecording;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+constexpr ImageSize kSceneSize{64, 64};
+constexpr double kInterval_s = 0.05;
+
+struct Scene {
+  double positive_threshold = 0.3;
+  double negative_threshold = 0.3;
+  NoiseSpec noise = {};
+  int still_columns = 32;  ///< at the left; a texture moves in the others
+  int frames = 17;         ///< 16 pairs, of which 12 are fitted
+};
+
+std::vector<GreyImage> scene_frames(const Scene& scene) {
+  const CounterRandom random(7);
+  std::vector<GreyImage> frames;
+  for (int i = 0; i < scene.frames; ++i) {
+    GreyImage& frame =
+        frames.emplace_back(kSceneSize, std::vector<std::uint8_t>(kSceneSize.pixel_count()));
+    for (int y = 0; y < kSceneSize.height; ++y) {
+      for (int x = 0; x < kSceneSize.width; ++x) {
+        const int moved = x < scene.still_columns ? x : 1000 + x + i;
+        const auto cell = static_cast<std::uint64_t>(y * 10000 + moved);
+        frame.pixels[static_cast<std::size_t>(y * kSceneSize.width + x)] =
+            static_cast<std::uint8_t>(30 + random.below(cell, 190));
+      }
+    }
+  }
+  return frames;
+}
+
+void add_noise_events(double mean, bool positive, int interval, std::vector<Event>& events) {
+  const CounterRandom random =
+      CounterRandom(3).keyed(std::to_string(interval)).keyed(positive ? "positive" : "negative");
+  for (int pixel = 0; pixel < static_cast<int>(kSceneSize.pixel_count()); ++pixel) {
+    const double count =
+        poisson(mean, random, static_cast<std::uint64_t>(pixel), kSceneSize.pixel_count());
+    for (int i = 0; i < static_cast<int>(count); ++i) {
+      events.push_back(
+          {pixel % kSceneSize.width, pixel / kSceneSize.width, 0.5 * kInterval_s, positive});
+    }
+  }
+}
+
+/// What a camera of known thresholds and noise would see of the frames.
+FakeRecording scene_recording(const Scene& scene) {
+  const std::vector<GreyImage> frames = scene_frames(scene);
+  SensorSpec sensor;
+  sensor.positive_threshold = scene.positive_threshold;
+  sensor.negative_threshold = scene.negative_threshold;
+  sensor.threshold_spread = 0;
+  sensor.log_epsilon = kFrameLogEpsilon;
+  std::vector<double> times_s{0};
+  std::vector<Event> all;
+  for (int i = 0; i + 1 < scene.frames; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    std::vector<Event> events =
+        simulate_difference(frames[at], frames[at + 1], sensor, kInterval_s, CounterRandom(1));
+    const double shot = scene.noise.shot_hz[0] / 2 * kInterval_s;
+    add_noise_events(shot + scene.noise.leak_hz[0] * kInterval_s, true, i, events);
+    add_noise_events(shot, false, i, events);
+    std::ranges::stable_sort(events, {}, &Event::t_s);
+    for (Event& event : events) {
+      event.t_s += i * kInterval_s;
+      all.push_back(event);
+    }
+    times_s.push_back((i + 1) * kInterval_s);
+  }
+  return {frames, times_s, all};
+}
+
+SensorFit fit_camera(const Recording& recording, const Generator* network = nullptr) {
+  const FitPart part{&recording, 0, std::nullopt};
+  return fit_sensor({&part, 1}, network, {1}, 2);
+}
+
+/// Knows its sensor: gives the change of log intensity in thresholds, as a rate.
+class RateGenerator final : public Generator {
+ public:
+  int bins() const override { return 1; }
+  std::optional<ThresholdRange> thresholds() const override { return ThresholdRange{0.05, 1.5}; }
+  std::string description() const override { return "rates"; }
+
+  GenerationNotes generate(const GeneratorInput& pair, std::span<float> volume) const override {
+    const std::size_t pixels = pair.size.pixel_count();
+    const auto log_of = [&](std::size_t i) {
+      return std::log((pair.frames[i] + 1) / 2 + kFrameLogEpsilon);
+    };
+    for (std::size_t i = 0; i < pixels; ++i) {
+      const double change = log_of(pixels + i) - log_of(i);
+      const ContrastThreshold& told = pair.threshold.value();
+      volume[i] = static_cast<float>(std::max(change, 0.0) / told.positive());
+      volume[pixels + i] = static_cast<float>(std::max(-change, 0.0) / told.negative());
+    }
+    return {};
+  }
+};
+
+TEST(FitSensor, FindsTheThresholdAndTheNoiseOfACamera) {
+  // 32 x 64 still pixels over 12 pairs of 0.05 s: 1229 pixel seconds, of 3 Hz positive and 2 Hz
+  // negative events. Four standard deviations of a rate r are 4 sqrt(r / 1229): 0.2 and 0.16.
+  const Scene scene{.noise = {{4, 4}, {1, 1}, {}}};
+  const SensorFit fit = fit_camera(scene_recording(scene));
+  EXPECT_EQ(fit.fitted_pairs, 12u);
+  EXPECT_EQ(fit.kept_pairs, 4u);
+  ASSERT_TRUE(fit.noise);
+  EXPECT_NEAR(fit.noise->positive_hz, 3, 0.2);
+  EXPECT_NEAR(fit.noise->negative_hz, 2, 0.16);
+  EXPECT_NEAR(fit.noise->pixel_seconds, 1229, 1229 * 0.1);  // less what is near the texture
+  EXPECT_LT(fit.noise->noise.shot_hz[0], 4);
+  EXPECT_GT(fit.noise->noise.shot_hz[1], 4 - 0.32);
+  EXPECT_LT(fit.noise->noise.leak_hz[0], 1);
+  EXPECT_GT(fit.noise->noise.leak_hz[1], 1 - 0.26);
+  ASSERT_TRUE(fit.difference);
+  EXPECT_NEAR(fit.difference->threshold.mean, 0.3, 0.03);
+  EXPECT_LT(fit.difference->mean.low, fit.difference->threshold.mean);
+  EXPECT_GT(fit.difference->mean.high, fit.difference->threshold.mean);
+  EXPECT_LT(fit.difference->mean.high - fit.difference->mean.low, 0.06);
+  EXPECT_FALSE(fit.network);
+  EXPECT_THAT(fit.warnings, IsEmpty());
+}
+
+TEST(FitSensor, ComparesOnThePairsKeptAside) {
+  const SensorFit fit = fit_camera(scene_recording({.noise = {{4, 4}, {1, 1}, {}}}));
+  ASSERT_EQ(fit.rows.size(), 3u);
+  const double camera = fit.rows[0].events_per_pixel;
+  EXPECT_NEAR(fit.rows[1].events_per_pixel, camera, 0.05 * camera);
+  // The default threshold of 0.2 makes some 1.5 times the events, without the noise.
+  EXPECT_GT(fit.rows[2].events_per_pixel, 1.2 * camera);
+}
+
+TEST(FitSensor, FindsThresholdsByPolarityThroughANetwork) {
+  const Scene scene{.positive_threshold = 0.25, .negative_threshold = 0.4, .frames = 5};
+  const FakeRecording recording = scene_recording(scene);
+  // The network's rates are Σ|change| / C: they add up to the camera's events with C = Σ|change| /
+  // N.
+  double rise = 0, fall = 0;
+  for (std::int64_t i = 0; i < 3; ++i) {
+    const GreyImage previous = recording.frame(i), next = recording.frame(i + 1);
+    for (std::size_t p = 0; p < kSceneSize.pixel_count(); ++p) {
+      const double change = std::log(next.pixels[p] / 255.0 + kFrameLogEpsilon) -
+                            std::log(previous.pixels[p] / 255.0 + kFrameLogEpsilon);
+      (change > 0 ? rise : fall) += std::abs(change);
+    }
+  }
+  const std::vector<Event> events = recording.events_between(0, 3);
+  const double positive = static_cast<double>(std::ranges::count(events, true, &Event::positive));
+  const double expected_positive = rise / positive;
+  const double expected_negative = fall / (static_cast<double>(events.size()) - positive);
+
+  const RateGenerator network;
+  const SensorFit fit = fit_camera(recording, &network);
+  ASSERT_TRUE(fit.network);
+  EXPECT_NEAR(fit.network->threshold.positive(), expected_positive, 0.01 * expected_positive);
+  EXPECT_NEAR(fit.network->threshold.negative(), expected_negative, 0.01 * expected_negative);
+  EXPECT_LE(fit.network->ratio.low, fit.network->threshold.ratio * 1.01);
+  EXPECT_GE(fit.network->ratio.high, fit.network->threshold.ratio * 0.99);
+  EXPECT_EQ(fit.rows.size(), 5u);
+  // The document has the network's.
+  const CameraSensor sensor = fit.sensor("mine", "a test");
+  EXPECT_NEAR(sensor.threshold->range[0], fit.network->threshold.mean, 5e-3);
+  EXPECT_NEAR(sensor.threshold->ratio, fit.network->threshold.ratio, 5e-3);
+  EXPECT_EQ(sensor.name, "mine");
+  EXPECT_EQ(sensor.origin, "a test");
+}
+
+TEST(FitSensor, WithoutStillPixelsTellsNoNoise) {
+  const SensorFit fit = fit_camera(scene_recording({.still_columns = 0}));
+  EXPECT_FALSE(fit.noise);
+  EXPECT_FALSE(fit.sensor("n", "").noise);
+  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("no noise")));
+  ASSERT_TRUE(fit.difference);
+  EXPECT_NEAR(fit.difference->threshold.mean, 0.3, 0.03);
+}
+
+TEST(FitSensor, WithoutEventsTellsNoThreshold) {
+  const Scene scene;
+  std::vector<double> times_s;
+  for (int i = 0; i < scene.frames; ++i) times_s.push_back(i * kInterval_s);
+  const RateGenerator network;
+  const SensorFit fit = fit_camera(FakeRecording(scene_frames(scene), times_s, {}), &network);
+  EXPECT_FALSE(fit.difference || fit.network);
+  ASSERT_TRUE(fit.noise);
+  EXPECT_EQ(fit.noise->noise, NoiseSpec());
+  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("no threshold")));
+  const CameraSensor sensor = fit.sensor("n", "");
+  EXPECT_FALSE(sensor.threshold);
+  EXPECT_TRUE(sensor.noise);
+  EXPECT_THAT(to_text(fit), HasSubstr("camera"));
+}
+
+TEST(FitSensor, OfAStillImageHasNoThresholdEither) {
+  // All events are noise, but for chance: no threshold below 5 makes so few of no change.
+  const SensorFit fit =
+      fit_camera(scene_recording({.noise = {{4, 4}, {}, {}}, .still_columns = kSceneSize.width}));
+  EXPECT_FALSE(fit.difference);
+  EXPECT_EQ(fit.warnings.size(), 1u);
+}
+
+TEST(FitSensor, OfOnePairSaysThatItIsNotSure) {
+  const SensorFit fit = fit_camera(scene_recording({.frames = 2}));
+  EXPECT_EQ(fit.fitted_pairs, 1u);
+  EXPECT_EQ(fit.kept_pairs, 0u);
+  EXPECT_THAT(fit.rows, IsEmpty());
+  ASSERT_TRUE(fit.difference);
+  EXPECT_TRUE(std::isnan(fit.difference->mean.low));
+  EXPECT_THAT(fit.warnings, ::testing::ElementsAre(HasSubstr("3 pairs")));
+  EXPECT_THAT(to_text(fit), ::testing::Not(HasSubstr("nan")));
+}
+
+TEST(FitSensor, PoolsRecordingsAndDependsOnNoThreads) {
+  const FakeRecording first = scene_recording({.frames = 5});
+  const FakeRecording second = scene_recording({.positive_threshold = 0.6, .frames = 9});
+  const FitPart parts[] = {{&first, 0, std::nullopt}, {&second, 1, 6}};
+  const SensorFit fit = fit_sensor(parts, nullptr, {1}, 1);
+  EXPECT_EQ(fit.fitted_pairs, 3u + 4u);
+  EXPECT_EQ(fit.kept_pairs, 1u + 1u);
+  EXPECT_EQ(fit_sensor(parts, nullptr, {1}, 3).difference->threshold, fit.difference->threshold);
+  EXPECT_GT(fit.difference->threshold.mean, 0.31);
+}
+
+TEST(FitSensor, KeepsNoPairAsideThatSharesTimeWithAFittedOne) {
+  // Of gap 2 the pairs (0,2), .. (14,16): the first 12 end with frame 13; (12,14) begins before it.
+  const FakeRecording recording = scene_recording({});
+  const FitPart part{&recording, 0, std::nullopt};
+  const SensorFit fit = fit_sensor({&part, 1}, nullptr, {2}, 1);
+  EXPECT_EQ(fit.fitted_pairs, 12u);
+  EXPECT_EQ(fit.kept_pairs, 2u);
+}
+
+TEST(FitSensor, RefusesGapsThatCannotBe) {
+  const FakeRecording recording = scene_recording({.frames = 3});
+  const FitPart part{&recording, 0, std::nullopt};
+  EXPECT_THROW(fit_sensor({&part, 1}, nullptr, {3}, 1), UsageError);
+  EXPECT_THROW(fit_sensor({&part, 1}, nullptr, {}, 1), UsageError);
+}
+
+SensorFit made_fit() {
+  SensorFit fit;
+  fit.fitted_pairs = 21;
+  fit.kept_pairs = 7;
+  fit.grey_level = 64.04;
+  fit.grey_levels = {60, 70};
+  fit.difference = FittedThreshold{{0.31234}, {0.3, 0.33}, {}};
+  fit.noise = NoiseFit{{{0.51234, 1}, {0, 0}, {1e-4, 1e-4}}, 0.5, 0.25, 2000, 1000, 1, 21};
+  fit.rows = {{"camera", 0.5}, {"difference, fitted", 0.45}};
+  return fit;
+}
+
+TEST(SensorFit, GivesThreeDigits) {
+  const CameraSensor sensor = made_fit().sensor("n", "");
+  EXPECT_EQ(sensor.threshold, (ThresholdSpec{{0.312, 0.312}, 1}));
+  EXPECT_EQ(sensor.noise, (NoiseSpec{{0.512, 1}, {0, 0}, {1e-4, 1e-4}}));
+}
+
+TEST(SensorFitText, SaysHowSureItIs) {
+  const std::string text = to_text(made_fit());
+  EXPECT_THAT(text, HasSubstr("21 fitted, 7 kept aside; mean grey level 64, 60..70"));
+  EXPECT_THAT(text, HasSubstr("difference: 0.312 ± 0.015\n"));
+  EXPECT_THAT(text, HasSubstr("shot_hz 0.512..1, leak_hz 0, hot_pixels 0.0001 (1 of them)"));
+  EXPECT_THAT(text, HasSubstr("from 1000 pixels, 2 s each, of 21 pairs"));
+  EXPECT_THAT(text, ::testing::ContainsRegex("difference, fitted +0.4500 +0.90\n"));
+  EXPECT_EQ(origin_text(made_fit(), "shipped:sensor"),
+            "21 pairs of frames of mean grey level 64 (60..70); threshold 0.312 ± 0.015 of "
+            "difference; noise of 2e+03 pixel seconds");
+}
+
+}  // namespace
+}  // namespace eventgan
