@@ -11,7 +11,6 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "pipeline/planning/spread.h"
-#include "pipeline/simulation/clip_frames.h"
 #include "stages/base/images/image_file.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/moving_planes.h"
@@ -119,7 +118,9 @@ std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> fold
   std::vector<GreyImage> textures;
   for (const std::size_t place : spread(most, files.size())) {
     try {
-      textures.push_back(sensor_image(decode_image_file(files[place]), std::nullopt));
+      const ColourFrame image = decode_image_file(files[place]);
+      textures.push_back(
+          {image.size, prepare_frame(ColourView{image.size, image.bgr.data()}, {}).grey});
     } catch (const std::runtime_error&) {
       std::throw_with_nested(InputError("cannot use the texture " + files[place].string()));
     }

@@ -63,6 +63,8 @@ TEST(JobWords, ANumberThatIsNoValueHasNone) {
 TEST(WeightsName, KnowsTheWords) {
   EXPECT_EQ(parse_weights_name("shipped"), (WeightsName{WeightsOrigin::kShipped, "", {}}));
   EXPECT_EQ(parse_weights_name("shipped:16"), (WeightsName{WeightsOrigin::kShipped, "", 16}));
+  EXPECT_EQ(parse_weights_name("shipped:sensor"),
+            (WeightsName{WeightsOrigin::kShipped, "", kSensorWeights}));
   EXPECT_EQ(parse_weights_name("untrained:1"), (WeightsName{WeightsOrigin::kUntrained, "", 1}));
   EXPECT_EQ(parse_weights_name("untrained:64"), (WeightsName{WeightsOrigin::kUntrained, "", 64}));
 }

@@ -324,12 +324,19 @@ TEST(CalibrationFields, RefuseHalfACalibration) {
 }
 
 std::filesystem::path repository_file(int width) {
+  const std::string name = width == kSensorWeights ? "sensor" : std::to_string(width);
   return std::filesystem::path(EVENTGAN_SOURCE_DIR) / "manifests" / "weights" /
-         ("eventgan-" + std::to_string(width) + ".safetensors");
+         ("eventgan-" + name + ".safetensors");
+}
+
+std::vector<int> widths_and_sensor() {
+  std::vector<int> widths = shipped_widths();
+  if (std::filesystem::exists(repository_file(kSensorWeights))) widths.push_back(kSensorWeights);
+  return widths;
 }
 
 TEST(ShippedWeights, AreTheRepositorysFilesByteForByte) {
-  for (const int width : shipped_widths()) {
+  for (const int width : widths_and_sensor()) {
     const auto bytes = shipped_weights_bytes(width);
     const std::string text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
     EXPECT_TRUE(text == testing::read_file(repository_file(width))) << width;
@@ -344,8 +351,17 @@ TEST(ShippedWeights, AreAllThatTheRepositoryHas) {
       if (entry.path().extension() == ".safetensors") ++files;
     }
   }
-  EXPECT_EQ(shipped_widths().size(), files);
+  EXPECT_EQ(widths_and_sensor().size(), files);
   EXPECT_TRUE(std::ranges::is_sorted(shipped_widths()));
+}
+
+TEST(ShippedWeights, HaveASetThatKnowsItsSensor) {
+  if (widths_and_sensor() == shipped_widths()) GTEST_SKIP() << "not shipped";
+  const Weights weights = read_shipped_weights(kSensorWeights);
+  ASSERT_TRUE(weights.thresholds.has_value());
+  // What manifests/weights/README.md and the examples tell it.
+  EXPECT_TRUE(weights.thresholds->contains(0.15) && weights.thresholds->contains(0.6));
+  EXPECT_NE(weights.calibration, nullptr);
 }
 
 TEST(ShippedWeights, AreNetworksOfTheirWidth) {
