@@ -54,12 +54,12 @@ void simulate(benchmark::State& state, GeneratorKind kind) {
   std::vector<float> volume(kShape.value_count());
   double events = 0;
   for (const auto& frames : pairs) {
-    generator->generate(frames, kShape.size, volume);
+    generator->generate({frames, kShape.size}, volume);
     events += std::accumulate(volume.begin(), volume.end(), 0.0);
   }
   std::size_t pair = 0;
   for (auto _ : state) {
-    generator->generate(pairs[pair++ % kPairs], kShape.size, volume);
+    generator->generate({pairs[pair++ % kPairs], kShape.size}, volume);
     benchmark::DoNotOptimize(volume.data());
   }
   state.SetItemsProcessed(state.iterations());
