@@ -19,6 +19,10 @@ CANDIDATE = os.environ.get("EVENTGAN_CANDIDATE_WEIGHTS") and os.path.abspath(os.
 FOLDER = SOURCE / "manifests" / "weights"
 SHIPPED = sorted(FOLDER.glob("eventgan-*.safetensors"))
 
+TOLD = FOLDER / "eventgan-sensor.safetensors"  # these draw events, which match no camera's one by one
+THRESHOLDS = [0.15, 0.3, 0.6]
+LEAST_RATIO = 3  # of the events at the lowest threshold to those at the highest
+
 # Images of a moving texture, and of one that rests.
 HEIGHT, WIDTH = 96, 128
 FRAMES = 7
@@ -96,7 +100,7 @@ class ShippedWeights(program.InFolder):
 
     @needs_shared_data
     def test_nearer_to_cameras_than_the_fitted_difference(self):
-        for weights in [CANDIDATE] if CANDIDATE else SHIPPED:
+        for weights in [CANDIDATE] if CANDIDATE else set(SHIPPED) - {TOLD}:
             scores = realism(REAL, "--gaps", REAL_GAP, "--with", "network,difference", "--weights", weights)
             self.assertEqual(len(scores), 6)
             for score in HIGHER + LOWER:
@@ -107,6 +111,44 @@ class ShippedWeights(program.InFolder):
                         self.assertGreater(network.mean(), model.mean())
                     else:
                         self.assertTrue((network < model).all(), network / model)
+
+    def events_at(self, threshold):
+        """Events per pixel of still and of moving pairs."""
+        job = {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1,
+               "sources": [{"dataset": "frames", "root": str(self.folder / "pictures"), "pairs": pairs([1], choose="all")}],
+               "generator": {"weights": str(TOLD), "sensor": {"threshold": threshold}},
+               "image": {"preset": "mpii"}, "output": {"directory": f"out-{threshold}", "samples_per_shard": 512}}
+        run("convert", self.write_manifest(job), "--progress", "none")
+        shard, = (self.folder / f"out-{threshold}").glob("*.h5")
+        with h5py.File(shard) as file:
+            self.assertTrue((file["pairs/threshold"][:] == threshold).all())
+            still = np.array(["still" in text(path) for path in file["pairs/prev_path"]])
+            events = file["events/volume"][:].astype(float).sum(axis=1)
+        sums = events.reshape(len(events), -1).sum(axis=1)
+        self.assertLess(np.abs(sums - sums.round()).max(), 0.01 * sums.max())  # whole ones
+        return events[still].mean(), events[~still].mean()
+
+    @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")
+    def test_a_higher_threshold_makes_fewer_events(self):
+        for name, steps in {"still": [0] * FRAMES, "moving": range(0, FRAMES * SPEED_PX, SPEED_PX)}.items():
+            write_images(self.folder / "pictures" / name, steps, HEIGHT, WIDTH, TEXTURES[0])
+        still, moving = np.array([self.events_at(threshold) for threshold in THRESHOLDS]).T
+        print(f"events per pixel at thresholds {THRESHOLDS}: still {still.round(5)}, moving {moving.round(4)}")
+        self.assertTrue((np.diff(moving) < 0).all(), moving)
+        self.assertGreater(moving[0], LEAST_RATIO * moving[-1])
+        self.assertLess(still.max(), MOST_OF_STILL * moving[0])
+
+    @needs_shared_data
+    @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")
+    def test_a_told_sensor_has_the_cameras_bins_and_polarities(self):
+        out, _ = run("realism", REAL, "--gaps", REAL_GAP, "--with", "network,difference", "--weights", TOLD, "--json", "--progress", "none")
+        for recording in json.loads(out)["recordings"]:
+            network, model = recording["methods"]
+            shares, real = (np.array(each["mean"]["events_per_channel"]) / each["mean"]["events_per_pixel"] for each in (network, recording["real"]))
+            print(f"{recording['recording']}: distance of shares {network['share_distance']:.3f}, difference's {model['share_distance']:.3f}")
+            with self.subTest(recording["recording"]):
+                self.assertLess(network["share_distance"], model["share_distance"])
+                self.assertAlmostEqual(shares[:9].sum(), real[:9].sum(), delta=0.03)
 
     @needs_shared_data
     def test_keeps_the_direction_of_motion(self):
