@@ -349,7 +349,7 @@ class EveryColumn(program.InFolder):
                    {"dataset": "kitti_object", "root": "cars", "split": "stills",
                     "pairs": {"from": "stills", "motion": {"translation_px": [1, 1], "rotation_deg": 1, "scale": 0.01}}}]
         path = self.write_manifest(program.manifest(sources, image={"width": 24, "height": 16, "fit": "letterbox", "preset": "mpii"},
-                                                    generator={"kind": "difference"}))
+                                                    generator={"kind": "difference", "sensor": {"threshold": [0.15, 0.3]}}))
         run("convert", path, "--progress", "none")
         self.out = self.folder / "out"
 
