@@ -27,7 +27,8 @@ struct PairKey {
 
 /// The contrast threshold of a pair's sensor, its mean drawn log-uniformly from the range that the
 /// manifest tells; none if it tells none. Pure.
-inline std::optional<ContrastThreshold> pair_threshold(const GeneratorSpec& spec, const PairKey& key) {
+inline std::optional<ContrastThreshold> pair_threshold(const GeneratorSpec& spec,
+                                                       const PairKey& key) {
   if (!spec.threshold) return std::nullopt;
   const auto [least, most] = spec.threshold->range;
   const double share = key.pair().keyed("threshold").uniform(0);

@@ -18,8 +18,8 @@ GeneratedPart generate_volume(const Generator& generator, const GeneratorSpec& s
   if (spec.scope.scope == Scope::kWhole) {
     part.notes = generator.generate(input, volume);
   } else {
-    const TileMask wanted = wanted_tiles(spec.scope, pair.input, pair.content, pair.content_y,
-                                         pair.content_x, labels);
+    const TileMask wanted =
+        wanted_tiles(spec.scope, pair.input, pair.content, pair.content_y, pair.content_x, labels);
     part.notes = generator.generate_tiles(input, wanted, volume);
     part.tiles = tiles_of_volume(wanted, pair.content_y, pair.content_x, pair.placement.volume);
   }

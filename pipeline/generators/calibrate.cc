@@ -115,8 +115,8 @@ std::string origin_text(const JobManifest& manifest) {
 
 /// Reads the samples; what is not held out goes into the calibrator. Returns the held-out pairs.
 std::vector<ToldPair> collect(const JobManifest& manifest, const SampleStages& stages,
-                                const std::vector<CalibrationSample>& samples, const Watch& watch,
-                                Calibrator& calibrator, std::vector<std::string>& skipped) {
+                              const std::vector<CalibrationSample>& samples, const Watch& watch,
+                              Calibrator& calibrator, std::vector<std::string>& skipped) {
   std::vector<ToldPair> held_out;
   for (const CalibrationSample& sample : samples) {
     watch.before_pair();

@@ -94,8 +94,8 @@ class SimulatedGenerator final : public Generator {
                             const SensorSpec& sensor) const {
     const CounterRandom random = random_.keyed(content_key(previous, next));
     if (spec_.kind == GeneratorKind::kEsim) {
-      return simulate_affine(previous, spec_.max_displacement_px, sensor, spec_.duration_s,
-                             random, EventOrder::kPixel);
+      return simulate_affine(previous, spec_.max_displacement_px, sensor, spec_.duration_s, random,
+                             EventOrder::kPixel);
     }
     return simulate_difference(previous, next, sensor, spec_.duration_s, random,
                                EventOrder::kPixel);

@@ -253,8 +253,7 @@ class PairGenerator {
         prepared(pairs.previous.at(index), job_.image, pairs.previous.name());
     const PreparedFrame following =
         prepared(pairs.following.at(index), job_.image, pairs.following.name());
-    const bool draws =
-        job_.generator.noise || job_.generator.threshold || generator().thresholds();
+    const bool draws = job_.generator.noise || job_.generator.threshold || generator().thresholds();
     const std::string name = draws ? content_name(previous, following) : "";
     const PairKey key{job_.seed, to_string(DatasetKind::kFrames), name};
     const PreparedPair pair = prepare_pair(previous, following);

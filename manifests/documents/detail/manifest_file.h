@@ -25,7 +25,8 @@ bool is_name(std::string_view text);
 /// 0..2^63-1.
 std::uint64_t read_seed(const StrictValue& value);
 
-/// A manifest file, byte for byte. Throws InputError if it cannot be read; `what` was expected then.
+/// A manifest file, byte for byte. Throws InputError if it cannot be read; `what` was expected
+/// then.
 std::string read_manifest_text(const std::filesystem::path& file,
                                std::string_view what = "a manifest");
 
