@@ -214,8 +214,7 @@ struct ScopeSpec {
 struct GeneratorSpec {
   GeneratorKind kind = GeneratorKind::kNetwork;
   /// kNetwork: path of a .safetensors file, "shipped", "shipped:WIDTH" or "shipped:sensor"
-  /// (manifests/weights), or
-  /// "untrained:WIDTH", WIDTH 1..64.
+  /// (manifests/weights), or "untrained:WIDTH", WIDTH 1..64.
   std::string weights = "shipped";
   /// kNetwork: none ("auto") means the fastest one for the precision on the processor that runs it.
   std::optional<Engine> engine;

@@ -24,7 +24,7 @@ struct GeneratorInput {
   /// [frame, y, x] float32, C order, previous then next, in [-1, 1].
   std::span<const float> frames;
   ImageSize size;
-  /// Of the sensor, for a generator that has thresholds(); none: the generator's own.
+  /// Of the sensor: for a simulator, or a network that has thresholds(). None: the generator's own.
   std::optional<ContrastThreshold> threshold = std::nullopt;
 };
 
