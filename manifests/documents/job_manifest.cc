@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <initializer_list>
 #include <limits>
@@ -16,7 +15,6 @@
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/documents/sensor_document.h"
 #include "manifests/values/job.h"
-#include "manifests/values/weights.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
@@ -36,9 +34,6 @@ std::vector<int> read_gaps(const StrictValue& value, PairSide side) {
   return gaps;
 }
 
-namespace {
-
-/// Reads [least, most], both in lowest..highest.
 std::array<double, 2> read_ends(const StrictValue& value, double lowest, double highest) {
   const std::vector<StrictValue> ends = value.elements(2);
   if (ends.size() != 2) {
@@ -50,6 +45,8 @@ std::array<double, 2> read_ends(const StrictValue& value, double lowest, double 
   if (range[1] < range[0]) ends[1].fault("a number not below the previous one");
   return range;
 }
+
+namespace {
 
 StillsSpec read_motion(const StrictValue& value) {
   constexpr double kFarthest_px = 100, kMost_deg = 45, kMostScale = 0.5;
@@ -384,195 +381,6 @@ ImageSpec read_image(const StrictValue& value, const std::vector<SourceSpec>& so
 }
 
 namespace {
-
-constexpr double kLargestRate_hz = 1e6;
-constexpr double kLeastThreshold = 0.01, kMostThreshold = 5;
-
-/// Reads what the simulators share; find(key) is a key's value, or none.
-template <class Find>
-SensorSpec read_sensor_keys(const Find& find) {
-  SensorSpec spec;
-  const auto read = [&](const char* key, double& number, double lowest, double highest) {
-    if (const std::optional<StrictValue> found = find(key)) number = found->number(lowest, highest);
-  };
-  read("positive_threshold", spec.positive_threshold, kLeastThreshold, kMostThreshold);
-  read("negative_threshold", spec.negative_threshold, kLeastThreshold, kMostThreshold);
-  read("threshold_spread", spec.threshold_spread, 0, 1);
-  read("refractory_s", spec.refractory_s, 0, 1);
-  read("leak_rate_hz", spec.leak_rate_hz, 0, kLargestRate_hz);
-  read("shot_noise_rate_hz", spec.shot_noise_rate_hz, 0, kLargestRate_hz);
-  read("hot_pixel_fraction", spec.hot_pixel_fraction, 0, 1);
-  read("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, 0, kLargestRate_hz);
-  read("log_epsilon", spec.log_epsilon, 1e-6, 1);
-  return spec;
-}
-
-}  // namespace
-
-SensorSpec read_sensor(const StrictValue& value) {
-  StrictObject object = value.object();
-  const SensorSpec spec = read_sensor_keys([&](const char* key) { return object.find(key); });
-  object.finish();
-  return spec;
-}
-
-namespace {
-
-/// Reads the keys that only some kinds of generator have.
-class KindKeys {
- public:
-  /// `kind`: none if the manifest's is faulty; then no key is out of place.
-  KindKeys(StrictObject& object, std::optional<GeneratorKind> kind)
-      : object_(object), kind_(kind) {}
-
-  /// The key's value if it is there. It is a fault where the kind is not one of `owners`.
-  std::optional<StrictValue> find(std::string_view key,
-                                  std::initializer_list<GeneratorKind> owners) {
-    std::optional<StrictValue> value = object_.find(key);
-    if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
-    const auto word = [](GeneratorKind owner) { return to_string(owner); };
-    value->fault(fmt::format("no such key for kind \"{}\" (only for {})", to_string(*kind_),
-                             fmt::join(owners | std::views::transform(word), ", ")));
-    return std::nullopt;
-  }
-
- private:
-  StrictObject& object_;
-  std::optional<GeneratorKind> kind_;
-};
-
-/// Reads a number, or [least, most].
-std::array<double, 2> read_range(const StrictValue& value, double lowest, double highest) {
-  if (value.is_array()) return read_ends(value, lowest, highest);
-  const double number = value.number(lowest, highest);
-  return {number, number};
-}
-
-}  // namespace
-
-ThresholdSpec read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio) {
-  ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
-  if (ratio) threshold.ratio = ratio->number(0.2, 5);
-  return threshold;
-}
-
-NoiseSpec read_noise(const StrictValue& value) {
-  NoiseSpec spec;
-  StrictObject object = value.object();
-  const auto read = [&](const char* key, std::array<double, 2>& range, double highest) {
-    if (const auto found = object.find(key)) range = read_range(*found, 0, highest);
-  };
-  read("shot_hz", spec.shot_hz, kMostNoise_hz);
-  read("leak_hz", spec.leak_hz, kMostNoise_hz);
-  read("hot_pixels", spec.hot_pixels, 1);
-  object.finish();
-  return spec;
-}
-
-namespace {
-
-void set_threshold(const ThresholdSpec& threshold, GeneratorSpec& spec) {
-  const auto [least, most] = threshold.range;
-  spec.sensor = threshold.applied(spec.sensor, {std::sqrt(least * most), threshold.ratio});
-  spec.threshold = threshold;
-}
-
-/// Reads a document in place of a `sensor`. Its threshold is that of frames.
-void read_camera(const StrictValue& value, GeneratorSpec& spec) {
-  const CameraSensor camera = read_camera_sensor(value);
-  spec.camera = camera.name;
-  spec.noise = camera.noise;
-  spec.sensor.log_epsilon = kFrameLogEpsilon;
-  if (camera.threshold) set_threshold(*camera.threshold, spec);
-}
-
-/// Reads a generator's `sensor`: what is asked of any, and of a simulator its settings.
-void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind> kind,
-                           GeneratorSpec& spec) {
-  using enum GeneratorKind;
-  if (value.is_text()) {  // a document would be here in its place (with_sensor_document)
-    value.fault(fmt::format("{} or the path of a sensor's document (*.json)",
-                            fmt::join(shipped_sensors(), ", ")));
-    return;
-  }
-  StrictObject object = value.object();
-  if (object.find("format")) return read_camera(value, spec);
-  if (const auto noise = object.find("noise")) spec.noise = read_noise(*noise);
-  KindKeys keys(object, kind);
-  spec.sensor = read_sensor_keys([&](const char* key) {
-    return keys.find(key, {kEsim, kDifference});
-  });
-  const auto ratio = object.find("threshold_ratio");
-  if (const auto found = object.find("threshold")) {
-    ThresholdSpec threshold = read_threshold(*found, ratio);
-    if (object.find("threshold_spread")) threshold.spread = spec.sensor.threshold_spread;
-    for (const char* own : {"positive_threshold", "negative_threshold"}) {
-      if (const auto key = object.find(own)) {
-        key->fault("no such key together with threshold, which sets it");
-      }
-    }
-    set_threshold(threshold, spec);
-  } else if (ratio) {
-    ratio->fault("threshold beside it", "none");
-  }
-  object.finish();
-}
-
-/// Reads the manifest's `generator`; which keys it may have depends on its kind.
-GeneratorSpec read_generator(const StrictValue& value) {
-  using enum GeneratorKind;
-  GeneratorSpec spec;
-  StrictObject object = value.object();
-  std::optional<GeneratorKind> kind = spec.kind;
-  if (const auto found = object.find("kind")) kind = found->sound_choice(kGeneratorWords);
-  spec.kind = kind.value_or(spec.kind);
-
-  KindKeys keys(object, kind);
-  if (const auto weights = keys.find("weights", {kNetwork})) {
-    spec.weights = weights->text(
-        "the path of a .safetensors file, \"shipped\", or \"shipped:WIDTH\" or "
-        "\"untrained:WIDTH\" with WIDTH in 1..64",
-        [](std::string_view text) { return parse_weights_name(text).has_value(); });
-  }
-  if (const auto engine = keys.find("engine", {kNetwork})) {
-    spec.engine = engine->choice(kEngineWords);
-  }
-  if (const auto device = keys.find("device", {kNetwork})) {
-    spec.device = device->choice(kDeviceWords);
-  }
-  if (const auto precision = keys.find("precision", {kNetwork})) {
-    spec.precision = precision->choice(kPrecisionWords);
-  }
-  if (const auto sample = keys.find("sample", {kNetwork})) spec.sample = sample->boolean();
-  if (const auto scope = keys.find("scope", {kNetwork})) {
-    spec.scope.scope = scope->choice(kScopeWords);
-  }
-  if (const auto threshold = keys.find("motion_threshold", {kNetwork})) {
-    spec.scope.motion_threshold = threshold->number(0, 255);
-  }
-  if (const auto margin = keys.find("motion_margin_px", {kNetwork})) {
-    spec.scope.motion_margin_px = margin->integer(0, 64);
-  }
-  if (const auto margin = keys.find("label_margin_px", {kNetwork})) {
-    spec.scope.label_margin_px = margin->integer(0, 1024);
-  }
-  if (const auto tile = keys.find("tile_px", {kNetwork}))
-    spec.scope.tile_px = tile->integer(8, 128);
-  if (const auto sensor = keys.find("sensor", {kNetwork, kEsim, kDifference})) {
-    read_generator_sensor(*sensor, kind, spec);
-  }
-  if (const auto duration = keys.find("duration_s", {kNetwork, kEsim, kDifference})) {
-    spec.duration_s = duration->number(1e-4, 10);
-    if (kind == kNetwork && !spec.noise) {
-      duration->fault("no such key for kind \"network\" without sensor.noise");
-    }
-  }
-  if (const auto displacement = keys.find("max_displacement_px", {kEsim})) {
-    spec.max_displacement_px = displacement->number(0.1, 100);
-  }
-  object.finish();
-  return spec;
-}
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {

@@ -53,19 +53,6 @@ void read_options(StrictObject& object, RecordingSpec& spec) {
   if (const auto rectify = find("rectify", {kDsec})) spec.options.rectify = rectify->boolean();
 }
 
-/// Two numbers, the second not below the first.
-std::array<double, 2> read_range(const StrictValue& value, double lowest, double highest) {
-  const auto elements = value.elements(2);
-  if (elements.empty()) return {1, 1};
-  if (elements.size() != 2) {
-    value.fault("an array of 2");
-    return {1, 1};
-  }
-  const std::array range{elements[0].number(lowest, highest), elements[1].number(lowest, highest)};
-  if (range[1] < range[0]) elements[1].fault("a number not below the previous one");
-  return range;
-}
-
 std::array<double, 2> read_betas(const StrictValue& value) {
   constexpr double kLargestBeta = 0.999999;
   const auto elements = value.elements(2);
@@ -165,8 +152,8 @@ AugmentationSpec read_augmentation(const StrictValue& value) {
   StrictObject object = value.object();
   if (const auto flip = object.find("flip")) spec.flip = flip->boolean();
   if (const auto reverse = object.find("reverse")) spec.reverse = reverse->boolean();
-  if (const auto gain = object.find("gain")) spec.gain = read_range(*gain, 0.1, 10);
-  if (const auto gamma = object.find("gamma")) spec.gamma = read_range(*gamma, 0.1, 10);
+  if (const auto gain = object.find("gain")) spec.gain = read_ends(*gain, 0.1, 10);
+  if (const auto gamma = object.find("gamma")) spec.gamma = read_ends(*gamma, 0.1, 10);
   if (const auto fraction = object.find("static_fraction")) {
     spec.static_fraction = fraction->number(0, 1);
   }

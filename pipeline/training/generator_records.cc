@@ -173,7 +173,7 @@ ValidationScores ValidationPairs::judge(const Generator& generator) const {
     result.volume_loss +=
         mean_difference(volume, sample.volume) / static_cast<double>(samples_.size());
     std::vector<float> real = sample.volume;
-    if (sample.threshold) {  // numbers of events, rounded at half an event
+    if (sample.threshold) {  // rates and counts: each on its own scale
       volume = normalized(std::move(volume));
       real = normalized(std::move(real));
     }

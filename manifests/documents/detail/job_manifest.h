@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -29,6 +30,9 @@ std::string read_stereo_camera(const StrictValue& value);
 /// Reads width and height, each in least..most.
 ImageSize read_size(const StrictValue& value, int least, int most);
 
+/// Reads [least, most], both in lowest..highest.
+std::array<double, 2> read_ends(const StrictValue& value, double lowest, double highest);
+
 /// Reads a recording's `columns`.
 EventFields read_columns(const StrictValue& value);
 
@@ -37,6 +41,9 @@ ThresholdSpec read_threshold(const StrictValue& value, const std::optional<Stric
 
 /// Reads a sensor's `noise`.
 NoiseSpec read_noise(const StrictValue& value);
+
+/// Reads the manifest's `generator`; which keys it may have depends on its kind.
+GeneratorSpec read_generator(const StrictValue& value);
 
 /// Reads a manifest's `sensor`, whose keys are SensorSpec's.
 SensorSpec read_sensor(const StrictValue& value);
