@@ -48,6 +48,25 @@ class SampleStagesTest : public ::testing::Test {
     return message;
   }
 
+  /// Seed, dataset and sample's id decide what is stored; neither the shard nor other sources do.
+  void expect_that_key_decides() {
+    const std::vector<std::byte> chunk = run().chunk;
+    shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
+    EXPECT_EQ(run().chunk, chunk) << "another shard";
+    manifest_.sources.emplace(manifest_.sources.begin())->dataset = DatasetKind::kMpii;
+    datasets_.insert(datasets_.begin(), std::make_unique<testing::FakeDataset>("other", 2));
+    shard_.source = 1;
+    EXPECT_EQ(run().chunk, chunk) << "another source before it";
+    shard_.samples[0].sample_id = "0002";
+    EXPECT_NE(run().chunk, chunk);
+    shard_.samples[0].sample_id = "0001";
+    manifest_.seed = 1;
+    EXPECT_NE(run().chunk, chunk);
+    manifest_.seed = 0;
+    manifest_.sources[1].dataset = DatasetKind::kMpiiList;
+    EXPECT_NE(run().chunk, chunk);
+  }
+
   /// What is stored of it, in float32.
   std::vector<float> volume(const SampleMessage& message) {
     EXPECT_FALSE(message.failed()) << message.sample.fault;
@@ -335,20 +354,7 @@ TEST_F(RatesTest, AreStoredAsTheyAreIfAsked) {
   EXPECT_NEAR(run().sample.statistics.sum_positive, 24 * 2.0 / 0.8, 1e-3);  // C+ = 0.4 / 0.5
 }
 
-TEST_F(RatesTest, EventsFollowFromSeedDatasetAndSampleAlone) {
-  const std::vector<std::byte> chunk = run().chunk;
-  EXPECT_EQ(run().chunk, chunk);
-  shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
-  EXPECT_EQ(run().chunk, chunk) << "another shard";
-  shard_.samples[0].sample_id = "0002";
-  EXPECT_NE(run().chunk, chunk);
-  shard_.samples[0].sample_id = "0001";
-  manifest_.seed = 1;
-  EXPECT_NE(run().chunk, chunk);
-  manifest_.seed = 0;
-  manifest_.sources[0].dataset = DatasetKind::kMpiiList;
-  EXPECT_NE(run().chunk, chunk);
-}
+TEST_F(RatesTest, EventsFollowFromSeedDatasetAndSampleAlone) { expect_that_key_decides(); }
 
 TEST_F(RatesTest, OfAStillSceneGiveNoEvents) {
   shard_.samples[0].pair.next = shard_.samples[0].pair.previous;
@@ -445,21 +451,7 @@ TEST_F(NoiseTest, CoversWhatTheScopeLeavesOut) {
 
 TEST_F(NoiseTest, FollowsFromSeedDatasetAndSampleAlone) {
   manifest_.generator.noise = kShotNoise;
-  const std::vector<std::byte> chunk = run().chunk;
-  shard_.samples.insert(shard_.samples.begin(), shard_.samples[0]);
-  EXPECT_EQ(run().chunk, chunk) << "another shard";
-  manifest_.sources.emplace(manifest_.sources.begin())->dataset = DatasetKind::kMpii;
-  datasets_.insert(datasets_.begin(), std::make_unique<testing::FakeDataset>("other", 2));
-  shard_.source = 1;
-  EXPECT_EQ(run().chunk, chunk) << "another source before it";
-  shard_.samples[0].sample_id = "0002";
-  EXPECT_NE(run().chunk, chunk);
-  shard_.samples[0].sample_id = "0001";
-  manifest_.seed = 1;
-  EXPECT_NE(run().chunk, chunk);
-  manifest_.seed = 0;
-  manifest_.sources[1].dataset = DatasetKind::kMpiiList;
-  EXPECT_NE(run().chunk, chunk);
+  expect_that_key_decides();
 }
 
 TEST_F(NoiseTest, HotPixelsAreThoseOfTheDataset) {
