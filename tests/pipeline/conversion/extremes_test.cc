@@ -266,6 +266,7 @@ class Extremes : public ::testing::TestWithParam<EngineCase> {
   static SampleMessage converted(const Generator& generator, const std::vector<float>& frames,
                                  ImageSize size, StoredType type) {
     JobManifest manifest;
+    manifest.sources.resize(1);
     manifest.output.dtype = type;
     const std::vector<std::unique_ptr<Dataset>> no_datasets;
     const SampleStages stages(manifest, no_datasets, generator, 1);
