@@ -289,12 +289,13 @@ at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real) {
 
 at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real) {
   require_alike(generated, real);
-  constexpr double kBackground = 0.02;
+  constexpr double kBackground = 1;
   // Below zero, where an output slope leads, nothing is expected; the gradient is as at zero, where
   // relu has none.
   const at::Tensor below = (generated - generated.detach()) * generated.le(0);
   const at::Tensor expected = at::relu(generated) + below + kBackground;
-  return (expected - (real + kBackground) * expected.log()).mean();
+  const at::Tensor happened = real + kBackground;
+  return (expected - happened - happened * (expected.log() - happened.log())).mean();
 }
 
 }  // namespace eventgan

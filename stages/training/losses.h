@@ -83,12 +83,13 @@ at::Tensor count_loss(const at::Tensor& generated, const at::Tensor& real, doubl
 at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real);
 
 /// How unlikely the real volume is where the generated one is the number of events to be expected
-/// in each voxel (a Poisson process), but for what does not depend on it: the mean over all voxels
-/// of
-///   r - n ln r,  r = λ + δ,  n = real + δ,  δ = 0.02
-/// λ the generated one, ≥ 0. The background δ, in both, keeps the gradient (λ - real) / (λ + δ)
-/// finite where nothing is expected and leaves the best λ what it is without: the mean of what
-/// happens. Else as volume_loss says.
+/// in each voxel: half the deviance of a Poisson process, the mean over all voxels of
+///   r - n - n ln(r / n),  r = λ + δ,  n = real + δ,  δ = 1
+/// λ the generated one, ≥ 0. It is ≥ 0, and 0 where just what was expected happened. The background
+/// δ, in both, leaves the best λ what it is without: the mean of what happens. The gradient,
+/// (λ - real) / (λ + δ), is then no larger than the number of events; with a small δ a single event
+/// where hardly any are expected outweighs all others, and the training takes many more steps. Else
+/// as volume_loss says.
 at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real);
 
 }  // namespace eventgan

@@ -360,7 +360,7 @@ TEST(OverlapLoss, HasTheGradientOfDifferences) {
 
 /// One term of the likelihood loss.
 double unlikelihood(double expected, double real) {
-  return expected + 0.02 - (real + 0.02) * std::log(expected + 0.02);
+  return expected - real - (real + 1) * std::log((expected + 1) / (real + 1));
 }
 
 TEST(LikelihoodLoss, IsTheMeanOfItsTerms) {
@@ -370,6 +370,12 @@ TEST(LikelihoodLoss, IsTheMeanOfItsTerms) {
       likelihood_loss(generated, real).item<double>(),
       (unlikelihood(0, 0) + unlikelihood(1, 0) + unlikelihood(0.5, 0.75) + unlikelihood(3, 5)) / 4,
       1e-6);
+}
+
+TEST(LikelihoodLoss, IsZeroWhereAllIsAsExpected) {
+  const at::Tensor real = tensor_of({1, 2, 1, 2}, {0, 1, 0.25f, 1e4f});
+  EXPECT_NEAR(likelihood_loss(real, real).item<double>(), 0, 1e-6);
+  EXPECT_GT(likelihood_loss(real + 0.01, real).item<double>(), 1e-6);
 }
 
 TEST(LikelihoodLoss, IsLeastWhereTheMeanOfTheCountsIsExpected) {
@@ -390,7 +396,7 @@ TEST(LikelihoodLoss, IsLeastWhereTheMeanOfTheCountsIsExpected) {
 }
 
 TEST(LikelihoodLoss, HasItsGradientAtZeroAndBelow) {
-  // (λ - real) / (λ + 0.02) of each of the voxels, of which there are six; below zero as at zero.
+  // (λ - real) / (λ + 1) of each of the voxels, of which there are six; below zero as at zero.
   const at::Tensor generated = tensor_of({1, 6, 1, 1}, {0, 0, -0.3f, -50, 1, 1});
   generated.set_requires_grad(true);
   const at::Tensor real = tensor_of({1, 6, 1, 1}, {0, 2, 2, 0, 0, 1});
@@ -401,8 +407,7 @@ TEST(LikelihoodLoss, HasItsGradientAtZeroAndBelow) {
           6,
       1e-6);
   loss.backward();
-  const at::Tensor expected =
-      tensor_of({1, 6, 1, 1}, {0, -2 / 0.02f, -2 / 0.02f, 0, 1 / 1.02f, 0}) / 6;
+  const at::Tensor expected = tensor_of({1, 6, 1, 1}, {0, -2, -2, 0, 0.5f, 0}) / 6;
   EXPECT_LT((generated.grad() - expected).abs().max().item<double>(), 1e-5);
 }
 
