@@ -45,6 +45,7 @@ class Source:
     normalize: str = "none"
     motion_px: float = MOTION_PX
     size: tuple[int, int] = SIZE
+    finer: int = 1  # the sensor has so many times the size's lines and columns; events are averaged down, as a camera's are before a detector
 
 
 def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -102,8 +103,8 @@ def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 # A sensor that is another one for each pair, in place of the detector's augmentation.
 DRAWN = {"threshold": [0.15, 0.6], "noise": {"shot_hz": [0.1, 1.5], "leak_hz": 0.1, "hot_pixels": 1e-4}}
 SENSORS = {
-    "EventGAN, drawn sensor": Source({"weights": "shipped:sensor", "sensor": DRAWN}),
-    "difference, drawn sensor": Source({"kind": "difference", "sensor": DRAWN}),
+    "EventGAN, drawn sensor": Source({"weights": "shipped:sensor", "sensor": DRAWN}, finer=2),
+    "difference, drawn sensor": Source({"kind": "difference", "sensor": DRAWN}, finer=2),
 }
 SHIPPED = {width: {"weights": f"shipped:{width}"} for width in (16, 8)}
 METHODS = {  # of the main table
@@ -117,6 +118,8 @@ METHODS = {  # of the main table
     "v2e": Source(of_pair=v2e),
 }
 SOURCES = METHODS | SENSORS | {
+    "EventGAN, drawn sensor, as coarse": Source({"weights": "shipped:sensor", "sensor": DRAWN}),
+    "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
     "ESIM, eta98": Source({"kind": "esim"}, normalize="eta98"),
@@ -149,7 +152,7 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
         threshold = fitted_threshold(args)
         generator["sensor"] = {"positive_threshold": threshold, "negative_threshold": threshold}
     return {"format": "eventgan-manifest", "version": 1, "name": "persons", "seed": 7, "sources": sources, "generator": generator,
-            "image": {"height": source.size[0], "width": source.size[1], "fit": "letterbox", "preset": "mpii"},
+            "image": {"height": source.size[0] * source.finer, "width": source.size[1] * source.finer, "fit": "letterbox", "preset": "mpii"},
             "volume": {"normalize": source.normalize}, "output": {"directory": name, "dtype": "float16", "samples_per_shard": 64}}
 
 
@@ -204,10 +207,13 @@ def items_of(args: argparse.Namespace, name: str, signed: bool = True) -> list[I
         shards = shards_of(args, name if source.generator else "EventGAN 16")
         if source.of_pair:
             shards = shards.changed(functools.partial(source.of_pair, args))
-        elif signed:
+        elif signed and source.finer == 1:
             shards = shards.changed(train_detector.signed)
         data = DetectionDataset(shards, CLASSES)
-        return [_halved(data[i]) for i in range(len(data))]
+        items = (data[i] for i in range(len(data)))
+        if source.finer > 1:
+            return [_smaller(item, source.size, signed_channel if signed else _normalized) for item in items]
+        return [_halved(item) for item in items]
 
     return _kept(args, f"{file_name(name)}{'' if signed else '-volume'}", make)
 

@@ -75,8 +75,9 @@ def rows(recordings_of_cameras: Sequence[str]) -> list[Row]:
 
 def drawn_sensors() -> list[Row]:
     """Sensors that are drawn where events are made, against what is drawn in the detector's training; with more steps for all."""
-    plain = [Row(f"{name}, {SENSOR_STEPS} steps", (name,), PLAIN, SENSOR_STEPS) for name in (*SENSORS, "gradient", "EventGAN 16")]
-    return [*plain, Row(f"EventGAN 16, augmented, {SENSOR_STEPS} steps", ("EventGAN 16",), steps=SENSOR_STEPS)]
+    finer = ("EventGAN 16", "EventGAN 16, finer")
+    plain = [Row(f"{name}, {SENSOR_STEPS} steps", (name,), PLAIN, SENSOR_STEPS) for name in (*SENSORS, "EventGAN, drawn sensor, as coarse", "gradient", *finer)]
+    return [*plain, *(Row(f"{name}, augmented, {SENSOR_STEPS} steps", (name,), steps=SENSOR_STEPS) for name in finer)]
 
 
 def ablations() -> list[Row]:
@@ -291,8 +292,8 @@ def run(args: argparse.Namespace) -> None:
     if args.quick:
         args.out = args.out / "quick"
         args.steps, args.seeds, main, drawn, extra = 60, 1, [row for row in main if row.name == "EventGAN 16, augmented"], [], []
-    tasks = [(args, row, seed) for seed in range(args.seeds) for row in main]
-    tasks += [(args, row, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for row in (*drawn, *extra)]
+    tasks = [(args, row, seed) for seed in range(args.seeds) for row in (*main, *drawn)]
+    tasks += [(args, row, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for row in extra]
     if args.trainer and not args.quick:
         tasks += [(args, name, seed) for seed in range(min(args.seeds, ABLATION_SEEDS)) for name in SOURCES if name.endswith(", eta98")]
     # What several processes read is made before there are several; the program uses all cores itself.

@@ -21,7 +21,7 @@ sys.path.append(str(EXAMPLES))
 import labelled_events  # noqa: E402
 import real_cameras  # noqa: E402
 
-from eventgan import Generator  # noqa: E402
+from eventgan import Generator, signed_channel  # noqa: E402
 
 DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 
@@ -133,6 +133,20 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
     assert volume.shape == (18, 192, 320) and volume.max() == 1 and volume.min() == 0 and not volume[9:].any()  # no negative events
     with pytest.raises(SystemExit, match="expected folders with windows .* got none"):
         labelled_events.recordings_in(args.frames)
+
+
+def test_events_of_a_finer_sensor_are_averaged(args):
+    """Each pixel that the detector sees is the mean of four of the sensor's; boxes keep their place."""
+    args.out.mkdir()
+    name = "difference, drawn sensor"
+    items, shards, coarse = labelled_events.items_of(args, name), labelled_events.shards_of(args, name), labelled_events.items_of(args, "difference")
+    assert len(items) == len(shards) == len(coarse) and shards[0]["volume"].shape == (18, 384, 640)
+    for item, sample, other in zip(items, shards, coarse):
+        averaged = sample["volume"].astype(np.float32).reshape(18, 192, 2, 320, 2).mean((2, 4))
+        np.testing.assert_allclose(item["volume"], signed_channel(averaged), atol=1e-3)
+        np.testing.assert_allclose(item["boxes"], other["boxes"], atol=0.5)
+    volume = labelled_events.items_of(args, name, signed=False)[0]["volume"]
+    assert volume.shape == (18, 192, 320) and volume.max() == 1
 
 
 def test_trained_once_and_never_on_what_it_is_tested_on(args, monkeypatch):
