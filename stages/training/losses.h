@@ -88,8 +88,7 @@ at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real);
 /// λ the generated one, ≥ 0. It is ≥ 0, and 0 where just what was expected happened. The background
 /// δ, in both, leaves the best λ what it is without: the mean of what happens. The gradient,
 /// (λ - real) / (λ + δ), is then no larger than the number of events; with a small δ a single event
-/// where hardly any are expected outweighs all others, and the training takes many more steps. Else
-/// as volume_loss says.
+/// where hardly any are expected outweighs all others. Else as volume_loss says.
 at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real);
 
 }  // namespace eventgan

@@ -21,6 +21,7 @@ SHIPPED = sorted(FOLDER.glob("eventgan-*.safetensors"))
 
 TOLD = FOLDER / "eventgan-sensor.safetensors"  # these draw events, which match no camera's one by one
 THRESHOLDS = [0.15, 0.3, 0.6]
+MOST_TOLD_STILL = 0.02  # events per pixel of a still pair, of weights that have learnt real cameras' noise: of 20 ms of 1 Hz
 LEAST_RATIO = 3  # of the events at the lowest threshold to those at the highest
 
 # Images of a moving texture, and of one that rests.
@@ -136,7 +137,7 @@ class ShippedWeights(program.InFolder):
         print(f"events per pixel at thresholds {THRESHOLDS}: still {still.round(5)}, moving {moving.round(4)}")
         self.assertTrue((np.diff(moving) < 0).all(), moving)
         self.assertGreater(moving[0], LEAST_RATIO * moving[-1])
-        self.assertLess(still.max(), MOST_OF_STILL * moving[0])
+        self.assertLess(still.max(), MOST_TOLD_STILL)
 
     @needs_shared_data
     @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")

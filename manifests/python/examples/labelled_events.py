@@ -118,7 +118,6 @@ METHODS = {  # of the main table
     "v2e": Source(of_pair=v2e),
 }
 SOURCES = METHODS | SENSORS | {
-    "EventGAN, drawn sensor, as coarse": Source({"weights": "shipped:sensor", "sensor": DRAWN}),
     "EventGAN 16, finer": Source(SHIPPED[16], finer=2),
     "EventGAN 16, eta98": Source(SHIPPED[16], normalize="eta98"),
     "difference, eta98": Source({"kind": "difference"}, normalize="eta98"),
