@@ -87,8 +87,8 @@ at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real);
 ///   r - n - n ln(r / n),  r = λ + δ,  n = real + δ,  δ = 1
 /// λ the generated one, ≥ 0. It is ≥ 0, and 0 where just what was expected happened. The background
 /// δ, in both, leaves the best λ what it is without: the mean of what happens. The gradient,
-/// (λ - real) / (λ + δ), is then no larger than the number of events; with a small δ a single event
-/// where hardly any are expected outweighs all others. Else as volume_loss says.
+/// (λ - real) / (λ + δ), then lies between -real and 1; with a small δ a single event where hardly
+/// any are expected outweighs all others. Else as volume_loss says.
 at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real);
 
 }  // namespace eventgan
