@@ -1,11 +1,9 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <ranges>
 
 #include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/manifest_file.h"
 #include "manifests/documents/detail/sensor_document.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/documents/sensor_document.h"
@@ -49,29 +47,6 @@ SensorSpec read_sensor(const StrictValue& value) {
 }
 
 namespace {
-
-/// Reads the keys that only some kinds of generator have.
-class KindKeys {
- public:
-  /// `kind`: none if the manifest's is faulty; then no key is out of place.
-  KindKeys(StrictObject& object, std::optional<GeneratorKind> kind)
-      : object_(object), kind_(kind) {}
-
-  /// The key's value if it is there. It is a fault where the kind is not one of `owners`.
-  std::optional<StrictValue> find(std::string_view key,
-                                  std::initializer_list<GeneratorKind> owners) {
-    std::optional<StrictValue> value = object_.find(key);
-    if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
-    const auto word = [](GeneratorKind owner) { return to_string(owner); };
-    value->fault(fmt::format("no such key for kind \"{}\" (only for {})", to_string(*kind_),
-                             fmt::join(owners | std::views::transform(word), ", ")));
-    return std::nullopt;
-  }
-
- private:
-  StrictObject& object_;
-  std::optional<GeneratorKind> kind_;
-};
 
 /// Reads a number, or [least, most].
 std::array<double, 2> read_range(const StrictValue& value, double lowest, double highest) {
@@ -130,7 +105,7 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
   StrictObject object = value.object();
   if (object.find("format")) return read_camera(value, spec);
   if (const auto noise = object.find("noise")) spec.noise = read_noise(*noise);
-  KindKeys keys(object, kind);
+  SpecialKeys keys(object, "kind", kind);
   spec.sensor = read_sensor_keys([&](const char* key) {
     return keys.find(key, {kEsim, kDifference});
   });
@@ -160,7 +135,7 @@ GeneratorSpec read_generator(const StrictValue& value) {
   if (const auto found = object.find("kind")) kind = found->sound_choice(kGeneratorWords);
   spec.kind = kind.value_or(spec.kind);
 
-  KindKeys keys(object, kind);
+  SpecialKeys keys(object, "kind", kind);
   if (const auto weights = keys.find("weights", {kNetwork})) {
     spec.weights = weights->text(
         "the path of a .safetensors file, \"shipped\", or \"shipped:WIDTH\" or "

@@ -1,12 +1,8 @@
 #include "manifests/documents/job_manifest.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cstdint>
-#include <initializer_list>
 #include <limits>
-#include <ranges>
 #include <stdexcept>
 
 #include "manifests/documents/detail/job_manifest.h"
@@ -100,40 +96,6 @@ PairSpec read_pairs(const StrictValue& value) {
 
 namespace {
 
-/// Reads the keys that only some datasets have.
-class SpecialKeys {
- public:
-  /// `dataset`: none if the manifest's is faulty; then no key is out of place.
-  SpecialKeys(StrictObject& object, std::optional<DatasetKind> dataset)
-      : object_(object), dataset_(dataset) {}
-
-  /// The key's value if it is there. It is a fault where the dataset is not one of `owners`.
-  std::optional<StrictValue> find(std::string_view key, std::initializer_list<DatasetKind> owners) {
-    std::optional<StrictValue> value = object_.find(key);
-    if (!value || !dataset_) return value;
-    if (std::find(owners.begin(), owners.end(), *dataset_) != owners.end()) return value;
-    std::string expected =
-        "no such key for dataset \"" + std::string(to_string(*dataset_)) + "\" (only for ";
-    std::string_view separator;
-    for (const DatasetKind owner : owners) {
-      expected.append(separator).append(to_string(owner));
-      separator = ", ";
-    }
-    value->fault(expected + ")");
-    return std::nullopt;
-  }
-
-  std::optional<std::string> find_path(std::string_view key,
-                                       std::initializer_list<DatasetKind> owners) {
-    const std::optional<StrictValue> value = find(key, owners);
-    return value ? std::optional(read_path(*value)) : std::nullopt;
-  }
-
- private:
-  StrictObject& object_;
-  std::optional<DatasetKind> dataset_;
-};
-
 std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
   std::vector<std::string> words;
   if (!value) return words;
@@ -141,7 +103,7 @@ std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
   return words;
 }
 
-SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
+SelectionSpec read_selection(StrictObject& object, SpecialKeys<DatasetKind>& keys) {
   SelectionSpec spec;
   if (const auto ids = object.find("ids")) spec.ids = read_path(*ids);
   using enum DatasetKind;
@@ -165,7 +127,7 @@ SelectionSpec read_selection(StrictObject& object, SpecialKeys& keys) {
 /// authors took.
 constexpr std::int64_t kDhp19Events = 7500;
 
-WindowSpec read_window(SpecialKeys& keys, std::optional<DatasetKind> dataset) {
+WindowSpec read_window(SpecialKeys<DatasetKind>& keys, std::optional<DatasetKind> dataset) {
   using enum DatasetKind;
   WindowSpec spec;
   const auto duration = keys.find("window_s", {kRecording});
@@ -192,7 +154,7 @@ LabelSpec read_labels(const StrictValue& value) {
   return spec;
 }
 
-RecordingOptions read_recording_options(SpecialKeys& keys) {
+RecordingOptions read_recording_options(SpecialKeys<DatasetKind>& keys) {
   constexpr int kLargestSensor = 8192;
   using enum DatasetKind;
   RecordingOptions options;
@@ -246,7 +208,7 @@ SourceSpec read_source(const StrictValue& value) {
   spec.root = read_path(object.at("root"));
   if (const auto split = object.find("split")) spec.split = read_name(*split);
 
-  SpecialKeys keys(object, dataset);
+  SpecialKeys keys(object, "dataset", dataset);
   spec.raw_root = keys.find_path("raw_root", {kKittiObject});
   spec.devkit = keys.find_path("devkit", {kKittiObject});
   // Neither is of use without the other: the devkit's mapping says which raw frame an image is.

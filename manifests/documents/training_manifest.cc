@@ -1,10 +1,6 @@
 #include "manifests/documents/training_manifest.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <initializer_list>
-#include <ranges>
 
 #include "manifests/documents/detail/job_manifest.h"
 #include "manifests/documents/detail/manifest_file.h"
@@ -39,18 +35,11 @@ static_assert(kFormatWords.back().value == RecordingFormat::kDsec);
 /// Reads the keys that only some formats have.
 void read_options(StrictObject& object, RecordingSpec& spec) {
   using enum RecordingFormat;
-  const auto find = [&](const char* key, std::initializer_list<RecordingFormat> owners) {
-    std::optional<StrictValue> value = object.find(key);
-    if (!value || std::ranges::find(owners, spec.format) != owners.end()) return value;
-    const auto word = [](RecordingFormat owner) { return to_string(owner); };
-    value->fault(fmt::format("no such key for format \"{}\" (only for {})", to_string(spec.format),
-                             fmt::join(owners | std::views::transform(word), ", ")));
-    return std::optional<StrictValue>();
-  };
-  if (const auto camera = find("camera", {kMvsec})) {
+  SpecialKeys keys(object, "format", std::optional(spec.format));
+  if (const auto camera = keys.find("camera", {kMvsec})) {
     spec.options.camera = read_stereo_camera(*camera);
   }
-  if (const auto rectify = find("rectify", {kDsec})) spec.options.rectify = rectify->boolean();
+  if (const auto rectify = keys.find("rectify", {kDsec})) spec.options.rectify = rectify->boolean();
 }
 
 std::array<double, 2> read_betas(const StrictValue& value) {

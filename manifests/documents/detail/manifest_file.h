@@ -1,7 +1,13 @@
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <initializer_list>
+#include <optional>
+#include <ranges>
 #include <string>
 #include <string_view>
 
@@ -21,6 +27,35 @@ std::string read_path(const StrictValue& value);
 /// stay below the file systems' limit of 255 bytes.
 std::string read_name(const StrictValue& value);
 bool is_name(std::string_view text);
+
+/// Reads the keys of an object that only some of its kinds have: datasets, generators, formats.
+template <class Kind>
+class SpecialKeys {
+ public:
+  /// `what`: the key that says the kind; `kind`: none if it is faulty; then no key is out of place.
+  SpecialKeys(StrictObject& object, const char* what, std::optional<Kind> kind)
+      : object_(object), what_(what), kind_(kind) {}
+
+  /// The key's value if it is there. It is a fault where the kind is not one of `owners`.
+  std::optional<StrictValue> find(std::string_view key, std::initializer_list<Kind> owners) {
+    std::optional<StrictValue> value = object_.find(key);
+    if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
+    const auto word = [](Kind owner) { return to_string(owner); };
+    value->fault(fmt::format("no such key for {} \"{}\" (only for {})", what_, to_string(*kind_),
+                             fmt::join(owners | std::views::transform(word), ", ")));
+    return std::nullopt;
+  }
+
+  std::optional<std::string> find_path(std::string_view key, std::initializer_list<Kind> owners) {
+    const std::optional<StrictValue> value = find(key, owners);
+    return value ? std::optional(read_path(*value)) : std::nullopt;
+  }
+
+ private:
+  StrictObject& object_;
+  const char* what_;
+  std::optional<Kind> kind_;
+};
 
 /// 0..2^63-1.
 std::uint64_t read_seed(const StrictValue& value);
