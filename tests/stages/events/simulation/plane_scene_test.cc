@@ -8,7 +8,7 @@
 namespace eventgan {
 namespace {
 
-constexpr ImageSize kSize{96, 128};
+constexpr ImageSize kSceneSize{96, 128};
 constexpr int kScenes = 4000;
 
 /// Four standard deviations of a share among the scenes.
@@ -20,7 +20,7 @@ bool rests(const Plane& plane) {
 
 TEST(DrawPlaneScene, IsAFunctionOfTheSeed) {
   const auto first_shift = [](std::uint64_t seed) {
-    const PlaneScene scene = draw_plane_scene(3, kSize, CounterRandom(seed));
+    const PlaneScene scene = draw_plane_scene(3, kSceneSize, CounterRandom(seed));
     return scene.planes.front().texture.x_place + scene.duration_s + scene.gain;
   };
   EXPECT_EQ(first_shift(1), first_shift(1));
@@ -30,8 +30,8 @@ TEST(DrawPlaneScene, IsAFunctionOfTheSeed) {
 TEST(DrawPlaneScene, KeepsWithinItsRanges) {
   for (int seed = 0; seed < kScenes; ++seed) {
     const PlaneScene scene =
-        draw_plane_scene(3, kSize, CounterRandom(static_cast<std::uint64_t>(seed)));
-    ASSERT_EQ(scene.size, kSize);
+        draw_plane_scene(3, kSceneSize, CounterRandom(static_cast<std::uint64_t>(seed)));
+    ASSERT_EQ(scene.size, kSceneSize);
     ASSERT_GE(scene.duration_s, 0.005);
     ASSERT_LE(scene.duration_s, 0.2);
     ASSERT_GE(scene.planes.size(), 1u);
@@ -57,7 +57,7 @@ TEST(DrawPlaneScene, OneSceneInTwentyIsAtRest) {
   int filtered = 0;
   for (int seed = 0; seed < kScenes; ++seed) {
     const PlaneScene scene =
-        draw_plane_scene(1, kSize, CounterRandom(static_cast<std::uint64_t>(seed)));
+        draw_plane_scene(1, kSceneSize, CounterRandom(static_cast<std::uint64_t>(seed)));
     bool moves = scene.light_change != 0;
     for (const Plane& plane : scene.planes) moves = moves || !rests(plane);
     at_rest += !moves;
@@ -70,7 +70,7 @@ TEST(DrawPlaneScene, OneSceneInTwentyIsAtRest) {
 }
 
 TEST(DrawPlaneScene, RefusesToDrawFromNothing) {
-  EXPECT_THROW(draw_plane_scene(0, kSize, CounterRandom(1)), std::invalid_argument);
+  EXPECT_THROW(draw_plane_scene(0, kSceneSize, CounterRandom(1)), std::invalid_argument);
   EXPECT_THROW(draw_plane_scene(1, {0, 5}, CounterRandom(1)), std::invalid_argument);
 }
 
