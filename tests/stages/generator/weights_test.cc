@@ -62,9 +62,9 @@ TEST(NetworkPlanes, AreTheSensorsInputOfTheThresholdThatIsToldOrTheMiddleOne) {
   const ThresholdRange range{0.1, 0.4};
   const auto planes = [&](std::optional<ContrastThreshold> told) {
     std::vector<float> kept;
-    const auto planes = network_planes({frames, {1, 2}, told}, range, kept);
-    EXPECT_EQ(planes.data(), kept.data());
-    return std::vector<float>(planes.begin(), planes.end());
+    const auto seen = network_planes({frames, {1, 2}, told}, range, kept);
+    EXPECT_EQ(seen.data(), kept.data());
+    return std::vector<float>(seen.begin(), seen.end());
   };
   EXPECT_EQ(planes(std::nullopt), sensor_input(frames, {range.geometric_mean()}));
   EXPECT_EQ(planes(ContrastThreshold{0.3, 2}), sensor_input(frames, {0.3, 2}));
