@@ -225,14 +225,14 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   };
   check(count.flow, factor.flow, "flow");
   check(count.reconstruction, factor.reconstruction, "reconstruction");
-  const bool of_volumes = factor.adversarial != 0 || factor.flow != 0 ||
-                          factor.reconstruction != 0 || factor.volume != 0 || factor.count != 0 ||
-                          factor.overlap != 0;
-  if (manifest.network.sensor && (of_volumes || factor.likelihood == 0)) {
-    losses.fault("likelihood above 0 and all others 0, since network.sensor", "others");
+  const bool published = factor.adversarial != 0 || factor.flow != 0 || factor.reconstruction != 0;
+  const bool direct = factor.volume != 0 || factor.count != 0 || factor.overlap != 0;
+  if (manifest.network.sensor && (published || factor.likelihood == 0)) {
+    losses.fault("likelihood above 0 and adversarial, flow, reconstruction 0, since network.sensor",
+                 "others");
   } else if (!manifest.network.sensor && factor.likelihood != 0) {
     losses.fault("likelihood 0, unless network.sensor", "another");
-  } else if (!of_volumes && !manifest.network.sensor) {
+  } else if (!published && !direct && !manifest.network.sensor) {
     losses.fault("one of adversarial, flow, reconstruction, volume, count, overlap above 0",
                  "all 0");
   }

@@ -60,7 +60,7 @@ struct NetworkSpec {
   /// written for the frames.
   double difference_gain = 0;
   /// The generator sees the sensor's threshold too (sensor_input.h) and learns rates of events, by
-  /// LossWeights::likelihood alone; without it, normalised volumes of the frames.
+  /// LossWeights::likelihood; without it, normalised volumes of the frames.
   bool sensor = false;
 };
 
@@ -73,9 +73,9 @@ struct SimulatedSpec {
 
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
 /// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
-/// voxel
-/// (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
-/// trainings.
+/// voxel (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
+/// trainings. With NetworkSpec::sensor these three fall to 0 until half of the generator's steps:
+/// they teach it sooner when events happen, but their best volumes are not the rates.
 struct LossWeights {
   double adversarial = 1;
   double flow = 1;
@@ -83,7 +83,7 @@ struct LossWeights {
   double volume = 0;
   double count = 0;
   double overlap = 0;
-  double likelihood = 0;    ///< of NetworkSpec::sensor, and of no other
+  double likelihood = 0;    ///< of NetworkSpec::sensor
   double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
   double smoothness = 0.5;  ///< of the flow loss
 };

@@ -70,8 +70,8 @@ double learning_rate(double rate, double final_fraction, std::int64_t step, std:
   return rate * (final_fraction + (1 - final_fraction) * fall);
 }
 
-double output_slope(double slope, std::int64_t step, std::int64_t steps) {
-  return slope * std::max(0.0, 1 - 2 * double(step) / double(std::max<std::int64_t>(steps, 1)));
+double faded(double value, std::int64_t step, std::int64_t steps) {
+  return value * std::max(0.0, 1 - 2 * double(step) / double(std::max<std::int64_t>(steps, 1)));
 }
 
 /// A network and what changes it.
@@ -157,7 +157,16 @@ struct Trainer::Learners {
     if (&learner == &flow) return flow_update(networks, batch, manifest.losses);
     if (&learner == &reconstruction) return reconstruction_update(networks, batch);
     if (&learner == &discriminator) return discriminator_update(networks, batch, manifest, step);
-    return generator_update(networks, batch, manifest.losses);
+    return generator_update(networks, batch, generator_losses(step));
+  }
+
+  LossWeights generator_losses(std::int64_t step) const {
+    LossWeights weights = manifest.losses;
+    if (!manifest.network.sensor) return weights;
+    for (double* const direct : {&weights.volume, &weights.count, &weights.overlap}) {
+      *direct = faded(*direct, step, manifest.steps.generator);
+    }
+    return weights;
   }
 
   double rate(const Learner& learner, TrainingPhase phase, std::int64_t step) const {
@@ -191,7 +200,7 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   BufferSnapshot before({generator.network, learner.network});
   learner.optimizer.zero_grad();
   networks.generator->set_output_slope(
-      output_slope(manifest.network.output_slope, step, manifest.steps.generator));
+      faded(manifest.network.output_slope, step, manifest.steps.generator));
 
   const std::string where =
       fmt::format(", in {} step {} of {}", to_string(phase), step,

@@ -160,8 +160,9 @@ ManifestCase with_sensor(std::string name, std::vector<testing::Edit> edits,
   return {std::move(name), std::move(all), std::move(faults)};
 }
 
-const std::string kLikelihoodAlone =
-    "$.losses: expected likelihood above 0 and all others 0, since network.sensor, got others";
+const std::string kLossesOfASensor =
+    "expected likelihood above 0 and adversarial, flow, reconstruction 0, since network.sensor, "
+    "got others";
 
 const ManifestCase kSensorCases[] = {
     with_sensor("a network that knows its sensor", {}),
@@ -198,14 +199,16 @@ const ManifestCase kSensorCases[] = {
                 {{"/validation", R"([{"path": "c", "format": "ecd"}])"}},
                 {"$.validation: expected a threshold of each recording, since network.sensor, got "
                  "none of c"}),
-    with_sensor("no likelihood", {{"/losses/likelihood", "0"}}, {kLikelihoodAlone}),
-    with_sensor("another loss than likelihood", {{"/losses/volume", "1"}}, {kLikelihoodAlone}),
-    with_sensor("an overlap beside likelihood", {{"/losses/overlap", "1e-3"}}, {kLikelihoodAlone}),
+    with_sensor("direct losses beside likelihood",
+                {{"/losses/volume", "1"}, {"/losses/count", "2"}, {"/losses/overlap", "1e-3"}}),
+    with_sensor("no likelihood", {{"/losses/likelihood", "0"}}, {"$.losses: " + kLossesOfASensor}),
+    with_sensor("direct losses in place of likelihood",
+                {{"/losses/likelihood", "0"}, {"/losses/volume", "1"}},
+                {"$.losses: " + kLossesOfASensor}),
     with_sensor("the published losses beside likelihood", {{"/losses", R"({"likelihood": 1})"}},
-                {kLikelihoodAlone}),
+                {"$.losses: " + kLossesOfASensor}),
     with_sensor("no losses of a network that knows its sensor", {{"/losses", ""}},
-                {"$.steps: expected likelihood above 0 and all others 0, since network.sensor, got "
-                 "others"}),
+                {"$.steps: " + kLossesOfASensor}),
     {"a sensor of no kind",
      {{"/network", R"({"sensor": 1})"}},
      {"$.network.sensor: expected true or false, got 1"}},

@@ -253,6 +253,33 @@ TEST(TrainerLearning, LowersTheLikelihoodLossOfANetworkThatKnowsItsSensor) {
   EXPECT_LT(change(curve), 0);
 }
 
+TEST(TrainerLearning, LeavesDirectLossesWhenHalfIsLearntIfItKnowsItsSensor) {
+  TrainingManifest manifest = testing::small_training();
+  manifest.losses = {.adversarial = 0,
+                     .flow = 0,
+                     .reconstruction = 0,
+                     .volume = 1,
+                     .count = 0.5,
+                     .overlap = 0.25,
+                     .likelihood = 2};
+  manifest.network.sensor = true;
+  manifest.steps.generator = 8;
+  auto batch = testing::edge_batch(manifest, 0);
+  for (TrainingSample& sample : batch) sample.threshold = ContrastThreshold{0.5};
+  Trainer trainer(manifest, "cpu");
+  for (int step = 0; step < 8; ++step) {
+    const StepLosses losses = trainer.step(TrainingPhase::kGenerator, step, batch);
+    double total = 2 * losses.at("likelihood");
+    EXPECT_EQ(losses.size(), step < 4 ? 5u : 2u) << step;
+    if (step < 4) {
+      const double direct =
+          losses.at("volume") + 0.5 * losses.at("count") + 0.25 * losses.at("overlap");
+      total += (1 - step / 4.0) * direct;
+    }
+    EXPECT_NEAR(losses.at("generator.total"), total, 1e-5 * total) << step;
+  }
+}
+
 TEST(TrainerLearning, LowersTheCycleLossesOfTheGenerator) {
   TrainingManifest manifest = testing::small_training();
   manifest.losses.adversarial = 0;
