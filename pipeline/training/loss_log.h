@@ -15,13 +15,14 @@
 namespace eventgan {
 
 /// The losses that a training reports, in the columns' order (see StepLosses).
-inline constexpr std::array<std::string_view, 12> kLossNames{"flow",
+inline constexpr std::array<std::string_view, 13> kLossNames{"flow",
                                                              "flow.photometric",
                                                              "flow.smoothness",
                                                              "reconstruction",
                                                              "volume",
                                                              "count",
                                                              "overlap",
+                                                             "likelihood",
                                                              "generator",
                                                              "generator.total",
                                                              "discriminator",
