@@ -70,8 +70,8 @@ double learning_rate(double rate, double final_fraction, std::int64_t step, std:
   return rate * (final_fraction + (1 - final_fraction) * fall);
 }
 
-double faded(double value, std::int64_t step, std::int64_t steps) {
-  return value * std::max(0.0, 1 - 2 * double(step) / double(std::max<std::int64_t>(steps, 1)));
+double faded(double value, std::int64_t step, double end) {
+  return end > 0 ? value * std::max(0.0, 1 - double(step) / end) : 0;
 }
 
 /// A network and what changes it.
@@ -164,7 +164,7 @@ struct Trainer::Learners {
     LossWeights weights = manifest.losses;
     if (!manifest.network.sensor) return weights;
     for (double* const direct : {&weights.volume, &weights.count, &weights.overlap}) {
-      *direct = faded(*direct, step, manifest.steps.generator);
+      *direct = faded(*direct, step, 0.75 * double(manifest.steps.generator));
     }
     return weights;
   }
@@ -200,7 +200,7 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   BufferSnapshot before({generator.network, learner.network});
   learner.optimizer.zero_grad();
   networks.generator->set_output_slope(
-      faded(manifest.network.output_slope, step, manifest.steps.generator));
+      faded(manifest.network.output_slope, step, 0.5 * double(manifest.steps.generator)));
 
   const std::string where =
       fmt::format(", in {} step {} of {}", to_string(phase), step,

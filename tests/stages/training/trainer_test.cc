@@ -77,12 +77,12 @@ TEST(LearningRate, StaysAtItsEndAndWithoutSteps) {
   EXPECT_DOUBLE_EQ(learning_rate(1, 0, 7, 5), 0);
 }
 
-TEST(Faded, FallsToNothingUntilHalfOfThePhase) {
-  EXPECT_DOUBLE_EQ(faded(0.1, 0, 300), 0.1);
-  EXPECT_DOUBLE_EQ(faded(0.1, 75, 300), 0.05);
-  EXPECT_DOUBLE_EQ(faded(0.1, 150, 300), 0);
-  EXPECT_DOUBLE_EQ(faded(0.1, 299, 300), 0);
-  EXPECT_DOUBLE_EQ(faded(0.1, 3, 0), 0);
+TEST(Faded, FallsToNothingOnALine) {
+  EXPECT_DOUBLE_EQ(faded(0.1, 0, 150), 0.1);
+  EXPECT_DOUBLE_EQ(faded(0.1, 75, 150), 0.05);
+  EXPECT_DOUBLE_EQ(faded(0.1, 150, 150), 0);
+  EXPECT_DOUBLE_EQ(faded(0.1, 299, 150), 0);
+  EXPECT_DOUBLE_EQ(faded(0.1, 0, 0), 0);
 }
 
 TEST(LearningRate, IsConstantAtFractionOne) {
