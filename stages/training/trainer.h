@@ -24,8 +24,8 @@ void check_trainable(const TrainingManifest& manifest);
 /// final rate.
 double learning_rate(double rate, double final_fraction, std::int64_t step, std::int64_t steps);
 
-/// What only the beginning of a phase has, in its step: it falls from `value` on a line, to 0 at the
-/// step `end`.
+/// What only the beginning of a phase has, in its step: it falls from `value` on a line, to 0 at
+/// the step `end`.
 double faded(double value, std::int64_t step, double end);
 
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
