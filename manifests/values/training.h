@@ -74,7 +74,7 @@ struct SimulatedSpec {
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
 /// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
 /// voxel (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
-/// trainings. With NetworkSpec::sensor these three fall on a line, to 0 at three quarters of the
+/// trainings. With NetworkSpec::sensor these three fade to 0 over the first three quarters of the
 /// generator's steps: they teach it sooner where and when events happen, but their best volumes are
 /// not the rates.
 struct LossWeights {

@@ -24,8 +24,9 @@ void check_trainable(const TrainingManifest& manifest);
 /// final rate.
 double learning_rate(double rate, double final_fraction, std::int64_t step, std::int64_t steps);
 
-/// What only the beginning of a phase has, in its step: it falls from `value` on a line, to 0 at
-/// the step `end`.
+/// `value` in a step of a phase that fades it out: it falls on a line to 0 at the step `end`, and
+/// stays 0. So the output slope does until half of the generator's steps, and the direct losses of
+/// a network that knows its sensor until three quarters of them.
 double faded(double value, std::int64_t step, double end);
 
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
