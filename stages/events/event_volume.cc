@@ -130,32 +130,25 @@ void pixel_event_volume(std::span<const Event> events, const VolumeShape& shape,
   check_span({first, last}, shape.bins - 1);
 
   const ScaledTime time{first, last - first, shape.bins - 1};
-  const auto bins = static_cast<std::size_t>(shape.bins);
+  const auto channels = static_cast<std::size_t>(shape.channels());
   const std::size_t plane = shape.size.pixel_count();
-  std::vector<double> sums(2 * bins, 0.0);      // of a pixel
-  constexpr std::size_t kBlock = 256;           // pixels whose values the cache holds
-  std::vector<float> block(2 * bins * kBlock);  // [bin, pixel]
+  constexpr std::size_t kBlock = 128;            // pixels whose sums the cache holds
+  std::vector<double> block(channels * kBlock);  // [channel, pixel]
+  const std::size_t negative = channels / 2 * kBlock;
   auto event = events.begin();
   for (std::size_t start = 0; start < plane; start += kBlock) {
     const std::size_t count = std::min(kBlock, plane - start);
-    std::ranges::fill(block, 0.0f);
-    while (event != events.end() && pixel_of(*event, shape.size) < start + count) {
-      const int x = event->x;
-      const int y = event->y;
-      float* place = block.data() + pixel_of(*event, shape.size) - start;
-      for (; event != events.end() && event->x == x && event->y == y; ++event) {
-        add_event(time.star(event->t_s), time.last_bin, sums.data() + (event->positive ? 0 : bins),
-                  1);
-      }
-      for (double& sum : sums) {
-        *place = static_cast<float>(sum);
-        sum = 0;
-        place += kBlock;
-      }
+    std::ranges::fill(block, 0.0);
+    for (; event != events.end(); ++event) {
+      const std::size_t place = pixel_of(*event, shape.size) - start;
+      if (place >= count) break;
+      add_event(time.star(event->t_s), time.last_bin,
+                block.data() + (event->positive ? 0 : negative) + place, kBlock);
     }
-    for (std::size_t bin = 0; bin < 2 * bins; ++bin) {
-      std::ranges::copy(std::span(block).subspan(bin * kBlock, count),
-                        volume.subspan(bin * plane + start).begin());
+    for (std::size_t channel = 0; channel < channels; ++channel) {
+      std::ranges::transform(std::span(block).subspan(channel * kBlock, count),
+                             volume.subspan(channel * plane + start).begin(),
+                             [](double sum) { return static_cast<float>(sum); });
     }
   }
 }
