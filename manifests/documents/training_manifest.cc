@@ -130,6 +130,7 @@ LossWeights read_losses(const StrictValue& value) {
   read("count", losses.count);
   read("overlap", losses.overlap);
   read("likelihood", losses.likelihood);
+  read("block_likelihood", losses.block_likelihood);
   if (const auto quantile = object.find("quantile")) losses.quantile = quantile->number(0.01, 0.99);
   read("smoothness", losses.smoothness);
   object.finish();
@@ -230,8 +231,8 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   if (manifest.network.sensor && (published || factor.likelihood == 0)) {
     losses.fault("likelihood above 0 and adversarial, flow, reconstruction 0, since network.sensor",
                  "others");
-  } else if (!manifest.network.sensor && factor.likelihood != 0) {
-    losses.fault("likelihood 0, unless network.sensor", "another");
+  } else if (!manifest.network.sensor && (factor.likelihood != 0 || factor.block_likelihood != 0)) {
+    losses.fault("likelihood and block_likelihood 0, unless network.sensor", "others");
   } else if (!published && !direct && !manifest.network.sensor) {
     losses.fault("one of adversarial, flow, reconstruction, volume, count, overlap above 0",
                  "all 0");

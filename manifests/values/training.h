@@ -74,9 +74,8 @@ struct SimulatedSpec {
 /// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
 /// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
 /// voxel (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
-/// trainings. With NetworkSpec::sensor these three fade to 0 over the first three quarters of the
-/// generator's steps: they teach it sooner where and when events happen, but their best volumes are
-/// not the rates.
+/// trainings. With NetworkSpec::sensor these three fade to 0 over the generator's steps: they
+/// teach it sooner where and when events happen, but their best volumes are not the rates.
 struct LossWeights {
   double adversarial = 1;
   double flow = 1;
@@ -84,9 +83,10 @@ struct LossWeights {
   double volume = 0;
   double count = 0;
   double overlap = 0;
-  double likelihood = 0;    ///< of NetworkSpec::sensor
-  double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
-  double smoothness = 0.5;  ///< of the flow loss
+  double likelihood = 0;        ///< of NetworkSpec::sensor
+  double block_likelihood = 0;  ///< of NetworkSpec::sensor, of sums over blocks of 8x8 pixels
+  double quantile = 0.5;        ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
+  double smoothness = 0.5;      ///< of the flow loss
 };
 
 struct AugmentationSpec {

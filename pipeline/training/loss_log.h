@@ -15,7 +15,7 @@
 namespace eventgan {
 
 /// The losses that a training reports, in the columns' order (see StepLosses).
-inline constexpr std::array<std::string_view, 13> kLossNames{"flow",
+inline constexpr std::array<std::string_view, 14> kLossNames{"flow",
                                                              "flow.photometric",
                                                              "flow.smoothness",
                                                              "reconstruction",
@@ -23,6 +23,7 @@ inline constexpr std::array<std::string_view, 13> kLossNames{"flow",
                                                              "count",
                                                              "overlap",
                                                              "likelihood",
+                                                             "block_likelihood",
                                                              "generator",
                                                              "generator.total",
                                                              "discriminator",

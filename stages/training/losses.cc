@@ -2,6 +2,7 @@
 
 #include <ATen/TensorOperators.h>
 #include <ATen/core/Tensor.h>
+#include <ATen/ops/avg_pool2d.h>
 #include <ATen/ops/cat.h>
 #include <ATen/ops/grid_sampler.h>
 #include <ATen/ops/linspace.h>
@@ -287,15 +288,39 @@ at::Tensor overlap_loss(const at::Tensor& generated, const at::Tensor& real) {
   return apart(events, real) + apart(summed_over_time(events), summed_over_time(real));
 }
 
+namespace {
+
+/// λ of a generated volume. Below zero, where an output slope leads, nothing is expected; the
+/// gradient is as at zero, where relu has none.
+at::Tensor expected_events(const at::Tensor& generated) {
+  return at::relu(generated) + (generated - generated.detach()) * generated.le(0);
+}
+
+/// Half the deviance of a Poisson process that expects `expected` and has `real`: the mean.
+at::Tensor half_deviance(const at::Tensor& expected, const at::Tensor& real) {
+  constexpr double kBackground = 1;
+  const at::Tensor r = expected + kBackground;
+  const at::Tensor n = real + kBackground;
+  return (r - n - n * (r.log() - n.log())).mean();
+}
+
+/// [B, C, H, W] → [B, C, ceil(H / 8), ceil(W / 8)]
+at::Tensor block_sums(const at::Tensor& volume) {
+  constexpr int kBlock = 8;
+  return at::avg_pool2d(volume, {kBlock, kBlock}, {}, 0, /*ceil_mode=*/true,
+                        /*count_include_pad=*/true, /*divisor_override=*/1);
+}
+
+}  // namespace
+
 at::Tensor likelihood_loss(const at::Tensor& generated, const at::Tensor& real) {
   require_alike(generated, real);
-  constexpr double kBackground = 1;
-  // Below zero, where an output slope leads, nothing is expected; the gradient is as at zero, where
-  // relu has none.
-  const at::Tensor below = (generated - generated.detach()) * generated.le(0);
-  const at::Tensor expected = at::relu(generated) + below + kBackground;
-  const at::Tensor happened = real + kBackground;
-  return (expected - happened - happened * (expected.log() - happened.log())).mean();
+  return half_deviance(expected_events(generated), real);
+}
+
+at::Tensor block_likelihood_loss(const at::Tensor& generated, const at::Tensor& real) {
+  require_alike(generated, real);
+  return half_deviance(block_sums(expected_events(generated)), block_sums(real));
 }
 
 }  // namespace eventgan

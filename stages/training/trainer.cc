@@ -163,10 +163,10 @@ struct Trainer::Learners {
   LossWeights generator_losses(std::int64_t step) const {
     LossWeights weights = manifest.losses;
     if (!manifest.network.sensor) return weights;
-    // Not before the learning rate is low: at half of the steps the likelihood alone unlearns what
+    // Until the end, where the learning rate is low: before, the likelihood alone unlearns what
     // they have taught.
     for (double* const direct : {&weights.volume, &weights.count, &weights.overlap}) {
-      *direct = faded(*direct, step, 0.75 * double(manifest.steps.generator));
+      *direct = faded(*direct, step, double(manifest.steps.generator));
     }
     return weights;
   }

@@ -26,13 +26,14 @@ double learning_rate(double rate, double final_fraction, std::int64_t step, std:
 
 /// `value` in a step of a phase that fades it out: it falls on a line to 0 at the step `end`, and
 /// stays 0. So the output slope does until half of the generator's steps, and the direct losses of
-/// a network that knows its sensor until three quarters of them.
+/// a network that knows its sensor until their end.
 double faded(double value, std::int64_t step, double end);
 
 /// Losses of one step by name: "flow.photometric", "flow.smoothness", "flow", "reconstruction",
-/// "volume", "count", "overlap", "likelihood", "generator" (adversarial), "generator.total",
-/// "discriminator", "discriminator.real_accuracy", "discriminator.fake_accuracy"; only those the
-/// step computed. Each before its weight, "flow" and "generator.total" being weighted sums.
+/// "volume", "count", "overlap", "likelihood", "block_likelihood", "generator" (adversarial),
+/// "generator.total", "discriminator", "discriminator.real_accuracy",
+/// "discriminator.fake_accuracy"; only those the step computed. Each before its weight, "flow" and
+/// "generator.total" being weighted sums.
 using StepLosses = std::map<std::string, double>;
 
 /// A loss or a gradient that is not finite. The networks are as before the step.

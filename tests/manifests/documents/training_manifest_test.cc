@@ -201,6 +201,10 @@ const ManifestCase kSensorCases[] = {
                  "none of c"}),
     with_sensor("direct losses beside likelihood",
                 {{"/losses/volume", "1"}, {"/losses/count", "2"}, {"/losses/overlap", "1e-3"}}),
+    with_sensor("the likelihood of blocks beside it", {{"/losses/block_likelihood", "0.25"}}),
+    with_sensor("the likelihood of blocks in place of it",
+                {{"/losses/likelihood", "0"}, {"/losses/block_likelihood", "0.25"}},
+                {"$.losses: " + kLossesOfASensor}),
     with_sensor("no likelihood", {{"/losses/likelihood", "0"}}, {"$.losses: " + kLossesOfASensor}),
     with_sensor("direct losses in place of likelihood",
                 {{"/losses/likelihood", "0"}, {"/losses/volume", "1"}},
@@ -223,7 +227,10 @@ const ManifestCase kSensorCases[] = {
      {"$.simulated: expected network.sensor with it, got none"}},
     {"a likelihood of normalised volumes",
      {{"/losses", R"({"likelihood": 1})"}},
-     {"$.losses: expected likelihood 0, unless network.sensor, got another"}},
+     {"$.losses: expected likelihood and block_likelihood 0, unless network.sensor, got others"}},
+    {"a likelihood of blocks of normalised volumes",
+     {{"/losses", R"({"block_likelihood": 1})"}},
+     {"$.losses: expected likelihood and block_likelihood 0, unless network.sensor, got others"}},
 };
 
 class TrainingFaults : public ::testing::TestWithParam<ManifestCase> {};
@@ -362,6 +369,7 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("losses", "count"), manifest.losses.count);
   EXPECT_EQ(section("losses", "overlap"), manifest.losses.overlap);
   EXPECT_EQ(section("losses", "likelihood"), manifest.losses.likelihood);
+  EXPECT_EQ(section("losses", "block_likelihood"), manifest.losses.block_likelihood);
   EXPECT_EQ(section("losses", "quantile"), manifest.losses.quantile);
   EXPECT_EQ(section("losses", "smoothness"), manifest.losses.smoothness);
   EXPECT_EQ(section("network", "sensor"), manifest.network.sensor);

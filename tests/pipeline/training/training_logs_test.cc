@@ -81,10 +81,10 @@ TEST(LossLog, WritesARowAStep) {
   log.flush();
   EXPECT_EQ(testing::read_file(folder / "training.csv"),
             "phase,step,seconds,flow,flow.photometric,flow.smoothness,reconstruction,volume,count,"
-            "overlap,likelihood,"
+            "overlap,likelihood,block_likelihood,"
             "generator,generator.total,discriminator,discriminator.real_accuracy,"
             "discriminator.fake_accuracy,learning_rate\n"
-            "flow,0,1.5,0.25,,2,,,,,,,,,,,0.001\n");
+            "flow,0,1.5,0.25,,2,,,,,,,,,,,,0.001\n");
   ASSERT_EQ(log.rows().size(), 1u);
   EXPECT_EQ(log.rows()[0].losses[0], 0.25);
   EXPECT_TRUE(std::isnan(log.rows()[0].losses[1]));

@@ -370,6 +370,28 @@ TEST(LikelihoodLoss, IsTheMeanOfItsTerms) {
       likelihood_loss(generated, real).item<double>(),
       (unlikelihood(0, 0) + unlikelihood(1, 0) + unlikelihood(0.5, 0.75) + unlikelihood(3, 5)) / 4,
       1e-6);
+  // Both pixels of a channel are in one block.
+  EXPECT_NEAR(block_likelihood_loss(generated, real).item<double>(),
+              (unlikelihood(1, 0) + unlikelihood(3.5, 5.75)) / 2, 1e-6);
+}
+
+TEST(BlockLikelihoodLoss, CountsBlocksOf8By8Pixels) {
+  // An event is expected where none is: in the same block, or in another one of the two times two
+  // that 9x10 pixels have, cut off at the right and below.
+  const at::Tensor real = at::zeros({1, 2, 9, 10});
+  real[0][0][3][7] = 1;
+  const auto of_event_at = [&](int y, int x) {
+    const at::Tensor generated = at::zeros({1, 2, 9, 10});
+    generated[0][0][y][x] = 1;
+    return block_likelihood_loss(generated, real).item<double>();
+  };
+  for (const auto& [y, x] : {std::pair(3, 7), {0, 0}}) {
+    EXPECT_NEAR(of_event_at(y, x), 0, 1e-7) << y << ", " << x;
+  }
+  for (const auto& [y, x] : {std::pair(3, 8), {8, 7}, {8, 9}}) {
+    EXPECT_NEAR(of_event_at(y, x), (unlikelihood(1, 0) + unlikelihood(0, 1)) / (2 * 2 * 2), 1e-6)
+        << y << ", " << x;
+  }
 }
 
 TEST(LikelihoodLoss, IsZeroWhereAllIsAsExpected) {
@@ -414,7 +436,9 @@ TEST(LikelihoodLoss, HasItsGradientAtZeroAndBelow) {
 TEST(LikelihoodLoss, HasTheGradientOfDifferences) {
   const at::Tensor real = random_tensor({2, 4, 3, 2}, 1) + 1;
   testing::expect_gradient_of_differences(
-      [&](const at::Tensor& generated) { return likelihood_loss(generated, real); },
+      [&](const at::Tensor& generated) {
+        return likelihood_loss(generated, real) + block_likelihood_loss(generated, real);
+      },
       random_tensor({2, 4, 3, 2}, 2) + 1.1);
 }
 
@@ -423,8 +447,10 @@ TEST(LikelihoodLoss, LetsNanThroughAndRefusesOtherShapes) {
   const at::Tensor zero = at::zeros({1, 2, 1, 1});
   EXPECT_TRUE(std::isnan(likelihood_loss(nan, zero).item<float>()));
   EXPECT_TRUE(std::isnan(likelihood_loss(zero, nan).item<float>()));
-  EXPECT_THROW(likelihood_loss(at::zeros({2, 18, 4, 5}), at::zeros({1, 18, 4, 5})),
-               std::invalid_argument);
+  EXPECT_TRUE(std::isnan(block_likelihood_loss(zero, nan).item<float>()));
+  for (const auto loss : {likelihood_loss, block_likelihood_loss}) {
+    EXPECT_THROW(loss(at::zeros({2, 18, 4, 5}), at::zeros({1, 18, 4, 5})), std::invalid_argument);
+  }
 }
 
 TEST(VolumeLoss, HasTheGradientOfDifferences) {
