@@ -5,7 +5,8 @@
     method = recordings.METHODS["difference, fitted"](frames, real.sum((1, 2, 3)), peers)
     volume = method(frames[0], frames[1])                                                         # [18, H, W]
 
-Volumes of the camera, of the models and of v2e are counts of events; those of the network are about [0, 1] and no counts.
+Volumes of the camera, of the models, of v2e and of the network that knows its sensor are counts of events; those of the other networks are about
+[0, 1] and no counts.
 """
 
 from __future__ import annotations
@@ -34,7 +35,8 @@ Method = Callable[[np.ndarray, np.ndarray], np.ndarray]  # previous, following: 
 
 BINS = 9  # per polarity
 THRESHOLD = 0.2  # of the models and of v2e where it is not fitted: the default of all three
-LEAST_THRESHOLD, LARGEST_THRESHOLD, TOLERANCE, MOST_STEPS, MOST_PAIRS = 0.01, 5.0, 0.005, 16, 16  # of the fit, as `eventgan realism` has them
+THRESHOLDS, TOLERANCE, MOST_STEPS, MOST_PAIRS = (0.01, 5.0), 0.005, 16, 16  # of the fit, as `eventgan realism` has them
+LEARNT_THRESHOLDS = (0.07, 0.93)  # by shipped:sensor
 SPREAD_SHARE = 0.15  # of a threshold over the pixels, and the next two: realism's, too
 LOG_EPSILON = 0.02
 ESIM_DISPLACEMENT_PX = 5
@@ -194,7 +196,7 @@ def volume_of(events: np.ndarray, size: tuple[int, int], bins: int = BINS) -> np
     return np.bincount(cells, weights, 2 * bins * size[0] * size[1]).astype(np.float32).reshape(2 * bins, *size)
 
 
-def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: np.ndarray) -> float:
+def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: np.ndarray, within: tuple[float, float] = THRESHOLDS) -> float:
     """The threshold with which a model makes as many events as the camera, as a simulator's user would set it and `eventgan realism` does.
 
     Parameters
@@ -205,15 +207,17 @@ def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: n
         uint8 [F, H, W].
     event_counts : numpy.ndarray
         [F - 1] of the camera. At most 16 pairs, spread evenly, count.
+    within : (float, float)
+        Least and largest threshold.
 
     Returns
     -------
     float
-        Within 0.01..5, so that the numbers agree within 0.5 %, or as near as 16 bisections come.
+        So that the numbers agree within 0.5 %, or as near as 16 bisections come.
     """
     pairs = np.unique(np.linspace(0, len(event_counts) - 1, min(MOST_PAIRS, len(event_counts))).round().astype(int))
     wanted = event_counts[pairs].sum(dtype=np.float64)
-    low, high = LEAST_THRESHOLD, LARGEST_THRESHOLD
+    low, high = within
     for _ in range(MOST_STEPS):
         middle = math.sqrt(low * high)
         method = model(middle)
@@ -222,6 +226,11 @@ def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: n
             break
         low, high = (middle, high) if made > wanted else (low, middle)
     return middle
+
+
+def told(threshold: float) -> Method:
+    """The network that knows its sensor."""
+    return Generator("shipped:sensor", sensor={"threshold": threshold}, bins=BINS)
 
 
 def difference(threshold: float) -> Method:
@@ -248,6 +257,7 @@ def _fitted_v2e(frames: np.ndarray, event_counts: np.ndarray, peers: PathLike) -
 METHODS: dict[str, Callable[[np.ndarray, np.ndarray, PathLike], Method]] = {
     "EventGAN 16": lambda frames, event_counts, peers: Generator("shipped:16", bins=BINS),
     "EventGAN 8": lambda frames, event_counts, peers: Generator("shipped:8", bins=BINS),
+    "EventGAN sensor, fitted": lambda frames, event_counts, peers: told(fitted(told, frames, event_counts, LEARNT_THRESHOLDS)),
     "difference": lambda frames, event_counts, peers: difference(THRESHOLD),
     "difference, fitted": lambda frames, event_counts, peers: difference(fitted(difference, frames, event_counts)),
     "esim": lambda frames, event_counts, peers: esim(fitted(esim, frames, event_counts)),
