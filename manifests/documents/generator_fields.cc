@@ -59,7 +59,8 @@ std::array<double, 2> read_range(const StrictValue& value, double lowest, double
 
 ThresholdSpec read_threshold(const StrictValue& value, const std::optional<StrictValue>& ratio) {
   ThresholdSpec threshold{.range = read_range(value, kLeastThreshold, kMostThreshold)};
-  if (ratio) threshold.ratio = ratio->number(0.2, 5);
+  const auto [least, most] = ThresholdSpec::kRatios;
+  if (ratio) threshold.ratio = ratio->number(least, most);
   return threshold;
 }
 

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -44,18 +45,20 @@ struct ThresholdSpec {
   /// Least and most, log units, 0.01..5; drawn log-uniformly.
   std::array<double, 2> range{0.2, 0.2};
   double ratio = 1;  ///< of the negative threshold to the positive one, 0.2..5
-  /// Standard deviation over the pixels, 0..1; none: the share of the threshold that it is of
-  /// SensorSpec's defaults.
+  /// Standard deviation over the pixels, 0..1; none: the share that it is of SensorSpec's defaults
+  /// of the lower one of both polarities' thresholds, so that no pixel comes near zero.
   std::optional<double> spread = std::nullopt;
   bool operator==(const ThresholdSpec&) const = default;
 
   static constexpr double kSpreadShare = 0.15;
+  static constexpr std::array<double, 2> kRatios{0.2, 5};
 
   /// The sensor with a threshold.
   SensorSpec applied(SensorSpec sensor, const ContrastThreshold& threshold) const {
     sensor.positive_threshold = threshold.positive();
     sensor.negative_threshold = threshold.negative();
-    sensor.threshold_spread = spread.value_or(kSpreadShare * threshold.mean);
+    sensor.threshold_spread =
+        spread.value_or(kSpreadShare * std::min(threshold.positive(), threshold.negative()));
     return sensor;
   }
 };

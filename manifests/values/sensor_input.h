@@ -22,6 +22,10 @@ struct ThresholdRange {
   double lowest = 0;
   double highest = 0;
   bool contains(double threshold) const { return lowest <= threshold && threshold <= highest; }
+  /// Of both polarities.
+  bool contains(const ContrastThreshold& threshold) const {
+    return contains(threshold.positive()) && contains(threshold.negative());
+  }
   double geometric_mean() const { return std::sqrt(lowest * highest); }
   bool operator==(const ThresholdRange&) const = default;
 };

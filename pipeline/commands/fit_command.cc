@@ -3,6 +3,7 @@
 #include <iostream>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "manifests/documents/sensor_document.h"
@@ -53,11 +54,15 @@ int run_fit(const FitArguments& arguments) {
   std::vector<std::unique_ptr<Recording>> recordings;
   std::vector<FitPart> parts;
   std::string names;
-  for (const RecordingSpec& part : wanted_parts(arguments.recordings)) {
-    recordings.push_back(open_recording(part.path, part.format, part.options));
+  const std::vector<RecordingSpec> wanted = wanted_parts(arguments.recordings);
+  for (const RecordingSpec& part : wanted) {
+    auto recording = open_recording(part.path, part.format, part.options);
+    if (wanted.size() > 1 && skipped_as_too_short(part, *recording, arguments.gaps)) continue;
+    recordings.push_back(std::move(recording));
     parts.push_back({recordings.back().get(), part.first_frame, part.last_frame});
     names += (names.empty() ? "" : ", ") + std::filesystem::path(part.path).filename().string();
   }
+  if (parts.empty()) refuse_all_too_short();
   const std::unique_ptr<Generator> network = open_told_generator(arguments.weights);
   const SensorFit fit =
       fit_sensor(parts, network.get(), arguments.gaps, thread_count(arguments.threads));

@@ -39,14 +39,6 @@ const std::map<std::string, RealismMethod> kMethods{{"network", RealismMethod::k
                                                     {"difference", RealismMethod::kDifference},
                                                     {"esim", RealismMethod::kEsim}};
 
-/// Whether a part is too short for any of the gaps: among several recordings that is no error.
-bool is_too_short(const RecordingSpec& part, const Recording& recording,
-                  const std::vector<int>& gaps) {
-  const std::int64_t last = part.last_frame.value_or(recording.frame_count() - 1);
-  return last >= part.first_frame &&
-         std::ranges::all_of(gaps, [&](int gap) { return last - part.first_frame < gap; });
-}
-
 double number_in(const std::string& text, const std::string& expected) {
   double value = 0;
   const char* const end = text.data() + text.size();
@@ -63,14 +55,13 @@ void take_sensor(const std::string& path_or_name, RealismOptions& options) {
                      path_or_name);
   }
   const auto [least, most] = sensor.threshold->range;
-  options.threshold = std::sqrt(least * most);
-  options.threshold_ratio = sensor.threshold->ratio;
+  options.threshold = {std::sqrt(least * most), sensor.threshold->ratio};
 }
 
 int run_realism(const RealismArguments& arguments) {
   RealismOptions options = arguments.options;
   if (arguments.threshold != "fit") {
-    options.threshold = number_in(arguments.threshold, "--threshold: expected fit or a number");
+    options.threshold = {number_in(arguments.threshold, "--threshold: expected fit or a number")};
   }
   if (!arguments.sensor.empty()) take_sensor(arguments.sensor, options);
   const std::vector<RecordingSpec> parts = wanted_parts(arguments.recordings);
@@ -83,18 +74,13 @@ int run_realism(const RealismArguments& arguments) {
       options.images /= std::filesystem::path(part.path).stem();
     }
     const auto recording = open_recording(part.path, part.format, part.options);
-    if (parts.size() > 1 && is_too_short(part, *recording, options.gaps)) {
-      tell_note("skipped, since it has too few frames for --gaps: " + recording->name());
-      continue;
-    }
+    if (parts.size() > 1 && skipped_as_too_short(part, *recording, options.gaps)) continue;
     reports.push_back(measure_realism(*recording, options, [&](std::int64_t total) {
       return show_progress(arguments.progress, total, {"pairs", /*has_bytes=*/false});
     }));
     for (const std::string& note : recording->notes()) tell_note(note);
   }
-  if (reports.empty()) {
-    throw UsageError("--gaps: expected a recording with enough frames, got none");
-  }
+  if (reports.empty()) refuse_all_too_short();
   std::cout << (arguments.json ? to_json(reports) : to_text(reports)) << std::flush;
   return kComplete;
 }

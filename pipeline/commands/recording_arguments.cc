@@ -1,6 +1,7 @@
 #include "pipeline/commands/recording_arguments.h"
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <filesystem>
@@ -9,7 +10,7 @@
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/words.h"
-#include "stages/recordings/recording.h"
+#include "pipeline/commands/standard_streams.h"
 
 namespace eventgan {
 namespace {
@@ -87,6 +88,22 @@ std::vector<RecordingSpec> wanted_parts(const RecordingArguments& arguments) {
     if (!arguments.frames.empty()) read_frame_range(arguments.frames, part);
   }
   return parts;
+}
+
+bool skipped_as_too_short(const RecordingSpec& part, const Recording& recording,
+                          const std::vector<int>& gaps) {
+  const std::int64_t last = part.last_frame.value_or(recording.frame_count() - 1);
+  const bool too_short = last >= part.first_frame && std::ranges::all_of(gaps, [&](int gap) {
+                           return last - part.first_frame < gap;
+                         });
+  if (too_short) {
+    tell_note("skipped, since it has too few frames for --gaps: " + recording.name());
+  }
+  return too_short;
+}
+
+void refuse_all_too_short() {
+  throw UsageError("--gaps: expected a recording with enough frames, got none");
 }
 
 }  // namespace eventgan

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "manifests/values/training.h"
+#include "stages/recordings/recording.h"
 
 namespace CLI {
 class App;
@@ -31,5 +32,13 @@ void add_gaps_option(CLI::App& command, std::vector<int>& gaps);
 /// which part, or a training's manifest (*.json), which has its validation's parts. Throws
 /// UsageError for options that cannot be, and as read_training_manifest.
 std::vector<RecordingSpec> wanted_parts(const RecordingArguments& arguments);
+
+/// Whether a part has too few frames for any of the gaps, which is no error among several
+/// recordings: says so then. A part without a frame is not one.
+bool skipped_as_too_short(const RecordingSpec& part, const Recording& recording,
+                          const std::vector<int>& gaps);
+
+/// Throws UsageError: every part was skipped.
+[[noreturn]] void refuse_all_too_short();
 
 }  // namespace eventgan

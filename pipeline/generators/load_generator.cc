@@ -106,7 +106,6 @@ LoadedGenerator load_without_weights(const JobManifest& manifest) {
 /// A sensor that the weights have not learnt would give volumes of another one.
 void check_threshold(const Weights& weights, const GeneratorSpec& spec) {
   if (!spec.threshold) return;
-  const auto [least, most] = spec.threshold->range;
   if (!weights.thresholds) {
     throw UsageError(
         "$.generator.sensor.threshold: expected weights that have learnt a sensor's threshold, got "
@@ -114,11 +113,16 @@ void check_threshold(const Weights& weights, const GeneratorSpec& spec) {
         spec.weights);
   }
   const ThresholdRange learnt = *weights.thresholds;
+  const double ratio = spec.threshold->ratio;
+  const ContrastThreshold least{spec.threshold->range[0], ratio};
+  const ContrastThreshold most{spec.threshold->range[1], ratio};
   if (learnt.contains(least) && learnt.contains(most)) return;
   throw UsageError(fmt::format(
       "$.generator.sensor.threshold: expected {:.3g}..{:.3g} as the weights have learnt, got "
-      "{:.3g}..{:.3g}",
-      learnt.lowest, learnt.highest, least, most));
+      "{:.3g}..{:.3g}{}",
+      learnt.lowest, learnt.highest, std::min(least.positive(), least.negative()),
+      std::max(most.positive(), most.negative()),
+      ratio == 1 ? "" : fmt::format(" with threshold_ratio {:.3g}", ratio)));
 }
 
 std::string choice_text(const EngineChoice& choice, const GeneratorSpec& spec,

@@ -1,5 +1,7 @@
 #include "pipeline/realism/realism.h"
 
+#include <fmt/core.h>
+
 #include <algorithm>
 #include <chrono>
 #include <set>
@@ -23,9 +25,9 @@ void check_options(const RealismOptions& options) {
                      std::to_string(options.methods.size()) + ", " +
                      std::to_string(distinct.size()) + " of them different");
   }
-  if (options.threshold && !(*options.threshold >= 0.01 && *options.threshold <= 5)) {
+  if (options.threshold && !(options.threshold->mean >= 0.01 && options.threshold->mean <= 5)) {
     throw UsageError("--threshold: expected fit or a number in 0.01..5, got " +
-                     std::to_string(*options.threshold));
+                     std::to_string(options.threshold->mean));
   }
   // Command lines can say "nan", which lies in no range and outside of none.
   if (!(options.log_epsilon >= 1e-6 && options.log_epsilon <= 1)) {
@@ -36,6 +38,15 @@ void check_options(const RealismOptions& options) {
     throw UsageError("--esim-displacement: expected a number in 0.1..100, got " +
                      std::to_string(options.esim_displacement_px));
   }
+}
+
+void check_learnt(const ContrastThreshold& threshold, const ThresholdRange& learnt) {
+  if (learnt.contains(threshold)) return;
+  throw UsageError(
+      fmt::format("--threshold: expected {:.3g}..{:.3g} as the weights have learnt, got {:.3g} for "
+                  "positive and "
+                  "{:.3g} for negative events",
+                  learnt.lowest, learnt.highest, threshold.positive(), threshold.negative()));
 }
 
 std::vector<IntervalFrames> frames_to_fit(const Recording& recording,
@@ -90,20 +101,21 @@ class MethodMaker {
 
   std::unique_ptr<VolumeMethod> network(std::unique_ptr<Generator> generator) {
     std::optional<ContrastThreshold> threshold;
-    if (generator->thresholds()) {
-      threshold = options_.threshold
-                      ? ContrastThreshold{*options_.threshold, options_.threshold_ratio}
-                      : fitted_threshold(*generator, fitted_frames(), threads_);
+    if (const auto learnt = generator->thresholds()) {
+      threshold = options_.threshold;
+      if (!threshold) threshold = fitted_threshold(*generator, fitted_frames(), threads_);
+      check_learnt(*threshold, *learnt);
     }
     return make_network_method(std::move(generator), options_.weights, threshold,
                                !options_.threshold, options_.seed);
   }
 
   std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {
-    const double threshold = options_.threshold
-                                 ? *options_.threshold
-                                 : fitted_threshold(scene, fitted_frames(), options_.log_epsilon,
-                                                    options_.seed, threads_);
+    const ContrastThreshold threshold =
+        options_.threshold
+            ? *options_.threshold
+            : ContrastThreshold{fitted_threshold(scene, fitted_frames(), options_.log_epsilon,
+                                                 options_.seed, threads_)};
     return make_simulated_method(std::move(scene), realism_sensor(threshold, options_.log_epsilon),
                                  !options_.threshold, bins_, options_.seed);
   }

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/values/sensor_input.h"
 #include "pipeline/realism/realism_report.h"
 #include "pipeline/runtime/progress.h"
 
@@ -29,12 +30,9 @@ struct RealismOptions {
                                         RealismMethod::kEsim};
   std::string weights = "shipped";  ///< of the network: a file, "shipped" or "shipped:WIDTH"
 
-  /// Contrast threshold of the two models, 0.01..5; none: fitted, for each model, so that it makes
-  /// as many events as the camera did.
-  std::optional<double> threshold;
-  /// Of the negative threshold to the positive one, told with `threshold` to a network that knows
-  /// its sensor.
-  double threshold_ratio = 1;
+  /// Contrast threshold of the two models, and of a network that knows its sensor, 0.01..5; none:
+  /// fitted, for each, so that it makes as many events as the camera did.
+  std::optional<ContrastThreshold> threshold;
   double log_epsilon = 0.02;        ///< ε of their log intensity ln(u/255 + ε), 1e-6..1
   int esim_draws = 5;               ///< motions for a pair; its scores are the means over them
   double esim_displacement_px = 5;  ///< largest displacement a frame of the motions

@@ -46,6 +46,36 @@ ChosenPairs choose_pairs_of(const FitPart& part, const std::vector<int>& gaps, s
           some_of(std::span(all).subspan(fitted, kept), most)};
 }
 
+/// Of pairs that share no time, so that no event counts twice.
+std::vector<StillPixels> still_pixels_of(const Recording& recording,
+                                         std::span<const FrameInterval> pairs) {
+  std::vector<StillPixels> still;
+  std::int64_t end = 0;
+  for (const FrameInterval& pair : pairs) {
+    if (pair.first < end) continue;
+    end = pair.last;
+    const auto events = recording.events_between(pair.first, pair.last);
+    const IntervalFrames frames = frames_of(recording, pair, events);
+    still.push_back(find_still_pixels(frames.previous, frames.next, events, frames.duration_s));
+  }
+  return still;
+}
+
+/// The pairs without the events of hot pixels; `hot`: [y, x], or empty for none.
+void read_pairs(const Recording& recording, std::span<const FrameInterval> pairs,
+                std::span<const std::uint8_t> hot, std::vector<IntervalFrames>& frames) {
+  for (const FrameInterval& pair : pairs) {
+    std::vector<Event> events = recording.events_between(pair.first, pair.last);
+    if (!hot.empty()) {
+      const int width = recording.size().width;
+      std::erase_if(events, [&](const Event& event) {
+        return hot[static_cast<std::size_t>(event.y * width + event.x)] != 0;
+      });
+    }
+    frames.push_back(frames_of(recording, pair, events));
+  }
+}
+
 double pixel_seconds(const IntervalFrames& frames) {
   return static_cast<double>(frames.previous.size.pixel_count()) * frames.duration_s;
 }
@@ -120,7 +150,7 @@ class Fitter {
     }
     const Sensitivity sensitivity([&](double factor) {
       return made_events(difference_scene(), frames_,
-                         realism_sensor(factor * threshold, kFrameLogEpsilon), kSeed, threads_);
+                         realism_sensor({factor * threshold}, kFrameLogEpsilon), kSeed, threads_);
     });
     FittedThreshold fitted{{threshold}, {}, {}};
     fitted.mean = bootstrap_bounds(frames_.size(), [&](std::span<const std::size_t> draw) {
@@ -138,6 +168,14 @@ class Fitter {
           fmt::format("no threshold in {:.3g}..{:.3g}, which the network has learnt, makes as "
                       "many events as the camera",
                       range.lowest, range.highest));
+      return std::nullopt;
+    }
+    const auto [least, most] = ThresholdSpec::kRatios;
+    if (threshold.ratio < least || threshold.ratio > most) {
+      warn(
+          fmt::format("no threshold through the network, since the negative one is {:.3g} times "
+                      "the positive one, expected {}..{}",
+                      threshold.ratio, least, most));
       return std::nullopt;
     }
     const Sensitivity sensitivity([&](double factor) {
@@ -197,7 +235,7 @@ std::vector<EventRow> compare(const std::vector<IntervalFrames>& kept, const Gen
   std::vector<EventRow> rows{{"camera", camera / pixels}};
   const auto difference = [&](double threshold) {
     return event_sum(made_events(difference_scene(), kept,
-                                 realism_sensor(threshold, kFrameLogEpsilon), kSeed, threads));
+                                 realism_sensor({threshold}, kFrameLogEpsilon), kSeed, threads));
   };
   const auto through_network = [&](const ContrastThreshold& threshold) {
     return event_sum(made_events(*network, kept, threshold, threads));
@@ -229,35 +267,47 @@ void describe_light(const std::vector<IntervalFrames>& frames, SensorFit& fit) {
   fit.grey_levels = {quantile(levels, 0.1), quantile(levels, 0.9)};
 }
 
+/// Noise that a document can tell, or none and why.
+std::optional<NoiseFit> checked_noise(std::optional<NoiseFit> noise,
+                                      std::vector<std::string>& warnings) {
+  if (!noise) {
+    warnings.emplace_back("no noise, since no pair of frames has 100 pixels that stay still");
+    return noise;
+  }
+  const double most_hz = std::max(noise->noise.shot_hz[1], noise->noise.leak_hz[1]);
+  if (most_hz <= kMostNoise_hz) return noise;
+  warnings.push_back(fmt::format(
+      "no noise, since pixels that stay still have {:.3g} events a second, expected at most {}",
+      most_hz, kMostNoise_hz));
+  return std::nullopt;
+}
+
 }  // namespace
 
 SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
                      const std::vector<int>& gaps, int threads) {
   SensorFit fit;
-  std::vector<IntervalFrames> fitted, kept;
+  std::vector<ChosenPairs> pairs;
   std::vector<std::vector<StillPixels>> still;
   const std::size_t most = std::max<std::size_t>(kMostPairs / parts.size(), 1);
   for (const FitPart& part : parts) {
-    const ChosenPairs pairs = choose_pairs_of(part, gaps, most);
-    still.emplace_back();
-    for (const FrameInterval& interval : pairs.fitted) {
-      const auto events = part.recording->events_between(interval.first, interval.last);
-      const auto& frames = fitted.emplace_back(frames_of(*part.recording, interval, events));
-      still.back().push_back(
-          find_still_pixels(frames.previous, frames.next, events, frames.duration_s));
-    }
-    for (const FrameInterval& interval : pairs.kept) {
-      kept.push_back(read_frames(*part.recording, interval));
-    }
+    pairs.push_back(choose_pairs_of(part, gaps, most));
+    still.push_back(still_pixels_of(*part.recording, pairs.back().fitted));
+  }
+  fit.noise = checked_noise(fit_noise(still), fit.warnings);
+  std::vector<IntervalFrames> fitted, kept;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::span<const std::uint8_t> hot = fit.noise
+                                                  ? std::span<const std::uint8_t>(fit.noise->hot[i])
+                                                  : std::span<const std::uint8_t>();
+    read_pairs(*parts[i].recording, pairs[i].fitted, hot, fitted);
+    read_pairs(*parts[i].recording, pairs[i].kept, hot, kept);
   }
   fit.fitted_pairs = fitted.size();
   fit.kept_pairs = kept.size();
   describe_light(fitted, fit);
-  fit.noise = fit_noise(still);
   if (fit.noise) {
     for (IntervalFrames& frames : fitted) frames = without_noise(std::move(frames), *fit.noise);
-  } else {
-    fit.warnings.emplace_back("no noise, since no pair of frames has 100 pixels that stay still");
   }
   const bool has_events = std::ranges::any_of(
       fitted, [](const IntervalFrames& frames) { return frames.event_count > 0; });

@@ -57,7 +57,9 @@ struct SensorFit {
 /// Fits one camera's noise (fit_noise) and thresholds (fitted_threshold; of the frames' log
 /// intensity, kFrameLogEpsilon) to the first three quarters of each part's pairs (i, i + gap), and
 /// compares on those of the rest that share no time with them. At most 64 pairs of either, spread
-/// evenly. `network`: one that knows its sensor, or null. The result does not depend on `threads`.
+/// evenly, but one of each part at least. Noise is of pairs that share no time; the events of hot
+/// pixels are left out of all that follows. `network`: one that knows its sensor, or null. The
+/// result does not depend on `threads`.
 ///
 /// Throws UsageError as choose_intervals does, InputError as Recording does.
 SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,

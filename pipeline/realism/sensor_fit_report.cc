@@ -56,8 +56,9 @@ std::string to_text(const SensorFit& fit) {
   text +=
       fmt::format("{:22} {:>16} {:>12}\n", "pairs kept aside", "events per pixel", "÷ camera's");
   for (const EventRow& row : fit.rows) {
-    text += fmt::format("{:22} {:16.4f} {:12.2f}\n", row.name, row.events_per_pixel,
-                        row.events_per_pixel / fit.rows.front().events_per_pixel);
+    const double camera = fit.rows.front().events_per_pixel;
+    text += fmt::format("{:22} {:16.4f} {:>12}\n", row.name, row.events_per_pixel,
+                        camera > 0 ? fmt::format("{:.2f}", row.events_per_pixel / camera) : "-");
   }
   return text;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 
 namespace eventgan {
@@ -11,9 +12,11 @@ namespace {
 constexpr int kReach = 2;  // of 5x5 pixels
 constexpr std::size_t kLeastPixels = 100;
 constexpr std::size_t kPairsOfRange = 10;
+constexpr double kEventsOfRange = 400;
 constexpr std::size_t kLeastHotEvents = 5;
 constexpr double kLeastHot_hz = 5;
 constexpr double kHotTimes = 20;
+constexpr double kMostActive = 0.01;  // of the pixels
 
 std::vector<int> changes(const GreyImage& previous, const GreyImage& next) {
   std::vector<int> change(previous.pixels.size());
@@ -103,19 +106,37 @@ PixelTotals totals_of(std::span<const StillPixels> pairs) {
   return totals;
 }
 
+/// Events a second of the pixels that were still, but for the most active ones.
+double mean_hz(const PixelTotals& totals, std::span<const double> rates_hz) {
+  std::vector<std::size_t> pixels;
+  for (std::size_t i = 0; i < rates_hz.size(); ++i) {
+    if (totals.seconds[i] > 0) pixels.push_back(i);
+  }
+  std::ranges::sort(pixels, {}, [&](std::size_t i) { return rates_hz[i]; });
+  pixels.resize(pixels.size() -
+                static_cast<std::size_t>(std::ceil(kMostActive * double(pixels.size()))));
+  double events = 0, seconds = 0;
+  for (const std::size_t i : pixels) {
+    events += static_cast<double>(totals.events[i]);
+    seconds += totals.seconds[i];
+  }
+  return seconds > 0 ? events / seconds : 0;
+}
+
 /// 1 for each pixel that is hot.
 std::vector<std::uint8_t> hot_pixels_of(const PixelTotals& totals) {
-  std::vector<double> rates_hz(totals.events.size()), active_hz;
-  for (std::size_t i = 0; i < rates_hz.size(); ++i) {
+  std::vector<std::uint8_t> hot(totals.events.size());
+  std::vector<double> rates_hz(hot.size()), others_hz;
+  for (std::size_t i = 0; i < hot.size(); ++i) {
     if (totals.events[i] == 0) continue;
     rates_hz[i] = static_cast<double>(totals.events[i]) / totals.seconds[i];
-    active_hz.push_back(rates_hz[i]);
+    hot[i] = totals.events[i] >= kLeastHotEvents && rates_hz[i] > kLeastHot_hz;
+    if (!hot[i]) others_hz.push_back(rates_hz[i]);
   }
-  std::vector<std::uint8_t> hot(rates_hz.size());
-  const double median_hz = quantile(std::move(active_hz), 0.5);
+  double usual_hz = mean_hz(totals, rates_hz);
+  if (!others_hz.empty()) usual_hz = std::max(usual_hz, quantile(std::move(others_hz), 0.5));
   for (std::size_t i = 0; i < hot.size(); ++i) {
-    hot[i] = totals.events[i] >= kLeastHotEvents && rates_hz[i] > kLeastHot_hz &&
-             rates_hz[i] > kHotTimes * median_hz;
+    hot[i] = hot[i] && rates_hz[i] > kHotTimes * usual_hz;
   }
   return hot;
 }
@@ -142,11 +163,20 @@ NoiseCount count_noise(const StillPixels& pair, std::span<const std::uint8_t> ho
   return {cool(pair.positive), cool(pair.negative), static_cast<double>(pixels) * pair.duration_s};
 }
 
-std::array<double, 2> range_of(std::span<const NoiseCount> pairs, const NoiseCount& all,
+/// Those whose number of events says more than chance.
+std::vector<NoiseCount> telling_pairs(std::span<const NoiseCount> pairs, const NoiseCount& all) {
+  std::vector<NoiseCount> telling;
+  std::ranges::copy_if(pairs, std::back_inserter(telling), [&](const NoiseCount& pair) {
+    return (all.positive_hz() + all.negative_hz()) * pair.pixel_seconds >= kEventsOfRange;
+  });
+  return telling;
+}
+
+std::array<double, 2> range_of(std::span<const NoiseCount> telling, const NoiseCount& all,
                                double (NoiseCount::*rate_hz)() const) {
-  if (pairs.size() < kPairsOfRange) return {(all.*rate_hz)(), (all.*rate_hz)()};
+  if (telling.size() < kPairsOfRange) return {(all.*rate_hz)(), (all.*rate_hz)()};
   std::vector<double> rates_hz;
-  for (const NoiseCount& pair : pairs) rates_hz.push_back((pair.*rate_hz)());
+  for (const NoiseCount& pair : telling) rates_hz.push_back((pair.*rate_hz)());
   return {quantile(rates_hz, 0.1), quantile(rates_hz, 0.9)};
 }
 
@@ -157,9 +187,10 @@ std::optional<NoiseFit> fit_noise(std::span<const std::vector<StillPixels>> reco
   NoiseCount all;
   std::vector<NoiseCount> counts;
   for (const std::vector<StillPixels>& pairs : recordings) {
+    std::vector<std::uint8_t>& hot = fit.hot.emplace_back();
     if (pairs.empty()) continue;
     const PixelTotals totals = totals_of(pairs);
-    const std::vector<std::uint8_t> hot = hot_pixels_of(totals);
+    hot = hot_pixels_of(totals);
     fit.pixels +=
         totals.seconds.size() - static_cast<std::size_t>(std::ranges::count(totals.seconds, 0.0));
     fit.hot_pixels += static_cast<std::size_t>(std::ranges::count(hot, 1));
@@ -174,8 +205,9 @@ std::optional<NoiseFit> fit_noise(std::span<const std::vector<StillPixels>> reco
   }
   if (counts.empty()) return std::nullopt;
   const double hot_share = static_cast<double>(fit.hot_pixels) / static_cast<double>(fit.pixels);
-  fit.noise.shot_hz = range_of(counts, all, &NoiseCount::shot_hz);
-  fit.noise.leak_hz = range_of(counts, all, &NoiseCount::leak_hz);
+  const std::vector<NoiseCount> telling = telling_pairs(counts, all);
+  fit.noise.shot_hz = range_of(telling, all, &NoiseCount::shot_hz);
+  fit.noise.leak_hz = range_of(telling, all, &NoiseCount::leak_hz);
   fit.noise.hot_pixels = {hot_share, hot_share};
   fit.positive_hz = all.positive_hz();
   fit.negative_hz = all.negative_hz();

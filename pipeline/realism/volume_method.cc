@@ -41,9 +41,11 @@ CounterRandom draw_random(const std::string& method, const FrameInterval& interv
       .keyed(std::to_string(draw));
 }
 
-std::string threshold_text(double threshold, bool fitted, double log_epsilon) {
-  return fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})", threshold,
-                     fitted ? " (fitted)" : "", log_epsilon);
+std::string threshold_text(const ContrastThreshold& threshold, bool fitted, double log_epsilon) {
+  const std::string text = fmt::format("contrast threshold {:.4g}{} of ln(u/255 + {:.4g})",
+                                       threshold.mean, fitted ? " (fitted)" : "", log_epsilon);
+  if (threshold.ratio == 1) return text;
+  return text + fmt::format(", negative ÷ positive {:.3g}", threshold.ratio);
 }
 
 class NetworkMethod final : public VolumeMethod {
@@ -60,9 +62,8 @@ class NetworkMethod final : public VolumeMethod {
   std::string settings() const override {
     const std::string text = "weights " + weights_;
     if (!threshold_) return text;
-    return fmt::format("{}, {}, negative ÷ positive {:.3g}, mean of {} draws of events", text,
-                       threshold_text(threshold_->mean, fitted_, kFrameLogEpsilon),
-                       threshold_->ratio, draws());
+    return fmt::format("{}, {}, mean of {} draws of events", text,
+                       threshold_text(*threshold_, fitted_, kFrameLogEpsilon), draws());
   }
   int draws() const override { return threshold_ ? 5 : 1; }
 
@@ -124,8 +125,9 @@ class SimulatedMethod final : public VolumeMethod {
   std::string name() const override { return scene_.name; }
 
   std::string settings() const override {
-    const std::string text =
-        threshold_text(sensor_.positive_threshold, fitted_, sensor_.log_epsilon);
+    const double positive = sensor_.positive_threshold, negative = sensor_.negative_threshold;
+    const std::string text = threshold_text({std::sqrt(positive * negative), negative / positive},
+                                            fitted_, sensor_.log_epsilon);
     return scene_.draws == 1 ? text : fmt::format("{}, mean of {} motions", text, scene_.draws);
   }
 
@@ -166,8 +168,8 @@ SimulatedScene esim_scene(double displacement_px, int draws) {
           draws};
 }
 
-SensorSpec realism_sensor(double threshold, double log_epsilon) {
-  return ThresholdSpec().applied({.log_epsilon = log_epsilon}, {threshold});
+SensorSpec realism_sensor(const ContrastThreshold& threshold, double log_epsilon) {
+  return ThresholdSpec().applied({.log_epsilon = log_epsilon}, threshold);
 }
 
 std::unique_ptr<VolumeMethod> make_simulated_method(SimulatedScene scene, const SensorSpec& sensor,
@@ -254,7 +256,7 @@ double fitted_threshold(const SimulatedScene& scene, std::span<const IntervalFra
   Bisection bisection(event_count(frames, &IntervalFrames::event_count),
                       {kLeastFittedThreshold, kMostFittedThreshold});
   for (int step = 0; step < kMostSteps; ++step) {
-    const SensorSpec sensor = realism_sensor(bisection.threshold(), log_epsilon);
+    const SensorSpec sensor = realism_sensor({bisection.threshold()}, log_epsilon);
     const auto [positive, negative] = sum_of(made_events(scene, frames, sensor, seed, threads));
     if (bisection.is_near(positive + negative)) break;
     bisection.take(positive + negative);

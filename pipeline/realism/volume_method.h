@@ -56,9 +56,9 @@ SimulatedScene difference_scene();
 /// A random affine motion of the previous frame, by at most `displacement_px` a frame: "esim".
 SimulatedScene esim_scene(double displacement_px, int draws);
 
-/// The sensor of a threshold, the same for both polarities; its spread over the pixels is 15 % of
-/// it, as in SensorSpec's defaults; no refractory time and no noise.
-SensorSpec realism_sensor(double threshold, double log_epsilon);
+/// The sensor of a threshold; its spread over the pixels is 15 % of the lower polarity's, as in
+/// SensorSpec's defaults; no refractory time and no noise.
+SensorSpec realism_sensor(const ContrastThreshold& threshold, double log_epsilon);
 
 /// A model with a sensor; `fitted` is stated in the report. Volumes of `bins` bins; random numbers
 /// by seed, name, interval and draw.

@@ -40,7 +40,7 @@ void check_generator_phase(const TrainingManifest& manifest) {
   if (manifest.steps.generator == 0) return;
   if (weights.adversarial == 0 && weights.flow == 0 && weights.reconstruction == 0 &&
       weights.volume == 0 && weights.count == 0 && weights.overlap == 0 &&
-      weights.likelihood == 0) {
+      weights.likelihood == 0 && weights.block_likelihood == 0) {
     throw UsageError("expected a loss for the generator, got weight 0 for all, in " +
                      manifest.name);
   }

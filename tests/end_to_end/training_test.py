@@ -341,6 +341,10 @@ class TrainedWeights(program.InFolder):
         self.assertIn("still-001.hdf5", err)
         run("realism", short, *gap, expect=64)
         run("realism", short, short, *gap, expect=64)
+        out, err = run("fit", short, clip, "--gaps", FRAMES - 1)
+        self.assertIn("pairs of frames: 1 fitted", out)
+        self.assertIn("still-001.hdf5", err)
+        run("fit", short, short, "--gaps", FRAMES - 1, expect=64)
 
     def test_a_fitted_sensor_is_taken_by_convert_and_realism(self):
         clip, document = work / "recordings" / "clip.hdf5", self.folder / "sim.json"

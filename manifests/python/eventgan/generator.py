@@ -23,7 +23,7 @@ except ImportError as error:
 PathLike = Union[str, os.PathLike]
 _PLACES = {  # of settings in a manifest
     "image": ("fit", "preset", "grey", "blur"),
-    "generator": ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor",
+    "generator": ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor", "sample",
                   "duration_s", "max_displacement_px"),
     "volume": ("bins", "normalize"),
 }
@@ -42,7 +42,7 @@ class Generator:
     Parameters
     ----------
     weights : str or path, default "shipped"
-        A .safetensors file, "shipped" or "shipped:WIDTH" (weights that come with the package), or "untrained:WIDTH".
+        A .safetensors file, "shipped", "shipped:WIDTH" or "shipped:sensor" (weights that come with the package), or "untrained:WIDTH".
     kind : {"network", "esim", "difference"}
         The EventGAN network, or a model of a sensor to compare it with, which needs no weights.
     precision : {"float32", "bfloat16", "int8"}
@@ -65,7 +65,7 @@ class Generator:
         Of the models' random numbers, of what sensor={"threshold": [0.1, 0.6], "noise": {...}} draws for each pair, and of untrained weights.
     **settings
         Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
-        sensor (a dictionary, or a camera: the path of its document or a name that ships), duration_s, max_displacement_px, bins.
+        sensor (a dictionary, or a camera: the path of its document or a name that ships), sample, duration_s, max_displacement_px, bins.
         manifest.schema.json has their meanings and ranges.
 
     Raises

@@ -55,7 +55,9 @@ PlaneMotion draw_motion(PlanePoint centre, double radius_px, double shift_px, Dr
   const double zoom = draws.uniform(-turn, turn);
   const double stretch = draws.uniform(-turn, turn) / 3;
   const double shear = draws.uniform(-turn, turn) / 3;
-  const double tilt = std::min(0.1 * shift_px / radius_px, 0.1) / radius_px;
+  // On what is small and moves far, the denominator stays above 1/2.
+  const double tilt =
+      std::min(std::min(0.1 * shift_px / radius_px, 0.1) / radius_px, 0.5 / (radius_px + shift_px));
   return {.centre = centre,
           .shift_px = draws.direction(shift_px),
           .linear = {zoom + stretch, shear - rotation, shear + rotation, zoom - stretch},

@@ -185,7 +185,7 @@ TEST(JobManifest, HoldsThresholdsAndTheSensorAtTheirMiddle) {
   EXPECT_EQ(ratio.threshold, (ThresholdSpec{.range = {0.1, 0.4}, .ratio = 4}));
   EXPECT_NEAR(ratio.sensor.positive_threshold, 0.1, 1e-12);
   EXPECT_NEAR(ratio.sensor.negative_threshold, 0.4, 1e-12);
-  EXPECT_NEAR(ratio.sensor.threshold_spread, 0.03, 1e-12);
+  EXPECT_NEAR(ratio.sensor.threshold_spread, 0.015, 1e-12);
 }
 
 TEST(JobManifest, DrawsEventsUnlessTold) {

@@ -257,6 +257,14 @@ def test_a_threshold_is_drawn_for_each_pair(images):
         eventgan.Generator(kind="difference", sensor={"threshold": 1, "positive_threshold": 1})
 
 
+def test_rates_are_given_where_no_events_are_drawn_of_them(images):
+    drawn, rates = (eventgan.Generator("shipped:sensor", sensor={"threshold": 0.3}, sample=sample)(*images[:2]).reshape(2, 9, -1).sum(1)
+                    for sample in (True, False))
+    np.testing.assert_allclose(drawn, drawn.round(), atol=1e-4)
+    assert (np.abs(rates - rates.round()) > 0.01).mean() > 0.1
+    assert np.abs(drawn - rates).max() < 1 + 1e-4
+
+
 # ---- Labels
 
 

@@ -274,8 +274,8 @@ class LoadSensorGenerator : public ::testing::Test {
     manifest_.generator.weights = "w.safetensors";
   }
 
-  std::string refusal(std::array<double, 2> range) {
-    manifest_.generator.threshold = ThresholdSpec{.range = range};
+  std::string refusal(std::array<double, 2> range, double ratio = 1) {
+    manifest_.generator.threshold = ThresholdSpec{.range = range, .ratio = ratio};
     try {
       load_generator(manifest_);
       return "";
@@ -309,6 +309,11 @@ TEST_F(LoadSensorGenerator, TakesThresholdsThatItLearntAndNoOthers) {
             "$.generator.sensor.threshold: expected 0.1..0.4 as the weights have learnt, got "
             "0.2..0.5");
   EXPECT_NE(refusal({0.05, 5}), "");
+  // Of either polarity.
+  EXPECT_EQ(refusal({0.21, 0.21}, 3.6), "");
+  EXPECT_EQ(refusal({0.2, 0.22}, 4),
+            "$.generator.sensor.threshold: expected 0.1..0.4 as the weights have learnt, got "
+            "0.1..0.44 with threshold_ratio 4");
 }
 
 TEST_F(LoadSensorGenerator, RefusesThresholdsForWeightsThatLearntNone) {

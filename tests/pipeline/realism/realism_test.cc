@@ -48,9 +48,27 @@ TEST(MeasureRealism, ComparesTheModelsWithFittedThresholds) {
 
 TEST(MeasureRealism, TakesTheThresholdItIsTold) {
   RealismOptions options = models_only();
-  options.threshold = 0.5;
-  const RealismReport report = measure_realism(moving_bar_recording({12, 16}, 3), options);
+  options.threshold = {0.5};
+  RealismReport report = measure_realism(moving_bar_recording({12, 16}, 3), options);
   EXPECT_EQ(report.methods[0].settings, "contrast threshold 0.5 of ln(u/255 + 0.02)");
+  // ln(u/255 + 0.02) changes by 1.5: positive events have a threshold of 0.25, negative ones of 4.
+  options.threshold = {1, 16};
+  report = measure_realism(moving_bar_recording({12, 16}, 3), options);
+  EXPECT_THAT(report.methods[0].settings, HasSubstr("negative ÷ positive 16"));
+  EXPECT_EQ(report.methods[0].mean.positive_share, 1);
+}
+
+TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
+  RealismOptions options = models_only();
+  options.methods = {RealismMethod::kNetwork};
+  options.weights = "shipped:sensor";
+  const FakeRecording recording = moving_bar_recording({12, 16}, 3);
+  options.threshold = {0.9};
+  EXPECT_NO_THROW(measure_realism(recording, options));
+  options.threshold = {0.9, 1.2};
+  EXPECT_THROW(measure_realism(recording, options), UsageError);
+  options.threshold = {0.01};
+  EXPECT_THROW(measure_realism(recording, options), UsageError);
 }
 
 TEST(MeasureRealism, SameSeedSameReport) {
@@ -88,7 +106,7 @@ TEST(MeasureRealism, RefusesOptionsThatCannotBe) {
   EXPECT_THROW(measure_realism(recording, twice), UsageError);
   for (const double threshold : {0.0, -1.0, 6.0, std::numeric_limits<double>::quiet_NaN()}) {
     RealismOptions options = models_only();
-    options.threshold = threshold;
+    options.threshold = {threshold};
     EXPECT_THROW(measure_realism(recording, options), UsageError) << threshold;
   }
   for (const double number : {0.0, -1.0, 200.0, std::numeric_limits<double>::quiet_NaN()}) {

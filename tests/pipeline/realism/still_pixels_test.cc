@@ -93,29 +93,62 @@ TEST(FitNoise, TellsLeakFromShotNoise) {
 }
 
 TEST(FitNoise, OfTenPairsIsTheRangeOfTheirMiddle) {
+  // In the mean 500 events of either polarity.
   std::vector<StillPixels> pairs;
-  for (std::uint32_t i = 0; i <= 10; ++i) pairs.push_back(pair_of(10 * i, 10 * i));
-  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[0], 0.2, 1e-9);  // of 0, 0.2, .. 2
-  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[1], 1.8, 1e-9);
+  for (std::uint32_t i = 0; i <= 10; ++i) pairs.push_back(pair_of(100 * i, 100 * i));
+  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[0], 2, 1e-9);  // of 0, 2, .. 20
+  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[1], 18, 1e-9);
   pairs.resize(9);
-  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[0], 0.8, 1e-9);  // the mean of 0, .. 1.6
-  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[1], 0.8, 1e-9);
+  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[0], 8, 1e-9);  // the mean of 0, .. 16
+  EXPECT_NEAR(fit_of(pairs).noise.shot_hz[1], 8, 1e-9);
+}
+
+TEST(FitNoise, OfFewEventsIsNoRange) {
+  // 199 or 200 events of either polarity in the mean of all pairs: 400 tell a rate to 5 %.
+  const auto range_of = [](std::uint32_t more) {
+    std::vector<StillPixels> pairs;
+    for (std::uint32_t i = 0; i < 10; ++i) pairs.push_back(pair_of(more + 20 * i, more + 20 * i));
+    return fit_of(pairs).noise.shot_hz;
+  };
+  EXPECT_NEAR(range_of(109)[0], 3.98, 1e-9);
+  EXPECT_NEAR(range_of(109)[1], 3.98, 1e-9);
+  EXPECT_LT(range_of(110)[0], 3);
+  EXPECT_GT(range_of(110)[1], 5);
 }
 
 TEST(FitNoise, LeavesOutHotPixels) {
-  // In a second 100 pixels have an event each, the median of those that have any; one more has 21,
-  // another 20, which is not above 20 times the median.
-  std::vector<StillPixels> pairs(10, pair_of(10, 0));
+  // In a second every pixel has an event; one has 21, another 20, which is not above 20 times that.
+  std::vector<StillPixels> pairs(10, pair_of(100, 0));
   for (std::uint32_t i = 0; i < 10; ++i) {
-    for (std::uint32_t pixel = 0; pixel < 10; ++pixel) pairs[i].positive[pixel] = 10 * i + pixel;
+    for (std::uint32_t pixel = 0; pixel < 100; ++pixel) pairs[i].positive[pixel] = 100 * i + pixel;
   }
-  pairs[0].negative.assign(21, 500);
-  pairs[1].negative.assign(20, 501);
+  pairs[0].negative.assign(20, 500);
+  pairs[1].negative.assign(19, 501);
   const NoiseFit fit = fit_of(pairs);
   EXPECT_EQ(fit.hot_pixels, 1u);
   EXPECT_EQ(fit.noise.hot_pixels[0], 0.001);
-  EXPECT_NEAR(fit.positive_hz, 100 / 999.0, 1e-9);
-  EXPECT_NEAR(fit.negative_hz, 20 / 999.0, 1e-9);
+  EXPECT_NEAR(fit.positive_hz, 1, 1e-9);
+  EXPECT_NEAR(fit.negative_hz, 19 / 999.0, 1e-9);
+  ASSERT_EQ(fit.hot.size(), 1u);
+  EXPECT_EQ(std::ranges::count(fit.hot[0], 1), 1);
+  EXPECT_EQ(fit.hot[0][500], 1);
+}
+
+TEST(FitNoise, FindsHotPixelsOfASilentCamera) {
+  StillPixels pair = pair_of(0, 0);
+  for (int event = 0; event < 100; ++event) pair.positive.insert(pair.positive.end(), {3, 700});
+  const NoiseFit fit = fit_of({pair});
+  EXPECT_EQ(fit.hot_pixels, 2u);
+  EXPECT_EQ(fit.positive_hz, 0);
+  EXPECT_EQ(fit.noise.leak_hz[0], 0);
+}
+
+TEST(FitNoise, TakesFlickerForNoHotPixels) {
+  StillPixels pair = pair_of(0, 0);
+  for (int event = 0; event < 20; ++event) {
+    for (std::uint32_t pixel = 0; pixel < 900; ++pixel) pair.positive.push_back(pixel);
+  }
+  EXPECT_EQ(fit_of({pair}).hot_pixels, 0u);
 }
 
 TEST(FitNoise, TakesFewEventsForChance) {

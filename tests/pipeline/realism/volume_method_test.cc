@@ -140,11 +140,15 @@ TEST(FittedThreshold, OfANetworkStaysInWhatItKnows) {
 }
 
 TEST(RealismSensor, IsWithoutNoise) {
-  const SensorSpec sensor = realism_sensor(0.2, 0.001);
+  const SensorSpec sensor = realism_sensor({0.2}, 0.001);
   EXPECT_EQ(sensor, SensorSpec{});  // 15 % of 0.2 is the default spread of 0.03
-  EXPECT_DOUBLE_EQ(realism_sensor(0.4, 0.02).threshold_spread, 0.06);
-  EXPECT_EQ(realism_sensor(0.4, 0.02).log_epsilon, 0.02);
-  EXPECT_EQ(realism_sensor(0.4, 0.02).negative_threshold, 0.4);
+  EXPECT_DOUBLE_EQ(realism_sensor({0.4}, 0.02).threshold_spread, 0.06);
+  EXPECT_EQ(realism_sensor({0.4}, 0.02).log_epsilon, 0.02);
+  EXPECT_EQ(realism_sensor({0.4}, 0.02).negative_threshold, 0.4);
+  const SensorSpec unlike = realism_sensor({0.3, 4}, 0.02);
+  EXPECT_DOUBLE_EQ(unlike.positive_threshold, 0.15);
+  EXPECT_DOUBLE_EQ(unlike.negative_threshold, 0.6);
+  EXPECT_DOUBLE_EQ(unlike.threshold_spread, 0.15 * 0.15);
 }
 
 IntervalFrames bar_frames() {
@@ -153,7 +157,7 @@ IntervalFrames bar_frames() {
 
 TEST(DifferenceScene, HasEventsWhereTheFramesDiffer) {
   const auto method =
-      make_simulated_method(difference_scene(), realism_sensor(0.2, 0.02), true, 3, 1);
+      make_simulated_method(difference_scene(), realism_sensor({0.2}, 0.02), true, 3, 1);
   const IntervalFrames frames = bar_frames();
   const std::vector<float> volume = method->volume(frames, 0);
   const std::size_t plane = frames.previous.pixels.size();
@@ -167,13 +171,13 @@ TEST(DifferenceScene, HasEventsWhereTheFramesDiffer) {
 TEST(EsimScene, DrawsDifferAndComeBack) {
   const IntervalFrames frames = bar_frames();
   const auto method =
-      make_simulated_method(esim_scene(5, 2), realism_sensor(0.2, 0.02), false, 3, 1);
+      make_simulated_method(esim_scene(5, 2), realism_sensor({0.2}, 0.02), false, 3, 1);
   EXPECT_EQ(method->draws(), 2);
   const std::vector<float> first = method->volume(frames, 0);
   EXPECT_EQ(method->volume(frames, 0), first);
   EXPECT_NE(method->volume(frames, 1), first);
   EXPECT_GT(std::accumulate(first.begin(), first.end(), 0.0f), 0.0f);
-  EXPECT_NE(make_simulated_method(esim_scene(5, 2), realism_sensor(0.2, 0.02), false, 3, 2)
+  EXPECT_NE(make_simulated_method(esim_scene(5, 2), realism_sensor({0.2}, 0.02), false, 3, 2)
                 ->volume(frames, 0),
             first);
   EXPECT_THAT(method->settings(), HasSubstr("mean of 2 motions"));
