@@ -79,18 +79,20 @@ NoiseSpec read_noise(const StrictValue& value) {
 
 namespace {
 
-void set_threshold(const ThresholdSpec& threshold, GeneratorSpec& spec) {
+/// A threshold is that of frames, unless an ε is told beside it.
+void set_threshold(const ThresholdSpec& threshold, GeneratorSpec& spec,
+                   std::optional<double> log_epsilon = std::nullopt) {
   const auto [least, most] = threshold.range;
+  spec.sensor.log_epsilon = log_epsilon.value_or(kFrameLogEpsilon);
   spec.sensor = threshold.applied(spec.sensor, {std::sqrt(least * most), threshold.ratio});
   spec.threshold = threshold;
 }
 
-/// Reads a document in place of a `sensor`. Its threshold is that of frames.
+/// Reads a document in place of a `sensor`.
 void read_camera(const StrictValue& value, GeneratorSpec& spec) {
   const CameraSensor camera = read_camera_sensor(value);
   spec.camera = camera.name;
   spec.noise = camera.noise;
-  spec.sensor.log_epsilon = kFrameLogEpsilon;
   if (camera.threshold) set_threshold(*camera.threshold, spec);
 }
 
@@ -119,7 +121,8 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
         key->fault("no such key together with threshold, which sets it");
       }
     }
-    set_threshold(threshold, spec);
+    const bool told = object.find("log_epsilon").has_value();
+    set_threshold(threshold, spec, told ? std::optional(spec.sensor.log_epsilon) : std::nullopt);
   } else if (ratio) {
     ratio->fault("threshold beside it", "none");
   }
@@ -139,7 +142,7 @@ GeneratorSpec read_generator(const StrictValue& value) {
   SpecialKeys keys(object, "kind", kind);
   if (const auto weights = keys.find("weights", {kNetwork})) {
     spec.weights = weights->text(
-        "the path of a .safetensors file, \"shipped\", or \"shipped:WIDTH\" or "
+        "the path of a .safetensors file, \"shipped\", \"shipped:sensor\", or \"shipped:WIDTH\" or "
         "\"untrained:WIDTH\" with WIDTH in 1..64",
         [](std::string_view text) { return parse_weights_name(text).has_value(); });
   }

@@ -1,4 +1,5 @@
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <memory>
@@ -25,14 +26,15 @@ namespace {
 struct FitArguments {
   RecordingArguments recordings;
   std::vector<int> gaps = {1};
-  std::string weights = "shipped";
+  std::string weights;  ///< none: no network
   std::string name = "camera";
   std::string out;
   int threads = 0;
 };
 
-/// The network, or null if it cannot be told a sensor.
+/// The network, or null if there is none or it cannot be told a sensor.
 std::unique_ptr<Generator> open_told_generator(const std::string& weights) {
+  if (weights.empty()) return nullptr;
   std::unique_ptr<Generator> generator = open_realism_generator(weights);
   if (generator->thresholds()) return generator;
   tell_note("the weights " + weights + " do not know their sensor: no threshold through them");
@@ -44,8 +46,21 @@ void check_names(const FitArguments& arguments) {
   CameraSensor named;
   named.name = arguments.name;
   parse_camera_sensor(to_document(named), "--name");
-  if (!arguments.out.empty() && !arguments.out.ends_with(".json")) {
+  const std::filesystem::path out = arguments.out;
+  if (out.empty()) return;
+  if (out.extension() != ".json") {
     throw UsageError("--out: expected a path of *.json, got " + arguments.out);
+  }
+  if (const auto folder = out.parent_path(); !folder.empty() && !is_directory(folder)) {
+    throw InputError("--out: expected a folder, got none, in " + folder.string());
+  }
+  if (!exists(out)) return;
+  try {
+    open_camera_sensor(out);
+  } catch (const std::exception&) {
+    std::throw_with_nested(
+        UsageError("--out: expected a new file or a sensor's document, got another file, in " +
+                   arguments.out));
   }
 }
 
@@ -100,10 +115,11 @@ void add_fit_command(CLI::App& app, int& exit_code) {
                         "(*.json) stands for its validation recordings");
   add_gaps_option(*command, arguments->gaps);
   command->add_option("--weights", arguments->weights,
-                      "Weights of the network: FILE.safetensors, shipped, shipped:WIDTH or "
-                      "shipped:sensor; default: shipped");
+                      "Weights that know their sensor, to find their threshold, too: "
+                      "FILE.safetensors or shipped:sensor; default: none");
   command->add_option("--name", arguments->name, "Name of the sensor; default: camera");
-  command->add_option("--out", arguments->out, "The document to write, *.json; default: print it");
+  command->add_option("--out", arguments->out,
+                      "The document to write, *.json, in place of an older one; default: print it");
   command->add_option("--threads", arguments->threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
   command->callback([arguments, &exit_code] { exit_code = run_fit(*arguments); });

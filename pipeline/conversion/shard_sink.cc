@@ -1,7 +1,11 @@
 #include "pipeline/conversion/shard_sink.h"
 
+#include <fmt/core.h>
+
+#include <array>
 #include <cstddef>
 #include <iterator>
+#include <string>
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
@@ -21,6 +25,24 @@ VolumeUnit unit_of(const GeneratorSpec& spec, const Generator& generator) {
   if (spec.kind != GeneratorKind::kNetwork) return VolumeUnit::kEvents;
   if (!generator.thresholds()) return VolumeUnit::kLearned;
   return spec.sample ? VolumeUnit::kDrawn : VolumeUnit::kRates;
+}
+
+std::string range_text(const std::array<double, 2>& range) {
+  return range[0] == range[1] ? fmt::format("{:.4g}", range[0])
+                              : fmt::format("{:.4g}..{:.4g}", range[0], range[1]);
+}
+
+/// What the manifest tells of the sensor, for people: all of it is in manifest_text.
+std::string sensor_text(const GeneratorSpec& spec) {
+  if (!spec.camera.empty()) return ", sensor " + spec.camera;
+  std::string text;
+  if (spec.threshold) text += ", threshold " + range_text(spec.threshold->range);
+  if (spec.noise) {
+    text += fmt::format(", noise of shot_hz {}, leak_hz {}, hot_pixels {}",
+                        range_text(spec.noise->shot_hz), range_text(spec.noise->leak_hz),
+                        range_text(spec.noise->hot_pixels));
+  }
+  return text;
 }
 
 ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
@@ -48,10 +70,7 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
     }
   }
   header.weights_hash = job.weights_hash;
-  header.generator = job.generator.description();
-  if (const std::string& camera = manifest.generator.camera; !camera.empty()) {
-    header.generator += ", sensor " + camera;  // all of it is in manifest_text
-  }
+  header.generator = job.generator.description() + sensor_text(manifest.generator);
   header.program_version = program_version();
   return header;
 }

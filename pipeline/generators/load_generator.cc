@@ -37,8 +37,8 @@ LoadedWeights named_weights(const JobManifest& manifest) {
   const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
   if (!name) {
     throw UsageError(
-        "$.generator.weights: expected a file, shipped, shipped:WIDTH or untrained:WIDTH with "
-        "WIDTH in 1.." +
+        "$.generator.weights: expected a file, shipped, shipped:sensor, or shipped:WIDTH or "
+        "untrained:WIDTH with WIDTH in 1.." +
         std::to_string(kLargestNamedWidth) + ", got \"" + manifest.generator.weights + "\"");
   }
   if (name->origin == WeightsOrigin::kShipped) {

@@ -106,8 +106,10 @@ class MethodMaker {
       if (!threshold) threshold = fitted_threshold(*generator, fitted_frames(), threads_);
       check_learnt(*threshold, *learnt);
     }
-    return make_network_method(std::move(generator), options_.weights, threshold,
-                               !options_.threshold, options_.seed);
+    const bool ignored = options_.threshold && !threshold;
+    return make_network_method(std::move(generator),
+                               options_.weights + (ignored ? ", which take no threshold" : ""),
+                               threshold, !options_.threshold, options_.seed);
   }
 
   std::unique_ptr<VolumeMethod> simulated(SimulatedScene scene) {

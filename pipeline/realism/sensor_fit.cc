@@ -166,7 +166,7 @@ class Fitter {
     if (is_at_end(threshold.positive(), range) || is_at_end(threshold.negative(), range)) {
       warn(
           fmt::format("no threshold in {:.3g}..{:.3g}, which the network has learnt, makes as "
-                      "many events as the camera",
+                      "many events as the camera: the document has that of difference",
                       range.lowest, range.highest));
       return std::nullopt;
     }
@@ -174,7 +174,7 @@ class Fitter {
     if (threshold.ratio < least || threshold.ratio > most) {
       warn(
           fmt::format("no threshold through the network, since the negative one is {:.3g} times "
-                      "the positive one, expected {}..{}",
+                      "the positive one, expected {}..{}: the document has that of difference",
                       threshold.ratio, least, most));
       return std::nullopt;
     }
@@ -316,7 +316,7 @@ SensorFit fit_sensor(std::span<const FitPart> parts, const Generator* network,
     fit.difference = fitter.difference();
     if (network) fit.network = fitter.network(*network);
     if (fitted.size() < 3) {
-      fit.warnings.emplace_back("how sure a threshold is takes 3 pairs of frames to tell");
+      fit.warnings.emplace_back("fewer than 3 pairs of frames do not tell how sure a threshold is");
     }
   } else {
     fit.warnings.emplace_back("no threshold, since the camera has no events but noise");

@@ -86,8 +86,9 @@ class NetworkMethod final : public VolumeMethod {
 Weights named_weights(const std::string& name) {
   const std::optional<WeightsName> parsed = parse_weights_name(name);
   if (!parsed || parsed->origin == WeightsOrigin::kUntrained) {
-    throw UsageError("--weights: expected a file, shipped or shipped:WIDTH with WIDTH in 1.." +
-                     std::to_string(kLargestNamedWidth) + ", got \"" + name + "\"");
+    throw UsageError(
+        "--weights: expected a file, shipped, shipped:sensor or shipped:WIDTH with WIDTH in 1.." +
+        std::to_string(kLargestNamedWidth) + ", got \"" + name + "\"");
   }
   if (parsed->origin == WeightsOrigin::kFile) return read_weights(parsed->path);
   return read_shipped_weights(parsed->width ? *parsed->width : default_shipped_width());

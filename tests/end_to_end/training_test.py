@@ -348,9 +348,12 @@ class TrainedWeights(program.InFolder):
 
     def test_a_fitted_sensor_is_taken_by_convert_and_realism(self):
         clip, document = work / "recordings" / "clip.hdf5", self.folder / "sim.json"
-        out, err = run("fit", clip, "--name", "sim", "--out", document)
+        out, err = run("fit", clip, "--weights", "shipped:8", "--name", "sim", "--out", document)
         self.assertRegex(out, r"difference: 0\.\d+ ± ")
         self.assertIn("do not know their sensor", err)
+        again, err = run("fit", clip, "--name", "sim", "--out", document)
+        self.assertEqual(again, out)
+        self.assertNotIn("do not know their sensor", err)
         sensor = json.loads(document.read_text())
         self.assertEqual(sensor["name"], "sim")
         self.assertIn("fit of clip.hdf5", sensor["origin"])
@@ -364,11 +367,21 @@ class TrainedWeights(program.InFolder):
             self.assertIn("sensor sim", run("inspect", path)[0])
         fields = json.loads((folder / "out" / "plan.json").read_text())["fingerprint"]
         self.assertEqual(fields["manifest $.generator.sensor.name"], '"sim"')
+        told = {"threshold": [0.2, 0.3], "noise": {"shot_hz": 1}}
+        run("convert", small_job(self.folder / "told", people=0, generator={"kind": "difference", "sensor": told}), "--progress", "none")
+        for path in self.folder.glob("told/out/*.h5"):
+            self.assertIn(", threshold 0.2..0.3, noise of shot_hz 1, leak_hz 0, hot_pixels 0", run("inspect", path)[0])
         out, _ = run("realism", clip, "--with", "difference", "--sensor", "davis346", "--progress", "none")
         self.assertNotIn("(fitted)", out)
         run("realism", clip, "--sensor", "davis346", "--threshold", "0.2", expect=64)
         run("fit", clip, "--name", "../x", expect=64)
         run("fit", clip, "--out", "x.txt", expect=64)
+        other = self.folder / "manifest.json"
+        other.write_text("{}")
+        _, err = run("fit", clip, "--out", other, expect=64)
+        self.assertIn("expected a new file or a sensor's document", err)
+        self.assertEqual(other.read_text(), "{}")
+        run("fit", clip, "--out", self.folder / "none" / "x.json", expect=66)
         run("fit", self.folder / "none.hdf5", expect=66)
 
 

@@ -104,7 +104,7 @@ def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
 DRAWN = {"threshold": [0.15, 0.6], "noise": {"shot_hz": [0.1, 1.5], "leak_hz": 0.1, "hot_pixels": 1e-4}}
 SENSORS = {
     "EventGAN, drawn sensor": Source({"weights": "shipped:sensor", "sensor": DRAWN}, finer=2),
-    "difference, drawn sensor": Source({"kind": "difference", "sensor": DRAWN}, finer=2),
+    "difference, drawn sensor": Source({"kind": "difference", "sensor": {**DRAWN, "log_epsilon": 0.001}}, finer=2),
 }
 SHIPPED = {width: {"weights": f"shipped:{width}"} for width in (16, 8)}
 METHODS = {  # of the main table

@@ -180,6 +180,10 @@ TEST(JobManifest, HoldsThresholdsAndTheSensorAtTheirMiddle) {
   EXPECT_NEAR(range.sensor.negative_threshold, 0.2, 1e-12);
   EXPECT_NEAR(range.sensor.threshold_spread, 0.03, 1e-12);
   EXPECT_EQ(range.sensor.refractory_s, 1);
+  // A threshold is that of frames, as in a sensor's document, unless told otherwise.
+  EXPECT_EQ(read("{}").sensor.log_epsilon, 0.001);
+  EXPECT_EQ(range.sensor.log_epsilon, kFrameLogEpsilon);
+  EXPECT_EQ(read(R"({"threshold": 0.5, "log_epsilon": 0.1})").sensor.log_epsilon, 0.1);
   // Of a middle of 0.2 and a ratio of 4 the polarities' are 0.1 and 0.4.
   const GeneratorSpec ratio = read(R"({"threshold": [0.1, 0.4], "threshold_ratio": 4})");
   EXPECT_EQ(ratio.threshold, (ThresholdSpec{.range = {0.1, 0.4}, .ratio = 4}));

@@ -46,7 +46,7 @@ inline const std::string kNameRule =
 
 /// What the generator's weights must be.
 inline const std::string kWeightsRule =
-    R"(expected the path of a .safetensors file, "shipped", or "shipped:WIDTH" or )"
+    R"(expected the path of a .safetensors file, "shipped", "shipped:sensor", or "shipped:WIDTH" or )"
     R"("untrained:WIDTH" with WIDTH in 1..64, got )";
 
 inline void PrintTo(const ManifestCase& manifest_case, std::ostream* stream) {

@@ -69,6 +69,10 @@ TEST(MeasureRealism, TellsANetworkNoThresholdThatItHasNotLearnt) {
   EXPECT_THROW(measure_realism(recording, options), UsageError);
   options.threshold = {0.01};
   EXPECT_THROW(measure_realism(recording, options), UsageError);
+  // Others take none, and the report says so.
+  options.weights = "shipped:8";
+  EXPECT_EQ(measure_realism(recording, options).methods[0].settings,
+            "weights shipped:8, which take no threshold");
 }
 
 TEST(MeasureRealism, SameSeedSameReport) {
