@@ -363,6 +363,24 @@ void note_unknown_sizes(Plan& plan) {
   }
 }
 
+/// Says of each source how many pairs get noise for a time that is not their own.
+void note_unknown_times(const GeneratorSpec& generator, Plan& plan) {
+  if (!generator.noise) return;
+  std::vector<std::int64_t> pairs(plan.sources.size());
+  for (const PlannedShard& shard : plan.shards) {
+    pairs[static_cast<std::size_t>(shard.source)] +=
+        std::ranges::count_if(shard.samples, [](const PlannedSample& sample) {
+          return !(sample.pair.gap_s() > 0);  // NaN, too
+        });
+  }
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    if (pairs[i] == 0) continue;
+    plan.sources[i].notes.push_back(
+        fmt::format("no times of {}: their noise is that of duration_s, {:g} s",
+                    count_text(pairs[i], "pair"), generator.duration_s));
+  }
+}
+
 /// The labelled frame of a sample as the source has it today; null if it has none.
 const LabelledFrame* frame_of(const Dataset& dataset, const SourceSpec& spec,
                               const PlannedSample& sample) {
@@ -449,6 +467,7 @@ PlannedJob make_plan(const JobManifest& manifest, const std::string& weights_has
   }
   job.plan.shards = layout.finish();
   note_unknown_sizes(job.plan);
+  note_unknown_times(manifest.generator, job.plan);
   whole.note("pairs", job.plan.sample_count());
   const TraceSpan span(options.trace, "fingerprint", "job");
   Phase phase(options.show_phase, {"files", /*has_bytes=*/false, "looking at"},

@@ -267,6 +267,17 @@ TEST_F(MakePlan, ALabelThatHasMovedWithinItsFileIsFoundByItsFrame) {
   }
 }
 
+TEST_F(MakePlan, SaysForWhichPairsTheTimeOfNoiseIsNotTheirOwn) {
+  const auto notes = [&] { return make_plan(manifest_, "w", "e").plan.sources[0].notes; };
+  EXPECT_THAT(notes(), ::testing::IsEmpty());
+  manifest_.generator.noise = NoiseSpec();
+  manifest_.generator.duration_s = 0.05;
+  EXPECT_THAT(notes(), ::testing::ElementsAre(::testing::MatchesRegex(
+                           "no times of [0-9] pairs: their noise is that of duration_s, 0.05 s")));
+  manifest_.sources[0].frames_per_second = 10;
+  EXPECT_THAT(notes(), ::testing::IsEmpty());
+}
+
 TEST_F(MakePlan, CountsForEachGapWhatIsUnpaired) {
   manifest_.sources[0].pairs.gaps = {1, 3, 6};
   const PlannedJob job = make_plan(manifest_, "w", "e");  // 4 frames
