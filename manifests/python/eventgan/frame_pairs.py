@@ -211,7 +211,7 @@ class FramePairs(Dataset):
                 return _Made(generator(*images), target, None, label_position)
             boxes, labels, ignore = self._boxes(target)
             sample = generator.sample(*images, boxes=boxes, gap=drawn.gap)
-            return _Made(sample["volume"], target, (sample["boxes"]["xyxy"], labels, ignore), label_position)
+            return _Made(sample["volume"], target, (sample["boxes"]["xyxy"], sample["boxes"]["xyxy_unclipped"], labels, ignore), label_position)
         except FileNotFoundError as error:
             raise FileNotFoundError(f"{error}, in item {index}") from error
         except ValueError as error:
@@ -262,7 +262,7 @@ class FramePairs(Dataset):
 class _Made(NamedTuple):
     volume: np.ndarray        # [2B, H, W]
     target: Any
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray] | None  # [n, 4] in volume pixels; labels; ignore
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None  # [n, 4] in volume pixels, and before they were cut; labels; ignore
     label_position: float
 
 

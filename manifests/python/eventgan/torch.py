@@ -114,7 +114,7 @@ class EventAugmentation:
         Parameters
         ----------
         item : dict
-            With `volume`, `boxes`, `labels` and `ignore`; `label_position`, which FramePairs gives, is 0.5 where it is not there.
+            With `volume`, `boxes`, `labels`, `ignore` and `label_position`; without the latter time is not reversed, unless `reverse_all`.
 
         Returns
         -------
@@ -122,7 +122,7 @@ class EventAugmentation:
             A new item; what else is in `item` is there, too.
         """
         boxes, labels, ignore = (item[name].numpy() for name in ("boxes", "labels", "ignore"))
-        return {**item, **_detection_item(item["volume"], boxes, labels, ignore, item.get("label_position", 0.5), self)}
+        return {**item, **_detection_item(item["volume"], boxes, boxes, labels, ignore, item.get("label_position", math.nan), self)}
 
     def affine(self, height: int, width: int) -> np.ndarray:
         """Where a point of the volume goes, drawn again.
@@ -332,15 +332,15 @@ def _moved(volume: torch.Tensor, label_position: float, augmentation: EventAugme
     return augmentation.sensor(warp(volume, affine, height, width)), affine
 
 
-def _detection_item(volume: torch.Tensor, boxes: np.ndarray, labels: np.ndarray, ignore: np.ndarray, label_position: float,
+def _detection_item(volume: torch.Tensor, boxes: np.ndarray, whole: np.ndarray, labels: np.ndarray, ignore: np.ndarray, label_position: float,
                     augmentation: EventAugmentation | None, size: tuple[int, int] | None = None, view: np.ndarray | None = None,
                     visible: float = 0.25) -> Item:
-    """`volume`, `boxes`, `labels` and `ignore` of an item of DetectionDataset, of boxes [n, 4] in pixels of the volume."""
+    """`volume`, `boxes`, `labels` and `ignore` of an item of DetectionDataset, of boxes [n, 4] in pixels of the volume; `whole`: before they were cut."""
     volume, affine = _moved(volume, label_position, augmentation, size, view)
-    boxes = boxes if affine is None else move_boxes(boxes, affine)
+    boxes, whole = (each if affine is None else move_boxes(each, affine) for each in (boxes, whole))
     height, width = volume.shape[1:]
     cut = np.clip(boxes, 0, [width, height, width, height])
-    ignore = ignore | (_areas(cut) < visible * np.maximum(_areas(boxes), 1e-9))
+    ignore = ignore | (_areas(cut) < visible * np.maximum(_areas(whole), 1e-9))
     kept = _areas(cut) > 0
     return {"volume": volume, "boxes": torch.from_numpy(cut[kept]).float(), "labels": torch.from_numpy(labels[kept]),
             "ignore": torch.from_numpy(ignore[kept])}
@@ -359,6 +359,7 @@ class DetectionDataset(Dataset):
     ignore : [n] bool: neither for training nor for scoring (annotated so, or less than `visible` of it is left)
     id : str, sample_id
     index : int, of the sample in `shards`
+    label_position : float, where in time the boxes lie: 0 at the start, 1 at the end
 
     Parameters
     ----------
@@ -408,9 +409,9 @@ class DetectionDataset(Dataset):
         labels = np.array([self.classes.get(names[each], -1) for each in rows["class_id"]], np.int64)
         ignore = rows["ignore"] != 0
         wanted = (labels >= 0) | ignore & np.isin(rows["class_id"], [i for i, name in enumerate(names) if name == DONT_CARE])
-        item = _detection_item(volume, rows["xyxy"][wanted], labels[wanted], ignore[wanted], sample["pair"]["label_position"],
-                               self._augmentation, self._size, self._view, self._visible)
-        return {**item, "id": sample["pair"]["sample_id"], "index": int(index)}
+        item = _detection_item(volume, rows["xyxy"][wanted], rows["xyxy_unclipped"][wanted], labels[wanted], ignore[wanted],
+                               sample["pair"]["label_position"], self._augmentation, self._size, self._view, self._visible)
+        return {**item, "id": sample["pair"]["sample_id"], "index": int(index), "label_position": float(sample["pair"]["label_position"])}
 
 
 def _areas(boxes: np.ndarray) -> np.ndarray:
@@ -630,7 +631,7 @@ class PoseAugmentation:
     flip : float, default 0.5
         Probability of left and right exchanged.
     events : EventAugmentation
-        What may happen to its events.
+        What may happen to its events: `reverse`, `drop`, `invert`, `threshold`, `lost` and `isolated`. Its geometry is not used.
     """
 
     scale: float = 0.25
@@ -718,7 +719,10 @@ class PoseDataset(Dataset):
                 "scale": np.array([scale, scale]), "rotation": rotation, "score": 1.0, "flipped": flipped,
                 "image": sample["pair"]["sample_id"], "index": int(index), "person": int(row),
                 "to_volume": to_volume, "to_source": to_source}
-        return warp(volume, to_input, height, width), torch.from_numpy(target), torch.from_numpy(weight), meta
+        volume = warp(volume, to_input, height, width)
+        if self._augmentation:
+            volume = self._augmentation.events.sensor(volume)
+        return volume, torch.from_numpy(target), torch.from_numpy(weight), meta
 
     def _person(self, index: int, row: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, float, Item]:
         sample = self._shards.sample(index, {"pair", "persons"})

@@ -295,6 +295,11 @@ def test_items_with_boxes():
     assert clip[0]["labels"].tolist() == [3, -1] and clip[0]["ignore"].tolist() == [False, True] and generator.gaps[-1] == 2
 
 
+def test_boxes_that_the_volume_cuts_are_ignored_by_what_is_left():
+    boxes = {"boxes": [[-3.9, 0, 1, 2], [-2.9, 0, 1, 2]], "labels": [0, 0]}  # 20 % and 26 % are left
+    assert FramePairs(StandIn(), [(image(), image(), boxes)])[0]["ignore"].tolist() == [True, False]
+
+
 def test_boxes_move_with_the_volume():
     """A bright block: its box is around its events, mirrored, moved by parts of pixels and cut, whatever was drawn."""
     block = np.zeros((4, 6), np.uint8)

@@ -89,6 +89,10 @@ def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
         with Shards(folder) as again:
             assert torch.equal(DetectionDataset(again, augmentation=backwards)[0]["volume"], expected)
             assert torch.equal(KeypointDataset(again, augmentation=backwards)[0]["volume"], expected)
+            item = DetectionDataset(again)[0]
+            assert item["label_position"] == position and torch.equal(backwards(item)["volume"], expected)
+    del item["label_position"]  # nobody knows where the boxes lie
+    assert torch.equal(backwards(item)["volume"], plain)
 
 
 @pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)}, {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2},
@@ -337,6 +341,8 @@ def test_persons_of_dhp19_s_names_are_mirrored(folder):
     persons = [PoseDataset(shards, size=(64, 64), augmentation=PoseAugmentation(scale=0, rotated=0, flip=flip))[1] for flip in (0, 1)]
     np.testing.assert_allclose(persons[1][3]["joints"][:, 0], 63 - persons[0][3]["joints"][[0, 2, 1], 0])
     assert PoseDataset(shards).flip_pairs == [(1, 2)]
+    lost = PoseAugmentation(scale=0, rotated=0, flip=0, events=EventAugmentation(flip=0, lost=(1, 1)))
+    assert persons[0][0].any() and not PoseDataset(shards, size=(64, 64), augmentation=lost)[1][0].any()
     for dataset, augmentation in ((KeypointDataset, EventAugmentation()), (PoseDataset, PoseAugmentation())):
         with pytest.raises(ValueError, match="got handL without a counterpart"):  # at once
             dataset(shards, joints=["head", "handL"], augmentation=augmentation)
