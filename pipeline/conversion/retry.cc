@@ -250,12 +250,13 @@ RetryReport retry(const fs::path& folder, const JobManifest& manifest, const Gen
     retried[i].volume_size = ShardReader(folder / retried[i].name).header().volume.size;
   }
   const std::int64_t to_do = report.quarantined;
+  const bool finalized = fs::exists(folder / "dataset.json");
   RetrySink sink(folder, shards, report, options.trace);
   run_conversion("redo samples",
                  {manifest, job.datasets, generator, weights_hash, folder, frozen, options},
                  to_redo, sink);
   report.stopped = options.stop_requested() && report.tried < to_do;
-  report.dataset_outdated = report.shards_rewritten > 0 && fs::exists(folder / "dataset.json");
+  report.dataset_outdated = finalized && !fs::exists(folder / "dataset.json");
   report.too_many_faults = beyond_limits(manifest.errors, report.quarantined, report.planned);
   report.wall_seconds =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -299,7 +300,9 @@ std::string to_text(const RetryReport& report) {
                         report.failed.size() - listed);
   }
   if (report.dataset_outdated) {
-    text += "dataset.json is out of date: run eventgan finalize again\n";
+    text +=
+        "dataset.json and dataset.h5 told of the shards as they were and are removed: run eventgan "
+        "finalize again\n";
   }
   if (report.stopped) text += "stopped before all were tried: run again\n";
   return text + report.folder + "\n";

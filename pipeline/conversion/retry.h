@@ -49,7 +49,7 @@ struct RetryReport {
   std::vector<std::string> changed_inputs;
   bool stopped = false;           ///< a request to stop came before all were tried
   bool too_many_faults = false;   ///< the manifest's limits are passed still
-  bool dataset_outdated = false;  ///< dataset.json tells of the shards as they were before
+  bool dataset_outdated = false;  ///< dataset.json and dataset.h5 were removed (outdate_dataset)
   double wall_seconds = 0;
 };
 

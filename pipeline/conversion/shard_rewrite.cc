@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "manifests/documents/commit_record.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
@@ -79,6 +80,7 @@ bool ShardRewrite::commit() {
     throw std::runtime_error("expected the shard that the retry started with, got another, in " +
                              (folder_ / record_.shard).string() + ": run retry again");
   }
+  outdate_dataset(folder_, record_.shard);
   ShardBackup backup(folder_ / record_.shard);
   ShardReceipt receipt = writer_->commit();
   record_.sha256 = receipt.sha256;

@@ -11,6 +11,7 @@
 #include "manifests/documents/commit_record.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "pipeline/folder/output_folder.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
@@ -134,6 +135,10 @@ bool ShardSink::commit() {
   span.note("shard", shard_->name);
   span.note("samples", record_.samples);
   const std::int64_t start_ns = thread_processor_ns();
+  if (outdate_dataset(job_.folder, shard_->name) && job_.options.warn) {
+    job_.options.warn("dataset.json and dataset.h5 told of " + shard_->name +
+                      " as it was and are removed: run eventgan finalize again");
+  }
   ShardReceipt receipt;
   try {
     const TraceSpan file(job_.options.trace, "close, fsync, hash, rename", "shard");

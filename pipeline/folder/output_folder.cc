@@ -339,6 +339,22 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
   fs::remove(folder / kPlanName);
 }
 
+bool outdate_dataset(const fs::path& folder, const std::string& shard) {
+  const fs::path description = folder / "dataset.json";
+  if (!fs::exists(description)) return false;
+  const auto json = nlohmann::json::parse(read_text_file(description), nullptr, false);
+  const auto shards = json.is_object() ? json.find("shards") : json.end();
+  if (shards != json.end() && shards->is_array() &&
+      std::ranges::none_of(*shards, [&](const nlohmann::json& entry) {
+        return !entry.is_object() || entry.value("name", "") == shard;
+      })) {
+    return false;
+  }
+  fs::remove(description);
+  fs::remove(folder / "dataset.h5");
+  return true;
+}
+
 void record_manifest_folder(const fs::path& folder, const JobManifest& manifest) {
   const std::string where = manifest.directory.string();
   std::string text;

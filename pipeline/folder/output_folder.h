@@ -51,6 +51,11 @@ void discard_output(const std::filesystem::path& folder,
                     const std::map<std::string, std::string>& fingerprint,
                     const std::filesystem::path& manifest_folder);
 
+/// For a shard that is about to be put in place of another one: removes dataset.json and dataset.h5
+/// if they tell of it (or cannot be read), since the view's places within the shard, of boxes and
+/// joints, are those of the former one. Whether they were there.
+bool outdate_dataset(const std::filesystem::path& folder, const std::string& shard);
+
 /// FOLDER/run.json says where the manifest was, so that `preview` finds the frames. It is a
 /// convenience, not part of the plan. One that is damaged, or has another than an absolute path, is
 /// as none.

@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "manifests/values/events.h"
@@ -34,6 +36,16 @@ bool are_untrained(const Weights& weights) {
   return origin != weights.metadata.end() && origin->second.starts_with("untrained");
 }
 
+/// A training may put newer weights in place meanwhile: what is hashed must be what was read.
+LoadedWeights read_unchanged(const std::filesystem::path& file) {
+  for (;;) {
+    std::error_code missing;  // is told by what reads
+    const auto written = std::filesystem::last_write_time(file, missing);
+    LoadedWeights loaded{read_weights(file), sha256_of_file(file), ""};
+    if (std::filesystem::last_write_time(file, missing) == written) return loaded;
+  }
+}
+
 LoadedWeights named_weights(const JobManifest& manifest) {
   const std::optional<WeightsName> name = parse_weights_name(manifest.generator.weights);
   if (!name) {
@@ -51,8 +63,7 @@ LoadedWeights named_weights(const JobManifest& manifest) {
     std::string hash = sha256_hex(serialize_weights(weights));
     return {std::move(weights), std::move(hash), ""};
   }
-  const auto file = resolve(manifest, name->path);
-  return {read_weights(file), sha256_of_file(file), ""};
+  return read_unchanged(resolve(manifest, name->path));
 }
 
 }  // namespace

@@ -90,8 +90,12 @@ void check_resumable(std::map<std::string, std::string> before,
   for (const auto phase :
        {TrainingPhase::kFlow, TrainingPhase::kReconstruction, TrainingPhase::kGenerator}) {
     const std::int64_t steps = steps_of(manifest.steps, phase);
-    const bool falls = manifest.optimizer.final_rate_fraction != 1 ||
-                       (phase == TrainingPhase::kGenerator && manifest.network.output_slope != 0);
+    const LossWeights& losses = manifest.losses;
+    const bool fades =
+        manifest.network.sensor && (losses.volume != 0 || losses.count != 0 || losses.overlap != 0);
+    const bool falls =
+        manifest.optimizer.final_rate_fraction != 1 ||
+        (phase == TrainingPhase::kGenerator && (manifest.network.output_slope != 0 || fades));
     const bool in_progress = phase == position.phase && steps >= position.step && !falls;
     if (phase > position.phase || in_progress) {
       const std::string field = "manifest $.steps." + std::string(to_string(phase));

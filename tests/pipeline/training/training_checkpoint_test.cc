@@ -101,6 +101,20 @@ TEST_F(Resumption, AFallingOutputSlopeFixesTheGeneratorsPhaseInProgress) {
   EXPECT_NO_THROW(check_resumable(before, now, kInReconstruction, manifest_));
 }
 
+TEST_F(Resumption, FadingLossesFixTheGeneratorsPhaseInProgress) {
+  const TrainingPosition in_generator{TrainingPhase::kGenerator, 1};
+  const auto before = settings();
+  auto now = before;
+  now["manifest $.steps.generator"] = "9";
+  manifest_.steps.generator = 9;
+  manifest_.losses.volume = 10;
+  EXPECT_NO_THROW(check_resumable(before, now, in_generator, manifest_));
+  manifest_.network.sensor = true;  // volume, count and overlap fade over the steps
+  EXPECT_THROW(check_resumable(before, now, in_generator, manifest_), UsageError);
+  manifest_.losses.volume = 0;
+  EXPECT_NO_THROW(check_resumable(before, now, in_generator, manifest_));
+}
+
 TrainingCheckpoint checkpoint_at(std::int64_t step) {
   TrainingCheckpoint checkpoint;
   checkpoint.position = {TrainingPhase::kReconstruction, step};
