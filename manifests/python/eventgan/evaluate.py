@@ -131,6 +131,15 @@ def _places(shards: Shards) -> list[tuple[str, int]]:
     return [(sample["shard"], sample["slot"]) for sample in (shards.sample(i, ()) for i in range(len(shards)))]
 
 
+def _is_coco_s(original: bytes) -> bool:
+    """Whether a sample's annotation is an entry of COCO's labels, whose images and annotations have numbers."""
+    try:
+        entry = json.loads(original)
+        return "annotations" in entry and "id" in entry["image"]
+    except (ValueError, TypeError, KeyError):
+        return False
+
+
 class Samples:
     """The samples that are scored, and what predictions call them.
 
@@ -149,7 +158,8 @@ class Samples:
         self.shards = Shards(truth, split=split, where=where, ids=ids)
         self._of_split, self.classes = Shards(truth, split=split), Shards(truth).known_classes()
         scored = {place: i for i, place in enumerate(_places(self.shards))}
-        self._of_number = [scored.get(place, -1) for place in _places(self._of_split)]
+        exported = (any((self._of_split.class_names(i), self._of_split.joint_names(i))) for i in range(len(self._of_split)))
+        self._of_number = [scored.get(place, -1) for place, is_exported in zip(_places(self._of_split), exported) if is_exported]
         names = self.shards.column("sample_id").tolist()
         self._of_name = {**dict.fromkeys(self._of_split.column("sample_id").tolist(), -1), **{name: i for i, name in enumerate(names)}}
         self._twice = {name for name, count in collections.Counter(names).items() if count > 1}
@@ -179,6 +189,7 @@ class Samples:
             if _is_whole(name) and 1 <= name <= len(self._of_number):
                 if len(self._splits) > 1:
                     raise ValueError(f"expected --split with samples that are numbered, got shards of {', '.join(self._splits)}")
+                self._refuse_coco_s_own("image_id", name, path, number)
                 found[number] = self._of_number[name - 1]
                 continue
             is_known = isinstance(name, str) and name in self._of_name
@@ -187,6 +198,16 @@ class Samples:
                                  f"{', which two samples have' if is_known else ''}, in {path} (entry {number})")
             found[number] = self._of_name[name]
         return found
+
+    def _refuse_coco_s_own(self, key: str, value: Any, path: PathLike, number: int) -> None:
+        if self._has_coco_labels:
+            raise ValueError(f"expected names, since `export --to coco` keeps the numbers of labels that are COCO's own, got {value} as {key}, "
+                             f"in {path} (entry {number})")
+
+    @functools.cached_property
+    def _has_coco_labels(self) -> bool:
+        first = {shard: i for i, (shard, _) in reversed(list(enumerate(_places(self._of_split))))}  # the samples of a shard are of one source
+        return any(_is_coco_s(self._of_split.sample(i, {"original"})["original"]) for i in first.values())
 
     @functools.cached_property
     def _splits(self) -> list[str]:
@@ -219,6 +240,9 @@ class Samples:
         if unknown:
             raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got {_brief(given[unknown[0]])}, in {path} "
                              f"(entry {unknown[0]})")
+        whole = [i for i, name in enumerate(given) if not isinstance(name, str)]
+        if whole:
+            self._refuse_coco_s_own("category_id", given[whole[0]], path, whole[0])
         return np.array([labels[name] for name in given], int)
 
 

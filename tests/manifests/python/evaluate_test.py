@@ -494,6 +494,20 @@ def test_detections_of_a_folder(folder, tmp_path):
     assert part["counts"]["not_of_these_samples"] == 1 and part["classes"]["Car"]["precision"] == 1
 
 
+def test_numbers_are_refused_where_an_export_keeps_those_of_coco_s_labels(folder, tmp_path, monkeypatch):
+    module = sys.modules[Samples.__module__]
+    entry = {"image": {"id": 3, "file_name": "a.png"}, "annotations": [{"id": 8, "category_id": 4}]}
+    assert module._is_coco_s(json.dumps(entry).encode())
+    for other in (b"Car 0 0 1.5 1 2 3 4", b"", b"[]", b"3", b'{"image": "a.png", "annotations": []}', b'{"image": {"id": 1}}', b"\xff"):
+        assert not module._is_coco_s(other)
+    monkeypatch.setattr(module, "_is_coco_s", lambda original: True)
+    samples, edges = Samples(folder, "train", None, None), [1, 1, 3, 3]
+    evaluate_detections(write(tmp_path / "names.json", [box("000000", "Car", edges)]), samples)
+    for wrong, key in ((box(1, "Car", edges), "image_id"), (box("000000", 1, edges), "category_id")):
+        with pytest.raises(ValueError, match=f"keeps the numbers of labels that are COCO's own, got 1 as {key}, in .*entry 0"):
+            evaluate_detections(write(tmp_path / "numbers.json", [wrong]), samples)
+
+
 def test_a_number_is_the_place_in_the_split_whatever_is_scored_of_it(two_shards, tmp_path):
     """The second shard is of another source, whose samples have the same ids: its places are 5 to 8."""
     with h5py.File(two_shards / SECOND, "r+") as file:
