@@ -59,6 +59,14 @@ bool too_far_apart(const FramePair& pair, std::optional<double> max_gap_s) {
   return max_gap_s && pair.gap_s() > *max_gap_s + kTolerance_s;  // false if a time is unknown
 }
 
+/// Where a labelled frame lies between the frames around it: where their times say. Half-way if
+/// they say nothing, or hardly anything else: clocks tick unevenly.
+double place_between(const FramePair& pair, double labelled_s) {
+  constexpr double kUneven = 0.01;
+  const double place = (labelled_s - pair.previous.time_s) / pair.gap_s();
+  return place > 0 && place < 1 && std::abs(place - 0.5) > kUneven ? place : 0.5;
+}
+
 Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const PairSpec& spec,
                     int gap) {
   using State = PairedFrame::State;
@@ -72,6 +80,9 @@ Candidate candidate(const Dataset& dataset, const LabelledFrame& frame, const Pa
                    frame.label_key,
                    {previous.frame, next.frame, gap, frame.frame.index, place.position},
                    ""};
+  if (spec.side == PairSide::kAround && !spec.stills) {
+    result.sample.pair.label_position = place_between(result.sample.pair, frame.frame.time_s);
+  }
   if (too_far_apart(result.sample.pair, spec.max_gap_s)) return result;
   for (const PairedFrame* paired_frame : {&previous, &next}) {
     if (paired_frame->state == State::kMissing && result.sample.fault.empty()) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <span>
 #include <stdexcept>
 #include <string_view>
@@ -35,6 +36,14 @@ std::uintmax_t bytes_of(const fs::path& path) {
   return bytes;
 }
 
+/// Of a folder of textures.
+std::string description(const fs::path& folder) {
+  std::error_code absent;
+  if (!fs::is_directory(folder, absent)) return "";
+  return std::to_string(std::distance(fs::recursive_directory_iterator(folder), {})) + " files, " +
+         std::to_string(bytes_of(folder)) + " bytes";
+}
+
 std::string description(const TrainingRecording& opened) {
   std::error_code absent;
   const bool there = fs::exists(opened.file, absent);
@@ -53,6 +62,11 @@ std::map<std::string, std::string> training_settings(
   }
   for (std::size_t i = 0; i < recordings.size(); ++i) {
     settings["recording " + std::to_string(i)] = description(recordings[i]);
+  }
+  if (manifest.simulated) {
+    for (const std::string& folder : manifest.simulated->textures) {
+      settings["textures " + folder] = description(resolve(manifest, folder));
+    }
   }
   return settings;
 }

@@ -22,7 +22,13 @@ FakeDataset::FakeDataset(const std::string& folder, int count) : folder_(folder)
 FrameRef FakeDataset::frame(int number) const {
   char name[16];
   std::snprintf(name, sizeof name, "/%04d.png", number);
-  return {folder_ + name, number, -1, number * 0.1};
+  const auto time = times_s_.find(number);
+  return {folder_ + name, number, -1, time != times_s_.end() ? time->second : number * 0.1};
+}
+
+void FakeDataset::set_time(int number, double time_s) {
+  times_s_[number] = time_s;
+  frames_[static_cast<std::size_t>(number)].frame = frame(number);
 }
 
 PairedFrame FakeDataset::paired_frame(const LabelledFrame& labelled, int steps) const {

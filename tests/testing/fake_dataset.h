@@ -16,6 +16,7 @@ class FakeDataset final : public Dataset {
   FakeDataset(const std::string& folder, int count);
 
   void make_missing(int frame) { missing_.insert(frame); }
+  void set_time(int frame, double time_s);  ///< else 0.1 s times its number
   void break_annotation(int frame) { broken_.insert(frame); }
   void set_annotation(int frame, Annotation annotation) {
     annotations_[frame] = std::move(annotation);
@@ -36,6 +37,7 @@ class FakeDataset final : public Dataset {
   std::string folder_;
   LabelSchema schema_;
   std::vector<LabelledFrame> frames_;
+  std::map<int, double> times_s_;
   std::set<int> missing_;
   std::set<int> broken_;
   std::map<int, Annotation> annotations_;

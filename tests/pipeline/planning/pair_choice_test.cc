@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <limits>
 #include <map>
 
 #include "pipeline/planning/make_plan.h"
@@ -45,6 +46,25 @@ TEST(ChoosePairs, SideSaysWhereTheLabelledFrameLies) {
     EXPECT_EQ(sample.sample_id, "0010");
     EXPECT_EQ(sample.fault, "");
   }
+}
+
+TEST(ChoosePairs, AroundALabelledFrameItsTimeSaysWhereItLies) {
+  FakeDataset dataset("root", 20);
+  const auto position = [&](double labelled_s, double next_s) {
+    dataset.set_time(10, labelled_s);
+    dataset.set_time(11, next_s);
+    return choose(dataset, 10, source({2}, PairSide::kAround, PairChoice::kOne))
+        .samples[0]
+        .pair.label_position;
+  };
+  const double nobody_knows = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_NEAR(position(1.4, 1.6), 5.0 / 7, 1e-12);  // the previous frame is at 0.9 s
+  EXPECT_NEAR(position(1.0, 1.3), 1.0 / 4, 1e-12);
+  EXPECT_EQ(position(1.0, 1.1), 0.5);
+  EXPECT_EQ(position(1.001, 1.1), 0.5);  // a clock that ticks unevenly
+  EXPECT_EQ(position(nobody_knows, 1.3), 0.5);
+  EXPECT_EQ(position(1.0, nobody_knows), 0.5);
+  EXPECT_EQ(position(2.0, 1.3), 0.5);
 }
 
 TEST(ChoosePairs, AWindowOfEventsIsFromItsBeginToItsEnd) {

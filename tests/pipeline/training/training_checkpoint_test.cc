@@ -54,6 +54,18 @@ TEST_F(Resumption, NamesTheFieldThatDiffers) {
               AllOf(HasSubstr("$.batch: expected 2, got 4"), Not(HasSubstr("$.seed"))));
 }
 
+TEST_F(Resumption, ComparesTheTextures) {
+  settings();
+  manifest_.simulated = SimulatedSpec{{"textures"}, 0.5};
+  testing::write_file(folder_ / "textures/a.png", "abc");
+  const auto before = training_settings(manifest_, {});
+  EXPECT_EQ(before.at("textures textures"), "1 files, 3 bytes");
+  testing::write_file(folder_ / "textures/b.png", "d");
+  EXPECT_THROW(
+      check_resumable(before, training_settings(manifest_, {}), kInReconstruction, manifest_),
+      UsageError);
+}
+
 TEST_F(Resumption, ComparesTheRecordings) {
   auto before = settings();
   const auto now = before;
