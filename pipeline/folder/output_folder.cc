@@ -342,11 +342,17 @@ void discard_output(const fs::path& folder, const Fingerprint& fingerprint,
 bool outdate_dataset(const fs::path& folder, const std::string& shard) {
   const fs::path description = folder / "dataset.json";
   if (!fs::exists(description)) return false;
-  const auto json = nlohmann::json::parse(read_text_file(description), nullptr, false);
+  std::string text;
+  try {
+    text = read_text_file(description);
+  } catch (const std::runtime_error&) {
+    if (!fs::exists(description)) return false;  // another worker has removed it
+  }
+  const auto json = nlohmann::json::parse(text, nullptr, false);
   const auto shards = json.is_object() ? json.find("shards") : json.end();
   if (shards != json.end() && shards->is_array() &&
       std::ranges::none_of(*shards, [&](const nlohmann::json& entry) {
-        return !entry.is_object() || entry.value("name", "") == shard;
+        return !entry.is_object() || !entry.contains("name") || entry.at("name") == shard;
       })) {
     return false;
   }

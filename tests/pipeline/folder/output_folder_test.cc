@@ -281,6 +281,28 @@ TEST(DiscardOutput, OfADamagedPlanLeavesTheShardsItCannotName) {
   EXPECT_THAT(names_in(folder.path()), ElementsAre(kShard));
 }
 
+TEST(OutdateDataset, RemovesWhatTellsOfTheShardOrCannotBeRead) {
+  const TemporaryFolder folder;
+  const auto removes = [&](const std::string& text) {
+    for (const char* name : {"dataset.h5", kShard}) write_file(folder / name, "x");
+    write_file(folder / "dataset.json", text);
+    const bool removed = outdate_dataset(folder.path(), kShard);
+    EXPECT_EQ(fs::exists(folder / "dataset.json"), !removed) << text;
+    EXPECT_EQ(fs::exists(folder / "dataset.h5"), !removed) << text;
+    EXPECT_TRUE(fs::exists(folder / kShard));
+    return removed;
+  };
+  const std::string shard = kShard;
+  EXPECT_TRUE(removes(R"({"shards": [{"name": "a.h5"}, {"name": ")" + shard + R"("}]})"));
+  EXPECT_FALSE(removes(R"({"shards": [{"name": "a.h5"}], "missing": [")" + shard + R"("]})"));
+  EXPECT_FALSE(removes(R"({"shards": []})"));
+  for (const char* damaged : {"", "{", "[]", "{}", R"({"shards": 3})", R"({"shards": [3]})",
+                              R"({"shards": [{"size": 3}]})"}) {
+    EXPECT_TRUE(removes(damaged)) << damaged;
+  }
+  EXPECT_FALSE(outdate_dataset(folder.path(), kShard));  // there is none
+}
+
 /// A folder with the shard of a job over the clip FOLDER/a/clip, and the plans of others.
 class DiscardOutputOfAnotherJob : public ::testing::Test {
  protected:
