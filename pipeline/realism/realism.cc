@@ -42,11 +42,10 @@ void check_options(const RealismOptions& options) {
 
 void check_learnt(const ContrastThreshold& threshold, const ThresholdRange& learnt) {
   if (learnt.contains(threshold)) return;
-  throw UsageError(
-      fmt::format("--threshold: expected {:.3g}..{:.3g} as the weights have learnt, got {:.3g} for "
-                  "positive and "
-                  "{:.3g} for negative events",
-                  learnt.lowest, learnt.highest, threshold.positive(), threshold.negative()));
+  throw UsageError(fmt::format(
+      "--threshold: expected {:.3g}..{:.3g} as the weights have learnt, got {:.3g} of positive "
+      "events, {:.3g} of negative ones",
+      learnt.lowest, learnt.highest, threshold.positive(), threshold.negative()));
 }
 
 std::vector<IntervalFrames> frames_to_fit(const Recording& recording,

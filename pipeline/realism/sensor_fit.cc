@@ -61,7 +61,8 @@ std::vector<StillPixels> still_pixels_of(const Recording& recording,
   return still;
 }
 
-/// The pairs without the events of hot pixels; `hot`: [y, x], or empty for none.
+/// The pairs (again: which pixels are hot takes all of them) without the events of hot pixels;
+/// `hot`: [y, x], or empty for none.
 void read_pairs(const Recording& recording, std::span<const FrameInterval> pairs,
                 std::span<const std::uint8_t> hot, std::vector<IntervalFrames>& frames) {
   for (const FrameInterval& pair : pairs) {
@@ -166,16 +167,16 @@ class Fitter {
     if (is_at_end(threshold.positive(), range) || is_at_end(threshold.negative(), range)) {
       warn(
           fmt::format("no threshold in {:.3g}..{:.3g}, which the network has learnt, makes as "
-                      "many events as the camera: the document has that of difference",
+                      "many events as the camera: the document can only have that of difference",
                       range.lowest, range.highest));
       return std::nullopt;
     }
     const auto [least, most] = ThresholdSpec::kRatios;
     if (threshold.ratio < least || threshold.ratio > most) {
-      warn(
-          fmt::format("no threshold through the network, since the negative one is {:.3g} times "
-                      "the positive one, expected {}..{}: the document has that of difference",
-                      threshold.ratio, least, most));
+      warn(fmt::format(
+          "no threshold through the network, since the negative one is {:.3g} times "
+          "the positive one, expected {}..{}: the document can only have that of difference",
+          threshold.ratio, least, most));
       return std::nullopt;
     }
     const Sensitivity sensitivity([&](double factor) {
