@@ -76,21 +76,34 @@ double faded(double value, std::int64_t step, double end) {
 
 /// A network and what changes it.
 struct Learner {
-  Learner(const std::string& name, torch::nn::Module& module, double base_rate,
+  Learner(const std::string& network_name, torch::nn::Module& module, double base_rate,
           const OptimizerSpec& spec);
 
-  std::string state_prefix;  ///< of the optimiser's state: "optimizer.NAME"
+  void save(StateDict& state) const;
+  void load(const StateDict& state);
+
+  std::string name;
   torch::nn::Module* network;
   double rate;  ///< at the start of its phase
   RAdam optimizer;
 };
 
-Learner::Learner(const std::string& name, torch::nn::Module& module, double base_rate,
+Learner::Learner(const std::string& network_name, torch::nn::Module& module, double base_rate,
                  const OptimizerSpec& spec)
-    : state_prefix("optimizer." + name),
+    : name(network_name),
       network(&module),
       rate(base_rate),
       optimizer(module.parameters(), {base_rate, spec.betas[0], spec.betas[1]}) {}
+
+void Learner::save(StateDict& state) const {
+  save_network(*network, state, name + ".");
+  optimizer.save(state, "optimizer." + name);
+}
+
+void Learner::load(const StateDict& state) {
+  load_network(*network, state, name + ".");
+  optimizer.load(state, "optimizer." + name);
+}
 
 namespace {
 
@@ -142,6 +155,19 @@ struct Trainer::Learners {
         flow("flow", *networks.flow, job.optimizer.cycle_rate, job.optimizer),
         reconstruction("reconstruction", *networks.reconstruction, job.optimizer.cycle_rate,
                        job.optimizer) {}
+
+  /// Those that a phase or a loss of the manifest uses, the generator first. The others stay as the
+  /// seed makes them.
+  std::vector<Learner*> used() {
+    std::vector<Learner*> found{&generator};
+    const auto add = [&](Learner& learner, double weight, std::int64_t steps) {
+      if (weight != 0 || steps > 0) found.push_back(&learner);
+    };
+    add(discriminator, manifest.losses.adversarial, 0);
+    add(flow, manifest.losses.flow, manifest.steps.flow);
+    add(reconstruction, manifest.losses.reconstruction, manifest.steps.reconstruction);
+    return found;
+  }
 
   /// Whose update this step is.
   Learner& turn(TrainingPhase phase, std::int64_t step) {
@@ -237,20 +263,12 @@ StepLosses Trainer::step(TrainingPhase phase, std::int64_t step,
 
 StateDict Trainer::state() const {
   StateDict state;
-  const Learners& all = *learners_;
-  all.networks.save(state);
-  for (const Learner* each : {&all.generator, &all.discriminator, &all.flow, &all.reconstruction}) {
-    each->optimizer.save(state, each->state_prefix);
-  }
+  for (const Learner* each : learners_->used()) each->save(state);
   return state;
 }
 
 void Trainer::load(const StateDict& state) {
-  Learners& all = *learners_;
-  all.networks.load(state);
-  for (Learner* each : {&all.generator, &all.discriminator, &all.flow, &all.reconstruction}) {
-    each->optimizer.load(state, each->state_prefix);
-  }
+  for (Learner* each : learners_->used()) each->load(state);
 }
 
 StateDict Trainer::generator_state() const { return learners_->networks.generator_of_frames(); }

@@ -59,7 +59,8 @@ class Trainer {
   /// the samples do not fit; std::runtime_error if LibTorch fails, likewise.
   StepLosses step(TrainingPhase phase, std::int64_t step, std::span<const TrainingSample> samples);
 
-  /// Everything needed to go on: parameters, buffers, optimisers' moments.
+  /// Everything needed to go on: parameters, buffers and optimisers' moments, of the generator and
+  /// of those networks that a phase or a loss of the manifest uses.
   StateDict state() const;
 
   /// Throws std::runtime_error naming what is missing or has another shape; then nothing is defined

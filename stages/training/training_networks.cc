@@ -140,13 +140,6 @@ at::Tensor TrainingNetworks::discriminate(const at::Tensor& volume, const at::Te
   return discriminator->forward(volume, images).to(at::kFloat);
 }
 
-void TrainingNetworks::save(StateDict& state) const {
-  save_network(*generator, state, "generator.");
-  save_network(*discriminator, state, "discriminator.");
-  save_network(*flow, state, "flow.");
-  save_network(*reconstruction, state, "reconstruction.");
-}
-
 StateDict TrainingNetworks::generator_of_frames() const {
   StateDict state;
   save_network(*generator, state, "");
@@ -165,13 +158,6 @@ StateDict TrainingNetworks::generator_of_frames() const {
     }
   }
   return state;
-}
-
-void TrainingNetworks::load(const StateDict& state) {
-  load_network(*generator, state, "generator.");
-  load_network(*discriminator, state, "discriminator.");
-  load_network(*flow, state, "flow.");
-  load_network(*reconstruction, state, "reconstruction.");
 }
 
 }  // namespace eventgan

@@ -25,11 +25,6 @@ struct TrainingNetworks {
   std::vector<at::Tensor> run(UNet& network, const at::Tensor& input) const;
   at::Tensor discriminate(const at::Tensor& volume, const at::Tensor& images);
 
-  /// Under "generator.", "discriminator.", "flow." and "reconstruction.". load() throws as
-  /// load_network.
-  void save(StateDict& state) const;
-  void load(const StateDict& state);
-
   /// The generator alone, its first layer of the frames whatever it was trained in.
   StateDict generator_of_frames() const;
 

@@ -289,6 +289,33 @@ TEST(Trainer, RefusesSamplesThatDoNotFit) {
   EXPECT_THROW(trainer.step(TrainingPhase::kFlow, 0, mixed), std::invalid_argument);
 }
 
+TEST(Trainer, TheStateHasTheNetworksThatAreUsed) {
+  const auto networks = [](const LossWeights& losses, const PhaseSteps& steps) {
+    TrainingManifest manifest = testing::small_training();
+    manifest.losses = losses;
+    manifest.steps = steps;
+    std::set<std::string> names;
+    for (const auto& [key, tensor] : Trainer(manifest, "cpu").state()) {
+      const std::string optimizer = "optimizer.";
+      const std::string name = key.starts_with(optimizer) ? key.substr(optimizer.size()) : key;
+      names.insert(name.substr(0, name.find('.')));
+    }
+    return names;
+  };
+  const LossWeights direct{.adversarial = 0, .flow = 0, .reconstruction = 0, .volume = 1};
+  LossWeights flow = direct, paper = direct;
+  flow.flow = 1;
+  paper.adversarial = paper.flow = paper.reconstruction = 1;
+  EXPECT_THAT(networks(direct, {.flow = 0, .reconstruction = 0, .generator = 5}),
+              ElementsAre("generator"));
+  EXPECT_THAT(networks(direct, {.flow = 0, .reconstruction = 5, .generator = 0}),
+              ElementsAre("generator", "reconstruction"));
+  EXPECT_THAT(networks(flow, {.flow = 0, .reconstruction = 0, .generator = 5}),
+              ElementsAre("flow", "generator"));
+  EXPECT_THAT(networks(paper, {.flow = 0, .reconstruction = 0, .generator = 5}),
+              ElementsAre("discriminator", "flow", "generator", "reconstruction"));
+}
+
 TEST(Trainer, LoadNamesWhatIsMissing) {
   Trainer trainer(testing::small_training(), "cpu");
   StateDict state = trainer.state();
