@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -15,6 +16,12 @@ namespace {
 
 constexpr std::size_t kTogether = 256;  ///< pixels, so that memory is read in its order
 constexpr float kMostApart = 64;
+
+/// In which sixteenth of [0, 1) a pixel's phase lies, by its place in a block of 4x4 pixels: each
+/// 2x2 of it have one in each quarter (Bayer 1973). It remains so where all sixteen are XORed with
+/// the same four bits.
+constexpr std::array<std::uint64_t, 16> kSixteenths = {0, 8,  2, 10, 12, 4, 14, 6,
+                                                       3, 11, 1, 9,  15, 7, 13, 5};
 
 /// Pixels of one polarity, [bin, pixel] with room for kTogether of each bin.
 struct Piece {
@@ -62,15 +69,35 @@ void add_events(std::size_t bin, std::size_t bins, float rate, float sum, float 
   }
 }
 
-/// Of one polarity [bin, pixel]; the pixels' random numbers begin at `first_random`.
-void draw_polarity(float* volume, std::size_t plane, const CounterRandom& random,
+/// Of pixels from number `first` on; those of their polarity have random numbers from
+/// `first_random` on.
+EVENTGAN_CLONES
+void draw_phases(const CounterRandom& random, std::size_t first_random, std::size_t first,
+                 std::size_t width, std::span<float> phases) {
+  for (std::size_t done = 0; done < phases.size();) {
+    const std::size_t begin = (first + done) % width;
+    const std::size_t end = std::min(width, begin + phases.size() - done);
+    const std::size_t y = (first + done) / width;
+    const std::size_t row_random = first_random + y * width;
+    const std::size_t block_random = row_random - y % 4 * width;
+    for (std::size_t x = begin; x < end; ++x, ++done) {
+      const std::uint64_t sixteenth =
+          kSixteenths[y % 4 * 4 + x % 4] ^ (random.bits(block_random + x - x % 4) % 16);
+      // 24 bits, of which float32 rounds none up to 1.
+      const std::uint64_t bits = sixteenth << 20 | random.bits(row_random + x) >> 44;
+      phases[done] = static_cast<float>(static_cast<std::int32_t>(bits)) * 0x1p-24f;
+    }
+  }
+}
+
+/// Of one polarity [bin, y, x]; the pixels' random numbers begin at `first_random`.
+void draw_polarity(float* volume, ImageSize size, const CounterRandom& random,
                    std::size_t first_random, Piece& piece) {
+  const std::size_t plane = size.pixel_count();
   for (std::size_t first = 0; first < plane; first += kTogether) {
     piece.pixels = std::min(kTogether, plane - first);
-    for (std::size_t i = 0; i < piece.pixels; ++i) {
-      // 24 bits, of which float32 rounds none up to 1.
-      piece.phases[i] = static_cast<float>(random.bits(first_random + first + i) >> 40) * 0x1p-24f;
-    }
+    draw_phases(random, first_random, first, static_cast<std::size_t>(size.width),
+                std::span(piece.phases).first(piece.pixels));
     for (std::size_t bin = 0; bin < piece.bins; ++bin) {
       float* const values = volume + bin * plane + first;
       std::copy_n(values, piece.pixels, piece.rates.data() + bin * kTogether);
@@ -98,8 +125,8 @@ void draw_events(std::span<float> volume, const VolumeShape& shape, const Counte
   const std::size_t plane = shape.size.pixel_count();
   const auto bins = static_cast<std::size_t>(shape.bins);
   Piece piece(bins);
-  draw_polarity(volume.data(), plane, random, 0, piece);
-  draw_polarity(volume.data() + bins * plane, plane, random, plane, piece);
+  draw_polarity(volume.data(), shape.size, random, 0, piece);
+  draw_polarity(volume.data() + bins * plane, shape.size, random, plane, piece);
 }
 
 }  // namespace eventgan

@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
@@ -106,18 +108,72 @@ TEST(DrawEvents, SeedDecides) {
   EXPECT_NE(drawn(rates, shape, 1), drawn(rates, shape, 2));
 }
 
-TEST(DrawEvents, PixelsAndPolaritiesAreIndependent) {
-  const VolumeShape shape{1, {100, 100}};
-  const std::size_t plane = shape.size.pixel_count();
-  const std::vector<float> events = drawn(std::vector<float>(shape.value_count(), 0.5f), shape, 11);
-  int both = 0, neighbours = 0;
-  for (std::size_t i = 0; i + 1 < plane; ++i) {
-    both += events[i] > 0 && events[plane + i] > 0;
-    neighbours += events[i] > 0 && events[i + 1] > 0;
+/// Of a polarity at a place, of events in one bin.
+int count_at(const std::vector<float>& events, const VolumeShape& shape, int polarity, int y,
+             int x) {
+  const std::size_t pixel = static_cast<std::size_t>(y) * shape.size.width + x;
+  return static_cast<int>(events[polarity * shape.size.pixel_count() + pixel]);
+}
+
+/// Of the pixels of a square whose upper left one is at (y, x).
+int count_in(const std::vector<float>& events, const VolumeShape& shape, int polarity, int y, int x,
+             int side) {
+  int count = 0;
+  for (int i = 0; i < side * side; ++i) {
+    count += count_at(events, shape, polarity, y + i / side, x + i % side);
   }
-  const double spread = std::sqrt(plane * 0.25 * 0.75);
-  EXPECT_NEAR(both, 0.25 * plane, 4 * spread);
-  EXPECT_NEAR(neighbours, 0.25 * plane, 4 * spread);
+  return count;
+}
+
+TEST(DrawEvents, NeighboursShareWhatIsExpectedOfThemTogether) {
+  const VolumeShape shape{1, {14, 301}};  // neither side a multiple of 4, and more than one piece
+  const auto of_rate = [&](float rate) {
+    return drawn(std::vector<float>(shape.value_count(), rate), shape, 5);
+  };
+  const auto sixteenth = of_rate(1.0f / 16), quarter = of_rate(0.25f), most = of_rate(1.75f);
+  for (const int polarity : {0, 1}) {
+    for (int y = 0; y + 4 <= shape.size.height; y += 4) {
+      for (int x = 0; x + 4 <= shape.size.width; x += 4) {
+        ASSERT_EQ(count_in(sixteenth, shape, polarity, y, x, 4), 1) << y << " " << x;
+      }
+    }
+    for (int y = 0; y + 2 <= shape.size.height; y += 2) {
+      for (int x = 0; x + 2 <= shape.size.width; x += 2) {
+        ASSERT_EQ(count_in(quarter, shape, polarity, y, x, 2), 1) << y << " " << x;
+        ASSERT_EQ(count_in(most, shape, polarity, y, x, 2), 7) << y << " " << x;
+      }
+    }
+  }
+}
+
+TEST(DrawEvents, PolaritiesAndBlocksAreIndependent) {
+  const VolumeShape shape{1, {100, 100}};
+  const std::vector<float> events = drawn(std::vector<float>(shape.value_count(), 0.5f), shape, 11);
+  int both = 0, next = 0, below = 0;
+  for (int y = 0; y < 96; ++y) {
+    for (int x = 0; x < 96; ++x) {
+      const int here = count_at(events, shape, 0, y, x);
+      both += here * count_at(events, shape, 1, y, x);
+      next += here * count_at(events, shape, 0, y, x + 4);
+      below += here * count_at(events, shape, 0, y + 4, x);
+    }
+  }
+  // Of the half of a block's pixels that have an event another block shares any number.
+  const double pixels = 96 * 96, spread = std::sqrt(pixels / 16) * 16 * 0.25;
+  for (const int count : {both, next, below}) EXPECT_NEAR(count, pixels / 4, 4 * spread);
+}
+
+TEST(DrawEvents, EachPixelsPhaseIsUniform) {
+  const VolumeShape shape{1, {5, 6}};  // a whole block and parts of others
+  constexpr int kSeeds = 4000;
+  std::vector<double> events(shape.value_count());
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const auto volume = drawn(std::vector<float>(shape.value_count(), 0.3f), shape, seed);
+    std::ranges::transform(events, volume, events.begin(), std::plus());
+  }
+  // 60 values of a standard deviation each: 5 of it are passed by chance once in 30,000 times.
+  const double bound = 5 * std::sqrt(0.3 * 0.7 / kSeeds);
+  for (const double count : events) EXPECT_NEAR(count / kSeeds, 0.3, bound);
 }
 
 TEST(DrawEvents, WhatIsNotFiniteStaysSo) {
