@@ -158,7 +158,7 @@ TEST(DrawEvents, PolaritiesAndBlocksAreIndependent) {
       below += here * count_at(events, shape, 0, y + 4, x);
     }
   }
-  // Of the half of a block's pixels that have an event another block shares any number.
+  // Events of two blocks are at the same 8 of 16 pixels, or at the other 8, with even chances.
   const double pixels = 96 * 96, spread = std::sqrt(pixels / 16) * 16 * 0.25;
   for (const int count : {both, next, below}) EXPECT_NEAR(count, pixels / 4, 4 * spread);
 }
