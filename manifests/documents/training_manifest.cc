@@ -278,6 +278,8 @@ TrainingManifest read_training_document(const StrictValue& document) {
   }
   const auto simulated = object.find("simulated");
   if (simulated) manifest.simulated = read_simulated(*simulated);
+  const auto teacher = object.find("teacher");
+  if (teacher) manifest.teacher = read_path(*teacher);
   if (const auto gaps = object.find("gaps")) manifest.gaps = read_gaps(*gaps, PairSide::kBefore);
   const auto losses = object.find("losses");
   if (losses) manifest.losses = read_losses(*losses);
@@ -304,8 +306,8 @@ TrainingManifest read_training_document(const StrictValue& document) {
   check_sensor(object, manifest);
   object.finish();
   check_phases(steps, losses.value_or(steps), manifest);
-  if (simulated && !manifest.network.sensor) {
-    simulated->fault("network.sensor with it", "none");
+  for (const auto& key : {simulated, teacher}) {
+    if (key && !manifest.network.sensor) key->fault("network.sensor with it", "none");
   }
   return manifest;
 }

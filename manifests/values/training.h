@@ -138,6 +138,10 @@ struct TrainingManifest : ManifestOrigin {
   std::vector<RecordingSpec> recordings;
   std::vector<RecordingSpec> validation;   ///< may be empty
   std::optional<SimulatedSpec> simulated;  ///< with NetworkSpec::sensor
+  /// Weights, as written in the manifest, of a network that has learnt the same: with
+  /// NetworkSpec::sensor the likelihoods are of its rates in place of the events (Hinton et al.
+  /// 2015, distillation).
+  std::optional<std::string> teacher;
   std::vector<int> gaps = {1, 2, 3, 4, 5, 6};
   ImageSize crop = {256, 256};  ///< sides 16..2048; from 48 with adversarial loss
   int batch = 8;                ///< 1..512, even with adversarial loss

@@ -181,4 +181,10 @@ LoadedGenerator load_generator(const JobManifest& manifest) {
   return result;
 }
 
+std::unique_ptr<Generator> make_fastest_generator(const Weights& weights) {
+  return onednn_support(Precision::kFloat32).able
+             ? make_onednn_generator(weights, Precision::kFloat32)
+             : make_torch_generator(weights);
+}
+
 }  // namespace eventgan

@@ -38,4 +38,7 @@ struct LoadedGenerator {
 /// manifest's simulator; throws as they do, and InputError if the engine refuses the weights.
 LoadedGenerator load_generator(const JobManifest& manifest);
 
+/// The fastest engine of this processor in float32. Throws as the engines do.
+std::unique_ptr<Generator> make_fastest_generator(const Weights& weights);
+
 }  // namespace eventgan

@@ -11,14 +11,13 @@
 #include "manifests/values/events.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/weights.h"
+#include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/events/drawn_events.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/simulate_pair.h"
 #include "stages/events/volume_statistics.h"
-#include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/shipped_weights.h"
-#include "stages/generator/torch/torch_generator.h"
 #include "stages/generator/weights_file.h"
 
 namespace eventgan {
@@ -104,10 +103,7 @@ std::unique_ptr<VolumeMethod> make_network_method(std::unique_ptr<Generator> gen
 }
 
 std::unique_ptr<Generator> open_realism_generator(const std::string& weights) {
-  const Weights named = named_weights(weights);
-  return onednn_support(Precision::kFloat32).able
-             ? make_onednn_generator(named, Precision::kFloat32)
-             : make_torch_generator(named);
+  return make_fastest_generator(named_weights(weights));
 }
 
 namespace {

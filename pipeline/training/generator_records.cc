@@ -58,10 +58,6 @@ std::string steps_text(const TrainingManifest& manifest, const TrainingPosition&
 
 }  // namespace
 
-namespace {
-
-/// Those of the recordings, and all that simulated scenes are drawn with; with gamma each is told
-/// as the threshold of more or less contrast.
 std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest) {
   if (!manifest.network.sensor) return std::nullopt;
   const auto [low, high] = std::ranges::minmax(
@@ -74,8 +70,6 @@ std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifes
   }
   return range;
 }
-
-}  // namespace
 
 Weights trained_weights(const StateDict& generator_state, const TrainingManifest& manifest,
                         const TrainingPosition& position) {
@@ -100,6 +94,10 @@ void add_final_origin(Weights& weights, const TrainingManifest& manifest,
     listing += spec.path + '\t' + recording_hash(recordings[i].file, spec.options) + '\n';
   }
   weights.metadata["training_recordings_sha256"] = listing;
+  if (manifest.teacher) {
+    weights.metadata["training_teacher_sha256"] =
+        sha256_of_file(resolve(manifest, *manifest.teacher));
+  }
   std::string means;
   for (const auto& [name, value] : losses) means += name + '\t' + csv_number(value) + '\n';
   weights.metadata["training_losses"] = means;

@@ -21,6 +21,11 @@
 
 namespace eventgan {
 
+/// The thresholds that a network which knows its sensor is told in this training: those of the
+/// recordings, and all that simulated scenes are drawn with; with gamma each is told as the
+/// threshold of more or less contrast. None for another network.
+std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifest);
+
 /// The trained generator, folded, ready to run. Its metadata say where it comes from: the
 /// manifest's text and SHA-256, the steps made, and the program's version. Throws
 /// std::runtime_error if the state is not a generator's.
@@ -28,7 +33,7 @@ Weights trained_weights(const StateDict& generator_state, const TrainingManifest
                         const TrainingPosition& position);
 
 /// Adds what is known at the end: each recording's path as the manifest has it with the SHA-256 of
-/// its files (reads them whole), and the losses, means over the last steps.
+/// its files (reads them whole), the teacher's SHA-256, and the losses, means over the last steps.
 void add_final_origin(Weights& weights, const TrainingManifest& manifest,
                       std::span<const TrainingRecording> recordings,
                       const std::map<std::string, double>& losses);

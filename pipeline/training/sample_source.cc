@@ -1,5 +1,7 @@
 #include "pipeline/training/sample_source.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <span>
@@ -10,12 +12,15 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
+#include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/spread.h"
+#include "pipeline/training/generator_records.h"
 #include "stages/base/images/image_file.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/simulation/moving_planes.h"
 #include "stages/frames/decoding/prepared_frame.h"
 #include "stages/frames/sequences/image_folder.h"
+#include "stages/generator/weights_file.h"
 
 namespace eventgan {
 namespace {
@@ -128,15 +133,40 @@ std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> fold
   return textures;
 }
 
+std::unique_ptr<Generator> open_teacher(const TrainingManifest& manifest) {
+  const std::filesystem::path file = resolve(manifest, manifest.teacher.value());
+  const Weights weights = read_weights(file);
+  const ThresholdRange wanted = trained_thresholds(manifest).value();
+  const auto fault = [&](const std::string& expected, const std::string& got) {
+    return UsageError(
+        fmt::format("$.teacher: expected {}, got {}, in {}", expected, got, file.string()));
+  };
+  const auto text = [](const ThresholdRange& range) {
+    return fmt::format("{:.3g}..{:.3g}", range.lowest, range.highest);
+  };
+  if (weights.bins != manifest.network.bins) {
+    throw fault(fmt::format("{} bins as in network.bins", manifest.network.bins),
+                std::to_string(weights.bins));
+  }
+  const auto& learnt = weights.thresholds;
+  if (!learnt || learnt->lowest > wanted.lowest || learnt->highest < wanted.highest) {
+    throw fault("weights that have learnt the thresholds of this training, " + text(wanted),
+                learnt ? text(*learnt) : "ones that have learnt none");
+  }
+  return make_fastest_generator(weights);
+}
+
 SampleSource::SampleSource(const TrainingManifest& manifest,
                            std::vector<TrainingRecording> recordings)
     : manifest_(manifest), reader_(std::move(recordings), manifest.network.bins) {
-  if (!manifest.simulated) return;
-  std::vector<std::filesystem::path> folders;
-  for (const std::string& folder : manifest.simulated->textures) {
-    folders.push_back(resolve(manifest, folder));
+  if (manifest.simulated) {
+    std::vector<std::filesystem::path> folders;
+    for (const std::string& folder : manifest.simulated->textures) {
+      folders.push_back(resolve(manifest, folder));
+    }
+    textures_ = read_textures(folders, kMostTextures);
   }
-  textures_ = read_textures(folders, kMostTextures);
+  if (manifest.teacher) teacher_ = open_teacher(manifest);
 }
 
 TrainingSample SampleSource::simulated_sample(const SamplePlace& place,
@@ -156,11 +186,7 @@ TrainingSample SampleSource::simulated_sample(const SamplePlace& place,
   return sample;
 }
 
-TrainingSample SampleSource::sample(const SamplePlace& place) const {
-  if (manifest_.simulated) {
-    const CounterRandom random = sample_random(manifest_, place).keyed("simulated");
-    if (random.uniform(0) < manifest_.simulated->fraction) return simulated_sample(place, random);
-  }
+TrainingSample SampleSource::recorded_sample(const SamplePlace& place) const {
   const auto draw_again = [&](const SampleDraw& draw) {
     return draw.first_frame != draw.last_frame &&
            reader_.event_count(draw.recording, draw.first_frame) < kFewestEvents;
@@ -184,6 +210,17 @@ TrainingSample SampleSource::sample(const SamplePlace& place) const {
   augmentation.top = augmentation.left = 0;  // it is cut already
   TrainingSample sample = augment(cut, augmentation);
   sample.origin = cut.origin;  // augment has added where it cut: nothing of the image
+  return sample;
+}
+
+TrainingSample SampleSource::sample(const SamplePlace& place) const {
+  const CounterRandom random = sample_random(manifest_, place).keyed("simulated");
+  TrainingSample sample = manifest_.simulated && random.uniform(0) < manifest_.simulated->fraction
+                              ? simulated_sample(place, random)
+                              : recorded_sample(place);
+  if (teacher_ && place.phase == TrainingPhase::kGenerator) {
+    sample.taught_rates = generated_volume(*teacher_, sample);
+  }
   return sample;
 }
 

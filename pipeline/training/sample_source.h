@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <functional>
 #include <future>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -14,6 +15,7 @@
 #include "manifests/values/frames.h"
 #include "manifests/values/training.h"
 #include "pipeline/training/training_recording.h"
+#include "stages/generator/generator.h"
 #include "stages/training/training_sample.h"
 
 namespace eventgan {
@@ -51,19 +53,24 @@ SampleDraw draw_sample(std::span<const TrainingRecording> recordings,
 std::vector<GreyImage> read_textures(std::span<const std::filesystem::path> folders,
                                      std::size_t most);
 
+/// The network of the manifest's `teacher`, which is there, in float32. Throws InputError if the
+/// weights cannot be used; UsageError if they have not learnt a sensor's threshold, all of those of
+/// this training, or its bins.
+std::unique_ptr<Generator> open_teacher(const TrainingManifest& manifest);
+
 /// The samples of a training: each a function of the manifest and its place, whatever was asked for
 /// before. Thread safe.
 class SampleSource {
  public:
-  /// `recordings` of the manifest, opened. Reads the textures of simulated scenes; throws as
-  /// read_textures.
+  /// `recordings` of the manifest, opened. Reads the textures of simulated scenes, and the teacher;
+  /// throws as read_textures and open_teacher.
   SampleSource(const TrainingManifest& manifest, std::vector<TrainingRecording> recordings);
 
   /// With probability simulated.fraction a simulated one (simulate_planes), without augmentation;
   /// else the sample drawn by draw_sample. As in the published code a pair whose first interval has
   /// fewer than 100 events in the whole image is drawn again (at most 10 times, from the same
-  /// recording): η98 would blow its noise up to full scale. Throws InputError naming the recording
-  /// if it cannot be read.
+  /// recording): η98 would blow its noise up to full scale. With the teacher's rates in the phase
+  /// of the generator. Throws InputError naming the recording if it cannot be read.
   TrainingSample sample(const SamplePlace& place) const;
 
   /// The samples of a step, manifest.batch of them.
@@ -72,11 +79,13 @@ class SampleSource {
   const std::vector<TrainingRecording>& recordings() const { return reader_.recordings(); }
 
  private:
+  TrainingSample recorded_sample(const SamplePlace& place) const;
   TrainingSample simulated_sample(const SamplePlace& place, const CounterRandom& random) const;
 
   TrainingManifest manifest_;
   CropReader reader_;
   std::vector<GreyImage> textures_;
+  std::unique_ptr<Generator> teacher_;
 };
 
 /// Prepares the batches of the steps to come in the background, a few ahead and no more. Since a

@@ -68,6 +68,9 @@ std::map<std::string, std::string> training_settings(
       settings["textures " + folder] = description(resolve(manifest, folder));
     }
   }
+  if (manifest.teacher) {
+    settings["teacher"] = sha256_of_file(resolve(manifest, *manifest.teacher));
+  }
   return settings;
 }
 

@@ -22,8 +22,8 @@ inline std::int64_t steps_of(const PhaseSteps& steps, TrainingPhase phase) {
 }
 
 /// What decides a training's result, field by field: the manifest's settings (without comments and
-/// `output`), and the size in bytes, images and frames of each recording and of what lies beside
-/// it.
+/// `output`), the size in bytes, images and frames of each recording and of what lies beside it,
+/// and the teacher's SHA-256.
 std::map<std::string, std::string> training_settings(const TrainingManifest& manifest,
                                                      std::span<const TrainingRecording> recordings);
 

@@ -48,18 +48,23 @@ TrainingBatch make_training_batch(std::span<const TrainingSample> samples, int b
   if (samples.empty()) throw std::invalid_argument("expected samples, got none");
   const VolumeShape shape{bins, samples[0].shape.size};
   for (const TrainingSample& sample : samples) {
-    if (sample.shape == shape && sample.threshold.has_value() == samples[0].threshold.has_value()) {
+    if (sample.shape == shape && sample.threshold.has_value() == samples[0].threshold.has_value() &&
+        sample.taught_rates.empty() == samples[0].taught_rates.empty()) {
       continue;
     }
-    throw std::invalid_argument("expected samples of one size and " + std::to_string(bins) +
-                                " bins, all with a threshold or none, got another, in " +
-                                sample.origin);
+    throw std::invalid_argument(
+        "expected samples of one size and " + std::to_string(bins) +
+        " bins, all with a threshold or none, all with a teacher's rates or none, got "
+        "another, in " +
+        sample.origin);
   }
   const auto values = [&](auto member, int channels) {
     return stack(samples, std::mem_fn(member), channels, shape.size, device);
   };
-  return {values(&TrainingSample::frames, 2), values(&TrainingSample::network_frames, 2),
-          values(&TrainingSample::volume, shape.channels()),
+  const at::Tensor volume = values(&TrainingSample::volume, shape.channels());
+  return {values(&TrainingSample::frames, 2), values(&TrainingSample::network_frames, 2), volume,
+          samples[0].taught_rates.empty() ? volume
+                                          : values(&TrainingSample::taught_rates, shape.channels()),
           stack_inputs(samples, shape.size, device)};
 }
 

@@ -26,6 +26,9 @@ struct TrainingSample {
   /// The sensor's in the network frames' log intensity; none unless the network knows its sensor.
   std::optional<ContrastThreshold> threshold = std::nullopt;
   std::string origin;  ///< for messages: recording, frames, crop
+  /// [2 bins, y, x] float32, C order, ≥ 0: the rates that a teacher gives for the network frames.
+  /// Empty without one.
+  std::vector<float> taught_rates = {};
 };
 
 /// What is done to one sample; drawn once, applied to frames and volume alike.

@@ -111,11 +111,11 @@ UpdateLoss generator_update(TrainingNetworks& networks, const TrainingBatch& bat
     loss.total = loss.total + weights.overlap * loss.parts["overlap"];
   }
   if (weights.likelihood != 0) {
-    loss.parts["likelihood"] = likelihood_loss(volume, batch.volume);
+    loss.parts["likelihood"] = likelihood_loss(volume, batch.expected);
     loss.total = loss.total + weights.likelihood * loss.parts["likelihood"];
   }
   if (weights.block_likelihood != 0) {
-    loss.parts["block_likelihood"] = block_likelihood_loss(volume, batch.volume);
+    loss.parts["block_likelihood"] = block_likelihood_loss(volume, batch.expected);
     loss.total = loss.total + weights.block_likelihood * loss.parts["block_likelihood"];
   }
   loss.parts["generator.total"] = loss.total;

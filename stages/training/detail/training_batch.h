@@ -14,6 +14,7 @@ struct TrainingBatch {
   at::Tensor frames;           ///< [B, 2, H, W], previous then next, in [-1, 1], as recorded
   at::Tensor network_frames;   ///< [B, 2, H, W], with gain and gamma
   at::Tensor volume;           ///< [B, 2 bins, H, W], real, as TrainingSample has it
+  at::Tensor expected;         ///< [B, 2 bins, H, W], the teacher's rates; without one `volume`
   at::Tensor generator_input;  ///< [B, 2 or 3, H, W]: the network frames, or sensor_input of them
 
   at::Tensor previous() const { return frames.narrow(1, 0, 1); }       ///< [B, 1, H, W]

@@ -42,7 +42,17 @@ TEST(TrainedWeights, RunAndSayWhereTheyComeFrom) {
     EXPECT_EQ(weights.metadata.at("training_recordings_sha256"),
               "bar.hdf5\t" + sha256_of_file(folder / "bar.hdf5") + "\n");
     EXPECT_EQ(weights.metadata.at("training_losses"), "volume\t0.25\n");
+    EXPECT_FALSE(weights.metadata.contains("training_teacher_sha256"));
   }
+}
+
+TEST(TrainedWeights, SayWhoTaughtThem) {
+  const testing::TemporaryFolder folder;
+  TrainingManifest manifest = testing::small_training(folder.path());
+  manifest.teacher = "bar.hdf5";  // any file
+  Weights weights;
+  add_final_origin(weights, manifest, {}, {});
+  EXPECT_EQ(weights.metadata.at("training_teacher_sha256"), sha256_of_file(folder / "bar.hdf5"));
 }
 
 TEST(TrainedWeights, EqualTheTrainersGenerator) {

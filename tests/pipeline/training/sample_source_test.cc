@@ -14,9 +14,14 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/runtime/errors.h"
+#include "pipeline/training/generator_records.h"
 #include "stages/base/images/image_file.h"
 #include "stages/events/simulation/moving_planes.h"
+#include "stages/generator/torch/torch_generator.h"
+#include "stages/generator/weights.h"
+#include "stages/generator/weights_file.h"
 #include "tests/pipeline/training/fake_training_recording.h"
+#include "tests/stages/generator/engine_trials.h"
 #include "tests/testing/fake_recording.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -421,6 +426,72 @@ TEST_F(SimulatedSamples, LeaveTheOthersAsTheyAre) {
 TEST_F(SimulatedSamples, NeedTheirTextures) {
   manifest_.directory = folder_ / "absent";
   EXPECT_THROW(source(0.5), InputError);
+}
+
+/// With a teacher of the thresholds 0.05 to 1.
+class TaughtSamples : public SimulatedSamples {
+ protected:
+  TaughtSamples() {
+    manifest_.recordings.resize(1);
+    manifest_.recordings[0].threshold = ContrastThreshold{0.25};
+    manifest_.augmentation.gain = {0.5, 0.5};
+    manifest_.teacher = "wide.safetensors";
+    teacher_.thresholds = ThresholdRange{0.05, 1};
+    write_teacher();
+  }
+
+  void write_teacher() const {
+    testing::write_file(folder_ / "wide.safetensors", serialize_weights(teacher_));
+  }
+
+  std::string fault() const {
+    try {
+      open_teacher(manifest_);
+      return "";
+    } catch (const UsageError& error) {
+      return error.what();
+    }
+  }
+
+  Weights teacher_ = testing::untrained_sensor_weights(2, 3, 1);
+};
+
+TEST_F(TaughtSamples, HaveTheTeachersRatesForWhatTheNetworkSees) {
+  const SampleSource samples = source(0.5);
+  const auto reference = make_torch_generator(teacher_);
+  int simulated = 0;
+  for (const TrainingSample& sample : samples.batch(TrainingPhase::kGenerator, 0)) {
+    simulated += is_simulated(sample);
+    const std::vector<float> expected = generated_volume(*reference, sample);
+    const float largest = std::ranges::max(expected);
+    ASSERT_GT(largest, 0);
+    ASSERT_EQ(sample.taught_rates.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      ASSERT_NEAR(sample.taught_rates[i], expected[i], 1e-4f * largest) << i;
+    }
+  }
+  EXPECT_TRUE(0 < simulated && simulated < manifest_.batch) << simulated;
+  EXPECT_TRUE(samples.sample({TrainingPhase::kFlow, 0, 0}).taught_rates.empty());
+}
+
+TEST_F(TaughtSamples, NeedATeacherThatHasLearntTheSame) {
+  EXPECT_EQ(fault(), "");
+  const std::string place = ", in " + (folder_ / "wide.safetensors").string();
+  manifest_.augmentation.gamma = {1, 5};
+  EXPECT_EQ(fault(),
+            "$.teacher: expected weights that have learnt the thresholds of this training, "
+            "0.25..1.25, got 0.05..1" +
+                place);
+  manifest_.augmentation.gamma = {0.1, 1};
+  EXPECT_THAT(fault(), ::testing::HasSubstr("0.025..0.25, got 0.05..1"));
+  manifest_.network.bins = 9;
+  EXPECT_EQ(fault(), "$.teacher: expected 9 bins as in network.bins, got 3" + place);
+  manifest_.network.bins = 3;
+  teacher_ = untrained_weights(2, 3, 1);
+  write_teacher();
+  EXPECT_THAT(fault(), ::testing::HasSubstr("got ones that have learnt none"));
+  testing::write_file(folder_ / "wide.safetensors", "no weights");
+  EXPECT_THROW(open_teacher(manifest_), InputError);
 }
 
 BatchPrefetch::Batch batch_of(std::int64_t step) {

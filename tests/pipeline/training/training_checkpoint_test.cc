@@ -66,6 +66,16 @@ TEST_F(Resumption, ComparesTheTextures) {
       UsageError);
 }
 
+TEST_F(Resumption, ComparesTheTeacher) {
+  settings();
+  manifest_.teacher = "wide.safetensors";
+  const auto with = [&](const std::string& bytes) {
+    testing::write_file(folder_ / "wide.safetensors", bytes);
+    return training_settings(manifest_, {});
+  };
+  EXPECT_THROW(check_resumable(with("abc"), with("abd"), kInReconstruction, manifest_), UsageError);
+}
+
 TEST_F(Resumption, ComparesTheRecordings) {
   auto before = settings();
   const auto now = before;

@@ -11,6 +11,7 @@
 
 #include "stages/training/detail/training_batch.h"
 #include "stages/training/detail/update_loss.h"
+#include "stages/training/losses.h"
 #include "stages/training/trainer.h"
 #include "tests/stages/training/small_training.h"
 
@@ -75,6 +76,19 @@ TEST(TrainingBatch, RefusesThresholdsOfSomeSamples) {
     EXPECT_THAT([&] { make_training_batch(samples, 1, c10::kCPU); },
                 ThrowsMessage<std::invalid_argument>(HasSubstr("all with a threshold or none")));
   }
+}
+
+TEST(TrainingBatch, ExpectsWhatATeacherSaysOrWhatHappened) {
+  std::vector<TrainingSample> samples{sample_from(0), sample_from(100)};
+  const TrainingBatch alone = make_training_batch(samples, 1, c10::kCPU);
+  EXPECT_TRUE(alone.expected.equal(alone.volume));
+  samples[0].taught_rates = {1, 2, 3, 4};
+  EXPECT_THAT([&] { make_training_batch(samples, 1, c10::kCPU); },
+              ThrowsMessage<std::invalid_argument>(HasSubstr("a teacher's rates or none")));
+  samples[1].taught_rates = {5, 6, 7, 8};
+  const TrainingBatch taught = make_training_batch(samples, 1, c10::kCPU);
+  EXPECT_TRUE(taught.volume.equal(alone.volume));
+  EXPECT_EQ(taught.expected[1][0][0][1].item<float>(), 6);
 }
 
 TEST(TrainingBatch, RefusesWhatDoesNotFit) {
@@ -160,6 +174,32 @@ TEST(GeneratorUpdate, IsTheWeightedSumAndReachesTheGeneratorThroughTheFrozenNetw
     ASSERT_TRUE(gradient.defined());
     EXPECT_GT(gradient.abs().max().item<double>(), 0);
   }
+}
+
+TEST(GeneratorUpdate, LearnsTheRatesOfATeacherAndTheEventsThatHappened) {
+  TrainingManifest manifest = stateless_training();
+  TrainingNetworks networks(manifest, c10::kCPU);
+  const LossWeights weights{.adversarial = 0,
+                            .flow = 0,
+                            .reconstruction = 0,
+                            .volume = 1,
+                            .count = 1,
+                            .overlap = 1,
+                            .likelihood = 1,
+                            .block_likelihood = 1};
+  TrainingBatch batch = batch_of(manifest);
+  const auto alone = generator_update(networks, batch, weights).parts;
+  batch.expected = batch.volume + 0.25;
+  const auto taught = generator_update(networks, batch, weights).parts;
+  for (const char* events : {"volume", "count", "overlap"}) {
+    EXPECT_EQ(taught.at(events).item<float>(), alone.at(events).item<float>()) << events;
+  }
+  const at::Tensor volume = networks.run(networks.generator, batch.generator_input)[0];
+  EXPECT_FLOAT_EQ(taught.at("likelihood").item<float>(),
+                  likelihood_loss(volume, batch.expected).item<float>());
+  EXPECT_FLOAT_EQ(taught.at("block_likelihood").item<float>(),
+                  block_likelihood_loss(volume, batch.expected).item<float>());
+  EXPECT_NE(taught.at("likelihood").item<float>(), alone.at("likelihood").item<float>());
 }
 
 TEST(TrainingBatch, KnowsWhereThereAreEvents) {
