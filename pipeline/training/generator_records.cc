@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <future>
 #include <numeric>
+#include <set>
 #include <span>
 #include <utility>
 #include <vector>
@@ -40,6 +41,19 @@ std::string recording_hash(const fs::path& path, const RecordingOptions& options
   std::string listing;
   for (const fs::path& file : files) {
     listing += file.filename().string() + '\t' + sha256_of_file(file) + '\n';
+  }
+  return sha256_hex(listing);
+}
+
+/// Of all files in the folder and below, in the order of their paths.
+std::string textures_hash(const fs::path& folder) {
+  std::set<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.insert(entry.path());
+  }
+  std::string listing;
+  for (const fs::path& file : files) {
+    listing += file.lexically_relative(folder).string() + '\t' + sha256_of_file(file) + '\n';
   }
   return sha256_hex(listing);
 }
@@ -94,6 +108,13 @@ void add_final_origin(Weights& weights, const TrainingManifest& manifest,
     listing += spec.path + '\t' + recording_hash(recordings[i].file, spec.options) + '\n';
   }
   weights.metadata["training_recordings_sha256"] = listing;
+  if (manifest.simulated) {
+    std::string folders;
+    for (const std::string& folder : manifest.simulated->textures) {
+      folders += folder + '\t' + textures_hash(resolve(manifest, folder)) + '\n';
+    }
+    weights.metadata["training_textures_sha256"] = folders;
+  }
   if (manifest.teacher) {
     weights.metadata["training_teacher_sha256"] =
         sha256_of_file(resolve(manifest, *manifest.teacher));

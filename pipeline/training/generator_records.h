@@ -32,8 +32,9 @@ std::optional<ThresholdRange> trained_thresholds(const TrainingManifest& manifes
 Weights trained_weights(const StateDict& generator_state, const TrainingManifest& manifest,
                         const TrainingPosition& position);
 
-/// Adds what is known at the end: each recording's path as the manifest has it with the SHA-256 of
-/// its files (reads them whole), the teacher's SHA-256, and the losses, means over the last steps.
+/// Adds what is known at the end: the path of each recording and folder of textures as the manifest
+/// has it with the SHA-256 of its files (reads them whole), the teacher's SHA-256, and the losses,
+/// means over the last steps.
 void add_final_origin(Weights& weights, const TrainingManifest& manifest,
                       std::span<const TrainingRecording> recordings,
                       const std::map<std::string, double>& losses);

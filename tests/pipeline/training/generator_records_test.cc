@@ -46,6 +46,20 @@ TEST(TrainedWeights, RunAndSayWhereTheyComeFrom) {
   }
 }
 
+TEST(TrainedWeights, SayWhichTexturesTheySaw) {
+  const testing::TemporaryFolder folder;
+  TrainingManifest manifest = testing::small_training(folder.path());
+  manifest.simulated = SimulatedSpec{{"textures", "textures/b"}, 0.5};
+  testing::write_file(folder / "textures/b/c.png", "1");
+  testing::write_file(folder / "textures/a.png", "2");
+  Weights weights;
+  add_final_origin(weights, manifest, {}, {});
+  const std::string c = "c.png\t" + sha256_hex("1") + "\n";
+  const std::string all = "a.png\t" + sha256_hex("2") + "\nb/" + c;
+  EXPECT_EQ(weights.metadata.at("training_textures_sha256"),
+            "textures\t" + sha256_hex(all) + "\ntextures/b\t" + sha256_hex(c) + "\n");
+}
+
 TEST(TrainedWeights, SayWhoTaughtThem) {
   const testing::TemporaryFolder folder;
   TrainingManifest manifest = testing::small_training(folder.path());
