@@ -36,7 +36,7 @@ import whole_conversion
 from measuring.bench import Bench, add_arguments, check_programs
 from measuring.machine import description, processor_name
 from measuring.curves import draw
-from measuring.report import markdown
+from measuring.report import markdown, wrapped
 
 PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "image_sizes": image_sizes,
          "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly,
@@ -65,7 +65,7 @@ def main():
         sections = list(measure_parts(bench, arguments.parts))
         libraries = {text for section in sections for text in section.libraries}
         machine = "\n".join(description(bench, shlex.join(sys.argv), libraries))
-    page = f"# Benchmarks\n\n{machine}\n\n{markdown(sections)}"
+    page = f"# Benchmarks\n\n{wrapped(machine)}\n\n{markdown(sections)}"
     if curves := [curves for section in sections for curves in section.curves]:
         draw(curves, arguments.out / "benchmarks.png", processor_name())
         page += "\n![curves](benchmarks.png)\n"

@@ -1,6 +1,7 @@
 """What a part of the benchmarks hands back, and that as Markdown."""
 
 import dataclasses
+import textwrap
 
 
 @dataclasses.dataclass
@@ -39,9 +40,18 @@ def markdown(sections):
     return "\n".join(part for section in sections for part in _section_lines(section))
 
 
+def wrapped(text):
+    """Each paragraph, and each line of a list, in lines of at most 120 characters."""
+    def filled(line):
+        return textwrap.fill(line, 120, subsequent_indent="  " * line.startswith("- "), break_long_words=False, break_on_hyphens=False)
+
+    return "\n\n".join("\n".join(map(filled, part.splitlines())) if part.startswith("- ") else filled(part)
+                       for part in text.strip().split("\n\n"))
+
+
 def _section_lines(section):
     yield f"## {section.title}\n"
-    yield section.text.strip() + "\n"
+    yield wrapped(section.text) + "\n"
     for table in section.tables:
         if table.caption:
             yield f"{table.caption}\n"
