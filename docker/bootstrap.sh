@@ -78,11 +78,11 @@ demo() {
   # The folder may be of an earlier build, which would have written other bytes.
   "$program" convert "$folder/manifest.json" --overwrite
   "$program" verify "$folder/events"
-  "$program" preview "$folder/events" --out "$folder/pictures" --count 12 >/dev/null
+  "$program" preview "$folder/events" --out "$folder/images" --count 12 >/dev/null
   "$program" report "$folder/events" >/dev/null
   say "done"
   echo "shards:    $folder/events/*.h5"
-  echo "images:    $folder/pictures/*.png"
+  echo "images:    $folder/images/*.png"
   echo "report:    $folder/events/report.html, open it in a browser"
 }
 

@@ -11,7 +11,7 @@
 namespace eventgan {
 namespace {
 
-constexpr char kCommitRecordFormat[] = "eventgan-marker";
+constexpr char kCommitRecordFormat[] = "eventgan-commit-record";
 constexpr int kCommitRecordVersion = 2;
 constexpr int kMostGap = 6;
 constexpr double kMostSeconds = 1e12;

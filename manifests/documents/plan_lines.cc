@@ -105,8 +105,8 @@ json to_json_value(const SourceSummary& source) {
     gaps.push_back({{"gap", gap}, {"pairs", pairs}});
   return {{"labelled_frames", source.labelled_frames},
           {"pairs_by_gap", gaps},
-          {"without_partner", source.unpaired},
-          {"without_partner_ids", source.unpaired_ids},
+          {"unpaired", source.unpaired},
+          {"unpaired_ids", source.unpaired_ids},
           {"faults", source.faults},
           {"notes", notes_as_json(source.notes)}};
 }
@@ -121,8 +121,8 @@ SourceSummary read_source_summary(const StrictValue& value) {
     source.pairs_by_gap[gap] = entry.at("pairs").integer<std::int64_t>(0, kMost);
     entry.finish();
   }
-  source.unpaired = object.at("without_partner").integer<std::int64_t>(0, kMost);
-  source.unpaired_ids = read_texts(object.at("without_partner_ids"));
+  source.unpaired = object.at("unpaired").integer<std::int64_t>(0, kMost);
+  source.unpaired_ids = read_texts(object.at("unpaired_ids"));
   source.faults = object.at("faults").integer<std::int64_t>(0, kMost);
   source.notes = read_texts(object.at("notes"));
   object.finish();

@@ -34,8 +34,8 @@ void read_affine(StrictObject& source, std::optional<SimulationMethod> method,
     }
     return value;
   };
-  if (const auto frames = find("frames_per_picture")) {
-    spec.frames_per_picture = frames->integer(2, 100);
+  if (const auto frames = find("frames_per_image")) {
+    spec.frames_per_image = frames->integer(2, 100);
   }
   if (const auto displacement = find("max_displacement_px")) {
     spec.max_displacement_px = displacement->number(0.1, 100);

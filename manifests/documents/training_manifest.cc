@@ -260,8 +260,8 @@ void read_training_output(const StrictValue& value, TrainingManifest& manifest) 
   if (const auto minutes = object.find("checkpoint_minutes")) {
     manifest.checkpoint_minutes = minutes->number(0, kMostMinutes);
   }
-  if (const auto minutes = object.find("picture_minutes")) {
-    manifest.picture_minutes = minutes->number(0, kMostMinutes);
+  if (const auto minutes = object.find("image_minutes")) {
+    manifest.image_minutes = minutes->number(0, kMostMinutes);
   }
   object.finish();
 }

@@ -28,7 +28,7 @@ struct SimulationSource {
   std::int64_t first_frame = 0;
   std::int64_t frame_count = 0;  ///< 0: to the end. With kAffine the number of images used
   std::int64_t frame_step = 1;   ///< takes each n-th frame, 1..100
-  int frames_per_picture = 7;    ///< kAffine: frames of the motion of one image, 2..100
+  int frames_per_image = 7;      ///< kAffine: frames of the motion of one image, 2..100
   /// kAffine: how far an image moves from one of its frames to the next is drawn uniformly from 0
   /// to this, for each image; 0.1..100.
   double max_displacement_px = 5;

@@ -155,7 +155,7 @@ struct TrainingManifest : ManifestOrigin {
   PhaseSteps steps;
   std::string output_directory;
   double checkpoint_minutes = 5;
-  double picture_minutes = 10;
+  double image_minutes = 10;
 };
 
 std::string_view to_string(RecordingFormat format);

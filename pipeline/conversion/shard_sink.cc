@@ -157,7 +157,7 @@ bool ShardSink::commit() {
   record_.wall_seconds = seconds_since(committed_at_);
   record_.peak_bytes = static_cast<std::int64_t>(peak_memory_bytes());
   {
-    const TraceSpan file(job_.options.trace, "write marker", "shard");
+    const TraceSpan file(job_.options.trace, "write commit record", "shard");
     write_file_atomically(job_.folder / commit_record_name(shard_->name), to_json(record_));
   }
   shared_.release(*shard_);

@@ -208,8 +208,8 @@ Json source_entry(const DatasetParts& parts, std::size_t index) {
   Json source = {{"dataset", to_string(spec.dataset)},
                  {"split", spec.split},
                  {"labelled_frames", summary.labelled_frames},
-                 {"without_partner", summary.unpaired},
-                 {"frames_without_partner", summary.unpaired_ids.size()},
+                 {"unpaired", summary.unpaired},
+                 {"unpaired_frames", summary.unpaired_ids.size()},
                  {"notes", summary.notes},
                  {"class_names", nullptr},
                  {"joint_names", nullptr}};

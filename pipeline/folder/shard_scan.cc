@@ -81,7 +81,7 @@ class Look {
       state_.record =
           parse_commit_record(read_text_file(commit_record_file_), commit_record_file_.string());
     } catch (const std::runtime_error& error) {
-      return fail(ShardCondition::kTornRecord, first_line(error.what()));
+      return fail(ShardCondition::kDamagedRecord, first_line(error.what()));
     }
     const CommitRecord& record = *state_.record;
     const auto foreign = [&](const std::string& expected, const std::string& got) {
@@ -178,11 +178,11 @@ const char* to_string(ShardCondition condition) {
     case ShardCondition::kUncommitted:
       return "not committed";
     case ShardCondition::kNoShard:
-      return "marker without shard";
-    case ShardCondition::kTornRecord:
-      return "torn marker";
+      return "commit record without shard";
+    case ShardCondition::kDamagedRecord:
+      return "damaged commit record";
     case ShardCondition::kForeignRecord:
-      return "foreign marker";
+      return "foreign commit record";
     case ShardCondition::kOtherSize:
       return "of another size";
     case ShardCondition::kOtherBytes:

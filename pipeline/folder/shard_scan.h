@@ -19,7 +19,7 @@ enum class ShardCondition {
   kMissing,        ///< neither shard nor commit record
   kUncommitted,    ///< a shard without a commit record: its writer ended between the two
   kNoShard,        ///< a commit record without a shard
-  kTornRecord,     ///< the commit record does not parse
+  kDamagedRecord,  ///< the commit record does not parse
   kForeignRecord,  ///< the commit record is of another plan or another shard
   kOtherSize,      ///< the shard has not the commit record's size
   kOtherBytes,     ///< the shard has not the commit record's SHA-256

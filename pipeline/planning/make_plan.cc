@@ -367,10 +367,10 @@ void note_unknown_sizes(Plan& plan) {
     if (unknown.samples.empty()) continue;
     plan.sources[i].notes.push_back(
         "planned without knowing the size of " + count_text(std::ssize(unknown.samples), "sample") +
-        ", no picture of which can be read (" + some_of(unknown.samples, 5) + "): quarantined in " +
+        ", no image of which can be read (" + some_of(unknown.samples, 5) + "): quarantined in " +
         std::to_string(unknown.shards) +
         (unknown.shards == 1 ? " shard of its own" : " shards of their own") +
-        " until the pictures are mended and eventgan retry has run");
+        " until the images are mended and eventgan retry has run");
   }
 }
 

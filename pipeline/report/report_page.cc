@@ -271,7 +271,7 @@ std::string counts(const Survey& survey) {
     rows.push_back(
         text_cell(escaped(source_name(survey, i))) +
         cell(fmt::format("source.{}.labelled_frames", i), summary.labelled_frames) +
-        cell(fmt::format("source.{}.without_partner", i), summary.unpaired) +
+        cell(fmt::format("source.{}.unpaired", i), summary.unpaired) +
         cell(fmt::format("source.{}.empty", i), survey.sources[i].events_per_pixel.zeros) +
         counts_cells(fmt::format("source.{}", i), survey.sources[i].counts));
   }
@@ -420,10 +420,10 @@ std::string images(const Survey& survey, const PageContext& context) {
       "manifest's seed.</p>";
   for (std::size_t i = 0; i < survey.sources.size(); ++i) {
     if (survey.sources[i].picked.empty()) continue;
-    html += "<h3>" + escaped(source_name(survey, i)) + "</h3><div class=pictures>";
+    html += "<h3>" + escaped(source_name(survey, i)) + "</h3><div class=images>";
     for (const PickedSample& sample : survey.sources[i].picked) {
       html += fmt::format(
-          "<figure data-key=picture><img alt=\"{}\" src=\"data:image/jpeg;base64,{}\"><figcaption>"
+          "<figure data-key=image><img alt=\"{}\" src=\"data:image/jpeg;base64,{}\"><figcaption>"
           "<b>{}</b> {} · slot {} of {}</figcaption></figure>",
           escaped(sample.sample_id), base64(context.image(sample)), escaped(sample.why),
           escaped(sample.sample_id), sample.slot, shard_link(context, sample.shard));
@@ -556,12 +556,12 @@ td{min-width:4rem}thead th{color:var(--soft);font-weight:600;vertical-align:bott
 .facts{width:100%}.facts th{color:var(--soft);font-weight:600;white-space:nowrap}.facts td,td code{overflow-wrap:anywhere}
 .n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}thead th.n{white-space:normal}
 .columns{display:flex;flex-wrap:wrap;gap:0 2rem;align-items:flex-start}.columns>div{max-width:100%}
-.charts,.pictures{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(min(100%,26rem),1fr));align-items:start}
-.pictures{grid-template-columns:repeat(auto-fill,minmax(min(100%,21rem),1fr))}
+.charts,.images{display:grid;gap:1rem;grid-template-columns:repeat(auto-fill,minmax(min(100%,26rem),1fr));align-items:start}
+.images{grid-template-columns:repeat(auto-fill,minmax(min(100%,21rem),1fr))}
 figure{margin:0;background:var(--card);border:1px solid var(--line);border-radius:8px;padding:.75rem;min-width:0}
 .charts figcaption{font-weight:600;font-size:.95rem;margin-bottom:.4rem}
-.pictures figure{padding:0;overflow:hidden}.pictures figcaption{padding:.5rem .75rem;font-size:.85rem;color:var(--soft)}
-.pictures figcaption b{color:var(--ink)}img{display:block;width:100%;height:auto}svg{display:block;width:100%;height:auto}
+.images figure{padding:0;overflow:hidden}.images figcaption{padding:.5rem .75rem;font-size:.85rem;color:var(--soft)}
+.images figcaption b{color:var(--ink)}img{display:block;width:100%;height:auto}svg{display:block;width:100%;height:auto}
 details{margin:.75rem 0}summary{cursor:pointer;color:var(--link)}details>.scroll,details>pre{margin-top:.5rem}
 )css";
 

@@ -23,7 +23,7 @@ nlohmann::json source_json(const SimulationSource& source) {
                          {"frame_step", source.frame_step}};
   if (source.frames_per_second) json["frames_per_second"] = *source.frames_per_second;
   if (source.method == SimulationMethod::kAffine) {
-    json["frames_per_picture"] = source.frames_per_picture;
+    json["frames_per_image"] = source.frames_per_image;
     json["max_displacement_px"] = source.max_displacement_px;
   } else {
     json["frame_count"] = source.frame_count;
@@ -43,7 +43,7 @@ std::string recording_settings(const SimulationManifest& manifest, const Simulat
                          {"source", source_json(source)},
                          {"files", files_hash},
                          {"sensor", nlohmann::json::parse(to_json(manifest.sensor))}};
-  if (image) json["picture"] = *image;
+  if (image) json["image"] = *image;
   if (manifest.size) {
     json["size"] = {{"width", manifest.size->width}, {"height", manifest.size->height}};
   }
@@ -120,7 +120,7 @@ std::vector<PlannedRecording> plan_recordings(const SimulationManifest& manifest
     add(source.name, std::nullopt, clip.count());
   } else {
     for (std::int64_t i = 0; i < clip.count(); ++i) {
-      add(numbered(source.name, i), i, source.frames_per_picture);
+      add(numbered(source.name, i), i, source.frames_per_image);
     }
   }
   return recordings;

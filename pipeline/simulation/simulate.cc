@@ -123,7 +123,7 @@ std::unique_ptr<Scene> make_scene(const SimulationSource& source, ClipFrames& cl
       break;
   }
   GreyImage image = clip.frame(recording.image.value());
-  const int frames = source.frames_per_picture;
+  const int frames = source.frames_per_image;
   const double a_frame_px = source.max_displacement_px * random.keyed("displacement").uniform(0);
   const AffineMotion motion =
       random_affine_motion(image.size, a_frame_px * frames, random.keyed("motion"));

@@ -247,7 +247,7 @@ StepLosses TrainingRun::take_step(const std::vector<TrainingSample>& batch) {
 
 void TrainingRun::keep_records(const std::vector<TrainingSample>& batch) {
   const bool is_last = position_.step == steps_of(manifest_.steps, position_.phase);
-  if (has_generator() && (is_last || passed(shown_, manifest_.picture_minutes))) {
+  if (has_generator() && (is_last || passed(shown_, manifest_.image_minutes))) {
     generator_records_.draw(trainer_.generator_state(), position_, batch);
     use_training_threads(threads_);
     shown_ = Clock::now();

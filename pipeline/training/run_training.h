@@ -39,7 +39,7 @@ struct TrainingOptions {
 /// - training.csv, curves.svg: the losses;
 /// - validation.csv: realism of the validation pairs, with each checkpoint of the generator phase;
 /// - training.lock: see TrainingLock;
-/// - pictures/generator-STEP.png: every picture_minutes of the generator phase, and after its last
+/// - images/generator-STEP.png: every image_minutes of the generator phase, and after its last
 ///   step; frames, generated, real, of four validation pairs, or of the batch where there is no
 ///   validation.
 ///

@@ -17,7 +17,7 @@ struct TrainingFolder {
   std::filesystem::path validation() const { return root / "validation.csv"; }
   std::filesystem::path latest_weights() const { return root / "weights-latest.safetensors"; }
   std::filesystem::path weights() const { return root / "weights.safetensors"; }
-  std::filesystem::path images() const { return root / "pictures"; }
+  std::filesystem::path images() const { return root / "images"; }
   std::filesystem::path image(const TrainingPosition& position) const {
     return images() /
            (std::string(to_string(position.phase)) + "-" + std::to_string(position.step) + ".png");

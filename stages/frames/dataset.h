@@ -89,7 +89,7 @@ class Dataset {
   /// FrameRef::path is, sorted; part of the plan's fingerprint.
   virtual std::vector<std::string> annotation_files() const = 0;
 
-  /// What the user should know about the source and no sample tells ("3 pictures without labels in
+  /// What the user should know about the source and no sample tells ("3 images without labels in
   /// kitti/training/image_2"); one line each.
   virtual std::vector<std::string> notes() const { return {}; }
 

@@ -15,7 +15,7 @@ struct FolderListing {
   std::vector<std::string> files;  ///< all that is no folder, dangling links too
 };
 
-/// What a note says of some files: "2 labels without a picture in clip: a.json, b.json". After
+/// What a note says of some files: "2 labels without an image in clip: a.json, b.json". After
 /// twenty names "..." stands for the others. `what` is what they are, and where.
 std::string counted(const std::vector<std::string>& names, const std::string& what);
 

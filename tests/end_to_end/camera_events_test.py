@@ -85,8 +85,8 @@ class Recordings(program.InFolder):
         self.assertEqual(len(empty["xyxy"]), 0)
         self.assertIn("sound: 2 shards, 4 samples", run("verify", self.out, "--deep")[0])
         run("finalize", self.out)
-        self.assertEqual(run("preview", self.out, "--out", self.folder / "pictures")[1], "")
-        self.assertEqual(len(list((self.folder / "pictures").iterdir())), 4)
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
+        self.assertEqual(len(list((self.folder / "images").iterdir())), 4)
         run("report", self.out)
         self.assertIn("windows of events", (self.out / "report.html").read_text())
 
@@ -104,7 +104,7 @@ class Recordings(program.InFolder):
 
     def greys_shown(self, *where):
         """How many pixels of each image that preview draws of `where` have the one grey of some recordings."""
-        images = self.folder / "pictures"
+        images = self.folder / "images"
         shutil.rmtree(images, ignore_errors=True)
         told, warned = run("preview", *where, "--out", images, "--frames", self.folder)
         drawn = [cv2.imread(line) for line in told.splitlines()]
@@ -305,8 +305,8 @@ class WithoutFrames(program.InFolder):
         told = self.convert("seq", sensor=self.SENSOR)[0]
         self.assertIn("7 of 7 pairs written, 0 quarantined", told)
         self.check_windows(self.events)
-        self.assertEqual(run("preview", self.out, "--out", self.folder / "pictures")[1], "")
-        self.assertEqual(len(list((self.folder / "pictures").iterdir())), 7)
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
+        self.assertEqual(len(list((self.folder / "images").iterdir())), 7)
         run("report", self.out)
 
     def test_dsec_rectified(self):
@@ -342,7 +342,7 @@ class WithoutFrames(program.InFolder):
         for sample, begin, end in zip(samples.values(), times, times[1:]):
             window = self.events[(self.events[:, 2] > begin) & (self.events[:, 2] <= end)]
             np.testing.assert_allclose(sample["volume"], volume_of(window), rtol=0, atol=1e-4)
-        self.assertEqual(run("preview", self.out, "--out", self.folder / "pictures")[1], "")
+        self.assertEqual(run("preview", self.out, "--out", self.folder / "images")[1], "")
         (self.folder / "seq/images/timestamps.txt").write_text("".join(f"{round(t * 1e6) + 1}\n" for t in times))
         self.assertIn("annotations", run("convert", manifest, expect=64)[1])  # another clock is another job
 
@@ -508,7 +508,7 @@ class Dhp19(program.InFolder):
                     count += 1
         self.assertEqual(count, 4)  # two whole windows of two cameras of S1, which alone is for training
         self.assertIn("sound", run("verify", self.folder / "out", "--deep")[0])
-        self.assertEqual(run("preview", self.folder / "out", "--out", self.folder / "pictures")[1], "")
+        self.assertEqual(run("preview", self.folder / "out", "--out", self.folder / "images")[1], "")
 
 
 if __name__ == "__main__":

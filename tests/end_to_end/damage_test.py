@@ -104,7 +104,7 @@ class Damage(program.InFolder):
         self.convert()
         self.same_as_whole()
 
-    def test_torn_commit_record(self):
+    def test_damaged_commit_record(self):
         for kept in (1, 200, -2):
             with self.subTest(kept=kept):
                 self.record.write_bytes(self.record.read_bytes()[:kept])
@@ -290,7 +290,7 @@ class Flips(program.InFolder):
                 told = "".join(run("finalize", self.out, expect=1))
                 self.assertIn(f"{self.shard}: expected SHA-256", told)
                 self.assertIn("SHA-256", self.damaged("inspect", self.shard))
-        self.assertIn("SHA-256", self.damaged("preview", self.shard, "--out", self.folder / "pictures"))
+        self.assertIn("SHA-256", self.damaged("preview", self.shard, "--out", self.folder / "images"))
 
     def test_a_lone_shard_is_read_apart(self):
         def inspect(place):
@@ -308,7 +308,7 @@ class Flips(program.InFolder):
         for place in self.KNOWN[2:5]:
             lone = self.folder / f"lone-{place}.h5"
             lone.write_bytes(self.flipped(place))
-            done = subprocess.run([program.PROGRAM, "preview", str(lone), "--out", str(self.folder / "pictures"), "--frames",
+            done = subprocess.run([program.PROGRAM, "preview", str(lone), "--out", str(self.folder / "images"), "--frames",
                                    str(self.folder / "job")], capture_output=True, text=True)
             self.assertIn(done.returncode, (0, 1), f"{place}: {done.stderr}")
 
@@ -321,7 +321,7 @@ class Flips(program.InFolder):
         run("inspect", self.folder / "none.h5", expect=66)
         with open("/dev/full", "w", encoding="utf-8") as full:
             self.assertEqual(subprocess.run([program.PROGRAM, "inspect", str(lone)], stdout=full, stderr=subprocess.PIPE).returncode, 1)
-        images, _ = run("preview", lone, "--out", self.folder / "pictures", "--frames", self.folder / "job", "--count", "2")
+        images, _ = run("preview", lone, "--out", self.folder / "images", "--frames", self.folder / "job", "--count", "2")
         self.assertEqual([pathlib.Path(line).exists() for line in images.splitlines()], [True, True])
 
 

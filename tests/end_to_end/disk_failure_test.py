@@ -187,7 +187,7 @@ class SizeLimit(program.InFolder):
         self.refused(2000, self.out, "finalize", self.out)
         self.refused(2000, self.out, "report", self.out)
         run("report", self.out)
-        images = self.folder / "pictures"
+        images = self.folder / "images"
         self.refused(500, images, "preview", self.out, "--out", images)
         run("finalize", self.out)
         for to in ("yolo", "coco", "mpii", "davis", "webdataset", "events", "dsec", "rvt"):

@@ -21,7 +21,7 @@ ON_FOLDERS = {
     "status": [], "retry": [], "finalize": [], "verify": [], "report": [],
     "export": ["--to", "coco", "--out", "{scratch}/export"],
 }
-ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/pictures"]}
+ON_SHARDS = {"inspect": [], "preview": ["--out", "{scratch}/images"]}
 # Those that are given a document.
 ON_DOCUMENTS = {"convert": [], "plan": [], "train": [], "simulate": [], "calibrate": ["--out", "{scratch}/w.safetensors"],
                 "tradeoff": ["--out", "{scratch}/tradeoff"]}

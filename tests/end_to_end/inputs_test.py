@@ -198,7 +198,7 @@ class Names(program.InFolder):
             check(command, manifest)
         shard = next(out.glob("*.h5"))
         for command in [("status", out), ("retry", out), ("verify", out, "--deep"), ("inspect", shard), ("inspect", shard, "--sample", 0),
-                        ("finalize", out), ("report", out), ("preview", out, "--out", self.folder / "pictures"),
+                        ("finalize", out), ("report", out), ("preview", out, "--out", self.folder / "images"),
                         ("preview", out, "--out", self.folder / "more", "--sample", evil)]:
             check(*command)
 

@@ -67,7 +67,7 @@ class Orientation(program.InFolder):
                             found += 1
                 self.assertEqual(found, 4)
                 run("verify", out, "--deep")
-                run("preview", out, "--out", out.parent / "pictures", "--count", "4")
+                run("preview", out, "--out", out.parent / "images", "--count", "4")
 
     def test_a_mirrored_one_is_quarantined_by_name(self):
         records = [json.loads(record.read_text()) for record in self.convert([2, 6]).glob("job-*.json")]

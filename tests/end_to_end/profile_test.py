@@ -74,7 +74,7 @@ class Profile(program.InFolder):
             for event in events(trace, "X", "finish"):
                 self.assertGreater(event["args"]["bytes"], 0)
             self.assertEqual(sorted(event["args"]["shard"] for event in events(trace, "X", "commit shard")), shards(self.out))
-            self.assertEqual(len(events(trace, "X", "write marker")), 5)
+            self.assertEqual(len(events(trace, "X", "write commit record")), 5)
             for once in ("load generator", "make plan", "fingerprint", "freeze plan", "make shards"):
                 self.assertEqual(len(events(trace, "X", once)), 1, once)
             self.assertEqual(len(events(trace, "X", "plan source")), 2)

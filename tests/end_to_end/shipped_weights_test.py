@@ -77,9 +77,9 @@ class ShippedWeights(program.InFolder):
     def test_events_come_with_motion(self):
         steps = range(0, FRAMES * SPEED_PX, SPEED_PX)
         for seed in TEXTURES:
-            write_images(self.folder / "pictures" / f"moving_{seed}", steps, HEIGHT, WIDTH, seed)
-            write_images(self.folder / "pictures" / f"still_{seed}", [0] * FRAMES, HEIGHT, WIDTH, seed)
-        shard = self.convert_by_default(self.folder / "pictures")
+            write_images(self.folder / "images" / f"moving_{seed}", steps, HEIGHT, WIDTH, seed)
+            write_images(self.folder / "images" / f"still_{seed}", [0] * FRAMES, HEIGHT, WIDTH, seed)
+        shard = self.convert_by_default(self.folder / "images")
         events = shard["events/volume"][:].sum(axis=1).mean(axis=(1, 2))  # per pixel
         still = np.array(["still" in text(path) for path in shard["pairs/prev_path"]])
         gaps = shard["pairs/gap_frames"][:]
@@ -92,8 +92,8 @@ class ShippedWeights(program.InFolder):
 
     @unittest.skipIf(CANDIDATE, "other weights are judged")
     def test_the_plan_tells_which_weights(self):
-        write_images(self.folder / "pictures", range(FRAMES), HEIGHT, WIDTH, TEXTURES[0])
-        shard = self.convert_by_default(self.folder / "pictures")
+        write_images(self.folder / "images", range(FRAMES), HEIGHT, WIDTH, TEXTURES[0])
+        shard = self.convert_by_default(self.folder / "images")
         hashes = {hashlib.sha256(path.read_bytes()).hexdigest() for path in SHIPPED}
         used = json.loads((self.folder / "out" / "plan.json").read_text())["fingerprint"]["weights"]
         self.assertIn(used, hashes)
@@ -116,7 +116,7 @@ class ShippedWeights(program.InFolder):
     def events_at(self, threshold):
         """Events per pixel of still and of moving pairs."""
         job = {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 1,
-               "sources": [{"dataset": "frames", "root": str(self.folder / "pictures"), "pairs": pairs([1], choose="all")}],
+               "sources": [{"dataset": "frames", "root": str(self.folder / "images"), "pairs": pairs([1], choose="all")}],
                "generator": {"weights": str(TOLD), "sensor": {"threshold": threshold}},
                "image": {"preset": "mpii"}, "output": {"directory": f"out-{threshold}", "samples_per_shard": 512}}
         run("convert", self.write_manifest(job), "--progress", "none")
@@ -131,7 +131,7 @@ class ShippedWeights(program.InFolder):
     @unittest.skipIf(CANDIDATE or not TOLD.exists(), "other weights are judged")
     def test_a_higher_threshold_makes_fewer_events(self):
         for name, steps in {"still": [0] * FRAMES, "moving": range(0, FRAMES * SPEED_PX, SPEED_PX)}.items():
-            write_images(self.folder / "pictures" / name, steps, HEIGHT, WIDTH, TEXTURES[0])
+            write_images(self.folder / "images" / name, steps, HEIGHT, WIDTH, TEXTURES[0])
         still, moving = np.array([self.events_at(threshold) for threshold in THRESHOLDS]).T
         print(f"events per pixel at thresholds {THRESHOLDS}: still {still.round(5)}, moving {moving.round(4)}")
         self.assertTrue((np.diff(moving) < 0).all(), moving)

@@ -40,13 +40,13 @@ PATIENCE_S = 120
 
 
 def simulation():
-    clip = {"path": "pictures", "frames_per_second": FRAMES_PER_SECOND}
+    clip = {"path": "images", "frames_per_second": FRAMES_PER_SECOND}
     return {
         "format": "eventgan-simulation", "version": 1, "name": "small", "seed": 3,
         "sources": [
             {**clip, "name": "clip"},
             {**clip, "name": "difference", "method": "difference"},
-            {**clip, "name": "still", "method": "affine", "frame_count": 2, "frame_step": 4, "frames_per_picture": AFFINE_FRAMES,
+            {**clip, "name": "still", "method": "affine", "frame_count": 2, "frame_step": 4, "frames_per_image": AFFINE_FRAMES,
              "max_displacement_px": AFFINE_PX}],
         "size": {"width": WIDTH, "height": HEIGHT}, "sensor": SENSOR, "output": {"directory": "recordings"},
     }
@@ -69,9 +69,9 @@ def training():
 def setUpModule():
     global work, images
     work = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-training-"))
-    images = write_images(work / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), HEIGHT, WIDTH, seed=1)
+    images = write_images(work / "images", range(0, FRAMES * SPEED_PX, SPEED_PX), HEIGHT, WIDTH, seed=1)
     for index in range(FRAMES):
-        (work / "pictures" / f"frame_{index:02d}.json").write_text(json.dumps({"seen": index}))
+        (work / "images" / f"frame_{index:02d}.json").write_text(json.dumps({"seen": index}))
     (work / "simulation.json").write_text(json.dumps(simulation()))
     (work / "training.json").write_text(json.dumps(training()))
     run("simulate", work / "simulation.json", "--progress", "none")
@@ -227,10 +227,10 @@ class Training(program.InFolder):
             self.assertEqual(listed[recording["path"]], hashlib.sha256(content).hexdigest())
 
     def test_the_shortest_example_runs_as_it_is_but_for_its_steps(self):
-        write_images(self.folder / "pictures", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
+        write_images(self.folder / "images", range(0, FRAMES * SPEED_PX, SPEED_PX), 128, 144, seed=2)
         (self.folder / "simulation.json").write_text(json.dumps({
             "format": "eventgan-simulation", "version": 1, "name": "one", "size": {"width": 144, "height": 128}, "output": {"directory": "."},
-            "sources": [{"path": "pictures", "name": "recording", "method": "difference", "frames_per_second": FRAMES_PER_SECOND}]}))
+            "sources": [{"path": "images", "name": "recording", "method": "difference", "frames_per_second": FRAMES_PER_SECOND}]}))
         run("simulate", self.folder / "simulation.json", "--progress", "none")
         example, steps = (program.SOURCE / "manifests" / "examples" / "train_one.json").read_text(), '"steps": { "generator": 2000 }'
         self.assertEqual((example.count(steps), example.count('"path": "recording.hdf5"')), (1, 1))
@@ -264,7 +264,7 @@ def contents(group):
 
 class TrainedWeights(program.InFolder):
     def convert(self, name, generator):
-        source = {"dataset": "frames", "root": str(work / "pictures"), "frames_per_second": FRAMES_PER_SECOND,
+        source = {"dataset": "frames", "root": str(work / "images"), "frames_per_second": FRAMES_PER_SECOND,
                   "pairs": pairs(CONVERTED_GAPS, choose="all")}
         job = manifest([source], generator=generator, output={"directory": name, "dtype": "float32", "samples_per_shard": 64})
         run("convert", self.write_manifest(job), "--progress", "none")

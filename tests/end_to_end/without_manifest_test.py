@@ -79,7 +79,7 @@ class WithoutManifest(program.InFolder):
         run("status", out / "manifest.json")
         run("verify", out, "--deep")
         run("retry", out)
-        run("preview", out, "--out", self.folder / "pictures", "--count", 1)
+        run("preview", out, "--out", self.folder / "images", "--count", 1)
         run("finalize", out)
 
     def test_a_video_is_handed_over_and_everything_is_told_once(self):

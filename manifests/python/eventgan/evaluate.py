@@ -1,7 +1,7 @@
 """Scores of what a network finds in shards: boxes as PASCAL VOC, COCO and KITTI count them, joints as the EventGAN paper and MPII do.
 
     python3 -m eventgan.evaluate detections found.json --truth out --split val
-    python3 -m eventgan.evaluate poses found.json --truth out --split val --dataset mpii --pictures pictures
+    python3 -m eventgan.evaluate poses found.json --truth out --split val --dataset mpii --images images
 
 The predictions are a list in JSON:
 
@@ -443,7 +443,7 @@ def pose_tables(result: Mapping[str, Any]) -> str:
 
 
 def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections, truth: GroundTruth) -> None:
-    """Writes pictures: precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue,
+    """Writes images: precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue,
     true green, to be ignored red. Needs OpenCV.
 
     Parameters
@@ -473,7 +473,7 @@ def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], fo
 
 
 def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: np.ndarray, persons: Persons) -> None:
-    """Writes pictures of some of the samples, evenly spread: joints found blue, true green, annotated and not scored red. Needs OpenCV.
+    """Writes images of some of the samples, evenly spread: joints found blue, true green, annotated and not scored red. Needs OpenCV.
 
     Parameters
     ----------
@@ -527,17 +527,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--iou", type=float, default=0.5, help="detections: lowest IoU at which a detection matches a box (default: %(default)s)")
     parser.add_argument("--hidden", action="store_true", help="poses: also score hidden joints that are annotated, as MPII's own evaluation does")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    parser.add_argument("--pictures", metavar="DIR", help="folder for plots of precision and recall and for images of some samples with their predictions; needs OpenCV")
+    parser.add_argument("--images", metavar="DIR", help="folder for plots of precision and recall and for images of some samples with their predictions; needs OpenCV")
     args = parser.parse_args(arguments)
     try:
         samples = Samples(args.truth, args.split, args.dataset, args.ids)
         if args.what == "detections":
             result, *boxes = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms, args.iou)
-            text, draw = detection_tables(result), functools.partial(draw_detections, args.pictures, samples, result, *boxes)
+            text, draw = detection_tables(result), functools.partial(draw_detections, args.images, samples, result, *boxes)
         else:
             result, *joints = evaluate_poses(args.predictions, samples, args.hidden)
-            text, draw = pose_tables(result), functools.partial(draw_poses, args.pictures, samples, result, *joints)
-        if args.pictures:
+            text, draw = pose_tables(result), functools.partial(draw_poses, args.images, samples, result, *joints)
+        if args.images:
             draw()
     except (ImportError, OSError, ValueError) as error:
         sys.exit(f"error: {error}")

@@ -476,7 +476,7 @@ def collate_torchvision(items: Sequence[Item]) -> tuple[list[torch.Tensor], list
 
 # What a name says of a side: "left" and "right"; "l" and "r" that stand alone, or are told from their word by its case ("lWrist", "LWrist", "wristL").
 _SIDE = re.compile(r"left|Left|LEFT|right|Right|RIGHT|(?<![^\W_])[lrLR](?![^\W_])|(?<![^\W_])[lrLR](?=[A-Z][a-z])|(?<=[a-z0-9])[LR](?![^\W_])")
-_PERHAPS_SIDES = re.compile("^[lrLR]"), re.compile("[lrLR]$")  # sides if there is a partner
+_PERHAPS_SIDES = re.compile("^[lrLR]"), re.compile("[lrLR]$")  # sides if its mirror name is there
 _OTHER_SIDE = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
 _OTHER_SIDE |= {right: left for left, right in _OTHER_SIDE.items()}
 _NAMELESS = re.compile("joint_[0-9]+")  # what eventgan calls joints of which it knows nothing
@@ -499,7 +499,7 @@ def flip_pairs(names: Sequence[str]) -> list[tuple[int, int]]:
     Raises
     ------
     ValueError
-        A name suggests a side and has no partner, or says nothing (joint_3): a mirror would leave it where it is.
+        A name suggests a side and has no counterpart, or says nothing (joint_3): a mirror would leave it where it is.
     """
     places, pairs, alone = {name: i for i, name in enumerate(names)}, [], []
     for name, place in places.items():
@@ -566,7 +566,7 @@ class KeypointDataset(Dataset):
     joints : sequence of str, optional
         Names to take, in that order. None: those of the first source, of Human3.6M the 17 in common use.
     size, augmentation, view
-        As DetectionDataset's. An augmentation that mirrors needs names with partners (`flip_pairs`).
+        As DetectionDataset's. An augmentation that mirrors needs names with counterparts (`flip_pairs`).
     margin : float, default 0.15
         The box's margin, as a share of its longer side.
 
@@ -667,7 +667,7 @@ class PoseDataset(Dataset):
     sigma : float, default 2
         Of the Gaussians, pixels of the target.
     augmentation : PoseAugmentation, optional
-        One that mirrors needs names with partners (`flip_pairs`).
+        One that mirrors needs names with counterparts (`flip_pairs`).
     moved : bool, default False
         True for shards of a table such as valid.h5 (`mpii_list`), whose centres and scales are moved and enlarged already.
 

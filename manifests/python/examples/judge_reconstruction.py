@@ -6,7 +6,7 @@
 Each recording's windows, the intervals between its frames, are given to the network one after the other: as the camera's volumes, and as those
 that each method makes of the frames. Image t is compared (SSIM) with the frame at the end of window t, as a whole and around the pixels where the
 camera has events, and with the image of the camera's events. All images are normalised by their 1st and 99th percentile. OUT gets results.json,
-judge.md, and a picture of each recording; the same command resumes.
+judge.md, and an image of each recording; the same command resumes.
 
 Recordings of large sensors are reduced to the size of a DAVIS before anything else, events and frames alike: EVREAL uses the network at such sizes.
 
@@ -46,7 +46,7 @@ SETTLING = 3  # images: the SSIM of the long recordings rises until then
 LEAST_CORRELATION = 0.5
 CAMERA, DENOISED, FLAT = "camera", "camera, denoised", "flat grey"
 CONTROLS = (CAMERA, DENOISED, FLAT)
-TILE_PX, TILES = 240, 6  # width in the pictures, and how many in a line
+TILE_PX, TILES = 240, 6  # width in the images, and how many in a line
 
 
 def read_args() -> argparse.Namespace:
@@ -127,7 +127,7 @@ def judge_recording(args: argparse.Namespace, network: torch.nn.Module, path: pa
     real_images = [robust_normalized(image) for image in reconstruct(network, real)]
     there = [training.without_noise({"volume": volume}).any(0)[5:-5, 5:-5] for volume in real]  # the pixels that an SSIM's map has
     middle = counted[len(counted) // 2]
-    write(args.out / path.stem, "frame", _picture(references[middle]))
+    write(args.out / path.stem, "frame", _image(references[middle]))
     for row in rows:
         if row in done.setdefault("rows", {}):
             continue
@@ -137,13 +137,13 @@ def judge_recording(args: argparse.Namespace, network: torch.nn.Module, path: pa
         images = (real_images if row == CAMERA else [np.full_like(image, 0.5) for image in real_images] if row == FLAT else
                   [robust_normalized(image) for image in reconstruct(network, scaled)])
         maps = [ssim_map(*pair) for pair in zip(images, references)]
-        write(args.out / path.stem, row, _picture(images[middle]))
+        write(args.out / path.stem, row, _image(images[middle]))
         done["rows"][row] = {"events": share, "frame": [each.mean() for each in maps], "moving": [each[at].mean() for each, at in zip(maps, there)],
                              "camera": [ssim(*pair) for pair in zip(images, real_images)]}
         yield
 
 
-def _picture(image: np.ndarray) -> np.ndarray:
+def _image(image: np.ndarray) -> np.ndarray:
     return cv2.cvtColor((255 * image).round().astype(np.uint8), cv2.COLOR_GRAY2BGR)
 
 

@@ -179,7 +179,7 @@ def yolo(args: argparse.Namespace, name: str, seed: int) -> dict[str, Any]:
         folder = args.out / "runs" / f"YOLOv3-tiny-{file_name(name)}-{seed}"
         command = [sys.executable, pathlib.Path(__file__).with_name("train_yolov3.py"), "--trainer", args.trainer, "--data",
                    args.out / "shards" / file_name(name), "--test", windows, "--out", folder, "--classes", CLASSES[0], "--scale", "1", "--steps", YOLO_STEPS,
-                   "--seed", seed, "--threads", "1", "--every", "1000", "--pictures", "0"]
+                   "--seed", seed, "--threads", "1", "--every", "1000", "--images", "0"]
         found = folder / f"predictions-{key_of(recording)}.json"
         if not found.exists():
             subprocess.run([str(word) for word in command], check=True, stdout=subprocess.DEVNULL)
@@ -230,7 +230,7 @@ def conditions(args: argparse.Namespace, images: int) -> str:
 
 
 def draw_curves(args: argparse.Namespace, results: Results, images: int) -> None:
-    """OUT/pictures/curves.png: AP@0.5 over the number of labelled images and over the steps, mean and range of the seeds, a line for each recording."""
+    """OUT/images/curves.png: AP@0.5 over the number of labelled images and over the steps, mean and range of the seeds, a line for each recording."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -250,12 +250,12 @@ def draw_curves(args: argparse.Namespace, results: Results, images: int) -> None
         axis.minorticks_off()
     axes[0].set_ylabel("AP@0.5")
     axes[0].legend()
-    (args.out / "pictures").mkdir(exist_ok=True)
-    figure.savefig(args.out / "pictures" / "curves.png", dpi=100)
+    (args.out / "images").mkdir(exist_ok=True)
+    figure.savefig(args.out / "images" / "curves.png", dpi=100)
 
 
 def draw(args: argparse.Namespace, drawn: Sequence[Row]) -> None:
-    """OUT/pictures/RECORDING.png: for some windows of each recording what the detectors of seed 0 find (blue: the best two) beside the boxes (green)."""
+    """OUT/images/RECORDING.png: for some windows of each recording what the detectors of seed 0 find (blue: the best two) beside the boxes (green)."""
     for recording in recordings_in(args.test):
         items = [_float(item) for item in test_items(args, recording, SIZE)]
         models = {row.name: train(args, row, 0) for row in drawn}
@@ -268,7 +268,7 @@ def draw(args: argparse.Namespace, drawn: Sequence[Row]) -> None:
                 canvas = training.draw_item(items[i], boxes[best], [f"{score:.2f}" for score in scores[best].tolist()])
                 cells.append(cv2.putText(canvas, name, (8, canvas.shape[0] - 8), cv2.FONT_HERSHEY_SIMPLEX, 0.5, drawing.BLACK, 1, cv2.LINE_AA))
             lines.append(np.hstack(cells))
-        drawing.write(args.out / "pictures", recording.name, np.vstack(lines))
+        drawing.write(args.out / "images", recording.name, np.vstack(lines))
 
 
 def _run(task: tuple[argparse.Namespace, Row | str, int]) -> tuple[str, int, dict[str, Any]]:

@@ -334,7 +334,7 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--program", default="eventgan", help="the eventgan program")
     parser.add_argument("--recordings", required=True, nargs="+", type=pathlib.Path, help="recordings in MVSEC's layout, or folders of such")
     parser.add_argument("--peers", type=pathlib.Path, help="folder with v2e, a checkout of SensorsINI/v2e; without it its rows are left out")
-    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for volumes, networks, results.json, table.md and pictures; run the "
+    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for volumes, networks, results.json, table.md and images; run the "
                         "same command again to resume")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=400, help="batches that each network learns from")
@@ -443,7 +443,7 @@ def main() -> None:
     def learn_and_test(row: str, half: int, seed: int) -> dict[str, dict[str, float]]:
         pairs = [pair for path in halves[half] for pair in read_pairs(args, row, path)]
         networks = {what: learn(what, pairs, seed, args.steps) for what in ("flow", "reconstruction")}
-        if seed == 0:  # for the pictures
+        if seed == 0:  # for the images
             torch.save({what: network.state_dict() for what, network in networks.items()}, weights(row, half))
         return {path.stem: mean_scores(tests[path.stem], lambda pair: predict(networks, pair)[1:]) for path in halves[1 - half]}
 

@@ -30,7 +30,7 @@ from eventgan.torch import inverse, move_boxes  # noqa: E402
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
-MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "pictures", "every", "test", "as_bright",
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every", "test", "as_bright",
               "without_noise"}  # when a run goes on
 
 
@@ -66,7 +66,7 @@ def options_of_any(description: str, data: str, **defaults: Any) -> argparse.Arg
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--threads", type=int, help="number of threads (default: all cores)")
     parser.add_argument("--workers", type=int, default=0, help="processes that read samples")
-    parser.add_argument("--pictures", type=int, default=6)
+    parser.add_argument("--images", type=int, default=6)
     parser.set_defaults(**defaults)
     return parser
 
@@ -337,7 +337,7 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
                "history": state["history"]}
     _replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
     _replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
-    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, pictures/, predictions.json")
+    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, images/, predictions.json")
 
 
 def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
@@ -394,5 +394,5 @@ def draw_item(item: dict, found: torch.Tensor, texts: Iterable[str]) -> np.ndarr
 def write_images(args: argparse.Namespace, count: int, image_of: Callable[[int], tuple[str, np.ndarray]]) -> None:
     """image_of(i) for some of `count` items, evenly spread: a name, and what to write under it."""
     with torch.no_grad():
-        for i in np.unique(np.linspace(0, count - 1, args.pictures).round().astype(int)).tolist() if args.pictures else ():
-            drawing.write(pathlib.Path(args.out, "pictures"), *image_of(i))
+        for i in np.unique(np.linspace(0, count - 1, args.images).round().astype(int)).tolist() if args.images else ():
+            drawing.write(pathlib.Path(args.out, "images"), *image_of(i))

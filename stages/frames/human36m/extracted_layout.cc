@@ -260,7 +260,7 @@ std::map<std::string, NumberedSequence> stored_in(const SourceRoot& root, const 
     left_out.push_back(file);
   }
   if (!left_out.empty()) {
-    dataset.add_note(counted(left_out, "pictures left out in " + root.written(folder)));
+    dataset.add_note(counted(left_out, "images left out in " + root.written(folder)));
   }
   std::map<std::string, NumberedSequence> sequences;
   for (const auto& [sequence, files] : names) {
@@ -293,7 +293,7 @@ void add_videos(const SourceRoot& root, const std::map<std::string, Video>& vide
   }
   if (!without_labels.empty()) {
     dataset.add_note(std::to_string(without_labels.size()) +
-                     " folders of pictures without labels, the first " + without_labels.front());
+                     " folders of images without labels, the first " + without_labels.front());
   }
 }
 

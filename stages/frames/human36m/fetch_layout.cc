@@ -208,7 +208,7 @@ std::unique_ptr<Dataset> open_human36m_fetch(const SourceSpec& spec,
   }
   if (!without_labels.empty()) {
     dataset->add_note(std::to_string(without_labels.size()) +
-                      " folders of pictures without labels, the first " + without_labels.front());
+                      " folders of images without labels, the first " + without_labels.front());
   }
   if (dataset->annotation_files().empty()) {
     throw InputError("expected SUBJECT/ACTION/annot.h5 files, got none, in " + root.written(""));

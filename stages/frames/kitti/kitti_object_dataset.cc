@@ -109,7 +109,7 @@ class KittiObjectDataset : public Dataset {
     std::ranges::sort(annotation_files_);
     note(std::ranges::count_if(images_.labelled().frames(),
                                [&](const auto& frame) { return !labels.contains(frame.first); }),
-         "pictures without labels in " + root_.written("image_2"));
+         "images without labels in " + root_.written("image_2"));
   }
 
   const LabelSchema& label_schema() const override { return kitti_label_schema(); }
@@ -227,7 +227,7 @@ class KittiObjectDataset : public Dataset {
       }
     }
     note(std::ranges::count_if(faults, [](const auto& drive) { return !drive.second; }),
-         "drives of which no picture could be compared with what " + mapping_path + " says");
+         "drives of which no image could be compared with what " + mapping_path + " says");
     for (LabelledFrame& frame : frames_) {
       const auto found = faults.find(frame.sequence);
       if (found != faults.end()) frame.fault = found->second.value_or("");
@@ -248,7 +248,7 @@ class KittiObjectDataset : public Dataset {
       const auto same = same_image(base, image, raw.frame.path);
       if (!same) continue;
       if (*same) return "";
-      return "expected the picture " + raw.frame.path + ", to which " + mapping_path +
+      return "expected the image " + raw.frame.path + ", to which " + mapping_path +
              " leads, got another, in " + image;
     }
     return std::nullopt;

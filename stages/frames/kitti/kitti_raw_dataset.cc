@@ -173,7 +173,7 @@ class KittiRawDataset : public Dataset {
       return drive.frames.frame(frame).state == PairedFrame::State::kBeyond;
     });
     if (beyond == 0) return;
-    notes_.push_back(std::to_string(beyond) + " frames beyond the drive's pictures left out in " +
+    notes_.push_back(std::to_string(beyond) + " frames beyond the drive's images left out in " +
                      path);
   }
 

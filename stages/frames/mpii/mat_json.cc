@@ -90,7 +90,7 @@ Json number_at(const MatArray& value, std::size_t index) {
   });
 }
 
-/// UTF-16 to UTF-8. A surrogate without its partner becomes a byte sequence that no decoder takes.
+/// UTF-16 to UTF-8. A lone surrogate becomes a byte sequence that no decoder takes.
 std::string from_utf16(std::span<const std::uint16_t> units) {
   std::string text;
   for (std::size_t i = 0; i < units.size(); ++i) {

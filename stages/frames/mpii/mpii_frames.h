@@ -43,7 +43,7 @@ inline constexpr std::string_view kMpiiBatchPrefix = "mpii_human_pose_v1_sequenc
 
 /// The note for the labelled frames of which is_without_image is true.
 inline constexpr const char* kWithoutImage =
-    "labelled frames of a sequence whose picture is not in images: their labels are taken to be in "
+    "labelled frames of a sequence whose image is not in images: their labels are taken to be in "
     "pixels of the frame";
 
 /// How many pixels of the labelled frame one of the annotated image is.

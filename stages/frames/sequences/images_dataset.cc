@@ -64,9 +64,9 @@ class ImagesDataset final : public Dataset {
     } else {
       for (const auto& [sequence, folder] : listed) add_all(sequence, folder.images);
     }
-    note(is_flat ? folders.size() : 0, "folders beside the pictures left out");
+    note(is_flat ? folders.size() : 0, "folders beside the images left out");
     for (const auto& [sequence, folder] : listed) note_unused(sequence, folder);
-    note(without_images, "folders without pictures");
+    note(without_images, "folders without images");
     std::ranges::sort(labelled_, {}, &LabelledFrame::sample_id);
     std::ranges::sort(annotation_files_);
   }
@@ -194,7 +194,7 @@ class ImagesDataset final : public Dataset {
       });
       std::ranges::sort(left_out);
     }
-    if (!alone.empty()) notes_.push_back(counted(alone, "labels without a picture" + place));
+    if (!alone.empty()) notes_.push_back(counted(alone, "labels without an image" + place));
     if (!sequence.empty() && !folder.folders.empty()) {
       notes_.push_back(counted(folder.folders, "folders left out" + place));
     }

@@ -41,7 +41,7 @@ TEST(CommitRecord, TextIsCanonical) {
     "Car": 2,
     "DontCare": 1
   },
-  "format": "eventgan-marker",
+  "format": "eventgan-commit-record",
   "gaps": [
     {
       "gap": 1,
@@ -146,7 +146,7 @@ struct BadCommitRecord {
 TEST(CommitRecord, EveryRuleIsChecked) {
   const std::vector<BadCommitRecord> table = {
       {"/format", R"("eventgan-manifest")",
-       R"($.format: expected "eventgan-marker", got "eventgan-manifest")"},
+       R"($.format: expected "eventgan-commit-record", got "eventgan-manifest")"},
       {"/version", "1", "$.version: expected 2 (the version that this program reads), got 1"},
       {"/shard", R"("../job-train-00000-of-00001.h5")",
        "$.shard: expected a shard's name, such as job-train-00012-of-01024.h5, got "

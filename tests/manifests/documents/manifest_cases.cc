@@ -53,8 +53,8 @@ std::vector<ManifestCase> top_cases() {
       {"no format", {{"/format", ""}}, {R"($.format: expected "eventgan-manifest", got nothing)"}},
       // Of another kind of document nothing else is said.
       {"another format",
-       {{"/format", R"("eventgan-marker")"}, {"/name", "3"}},
-       {R"($.format: expected "eventgan-manifest", got "eventgan-marker")"}},
+       {{"/format", R"("eventgan-commit-record")"}, {"/name", "3"}},
+       {R"($.format: expected "eventgan-manifest", got "eventgan-commit-record")"}},
       {"another version",
        {{"/version", "2"}, {"/name", "3"}},
        {"$.version: expected 1 (the version that this program reads), got 2"}},

@@ -95,7 +95,7 @@ TEST(PlanJson, BytesAreAsTheyEverWere) {
 {"gap":2,"id":"s3","label":"","label_index":7,"label_position":1.0,"next":{"index":7,"path":"b"},"previous":{"index":5,"path":"a"},"sequence":""}
 ],"source":1,"width":6}
 ],
-"sources":[{"faults":1,"labelled_frames":3,"notes":["a \"note\""],"pairs_by_gap":[{"gap":1,"pairs":1},{"gap":6,"pairs":1}],"without_partner":1,"without_partner_ids":["b"]},{"faults":0,"labelled_frames":1,"notes":[],"pairs_by_gap":[{"gap":2,"pairs":1}],"without_partner":0,"without_partner_ids":[]}],
+"sources":[{"faults":1,"labelled_frames":3,"notes":["a \"note\""],"pairs_by_gap":[{"gap":1,"pairs":1},{"gap":6,"pairs":1}],"unpaired":1,"unpaired_ids":["b"]},{"faults":0,"labelled_frames":1,"notes":[],"pairs_by_gap":[{"gap":2,"pairs":1}],"unpaired":0,"unpaired_ids":[]}],
 "version":1}
 )");
 }
@@ -140,7 +140,7 @@ struct Damage {
 
 TEST(PlanJson, EveryRuleIsChecked) {
   const std::vector<Damage> table = {
-      {"\"eventgan-plan\"", "\"eventgan-marker\"",
+      {"\"eventgan-plan\"", "\"eventgan-commit-record\"",
        "p:2: expected the line \"format\":\"eventgan-plan\",, got \"\\\"format"},
       {"\"version\":1", "\"version\":2", ": expected the line \"version\":1}, got"},
       {"\"name\":\"job\"", "\"name\":7", "p:4: $.name: expected text, got 7"},

@@ -46,8 +46,8 @@ const ManifestCase kSimulationCases[] = {
       "$.sources[0].frame_step: expected an integer 1..100, got 0",
       R"($.sources[0].frame_cont: expected the key "frame_count" or none, got an unknown key)"}},
     {"keys of affine elsewhere",
-     {{"/sources/0/frames_per_picture", "7"}, {"/sources/0/max_displacement_px", "1"}},
-     {R"($.sources[0].frames_per_picture: expected no such key for method "clip" (only for affine), got 7)",
+     {{"/sources/0/frames_per_image", "7"}, {"/sources/0/max_displacement_px", "1"}},
+     {R"($.sources[0].frames_per_image: expected no such key for method "clip" (only for affine), got 7)",
       R"($.sources[0].max_displacement_px: expected no such key for method "clip" (only for affine), got 1)"}},
     {"one image", {{"/sources/1/frame_count", "1"}}, {}},
     {"a clip of one frame",
@@ -112,7 +112,7 @@ TEST(SimulationManifest, HasTheDefaultsOfItsHeader) {
   EXPECT_EQ(clip.frame_count, 0);
   EXPECT_EQ(clip.frame_step, 1);
   EXPECT_EQ(manifest.sources.at(1).name, "drive");
-  EXPECT_EQ(manifest.sources.at(1).frames_per_picture, 7);
+  EXPECT_EQ(manifest.sources.at(1).frames_per_image, 7);
   EXPECT_EQ(manifest.sources.at(1).max_displacement_px, 5);
   EXPECT_EQ(resolve(manifest, "a/clip.mp4"), "/data/a/clip.mp4");
 }
@@ -121,7 +121,7 @@ TEST(SimulationManifest, HoldsEveryValueGiven) {
   const SimulationManifest manifest = parse_simulation(R"({
     "format": "eventgan-simulation", "version": 1, "name": "n", "seed": 9,
     "sources": [{"path": "p", "name": "q", "method": "affine", "frames_per_second": 29.97,
-      "first_frame": 3, "frame_count": 4, "frame_step": 5, "frames_per_picture": 6,
+      "first_frame": 3, "frame_count": 4, "frame_step": 5, "frames_per_image": 6,
       "max_displacement_px": 7.5}],
     "size": {"width": 346, "height": 260}, "sensor": {"log_epsilon": 0.01},
     "output": {"directory": "o"}})");
@@ -134,7 +134,7 @@ TEST(SimulationManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(source.first_frame, 3);
   EXPECT_EQ(source.frame_count, 4);
   EXPECT_EQ(source.frame_step, 5);
-  EXPECT_EQ(source.frames_per_picture, 6);
+  EXPECT_EQ(source.frames_per_image, 6);
   EXPECT_EQ(source.max_displacement_px, 7.5);
   EXPECT_EQ(manifest.size, (ImageSize{.height = 260, .width = 346}));
   EXPECT_EQ(manifest.sensor.log_epsilon, 0.01);
@@ -151,7 +151,7 @@ TEST(SimulationSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(stated("first_frame"), source.first_frame);
   EXPECT_EQ(stated("frame_count"), source.frame_count);
   EXPECT_EQ(stated("frame_step"), source.frame_step);
-  EXPECT_EQ(stated("frames_per_picture"), source.frames_per_picture);
+  EXPECT_EQ(stated("frames_per_image"), source.frames_per_image);
   EXPECT_EQ(stated("max_displacement_px"), source.max_displacement_px);
 }
 

@@ -141,10 +141,10 @@ const ManifestCase kTrainingCases[] = {
       "$.discriminator_steps: expected an integer 1..10, got 0",
       R"($.precision: expected "float32" or "bfloat16", got "float16")"}},
     {"output of no kind",
-     {{"/output", R"({"checkpoint_minutes": -1, "picture_minutes": "1"})"}},
+     {{"/output", R"({"checkpoint_minutes": -1, "image_minutes": "1"})"}},
      {"$.output.directory: expected a path, got nothing",
       "$.output.checkpoint_minutes: expected a number 0..1e+06, got -1",
-      R"($.output.picture_minutes: expected a number 0..1e+06, got "1")"}},
+      R"($.output.image_minutes: expected a number 0..1e+06, got "1")"}},
 };
 
 /// What makes the sound training that of a network that knows its sensor.
@@ -279,7 +279,7 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
     "optimizer": {"generator_rate": 1e-3, "cycle_rate": 2e-3, "discriminator_rate": 3e-3,
                   "betas": [0.5, 0.9], "final_rate_fraction": 0.01},
     "precision": "bfloat16", "steps": {"flow": 1, "reconstruction": 2, "generator": 3},
-    "output": {"directory": "o", "checkpoint_minutes": 0, "picture_minutes": 0.5}})");
+    "output": {"directory": "o", "checkpoint_minutes": 0, "image_minutes": 0.5}})");
   EXPECT_EQ(manifest.seed, 9u);
   RecordingSpec first{"a", RecordingFormat::kMvsec, {}, 2.5, 3, 8, std::nullopt};
   first.options.camera = "right";
@@ -324,7 +324,7 @@ TEST(TrainingManifest, HoldsEveryValueGiven) {
   EXPECT_EQ(manifest.steps.generator, 3);
   EXPECT_EQ(manifest.output_directory, "o");
   EXPECT_EQ(manifest.checkpoint_minutes, 0);
-  EXPECT_EQ(manifest.picture_minutes, 0.5);
+  EXPECT_EQ(manifest.image_minutes, 0.5);
   EXPECT_EQ(resolve(manifest, "a"), "/data/a");
 }
 
@@ -389,7 +389,7 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("optimizer", "discriminator_rate"), manifest.optimizer.discriminator_rate);
   EXPECT_EQ(section("optimizer", "final_rate_fraction"), manifest.optimizer.final_rate_fraction);
   EXPECT_EQ(section("output", "checkpoint_minutes"), manifest.checkpoint_minutes);
-  EXPECT_EQ(section("output", "picture_minutes"), manifest.picture_minutes);
+  EXPECT_EQ(section("output", "image_minutes"), manifest.image_minutes);
   EXPECT_EQ(stated("/definitions/recording/properties/weight"), RecordingSpec().weight);
   EXPECT_EQ(stated("/definitions/recording/properties/threshold_ratio"), ContrastThreshold().ratio);
 }

@@ -100,14 +100,14 @@ def test_overlapping_boxes_are_one():
 @pytest.mark.parametrize("channels", ["signed", "volume"])
 def test_a_few_steps(channels, data, tmp_path):
     line = [sys.executable, EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset", "kitti_object", "--threads", "1",
-            "--channels", channels, "--batch", "4", "--pictures", "2", "--every", "2"]
+            "--channels", channels, "--batch", "4", "--images", "2", "--every", "2"]
     for steps, epochs in ((4, "2"), (8, "4")):  # and on
         done = subprocess.run([*line, "--epochs", epochs], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
     assert "resuming after epoch 2" in done.stdout
     history = json.loads((tmp_path / "out" / "metrics.json").read_text())["history"]
     assert [row["epoch"] for row in history] == [0, 2, 4] and history[-1]["loss"] < history[1]["loss"]
-    assert len([*pathlib.Path(tmp_path, "out", "pictures").iterdir()]) == 2
+    assert len([*pathlib.Path(tmp_path, "out", "images").iterdir()]) == 2
     entries = json.loads((tmp_path / "out" / "predictions.json").read_text())
     more = [*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained", tmp_path / "out" / "weights.pt"]
     done = subprocess.run(more, capture_output=True, text=True)

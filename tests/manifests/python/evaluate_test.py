@@ -643,8 +643,8 @@ def test_the_command_prints_tables_json_and_images(folder, tmp_path):
         said = evaluate("detections", tmp_path / "deep.json", "--truth", folder, expect=1)
         assert said.startswith("error: expected ") and "Traceback" not in said
     pytest.importorskip("cv2")
-    evaluate("detections", found, "--truth", folder, "--pictures", tmp_path / "boxes", "--confidence", "0")
+    evaluate("detections", found, "--truth", folder, "--images", tmp_path / "boxes", "--confidence", "0")
     write(poses, [{"image_id": "000000", "person": 1, "joints": [[1e30, 2], [3, -1e30]]}])
-    evaluate("poses", poses, "--truth", folder, "--pictures", tmp_path / "joints")
+    evaluate("poses", poses, "--truth", folder, "--images", tmp_path / "joints")
     assert {path.name for path in (tmp_path / "boxes").iterdir()} >= {"precision_recall.png", "000000.png"}
     assert len(list((tmp_path / "joints").glob("*.png"))) == 2

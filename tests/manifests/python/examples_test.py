@@ -59,7 +59,7 @@ def evaluate(what, out, data, *more):
 def assert_trained(out, steps, images):
     assert [row["step"] for row in history(out)] == steps
     assert all(np.isfinite(row["loss"]) for row in history(out)[1:])
-    assert len(list((out / "pictures").glob("*.png"))) == images
+    assert len(list((out / "images").glob("*.png"))) == images
     assert torch.load(out / "weights.pt", weights_only=True)
     assert not list(out.glob("*.new"))
 
@@ -134,7 +134,7 @@ def test_faster_rcnn_learns_on_the_fly(tmp_path):
         frames.append(f"{number}.png,100,60,{'drive' if number < 7 else ''},{2 * number}")
     (tmp_path / "road" / "boxes.csv").write_text("\n".join(boxes))
     (tmp_path / "road" / "frames.csv").write_text("\n".join(frames))
-    options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--pictures", "1", "--workers", "1", "--epochs", "1"]
+    options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--images", "1", "--workers", "1", "--epochs", "1"]
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options)
     assert "8 images for training, 2 for validation, of 1 folders" in said and "input 96x64, classes car" in said
     assert_trained(tmp_path / "out", [0, 2], images=1)

@@ -46,12 +46,12 @@ def previewed(root, folder):
                 "output": {"directory": "out", "samples_per_shard": 64, "dtype": "float32"}}
     (folder / "manifest.json").write_text(json.dumps(manifest))
     subprocess.run([PROGRAM, "convert", folder / "manifest.json", "--progress", "none"], check=True, capture_output=True)
-    subprocess.run([PROGRAM, "preview", folder / "out", "--out", folder / "pictures", "--count", "99"], check=True, capture_output=True)
+    subprocess.run([PROGRAM, "preview", folder / "out", "--out", folder / "images", "--count", "99"], check=True, capture_output=True)
     panels, left, size = {}, GAP + 2 * (WIDTH * ZOOM + GAP), (HEIGHT * ZOOM, WIDTH * ZOOM)
-    for path in (folder / "pictures").iterdir():
-        picture = cv2.imread(str(path))[..., ::-1]
-        assert picture.shape[1] == left + size[1] + GAP
-        panels[int(path.stem.rpartition("_")[2])] = picture[TITLE:TITLE + size[0], left:left + size[1]]
+    for path in (folder / "images").iterdir():
+        image = cv2.imread(str(path))[..., ::-1]
+        assert image.shape[1] == left + size[1] + GAP
+        panels[int(path.stem.rpartition("_")[2])] = image[TITLE:TITLE + size[0], left:left + size[1]]
     return eventgan.Shards(folder / "out"), panels
 
 

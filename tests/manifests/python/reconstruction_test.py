@@ -249,10 +249,10 @@ def test_the_judge_compares_methods_and_resumes(tmp_path, monkeypatch, capsys, r
     assert all(len(row[key]) == WINDOWS for row in first.values() for key in ("frame", "moving", "camera"))
     # ln((200 + 5.1) / (50 + 5.1)) = 6.6 thresholds of 0.2, of which six are passed, where the camera has one event.
     assert 5 < first["difference"]["events"] < 7
-    picture = out / "squares" / "difference.png"
-    written = picture.stat().st_mtime_ns
+    image = out / "squares" / "difference.png"
+    written = image.stat().st_mtime_ns
     assert "esim" in judge("difference", "esim")
-    assert {name: row for name, row in rows().items() if name != "esim"} == first and picture.stat().st_mtime_ns == written
+    assert {name: row for name, row in rows().items() if name != "esim"} == first and image.stat().st_mtime_ns == written
     assert "| esim |" in (out / "judge.md").read_text() and (out / "squares.png").exists()
     with pytest.raises(SystemExit, match="2"):
         judge("v2e")

@@ -26,7 +26,7 @@ class PlanSummary : public ::testing::Test {
     source.unpaired = 9;
     source.unpaired_ids = {"a", "b", "c", "d", "e", "f"};
     source.faults = 1;
-    source.notes = {"2 pictures without labels"};
+    source.notes = {"2 images without labels"};
     job_.plan.sources = {source};
     job_.plan.shards.resize(1);
     job_.plan.shards[0].samples.resize(3);
@@ -46,7 +46,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "  no paired frame  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
       "  lacking a gap    6 of 12 labelled frames  (a, b, c, d, e, ...)\n"
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
-      "  note: 2 pictures without labels\n"
+      "  note: 2 images without labels\n"
       "  shards           1\n"
       "total: 3 pairs in 1 shards, about 4 MB and 1m30s with 2 threads (0.500 s per pair on one "
       "thread, measured on 2 pairs)\n");
@@ -81,10 +81,10 @@ TEST_F(PlanSummary, JsonHasTheSameNumbers) {
   EXPECT_EQ(json["estimated_bytes"], 4e6);
   EXPECT_EQ(json["sources"][0]["pairs_by_gap"]["3"], 1);
   EXPECT_EQ(json["sources"][0]["stills"], 0);
-  EXPECT_EQ(json["sources"][0]["without_partner"], 9);
-  EXPECT_EQ(json["sources"][0]["without_partner_by_gap"]["3"], 6);
-  EXPECT_EQ(json["sources"][0]["frames_without_partner"], 6);
-  EXPECT_EQ(json["sources"][0]["without_partner_ids"].size(), 6u);
+  EXPECT_EQ(json["sources"][0]["unpaired"], 9);
+  EXPECT_EQ(json["sources"][0]["unpaired_by_gap"]["3"], 6);
+  EXPECT_EQ(json["sources"][0]["unpaired_frames"], 6);
+  EXPECT_EQ(json["sources"][0]["unpaired_ids"].size(), 6u);
 }
 
 TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {

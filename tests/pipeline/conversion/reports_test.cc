@@ -47,8 +47,8 @@ TEST(ReportText, TellsUnpairedFramesFromTheirPairs) {
   EXPECT_THAT(to_text(all),
               ::testing::HasSubstr("\n2 labelled frames without a paired frame for at least one of "
                                    "their gaps, 7 pairs in total (listed in plan.json)"));
-  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"without_partner\":7"));
-  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"frames_without_partner\":2"));
+  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"unpaired\":7"));
+  EXPECT_THAT(to_json(all), ::testing::HasSubstr("\"unpaired_frames\":2"));
 }
 
 TEST(ReportText, SaysWhichPartAndWhoseWork) {

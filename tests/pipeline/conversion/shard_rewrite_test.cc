@@ -112,7 +112,7 @@ class ShardRewriteTest : public ::testing::Test {
     return folder_ / commit_record_name(before_.shard);
   }
   CommitRecord record() const {
-    return parse_commit_record(testing::read_file(commit_record_file()), "marker");
+    return parse_commit_record(testing::read_file(commit_record_file()), "commit record");
   }
 
   /// What the stages make of a slot.

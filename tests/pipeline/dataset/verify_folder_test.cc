@@ -29,7 +29,7 @@ TEST(StrayFiles, AreThoseThatLookLikeThePlansAndAreNot) {
   plan.shards = {{"job-train-00000-of-00001.h5", 0, {2, 2}, 1}};
   for (const char* name :
        {"job-train-00000-of-00001.h5", "job-train-00000-of-00001.json", "plan.json", "run.json",
-        "amendments.json", "dataset.json", "dataset.h5", "notes.txt", "pictures/deeper.h5",
+        "amendments.json", "dataset.json", "dataset.h5", "notes.txt", "images/deeper.h5",
         ".job-train-00000-of-00001.h5.host.1.1.tmp"}) {
     testing::write_file(folder / name, "");
   }
@@ -38,7 +38,8 @@ TEST(StrayFiles, AreThoseThatLookLikeThePlansAndAreNot) {
   EXPECT_THAT(stray_files(folder.path(), plan), IsEmpty());
 
   testing::write_file(folder / "old.h5", "");
-  testing::write_file(folder / "job-train-00000-of-00009.json", R"({"format": "eventgan-marker"})");
+  testing::write_file(folder / "job-train-00000-of-00009.json",
+                      R"({"format": "eventgan-commit-record"})");
   std::filesystem::create_directory(folder / "folder.json");
   const auto fault = [&](const char* name) {
     return (folder / name).string() + ": expected files of the plan only, got another file";
@@ -170,7 +171,7 @@ TEST_F(VerifyFolder, NamesADamagedShard) {
   EXPECT_THAT(faults(), ::testing::Contains(HasSubstr(shard_.string())));
 }
 
-TEST_F(VerifyFolder, NamesATornAndAForeignCommitRecord) {
+TEST_F(VerifyFolder, NamesADamagedAndAForeignCommitRecord) {
   const std::string text = testing::read_file(record_);
   testing::write_file(record_, text.substr(0, text.size() / 2));
   EXPECT_THAT(faults(), ElementsAre(HasSubstr(record_.string())));

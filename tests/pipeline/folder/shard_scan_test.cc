@@ -96,18 +96,18 @@ TEST_F(ShardStateTest, ACommitRecordWithoutShardIsNotDone) {
   expect(ShardCondition::kNoShard, "got no file");
 }
 
-TEST_F(ShardStateTest, ATornCommitRecordIsNotTrustedWhereverItEnds) {
+TEST_F(ShardStateTest, ADamagedCommitRecordIsNotTrustedWhereverItEnds) {
   const std::string text = to_json(record_);
   for (std::size_t end = 0; end + 1 < text.size(); end += 7) {  // the last byte is a newline
     write_commit_record(text.substr(0, end));
-    ASSERT_EQ(state().condition, ShardCondition::kTornRecord) << end;
+    ASSERT_EQ(state().condition, ShardCondition::kDamagedRecord) << end;
   }
   write_commit_record("\xff\xfe not JSON");
-  expect(ShardCondition::kTornRecord, commit_record_file_.string() + ":");
+  expect(ShardCondition::kDamagedRecord, commit_record_file_.string() + ":");
   EXPECT_THAT(state().faults, ElementsAre(Not(HasSubstr("\n"))));
   std::filesystem::remove(commit_record_file_);
   std::filesystem::create_directory(commit_record_file_);
-  expect(ShardCondition::kTornRecord, commit_record_file_.string());
+  expect(ShardCondition::kDamagedRecord, commit_record_file_.string());
 }
 
 TEST_F(ShardStateTest, ACommitRecordOfAnotherPlanShardOrLengthIsForeign) {
@@ -148,7 +148,7 @@ TEST_F(ShardStateTest, AFlippedBitShowsInTheHashAlone) {
                                 HasSubstr("got " + sha256_hex("12354")))));
 }
 
-/// Of 100 shards every third is done, the one after it has a torn commit record, the next is not
+/// Of 100 shards every third is done, the one after it has a damaged commit record, the next is not
 /// there.
 TEST(ShardStates, AreInTheOrderOfThePlan) {
   const testing::TemporaryFolder folder;
@@ -170,7 +170,7 @@ TEST(ShardStates, AreInTheOrderOfThePlan) {
   const std::vector<ShardState> states = scan_shards(folder.path(), shards, kPlan);
   ASSERT_EQ(states.size(), 100u);
   for (std::size_t i = 0; i < states.size(); ++i) {
-    constexpr ShardCondition kExpected[] = {ShardCondition::kDone, ShardCondition::kTornRecord,
+    constexpr ShardCondition kExpected[] = {ShardCondition::kDone, ShardCondition::kDamagedRecord,
                                             ShardCondition::kMissing};
     EXPECT_EQ(states[i].outline, shards[i]);
     EXPECT_EQ(states[i].condition, kExpected[i % 3]) << i;

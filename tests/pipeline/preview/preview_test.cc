@@ -51,7 +51,7 @@ class Preview : public ::testing::Test {
     options.output = folder_ / "out";
     options.threads = 1;
     convert(job, testing::FakeGenerator(), "weights", options);
-    options_.out = folder_ / "pictures";
+    options_.out = folder_ / "images";
   }
 
   /// Names of what it wrote.
@@ -140,7 +140,7 @@ TEST_F(Preview, ASheetIsOneImage) {
 TEST_F(Preview, AVideoHasTheSequence) {
   options_.video = true;
   EXPECT_THAT(draw("out"), ElementsAre("sequence.mp4"));
-  EXPECT_EQ(probe_image_size(folder_ / "pictures/sequence.mp4", ImageOrientation::kStored).index(),
+  EXPECT_EQ(probe_image_size(folder_ / "images/sequence.mp4", ImageOrientation::kStored).index(),
             0u);
 }
 

@@ -94,7 +94,7 @@ TEST(MeasureRealism, SameSeedSameReport) {
 TEST(MeasureRealism, MakesTheImagesFolder) {
   const testing::TemporaryFolder folder;
   RealismOptions options = models_only();
-  options.images = folder / "new/pictures";
+  options.images = folder / "new/images";
   options.last_frame = 1;
   measure_realism(moving_bar_recording({12, 16}, 3), options);
   EXPECT_TRUE(std::filesystem::exists(options.images / "000000-000001.png"));

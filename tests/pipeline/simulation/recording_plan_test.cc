@@ -82,7 +82,7 @@ TEST(RecordingPlan, AnImageIsOneEach) {
   const testing::TemporaryFolder folder;
   testing::write_moving_clip(folder / "clip", {16, 16}, 4);
   const auto recordings = plan(
-      folder, R"({"path": "clip", "method": "affine", "frame_step": 3, "frames_per_picture": 9})");
+      folder, R"({"path": "clip", "method": "affine", "frame_step": 3, "frames_per_image": 9})");
   ASSERT_EQ(recordings.size(), 2u);
   EXPECT_EQ(recordings[0].name, "clip-000");
   EXPECT_EQ(recordings[1].file, "/out/clip-001.hdf5");

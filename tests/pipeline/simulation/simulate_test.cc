@@ -102,7 +102,7 @@ TEST(Record, LeavesNothingIfTheSceneFails) {
 
 const std::string kSources = R"(
   {"path": "clip"}, {"path": "clip", "name": "fade", "method": "difference"},
-  {"path": "clip", "name": "still", "method": "affine", "frame_count": 2, "frames_per_picture": 3})";
+  {"path": "clip", "name": "still", "method": "affine", "frame_count": 2, "frames_per_image": 3})";
 
 class Simulate : public ::testing::Test {
  protected:
@@ -151,7 +151,7 @@ TEST_F(Simulate, ThreadsAndOtherSourcesDoNotChangeBytes) {
   run("four", 4);
   EXPECT_EQ(files("one"), files("four"));
   run("alone", 2, false, R"({"path": "clip", "name": "still", "method": "affine", "frame_count": 1,
-                             "frames_per_picture": 3})");
+                             "frames_per_image": 3})");
   EXPECT_EQ(files("alone").at("still-000.hdf5"), files("one").at("still-000.hdf5"));
 }
 

@@ -19,7 +19,7 @@ std::string small_training_text() {
   "network": {"generator_channels": 2, "discriminator_channels": 2, "cycle_channels": 2, "bins": 3},
   "optimizer": {"generator_rate": 1e-3},
   "steps": {"flow": 2, "reconstruction": 2, "generator": 4},
-  "output": {"directory": "out", "checkpoint_minutes": 1000, "picture_minutes": 1000}
+  "output": {"directory": "out", "checkpoint_minutes": 1000, "image_minutes": 1000}
 })";
 }
 

@@ -49,7 +49,7 @@ TEST(TrainingFolder, DiscardsItsOwnFilesOnly) {
 }
 
 TEST(TrainingFolder, ReachesNothingThroughALink) {
-  for (const char* name : {"checkpoints", "pictures"}) {
+  for (const char* name : {"checkpoints", "images"}) {
     const testing::TemporaryFolder root;
     const testing::TemporaryFolder elsewhere;
     const TrainingFolder folder{root.path()};
@@ -348,15 +348,15 @@ TEST_F(SmallTraining, LeavesAFolderAloneThatAnotherRunWritesTo) {
 }
 
 TEST_F(SmallTraining, DrawsImages) {
-  train("out", {}, "\"picture_minutes\": 1000", "\"picture_minutes\": 0");
-  EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-1.png"));
-  EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
+  train("out", {}, "\"image_minutes\": 1000", "\"image_minutes\": 0");
+  EXPECT_TRUE(fs::exists(folder_ / "out/images/generator-1.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/images/generator-4.png"));
 }
 
 TEST_F(SmallTraining, DrawsAnImageAfterItsLastStepHoweverFewThereAre) {
   train("out");  // in far less than the 1000 minutes between two
-  EXPECT_TRUE(fs::exists(folder_ / "out/pictures/generator-4.png"));
-  EXPECT_FALSE(fs::exists(folder_ / "out/pictures/generator-1.png"));
+  EXPECT_TRUE(fs::exists(folder_ / "out/images/generator-4.png"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/images/generator-1.png"));
 }
 
 TEST(TrainingReport, IsTextAndJson) {

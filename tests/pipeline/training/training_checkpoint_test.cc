@@ -85,7 +85,7 @@ TEST_F(Resumption, ComparesTheRecordings) {
 }
 
 TEST_F(Resumption, LetsOutputAndCommentsChange) {
-  EXPECT_EQ(refusal(kInReconstruction, "\"picture_minutes\": 1000", "\"picture_minutes\": 1"), "");
+  EXPECT_EQ(refusal(kInReconstruction, "\"image_minutes\": 1000", "\"image_minutes\": 1"), "");
   EXPECT_EQ(refusal(kInReconstruction, "\"directory\": \"out\"", "\"directory\": \"moved\""), "");
   EXPECT_EQ(refusal(kInReconstruction, "{", "{ // a comment\n"), "");
 }

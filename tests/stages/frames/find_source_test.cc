@@ -54,7 +54,7 @@ TEST_F(FindSource, KnowsEachDatasetByItsNames) {
        DatasetKind::kHuman36m, "extracted"},
       {"official", "S1/MyPoseFeatures/D2_Positions/Walking 1.54138969.cdf", DatasetKind::kHuman36m,
        "official"},
-      {"pictures", "a.PNG", DatasetKind::kFrames, ""},
+      {"images", "a.PNG", DatasetKind::kFrames, ""},
       {"folders", "clip/1.jpg", DatasetKind::kFrames, ""},
       {"videos", "clip.MOV", DatasetKind::kFrames, ""},
   };
@@ -157,7 +157,7 @@ TEST_F(FindSource, SaysOfWhichDatasetTheFramesAreAPart) {
 TEST_F(FindSource, SaysWhatThereIsInstead) {
   write("testing/image_2/000000.png");
   write("notes/readme.txt");
-  write("pictures/1.png");
+  write("images/1.png");
   const auto refused = [](const std::string& text) {
     return ThrowsMessage<InputError>(AllOf(HasSubstr(text), Not(HasSubstr("\n"))));
   };
@@ -165,7 +165,7 @@ TEST_F(FindSource, SaysWhatThereIsInstead) {
   EXPECT_THAT([&] { find("notes/readme.txt"); }, refused("got none of these, in "));
   EXPECT_THAT([&] { find("testing"); }, refused("got none of these, in "));
   EXPECT_THAT([&] { find("absent"); }, refused("expected a folder or a video, got "));
-  EXPECT_THAT([&] { find("pictures", DatasetKind::kMpii); },
+  EXPECT_THAT([&] { find("images", DatasetKind::kMpii); },
               refused("expected mpii, got frames, in "));
   EXPECT_THAT([&] { find("notes", DatasetKind::kFrames); },
               refused("expected frames, got none of these, in "));

@@ -365,8 +365,8 @@ TEST_F(VideoFolderTest, AVideoThatCannotBeReadIsLeftOutWithItsReason) {
 }
 
 TEST_F(VideoFolderTest, ImagesCountBeforeVideosAndVideosBeforeFolders) {
-  std::filesystem::create_directory(folder_ / "v/pictures");
-  testing::write_file(folder_ / "v/pictures/1.png", "");
+  std::filesystem::create_directory(folder_ / "v/images");
+  testing::write_file(folder_ / "v/images/1.png", "");
   EXPECT_EQ(open()->labelled_frames().front().sample_id, "clip/000000");
   testing::write_file(folder_ / "v/1.png", "");
   EXPECT_EQ(open()->labelled_frames().front().sample_id, "1");

@@ -9,7 +9,7 @@ from example_shards import SOURCE, ExampleShards
 
 PAGE = SOURCE / "manifests" / "guides" / "shard_format.md"
 # What a shard is; the parts after that are on the files beside it.
-TEXT = PAGE.read_text(encoding="utf-8").split("## The marker")[0]
+TEXT = PAGE.read_text(encoding="utf-8").split("## The commit record")[0]
 
 
 def tables():

@@ -36,7 +36,7 @@ class JpegKinds : public ::testing::TestWithParam<JpegKind> {};
 
 TEST_P(JpegKinds, DecodesToTheSamePixelsAsOpenCv) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.jpg";
+  const auto file = folder / "image.jpg";
   cv::Mat image = gradient_image(GetParam().size);
   if (GetParam().opencv_type == CV_8UC1) cv::extractChannel(image, image, 2);
   ASSERT_TRUE(cv::imwrite(file.string(), image, GetParam().parameters));
@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(JpegImage, EveryTruncationIsRefused) {
   for (const int progressive : {0, 1}) {
     const TemporaryFolder folder;
-    const auto file = folder / "picture.jpg";
+    const auto file = folder / "image.jpg";
     cv::imwrite(file.string(), gradient_image({64, 96}),
                 {cv::IMWRITE_JPEG_PROGRESSIVE, progressive});
     const std::string bytes = read_file(file);
@@ -73,7 +73,7 @@ TEST(JpegImage, EveryTruncationIsRefused) {
 
 TEST(JpegImage, AHoleInTheMiddleIsRefused) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.jpg";
+  const auto file = folder / "image.jpg";
   cv::imwrite(file.string(), gradient_image({64, 96}));
   std::string bytes = read_file(file);
   // Half-written: the last half of the blocks on disk is still zero.
@@ -84,7 +84,7 @@ TEST(JpegImage, AHoleInTheMiddleIsRefused) {
 
 TEST(JpegImage, OrientationTagIsNotApplied) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.jpg";
+  const auto file = folder / "image.jpg";
   cv::imwrite(file.string(), gradient_image({40, 60}));
   const std::string bytes = read_file(file);
   const cv::Mat stored = opencv_read(file);
@@ -96,7 +96,7 @@ TEST(JpegImage, OrientationTagIsNotApplied) {
 
 TEST(JpegImage, HugeAnnouncedSizeIsRefusedByName) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.jpg";
+  const auto file = folder / "image.jpg";
   cv::imwrite(file.string(), gradient_image({16, 16}));
   std::string bytes = read_file(file);
   // Baseline frame header: FF C0, length (2), precision (1), height (2), width (2).

@@ -119,7 +119,7 @@ TEST_F(ImageOrientationTest, IsAppliedOrRefused) {
   for (const std::string ending : {"jpg", "png", "webp"}) {
     for (const bool lowest_first : {true, false}) {
       for (int orientation = 0; orientation <= 9; ++orientation) {
-        const auto file = folder_ / ("picture." + ending);
+        const auto file = folder_ / ("image." + ending);
         write_file(file, file_bytes(ending, exif_of(orientation, lowest_first)));
         const std::string what = ending + " " + std::to_string(orientation);
         const cv::Mat stored = opencv_read(file);
@@ -169,7 +169,7 @@ TEST_F(ImageOrientationTest, OfTiffIsItsOwnTag) {
 }
 
 TEST_F(ImageOrientationTest, IsNoneWhereNoneIsTold) {
-  const auto file = folder_ / "picture";
+  const auto file = folder_ / "image";
   const auto size_of = [&](const std::string& bytes) {
     write_file(file, bytes);
     return image_file_size(file, ImageOrientation::kUpright);
@@ -193,7 +193,7 @@ TEST_F(ImageOrientationTest, IsNoneWhereNoneIsTold) {
 }
 
 TEST_F(ImageOrientationTest, IsFoundWhereverItStands) {
-  const auto file = folder_ / "picture";
+  const auto file = folder_ / "image";
   const ImageSize lying{kSize.width, kSize.height};
   const std::string six = exif_of(6, false);
   cv::imwrite((folder_ / "a.png").string(), gradient_image(kSize));

@@ -36,8 +36,8 @@ std::string why_refused(const std::filesystem::path& file) try {
 }
 
 std::string why_refused(const TemporaryFolder& folder, const std::string& bytes) {
-  write_file(folder / "picture", bytes);
-  return why_refused(folder / "picture");
+  write_file(folder / "image", bytes);
+  return why_refused(folder / "image");
 }
 
 /// Grey, colour, with transparency, and the same in 16 bits.
@@ -63,7 +63,7 @@ TEST(OtherImages, HaveTheSamePixelsAsOpenCvReads) {
     for (const cv::Mat& image : kinds(size)) {
       for (const char* ending : {"webp", "tiff", "bmp", "pgm", "ppm", "pbm"}) {
         for (const int choice : {0, 1}) {  // PNM: plain or binary; TIFF: not compressed or LZW
-          const auto file = folder / "picture."s.append(ending);
+          const auto file = folder / "image."s.append(ending);
           const bool is_colour = image.channels() == 3;
           const bool is_wide = image.depth() == CV_16U;
           if (ending == "ppm"s ? !is_colour : ending[0] == 'p' && image.channels() > 1) continue;
@@ -88,7 +88,7 @@ TEST(OtherImages, EveryTruncationIsRefused) {
     for (const int choice : {0, 1}) {
       for (const int quality : {80, 101}) {  // beyond 100: without loss
         if (quality > 100 && ending != "webp"s) continue;
-        const auto file = folder / "picture."s.append(ending);
+        const auto file = folder / "image."s.append(ending);
         const bool is_grey = ending == "pgm"s || ending == "pbm"s;
         const cv::Mat image = kinds({24, 33})[is_grey ? 0 : 1];
         ASSERT_TRUE(cv::imwrite(file.string(), image,
@@ -115,7 +115,7 @@ TEST(OtherImages, DamageIsAnErrorOrOtherPixels) {
   const CounterRandom random(7);
   for (const char* ending : {"webp", "tiff", "bmp", "pgm", "ppm", "pbm"}) {
     for (const int choice : {0, 1}) {
-      const auto file = folder / "picture."s.append(ending);
+      const auto file = folder / "image."s.append(ending);
       const bool is_grey = ending == "pgm"s || ending == "pbm"s;
       cv::imwrite(file.string(), kinds({12, 17})[is_grey ? 0 : 1],
                   {cv::IMWRITE_PXM_BINARY, choice, cv::IMWRITE_WEBP_QUALITY, 100 + choice,
@@ -150,7 +150,7 @@ std::string small_bmp(const std::string& rows) {
 
 TEST(OtherImages, BmpPixelsAreColoursOfThePalette) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture";
+  const auto file = folder / "image";
   write_file(file, small_bmp("\x02\0\0\0\x10\0\0\0"s));
   const ColourFrame frame = decode_image_file(file);
   EXPECT_EQ(frame.bgr, (std::vector<std::uint8_t>{4, 5, 6, 1, 2, 3, 1, 2, 3, 7, 8, 9}));
@@ -189,7 +189,7 @@ TEST(OtherImages, HugeAnnouncedSizesAreRefusedByName) {
 
 TEST(OtherImages, PnmHeadersHaveCommentsAndAnySpace) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture";
+  const auto file = folder / "image";
   const std::vector<std::uint8_t> grey{10, 10, 10, 255, 255, 255};
   for (const std::string& bytes : {"P2\n# a 1 2\n2 1\n255\n10 255\n"s,
                                    "P2 2\t1\r\n#\n255 10\n#x\n255\n"s, "P5 2 1 255 \n\xff"s}) {
@@ -228,8 +228,8 @@ TEST(OtherImages, AnOrientationTagIsNotApplied) {
                            entry(258, 8) + entry(259, 1) + entry(262, 1) +
                            entry(273, 8 + 2 + 9 * 12 + 4) + entry(274, 2) + entry(278, 1) +
                            entry(279, 2) + "\0\0\0\0\x0a\xff"s;
-  write_file(folder / "picture", tiff);
-  EXPECT_EQ(decode_image_file(folder / "picture").bgr,
+  write_file(folder / "image", tiff);
+  EXPECT_EQ(decode_image_file(folder / "image").bgr,
             (std::vector<std::uint8_t>{10, 10, 10, 255, 255, 255}));
 }
 
@@ -240,10 +240,10 @@ TEST(OtherImages, AreToldByTheirFirstBytes) {
   for (const std::string& bytes :
        {"P7 1 1 255\n\1"s, "P5"s, "RIFF\4\0\0\0WAVE"s, "II*"s, "GIF89a"s, "B"s}) {
     EXPECT_EQ(why_refused(folder, bytes), other) << bytes;
-    EXPECT_FALSE(is_image_file(folder / "picture"));
+    EXPECT_FALSE(is_image_file(folder / "image"));
   }
-  write_file(folder / "picture", "BM");
-  EXPECT_TRUE(is_image_file(folder / "picture"));
+  write_file(folder / "image", "BM");
+  EXPECT_TRUE(is_image_file(folder / "image"));
 }
 
 }  // namespace

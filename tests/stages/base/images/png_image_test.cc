@@ -73,7 +73,7 @@ class PngKinds : public ::testing::TestWithParam<PngKind> {};
 
 TEST_P(PngKinds, DecodesToTheSamePixelsAsOpenCv) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   for (const ImageSize size : {ImageSize{11, 13}, ImageSize{1, 1}}) {
     write_png(file, size, GetParam().kind, GetParam().bits, GetParam().interlace);
     EXPECT_TRUE(same_pixels(with_open(file, decode_png), opencv_read(file)));
@@ -96,7 +96,7 @@ INSTANTIATE_TEST_SUITE_P(, PngKinds,
 
 TEST(PngImage, EveryTruncationIsRefused) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   cv::imwrite(file.string(), gradient_image({64, 96}));
   const std::string bytes = read_file(file);
   // The last 12 bytes are the chunk IEND: without it all pixels are there, the file is not whole.
@@ -108,7 +108,7 @@ TEST(PngImage, EveryTruncationIsRefused) {
 
 TEST(PngImage, AnyChangedByteOfThePixelDataIsRefused) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   cv::imwrite(file.string(), gradient_image({16, 24}));
   const std::string bytes = read_file(file);
   const std::size_t data = bytes.find("IDAT") + 4;
@@ -122,7 +122,7 @@ TEST(PngImage, AnyChangedByteOfThePixelDataIsRefused) {
 
 TEST(PngImage, AnIndexBeyondThePaletteIsRefused) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   // Pixels count up by 37, so that they reach any number; the palette has four colours.
   for (const int interlace : {0, 1}) {
     for (const int bits : {4, 8}) {
@@ -136,7 +136,7 @@ TEST(PngImage, AnIndexBeyondThePaletteIsRefused) {
 
 TEST(PngImage, DamageBesideThePixelsIsForgiven) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   cv::imwrite(file.string(), gradient_image({16, 24}));
   const cv::Mat whole = opencv_read(file);
   std::string bytes = read_file(file);
@@ -149,7 +149,7 @@ TEST(PngImage, DamageBesideThePixelsIsForgiven) {
 
 TEST(PngImage, HugeAnnouncedSizeIsRefusedByName) {
   const TemporaryFolder folder;
-  const auto file = folder / "picture.png";
+  const auto file = folder / "image.png";
   write_png(file, {90000, 100000}, PNG_COLOR_TYPE_RGB, 8, 0, /*pixels=*/false);
   // Room for the start of the pixel data, so that the header counts as read.
   write_file(file, read_file(file) + std::string("\0\0\1\0IDAT", 8));
@@ -181,7 +181,7 @@ class StoredPngTest : public ::testing::Test {
   }
 
   const TemporaryFolder folder_;
-  const std::filesystem::path file_ = folder_ / "picture.png";
+  const std::filesystem::path file_ = folder_ / "image.png";
 };
 
 std::uint32_t number_at(const std::string& bytes, std::size_t at) {
@@ -243,7 +243,7 @@ TEST_F(StoredPngTest, OnlyWhatDecidesThePixelsStays) {
   const std::string whole = stored();
   const std::string early = chunk("tEXt", std::string("a\0b", 3));
   const std::string late = chunk("tIME", std::string("\7\xd0\1\1\0\0\0", 7));
-  const std::string palette = chunk("PLTE", "rgbRGB");  // which colour pictures may suggest
+  const std::string palette = chunk("PLTE", "rgbRGB");  // which colour images may suggest
   bytes.insert(33, early + palette);                    // after the signature (8) and IHDR (25)
   bytes.insert(bytes.size() - 12, late);
   EXPECT_EQ(stored(bytes), whole.substr(0, 33) + palette + whole.substr(33));

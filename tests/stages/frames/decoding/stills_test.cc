@@ -258,7 +258,7 @@ TEST_F(Stills, OfAVideoItIsOpenedOnceWhateverTheOrder) {
   }
 }
 
-TEST_F(Stills, PicturesForTheEyeShowWhatTheNetworkSees) {
+TEST_F(Stills, ImagesForTheEyeShowWhatTheNetworkSees) {
   cv::Mat colour;
   cv::Mat channels[] = {noise({40, 60}), noise({40, 60}), noise({40, 60})};  // grey: all the same
   cv::merge(channels, 3, colour);

@@ -269,8 +269,8 @@ TEST_F(ExtractedLayoutTest, RefusesMissingAndMisshapenArrays) {
 
 TEST_F(ExtractedLayoutTest, RefusesNamesItCannotPlace) {
   spec_.annotations = "h36m/a.npz";
-  add_npz(members({kVideo + "_000001.jpg", "picture.jpg"}));
-  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("\"picture.jpg\""),
+  add_npz(members({kVideo + "_000001.jpg", "image.jpg"}));
+  EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(AllOf(HasSubstr("\"image.jpg\""),
                                                                HasSubstr("(imgname, row 1)"))));
   add_npz(members({kVideo + "_000001.jpg", kVideo + "_000001.jpg"}));
   EXPECT_THAT([&] { open(); }, ThrowsMessage<InputError>(HasSubstr("a.npz#0 and a.npz#1")));
@@ -307,9 +307,8 @@ TEST_F(ExtractedLayoutTest, TellsOfImagesWithoutLabels) {
   add_images(
       {"S1/" + kVideo + "/" + kVideo + "_000001.jpg", "S1/S1_Eating.7/S1_Eating.7_000001.jpg"});
   add_npz(members({kVideo + "_000001.jpg"}));
-  EXPECT_THAT(open()->notes(),
-              ::testing::Contains("1 folders of pictures without labels, the first "
-                                  "h36m/S1/S1_Eating.7"));
+  EXPECT_THAT(open()->notes(), ::testing::Contains("1 folders of images without labels, the first "
+                                                   "h36m/S1/S1_Eating.7"));
 }
 
 TEST_F(ExtractedLayoutTest, ImagesLeftOutAreCountedAndNamed) {
@@ -317,7 +316,7 @@ TEST_F(ExtractedLayoutTest, ImagesLeftOutAreCountedAndNamed) {
               "all/S1_A.7_000006_mask.png", "all/S1_A.7_000011.JPG", "all/readme.txt"});
   add_npz(members({"all/S1_A.7_000001.jpg"}));
   EXPECT_THAT(open()->notes(),
-              ::testing::Contains("4 pictures left out in h36m/all: S1_A.7_000001.png, "
+              ::testing::Contains("4 images left out in h36m/all: S1_A.7_000001.png, "
                                   "S1_A.7_000006.webp, S1_A.7_000006_mask.png, "
                                   "S1_A.7_000011.JPG"));
 }

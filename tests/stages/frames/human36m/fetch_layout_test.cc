@@ -269,7 +269,7 @@ TEST_F(FetchLayoutTest, TellsOfImagesWithoutLabelsAndCamerasWithoutIntrinsics) {
   const auto dataset = open();
   EXPECT_THAT(dataset->notes(),
               ElementsAre("no intrinsics for camera 8, in h36m/S1/Walking-1/annot.h5",
-                          "2 folders of pictures without labels, the first "
+                          "2 folders of images without labels, the first "
                           "h36m/S1/Walking-1/imageSequence/9"));
   const auto outcome = dataset->annotation("S1/Walking-1/annot.h5#1");
   EXPECT_FALSE(std::get<Annotation>(outcome).persons[0].camera);

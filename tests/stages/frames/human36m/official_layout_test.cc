@@ -215,7 +215,7 @@ TEST_F(OfficialLayoutTest, PosesBeyondTheVideosEndAreTold) {
   EXPECT_THAT(open(7)->notes(), ::testing::Each(::testing::Not(HasSubstr("beyond"))));
 }
 
-TEST_F(OfficialLayoutTest, FilesWithoutTheirPartnersAreTold) {
+TEST_F(OfficialLayoutTest, FilesWithoutTheirCounterpartsAreTold) {
   add_video("Walking", 2);
   add_poses("Walking", 2);
   add_video("Eating", 2);

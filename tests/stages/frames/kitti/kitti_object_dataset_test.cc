@@ -173,7 +173,7 @@ TEST_F(KittiObjectDatasetTest, ALabelWithoutAnImageIsAMissingFrameAndTheOtherWay
   const PairedFrame itself = dataset->paired_frame(dataset->labelled_frames()[3], 0);
   EXPECT_EQ(itself.state, State::kMissing);
   EXPECT_EQ(itself.frame.path, "training/image_2/000007.png");
-  EXPECT_THAT(dataset->notes(), ElementsAre("1 pictures without labels in training/image_2"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 images without labels in training/image_2"));
 }
 
 TEST_F(KittiObjectDatasetTest, TheMappingGivesSequenceNumbersAndPairedFramesOnBothSides) {
@@ -229,7 +229,7 @@ TEST_F(KittiObjectDatasetTest, AMappingThatContradictsTheImagesIsAFaultThatNames
   EXPECT_EQ(open()->labelled_frames()[0].fault, "");
 
   write_image(std::string(kDrive) + "data/0000000004.png", 41);
-  const std::string fault = "expected the picture " + std::string(kDrive) +
+  const std::string fault = "expected the image " + std::string(kDrive) +
                             "data/0000000004.png, to which devkit/mapping/train_mapping.txt leads, "
                             "got another, in training/image_2/000000.png";
   const auto dataset = open();
@@ -270,7 +270,7 @@ TEST_F(KittiObjectDatasetTest, ADriveOfWhichNothingCanBeComparedIsNoted) {
   }
   const auto dataset = open();
   EXPECT_EQ(dataset->labelled_frames()[0].fault, "");
-  EXPECT_THAT(dataset->notes(), Contains("1 drives of which no picture could be compared with what "
+  EXPECT_THAT(dataset->notes(), Contains("1 drives of which no image could be compared with what "
                                          "devkit/mapping/train_mapping.txt says"));
 }
 

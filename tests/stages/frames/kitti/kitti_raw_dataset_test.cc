@@ -129,9 +129,8 @@ TEST_F(KittiRawDatasetTest, TrackletsBeyondTheImagesAreNoted) {
   write_calibration();
   const auto dataset = open();
   EXPECT_THAT(dataset->labelled_frames(), SizeIs(6));
-  EXPECT_THAT(dataset->notes(),
-              ElementsAre("1 frames beyond the drive's pictures left out in raw/" + kFirst +
-                          "/tracklet_labels.xml"));
+  EXPECT_THAT(dataset->notes(), ElementsAre("1 frames beyond the drive's images left out in raw/" +
+                                            kFirst + "/tracklet_labels.xml"));
 }
 
 TEST_F(KittiRawDatasetTest, ATrackletsFrameWithoutImageInsideADriveIsMissing) {

@@ -176,7 +176,7 @@ TEST_F(MpiiFrameOfAnotherSize, WithoutTheImageNothingTells) {
   spec_.split = "train";
   EXPECT_THAT(open()->notes(),
               ::testing::Contains(::testing::StartsWith(
-                  "1 labelled frames of a sequence whose picture is not in images")));
+                  "1 labelled frames of a sequence whose image is not in images")));
 }
 
 TEST_F(MpiiFrameOfAnotherSize, AnImageThatCannotBeReadIsAFault) {

@@ -29,7 +29,7 @@ class MpiiListDatasetTest : public ::testing::Test {
     spec_.dataset = DatasetKind::kMpiiList;
     spec_.root = "m";
     spec_.annotations = "labels/list.json";
-    testing::write_file(folder_ / "m/images/b.jpg", "picture");
+    testing::write_file(folder_ / "m/images/b.jpg", "image");
     testing::write_file(folder_ / "labels/list.json",
                         R"([{"image": "b.jpg", "scale": 1}, {"image": "a.jpg", "scale": 2},
                             {"image": "b.jpg", "scale": 3, "center": [11, 21]}])");

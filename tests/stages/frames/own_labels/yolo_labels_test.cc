@@ -168,7 +168,7 @@ TEST_F(YoloLabels, LieWhereTheirPathsSay) {
       {"data/images/train", "data", "data/images/train/7.png", "data/labels/train/7.txt"},
       {"data", "data", "data/7.png", "data/7.txt"},
       {"data", "texts", "data/train/7.png", "texts/train/7.txt"},
-      {"data/pictures", "data", "data/pictures/7.png", "data/labels/7.txt"},
+      {"data/photos", "data", "data/photos/7.png", "data/labels/7.txt"},
       {"data/images", "texts", "data/images/7.png", "texts/7.txt"},
   };
   for (const auto& layout : cases) {
