@@ -12,7 +12,7 @@ import tempfile
 
 import program
 
-LAYER = os.environ["EVENTGAN_FAILING_FILES"]
+LAYER = pathlib.Path(os.environ["EVENTGAN_FAILING_FILES"])
 
 Call = collections.namedtuple("Call", "kind path")
 Outcome = collections.namedtuple("Outcome", "code out err calls struck")
@@ -22,7 +22,10 @@ def run(folder, rule, *arguments):
     """Runs the program, watched as it changes `folder`: exit code (-9: killed), what it printed, the calls in their order,
     and whether the rule came to strike."""
     with tempfile.NamedTemporaryFile(prefix="eventgan-calls-") as log:
-        environment = {**os.environ, "LD_PRELOAD": LAYER, "EVENTGAN_FAILING_RULE": rule, "EVENTGAN_FAILING_LOG": log.name,
+        # By its name alone: LD_PRELOAD takes no path with a space.
+        folders = ":".join([str(LAYER.parent), *filter(None, [os.environ.get("LD_LIBRARY_PATH")])])
+        environment = {**os.environ, "LD_PRELOAD": LAYER.name, "LD_LIBRARY_PATH": folders,
+                       "EVENTGAN_FAILING_RULE": rule, "EVENTGAN_FAILING_LOG": log.name,
                        "EVENTGAN_FAILING_FOLDER": str(pathlib.Path(folder).resolve())}
         done = subprocess.run([program.PROGRAM, *map(str, arguments)], capture_output=True, text=True, env=environment)
         lines = [line.split("\t") for line in pathlib.Path(log.name).read_text().splitlines()]
