@@ -1,11 +1,28 @@
 #include "manifests/values/text.h"
 
+#include <algorithm>
+#include <initializer_list>
 #include <iomanip>
 
 namespace eventgan {
 
+namespace {
+
+std::string plural_of(const std::string& noun) {
+  const auto ends_in_any = [&](std::initializer_list<std::string_view> endings) {
+    return std::ranges::any_of(endings, [&](auto ending) { return noun.ends_with(ending); });
+  };
+  if (ends_in_any({"s", "x", "z", "ch", "sh"})) return noun + "es";
+  if (noun.ends_with('y') && !ends_in_any({"ay", "ey", "oy", "uy"})) {
+    return noun.substr(0, noun.size() - 1) + "ies";
+  }
+  return noun + "s";
+}
+
+}  // namespace
+
 std::string count_text(std::int64_t count, const std::string& noun) {
-  return std::to_string(count) + " " + noun + (count == 1 ? "" : "s");
+  return std::to_string(count) + " " + (count == 1 ? noun : plural_of(noun));
 }
 
 std::string bytes_text(std::int64_t bytes) {

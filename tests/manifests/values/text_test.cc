@@ -13,6 +13,12 @@ TEST(Text, CountsOneAndMany) {
   EXPECT_EQ(count_text(0, "pair"), "0 pairs");
   EXPECT_EQ(count_text(1, "pair"), "1 pair");
   EXPECT_EQ(count_text(12, "pair"), "12 pairs");
+  EXPECT_EQ(count_text(2, "box"), "2 boxes");
+  EXPECT_EQ(count_text(2, "batch"), "2 batches");
+  EXPECT_EQ(count_text(2, "class"), "2 classes");
+  EXPECT_EQ(count_text(2, "entry"), "2 entries");
+  EXPECT_EQ(count_text(2, "ray"), "2 rays");
+  EXPECT_EQ(count_text(-1, "entry"), "-1 entries");
 }
 
 TEST(Text, HasBytesWithThreeDigits) {
