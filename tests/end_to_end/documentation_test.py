@@ -15,7 +15,7 @@ import unittest
 import program
 from program import PACKAGE, SOURCE, run
 
-PAGES = [SOURCE / "README.md", SOURCE / "CONTRIBUTING.md", SOURCE / "docker" / "running.md", SOURCE / "manifests" / "weights" / "README.md",
+PAGES = [*(SOURCE / page for page in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md", "docker/running.md", "manifests/weights/README.md")),
          *sorted((SOURCE / "manifests" / "guides").glob("*.md"))]
 MEASURED = sorted((SOURCE / "tests" / "benchmarks" / "measured").glob("*.md"))  # written by tests/benchmarks
 GUARANTEES = SOURCE / "manifests" / "guides" / "guarantees.md"
