@@ -5,6 +5,7 @@ import fcntl
 import os
 import pty
 import re
+import shlex
 import shutil
 import signal
 import struct
@@ -190,8 +191,8 @@ class Terminal(program.InFolder):
         server = ["tmux", "-L", self.folder.name, "-f", "/dev/null"]
         tmux = lambda *command: subprocess.run([*server, *map(str, command)], capture_output=True, text=True, check=True).stdout
         script = self.folder / "script"
-        script.write_text(f"seq 15\necho begun\n{program.PROGRAM} convert {self.manifest} --output {self.folder}/tmux --threads 1\n"
-                          "echo exit code $?\nexec sleep 1000\n")
+        convert = shlex.join(map(str, (program.PROGRAM, "convert", self.manifest, "--output", self.folder / "tmux", "--threads", 1)))
+        script.write_text(f"seq 15\necho begun\n{convert}\necho exit code $?\nexec sleep 1000\n")
         tmux("new-session", "-d", "-x", 200, "-y", 24, "sh", script)
         self.addCleanup(subprocess.run, [*server, "kill-server"])
         widths = iter([40, 120, 60, 80])
