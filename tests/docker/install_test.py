@@ -145,7 +145,7 @@ class Packages(unittest.TestCase):
         self.assertIn("usr/share/man/man1/eventgan.1.gz", contents["eventgan"])
         package = SOURCE / "manifests" / "python"
         self.assertEqual(contents["python3-eventgan"], {f"usr/lib/python3/dist-packages/{name}" for name in (
-            *(path.relative_to(package) for folder in ("eventgan", "eventgan_shards") for path in (package / folder).glob("*.py*")),
+            *(path.relative_to(package) for path in (package / "eventgan").glob("*.py*")),
             "eventgan/py.typed", *(f"eventgan/{name}" for name in ENGINES))})
         self.assertFalse([name for name in contents["eventgan"] if "dist-packages" in name])
         self.assertFalse([name for name in contents["eventgan"] if "torch" in pathlib.PurePath(name).name and "libexec" in name])

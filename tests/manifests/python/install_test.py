@@ -147,23 +147,6 @@ def test_another_pybind11_has_a_build_of_its_own(tmp_path):
                      "-Dpybind11_DIR=/of/pip", f"--build {build} --target eventgan_python"]
 
 
-@pytest.mark.parametrize("path", [PACKAGE, SOURCE / "manifests" / "python"])
-def test_the_old_name_goes_on(path, example):
-    environment = {**HERE, "PYTHONPATH": str(path)}
-    code = f"""
-import warnings
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    import eventgan_shards
-import eventgan
-print(*((w.category.__name__, w.message) for w in caught), eventgan_shards.Shards is eventgan.Shards)
-print(len(eventgan_shards.Shards({str(example.path("uint8-1"))!r})))
-"""
-    assert python(code, environment).splitlines() == [
-        "('DeprecationWarning', DeprecationWarning('eventgan_shards is now called eventgan: import eventgan')) True", "4"]
-    assert "detections" in run(sys.executable, "-m", "eventgan_shards.evaluate", "--help", environment=environment)
-
-
 @needs_engine
 def test_it_loads_no_library_that_it_does_not_need():
     def loaded(code):
