@@ -96,6 +96,15 @@ void FaultList::add_line(std::string line) {
   }
 }
 
+void FaultList::add_unknown_key(std::string_view json_path) {
+  std::string place;
+  for (const char c : json_path) {
+    const bool is_index = place.ends_with('[') && c >= '0' && c <= '9';
+    if (!is_index) place += c;
+  }
+  unknown_keys_.insert(std::move(place));
+}
+
 std::string FaultList::text() const {
   std::string text = fmt::format("{}", fmt::join(lines_, "\n"));
   if (left_out_ > 0)

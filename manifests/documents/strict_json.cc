@@ -197,23 +197,43 @@ std::optional<StrictValue> StrictObject::find(std::string_view key) {
 }
 
 bool StrictObject::has_format(std::string_view format, int version) {
-  const StrictValue found_format = at("format");
+  const bool is_format = has_format_name(format);
   const StrictValue found_version = at("version");
-  const bool is_format = found_format.node_ != nullptr && *found_format.node_ == format;
   const bool is_version = found_version.node_ != nullptr &&
                           found_version.node_->is_number_integer() &&
                           *found_version.node_ == version;
-  if (!is_format) found_format.fault("\"" + std::string(format) + "\"");
   if (!is_version) {
     found_version.fault(std::to_string(version) + " (the version that this program reads)");
   }
   return is_format && is_version;
 }
 
+bool StrictObject::has_format(std::string_view format, FormatVersion own) {
+  const bool is_format = has_format_name(format);
+  const StrictValue found = at("version");
+  const auto version = found.is_text()
+                           ? readable_version(found.node_->get_ref<const std::string&>(), own)
+                           : std::nullopt;
+  if (!version) found.fault(readable_versions(own));
+  if (version && version->minor > own.minor) faults_->allow_unknown_keys();
+  return is_format && version;
+}
+
+bool StrictObject::has_format_name(std::string_view format) {
+  const StrictValue found = at("format");
+  const bool is_format = found.node_ != nullptr && *found.node_ == format;
+  if (!is_format) found.fault("\"" + std::string(format) + "\"");
+  return is_format;
+}
+
 void StrictObject::finish() const {
   if (node_ == nullptr) return;
   for (const auto& [key, value] : node_->items()) {
     if (std::find(known_.begin(), known_.end(), key) != known_.end()) continue;
+    if (faults_->allows_unknown_keys()) {
+      faults_->add_unknown_key(json_path(path_, key));
+      continue;
+    }
     const std::string_view meant = near_word(key, known_);
     const std::string expected = meant.empty()
                                      ? fmt::format("one of the keys {}", fmt::join(known_, ", "))

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -39,6 +40,15 @@ class FaultList {
   void add_at(std::string_view text, std::size_t byte, std::string_view expected,
               std::string_view got);
 
+  /// From here on keys that nobody asks for are no faults but are named in unknown_keys(): the
+  /// document is of a later minor version (format_version.h).
+  void allow_unknown_keys() { allows_unknown_keys_ = true; }
+  bool allows_unknown_keys() const { return allows_unknown_keys_; }
+  void add_unknown_key(std::string_view json_path);
+
+  /// Each once, in places that are told without numbers: `$.shards[].samples[].key`; sorted.
+  const std::set<std::string>& unknown_keys() const { return unknown_keys_; }
+
   bool empty() const { return lines_.empty(); }
 
   /// One fault a line, no newline at the end. Beyond a thousand they are only counted.
@@ -50,6 +60,8 @@ class FaultList {
   std::string document_;
   std::vector<std::string> lines_;
   std::size_t left_out_ = 0;
+  bool allows_unknown_keys_ = false;
+  std::set<std::string> unknown_keys_;
 };
 
 /// Parses a JSON text in which // and /* */ comments are allowed. Stricter than

@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/documents/format_version.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
@@ -124,13 +125,19 @@ class StrictObject {
   /// the rest had better not be read: it is another kind of document.
   bool has_format(std::string_view format, int version);
 
-  /// Adds a fault for each member never asked for, naming the key that may have been meant. Call it
-  /// once everything has been asked for.
+  /// The same of a format whose version is "MAJOR.MINOR": whether this program reads it. Of a later
+  /// minor version, unknown keys are named and passed over (FaultList::allow_unknown_keys).
+  bool has_format(std::string_view format, FormatVersion own);
+
+  /// Adds a fault for each member never asked for, naming the key that may have been meant, or
+  /// names it as unknown in a document of a later minor version. Call it once everything has been
+  /// asked for.
   void finish() const;
 
  private:
   friend class StrictValue;
   StrictObject(const nlohmann::json* node, std::string path, FaultList& faults);
+  bool has_format_name(std::string_view format);
 
   const nlohmann::json* node_;  // null below something faulty
   std::string path_;

@@ -194,5 +194,52 @@ TEST(StrictObject, FormatAndVersionMustBeThese) {
             "d: $.version: expected 2 (the version that this program reads), got nothing");
 }
 
+TEST(FormatVersion, EveryMinorOfTheOwnMajorIsReadable) {
+  constexpr FormatVersion kOwn{2, 1};
+  EXPECT_EQ(to_string(kOwn), "2.1");
+  EXPECT_EQ(readable_version("2.0", kOwn), (FormatVersion{2, 0}));
+  EXPECT_EQ(readable_version("2.1", kOwn), kOwn);
+  EXPECT_EQ(readable_version("2.13", kOwn), (FormatVersion{2, 13}));
+  for (const char* other : {"", "2", "2.", ".1", "2.01", "02.1", "2.1 ", " 2.1", "2.-1", "-2.1",
+                            "2,1", "2.1.0", "1.1", "3.0", "20.1", "2.99999999999"}) {
+    EXPECT_EQ(readable_version(other, kOwn), std::nullopt) << other;
+  }
+}
+
+TEST(StrictObject, OfALaterMinorVersionUnknownKeysAreNamed) {
+  const auto read = [](Reading& reading) {
+    StrictObject object = reading.object();
+    if (!object.has_format("f", FormatVersion{1, 1})) return false;
+    for (const StrictValue& element : object.at("list").elements()) {
+      StrictObject entry = element.object();
+      entry.at("a").integer(0, 9);
+      entry.finish();
+    }
+    object.finish();
+    return true;
+  };
+  Reading later(
+      R"({"format": "f", "version": "1.2", "new": 1, "list": [{"a": 1, "b c": 2}, {"a": 3, "b c": 4}]})");
+  EXPECT_TRUE(read(later));
+  EXPECT_EQ(later.faults.text(), "");
+  EXPECT_THAT(later.faults.unknown_keys(), ::testing::ElementsAre("$.list[][\"b c\"]", "$.new"));
+
+  Reading missing(R"({"format": "f", "version": "1.2", "list": [{}]})");
+  EXPECT_TRUE(read(missing));
+  EXPECT_EQ(missing.faults.text(), "d: $.list[0].a: expected an integer 0..9, got nothing");
+
+  Reading same(R"({"format": "f", "version": "1.1", "new": 1, "list": []})");
+  EXPECT_TRUE(read(same));
+  EXPECT_EQ(same.faults.text(),
+            "d: $.new: expected one of the keys format, version, list, got an unknown key");
+
+  Reading other(R"({"format": "f", "version": "2.0"})");
+  EXPECT_FALSE(read(other));
+  EXPECT_EQ(other.faults.text(),
+            R"(d: $.version: expected "1.1" (this program reads versions 1.x), got "2.0")");
+  Reading number(R"({"format": "f", "version": 1.1})");
+  EXPECT_FALSE(read(number));
+}
+
 }  // namespace
 }  // namespace eventgan
