@@ -103,14 +103,40 @@ std::vector<std::string> read_words(const std::optional<StrictValue>& value) {
   return words;
 }
 
-SelectionSpec read_selection(StrictObject& object, SpecialKeys<DatasetKind>& keys) {
+/// A source's keys that not every kind of dataset takes.
+class SourceKeys {
+ public:
+  /// `row`: none if the kind is faulty; then no key is out of place.
+  SourceKeys(StrictObject& object, const DatasetRow* row) : object_(object), row_(row) {}
+
+  /// The key's value if it is there, or must be. It is a fault where the kind does not take it.
+  std::optional<StrictValue> find(std::string_view key) {
+    if (row_ != nullptr && row_->required_key == key) return object_.at(key);
+    std::vector<DatasetKind> owners;
+    for (const DatasetRow& row : kDatasets) {
+      if (takes(row, key)) owners.push_back(row.value);
+    }
+    const auto kind = row_ == nullptr ? std::nullopt : std::optional(row_->value);
+    return SpecialKeys(object_, "dataset", kind).find(key, owners);
+  }
+
+  std::optional<std::string> find_path(std::string_view key) {
+    const std::optional<StrictValue> value = find(key);
+    return value ? std::optional(read_path(*value)) : std::nullopt;
+  }
+
+ private:
+  StrictObject& object_;
+  const DatasetRow* row_;
+};
+
+SelectionSpec read_selection(StrictObject& object, SourceKeys& keys) {
   SelectionSpec spec;
   if (const auto ids = object.find("ids")) spec.ids = read_path(*ids);
-  using enum DatasetKind;
-  spec.subjects = read_words(keys.find("subjects", {kHuman36m, kDhp19}));
-  spec.cameras = read_words(keys.find("cameras", {kHuman36m, kDhp19}));
-  spec.actions = read_words(keys.find("actions", {kHuman36m, kDhp19}));
-  spec.without_actions = read_words(keys.find("without_actions", {kDhp19}));
+  spec.subjects = read_words(keys.find("subjects"));
+  spec.cameras = read_words(keys.find("cameras"));
+  spec.actions = read_words(keys.find("actions"));
+  spec.without_actions = read_words(keys.find("without_actions"));
   if (const auto fraction = object.find("fraction")) {
     const auto ends = fraction->elements(2);
     if (ends.size() == 2) {
@@ -123,25 +149,14 @@ SelectionSpec read_selection(StrictObject& object, SpecialKeys<DatasetKind>& key
   return spec;
 }
 
-/// A label of dhp19 is the mean pose of a window, which is of so many events as the dataset's
-/// authors took.
-constexpr std::int64_t kDhp19Events = 7500;
-
-WindowSpec read_window(SpecialKeys<DatasetKind>& keys, std::optional<DatasetKind> dataset) {
-  using enum DatasetKind;
-  WindowSpec spec;
-  const auto duration = keys.find("window_s", {kRecording});
-  const auto events = keys.find("window_events", {kRecording, kDhp19});
+/// Reads what the source says of its windows, over what is usual.
+WindowSpec read_window(SourceKeys& keys, WindowSpec spec) {
+  const auto duration = keys.find("window_s");
+  const auto events = keys.find("window_events");
   if (duration) spec.duration_s = duration->number(1e-6, 1e3);
   if (events) spec.events = events->integer<std::int64_t>(1, 1'000'000'000);
   if (duration && events) events->fault("no such key together with window_s, which sets it");
-  if (const auto place = keys.find("label_at", {kRecording})) {
-    spec.label = place->choice(kLabelPlaceWords);
-  }
-  if (dataset == kDhp19) {
-    spec.events = spec.events.value_or(kDhp19Events);
-    spec.label = LabelPlace::kMiddle;
-  }
+  if (const auto place = keys.find("label_at")) spec.label = place->choice(kLabelPlaceWords);
   return spec;
 }
 
@@ -154,18 +169,15 @@ LabelSpec read_labels(const StrictValue& value) {
   return spec;
 }
 
-RecordingOptions read_recording_options(SpecialKeys<DatasetKind>& keys) {
+RecordingOptions read_recording_options(SourceKeys& keys) {
   constexpr int kLargestSensor = 8192;
-  using enum DatasetKind;
   RecordingOptions options;
-  if (const auto camera = keys.find("camera", {kRecording})) {
-    options.camera = read_stereo_camera(*camera);
-  }
-  if (const auto rectify = keys.find("rectify", {kRecording})) options.rectify = rectify->boolean();
-  if (const auto sensor = keys.find("sensor", {kRecording}))
+  if (const auto camera = keys.find("camera")) options.camera = read_stereo_camera(*camera);
+  if (const auto rectify = keys.find("rectify")) options.rectify = rectify->boolean();
+  if (const auto sensor = keys.find("sensor")) {
     options.sensor = read_size(*sensor, 1, kLargestSensor);
-  if (const auto columns = keys.find("columns", {kRecording}))
-    options.columns = read_columns(*columns);
+  }
+  if (const auto columns = keys.find("columns")) options.columns = read_columns(*columns);
   return options;
 }
 
@@ -200,7 +212,6 @@ EventFields read_columns(const StrictValue& value) {
 }
 
 SourceSpec read_source(const StrictValue& value) {
-  using enum DatasetKind;
   SourceSpec spec;
   StrictObject object = value.object();
   const auto dataset = object.at("dataset").sound_choice(kDatasetWords);
@@ -208,36 +219,34 @@ SourceSpec read_source(const StrictValue& value) {
   spec.root = read_path(object.at("root"));
   if (const auto split = object.find("split")) spec.split = read_name(*split);
 
-  SpecialKeys keys(object, "dataset", dataset);
-  spec.raw_root = keys.find_path("raw_root", {kKittiObject});
-  spec.devkit = keys.find_path("devkit", {kKittiObject});
+  const DatasetRow* const row = dataset ? &dataset_row(*dataset) : nullptr;
+  SourceKeys keys(object, row);
+  spec.raw_root = keys.find_path("raw_root");
+  spec.devkit = keys.find_path("devkit");
   // Neither is of use without the other: the devkit's mapping says which raw frame an image is.
   if (spec.raw_root && !spec.devkit) object.at("devkit").fault("a path, since raw_root is given");
-  spec.annotations = keys.find_path("annotations", {kMpii, kMpiiList, kHuman36m, kRecording});
-  if (dataset == kMpiiList && !spec.annotations)
-    spec.annotations = read_path(object.at("annotations"));
-  spec.sequences = keys.find_path("sequences", {kMpii, kMpiiList});
-  const auto layout = keys.find("layout", {kHuman36m});
-  if (layout || dataset == kHuman36m) spec.layout = object.at("layout").choice(kLayoutWords);
-  if (const auto every = keys.find("every", {kHuman36m})) {
+  spec.annotations = keys.find_path("annotations");
+  spec.sequences = keys.find_path("sequences");
+  if (const auto layout = keys.find("layout")) spec.layout = layout->choice(kLayoutWords);
+  if (const auto every = keys.find("every")) {
     spec.every = every->integer(1, 1000);
     if (spec.layout != Human36mLayout::kOfficial) {
       every->fault("no such key for this layout (only for official)");
     }
   }
-  if (const auto rate = keys.find("frames_per_second", {kFrames})) {
+  if (const auto rate = keys.find("frames_per_second")) {
     spec.frames_per_second = rate->number(1e-6, 1e6);
   }
 
-  if (const auto labels = keys.find("labels", {kFrames})) spec.labels = read_labels(*labels);
+  if (const auto labels = keys.find("labels")) spec.labels = read_labels(*labels);
   spec.recording = read_recording_options(keys);
 
   spec.selection = read_selection(object, keys);
-  spec.window = read_window(keys, dataset);
-  if (!dataset || !has_events(*dataset)) {
+  spec.window = read_window(keys, row == nullptr ? WindowSpec() : row->window);
+  if (row == nullptr || !row->has_events) {
     spec.pairs = read_pairs(object.at("pairs"));
   } else if (const auto pairs = object.find("pairs")) {
-    pairs->fault("no such key for dataset \"" + std::string(to_string(*dataset)) +
+    pairs->fault("no such key for dataset \"" + std::string(row->word) +
                  "\", whose samples are windows of events");
   }
   object.finish();
@@ -261,46 +270,30 @@ struct Preset {
 constexpr Preset kKitti{"kitti", GreyOrder::kBeforeResize, 3};
 constexpr Preset kMpii{"mpii", GreyOrder::kBeforeResize, 0};
 constexpr Preset kDemo{"demo", GreyOrder::kAfterResize, 0};
-/// Of events, which have no grey values.
-constexpr Preset kNoPreset{"", GreyOrder::kBeforeResize, 0};
 constexpr std::array kPresetWords{Word<Preset>{kKitti.name, kKitti},
                                   Word<Preset>{kMpii.name, kMpii}, Word<Preset>{kDemo.name, kDemo}};
 
-/// What the published scripts do to a dataset; to any other images, what their demo does.
-const Preset& preset_of(DatasetKind dataset) {
-  switch (dataset) {
-    case DatasetKind::kKittiObject:
-    case DatasetKind::kKittiTracking:
-    case DatasetKind::kKittiRaw:
-      return kKitti;
-    case DatasetKind::kMpii:
-    case DatasetKind::kMpiiList:
-    case DatasetKind::kHuman36m:
-      return kMpii;
-    case DatasetKind::kFrames:
-      return kDemo;
-    case DatasetKind::kRecording:
-    case DatasetKind::kDhp19:
-      return kNoPreset;
-  }
-  throw std::logic_error("preset_of: not a kind of dataset");
+/// The preset of that name; one without a name if there is none.
+Preset preset_named(std::string_view name) {
+  const auto preset = std::ranges::find(kPresetWords, name, &Word<Preset>::word);
+  return preset == kPresetWords.end() ? Preset{"", GreyOrder::kBeforeResize, 0} : preset->value;
 }
 
 /// The preset of the sources' datasets. A job has one preprocessing: where they differ, that is a
 /// fault of `preset`, which had to say which.
 Preset default_preset(const std::vector<SourceSpec>& sources, StrictObject& image) {
   if (sources.empty()) return kKitti;  // a fault already
-  const DatasetKind first = sources.front().dataset;
+  const DatasetRow& first = dataset_row(sources.front().dataset);
   for (const SourceSpec& source : sources) {
-    if (preset_of(source.dataset).name == preset_of(first).name) continue;
-    const auto has = [](DatasetKind dataset) {
-      return std::string(to_string(dataset)) + " has \"" + std::string(preset_of(dataset).name) +
-             "\"";
+    const DatasetRow& other = dataset_row(source.dataset);
+    if (other.preset == first.preset) continue;
+    const auto has = [](const DatasetRow& row) {
+      return std::string(row.word) + " has \"" + std::string(row.preset) + "\"";
     };
-    image.at("preset").fault("a preset, since " + has(first) + " and " + has(source.dataset));
+    image.at("preset").fault("a preset, since " + has(first) + " and " + has(other));
     break;
   }
-  return preset_of(first);
+  return preset_named(first.preset);
 }
 
 int read_blur(const StrictValue& value) {
@@ -347,12 +340,16 @@ namespace {
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
   const bool wants_events = manifest.generator.kind == GeneratorKind::kEvents;
+  std::string of_events;
+  for (const DatasetRow& row : kDatasets) {
+    if (row.has_events) of_events += (of_events.empty() ? "" : ", ") + std::string(row.word);
+  }
   for (std::size_t i = 0; i < sources.size(); ++i) {
     const DatasetKind dataset = manifest.sources[i].dataset;
     if (has_events(dataset) == wants_events) continue;
     StrictObject source = sources[i].object();
     source.at("dataset").fault(
-        wants_events ? "a dataset of events (recording, dhp19), since generator.kind is \"events\""
+        wants_events ? "a dataset of events (" + of_events + "), since generator.kind is \"events\""
                      : "a dataset of frames, since generator.kind is not \"events\"");
   }
 }

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "manifests/values/datasets.h"
 #include "manifests/values/events.h"
 #include "manifests/values/frames.h"
 
@@ -47,28 +48,6 @@ enum class Device {
 std::string_view to_string(Precision precision);
 std::string_view to_string(Engine engine);
 std::string_view to_string(Device device);
-
-enum class DatasetKind {
-  kKittiObject,
-  kKittiTracking,
-  kKittiRaw,
-  kMpii,
-  kMpiiList,
-  kHuman36m,
-  kFrames,
-  kRecording,  ///< of an event camera, with frames
-  kDhp19
-};
-
-/// Whether the dataset's samples are windows of real events (GeneratorKind::kEvents), not pairs of
-/// frames.
-constexpr bool has_events(DatasetKind dataset) {
-  return dataset == DatasetKind::kRecording || dataset == DatasetKind::kDhp19;
-}
-
-/// Whether images are turned upright as their EXIF orientation says, as tools show those that one
-/// labels oneself. The labels of the known datasets are in pixels as stored.
-constexpr bool is_turned_upright(DatasetKind dataset) { return dataset == DatasetKind::kFrames; }
 
 /// How the Human3.6M source is laid out on disk (manifests/guides/datasets.md).
 enum class Human36mLayout { kFetch, kExtracted, kOfficial };
@@ -129,17 +108,6 @@ struct RecordingOptions {
   bool operator==(const RecordingOptions&) const = default;
 };
 
-/// Where in its window of events a label lies.
-enum class LabelPlace { kEnd, kMiddle };
-
-/// Which events around a label's time make its volume: those of one interval between frames, or as
-/// many seconds, or as many events.
-struct WindowSpec {
-  std::optional<double> duration_s;    ///< 1e-6..1e3
-  std::optional<std::int64_t> events;  ///< 1..1e9; of dhp19 always given
-  LabelPlace label = LabelPlace::kEnd;
-};
-
 /// Which labelled frames of a dataset are taken: those for which all of it holds.
 struct SelectionSpec {
   std::optional<std::string> ids;  ///< a text file, as written in the manifest: a sample_id a line
@@ -167,7 +135,7 @@ struct SourceSpec {
   SelectionSpec selection;
   PairSpec pairs;
   RecordingOptions recording;  ///< recording
-  WindowSpec window;           ///< recording, dhp19: in place of `pairs`
+  WindowSpec window;           ///< of events: in place of `pairs`
 };
 
 enum class ImageFit { kStretch, kLetterbox, kCrop };

@@ -29,18 +29,17 @@ std::string_view word_of(const std::array<Word<T>, N>& words, T value) {
   throw std::invalid_argument("expected a value of the enumeration, got another number");
 }
 
+/// The words of a table whose rows have `word` and `value`, in its order.
+template <class Row, std::size_t N>
+constexpr auto words_of(const std::array<Row, N>& rows) {
+  std::array<Word<decltype(Row::value)>, N> words{};
+  for (std::size_t i = 0; i < N; ++i) words[i] = {rows[i].word, rows[i].value};
+  return words;
+}
+
 // The manifest's words, in the order in which messages list them.
 
-inline constexpr std::array kDatasetWords{
-    Word<DatasetKind>{"kitti_object", DatasetKind::kKittiObject},
-    Word<DatasetKind>{"kitti_tracking", DatasetKind::kKittiTracking},
-    Word<DatasetKind>{"kitti_raw", DatasetKind::kKittiRaw},
-    Word<DatasetKind>{"mpii", DatasetKind::kMpii},
-    Word<DatasetKind>{"mpii_list", DatasetKind::kMpiiList},
-    Word<DatasetKind>{"human36m", DatasetKind::kHuman36m},
-    Word<DatasetKind>{"frames", DatasetKind::kFrames},
-    Word<DatasetKind>{"recording", DatasetKind::kRecording},
-    Word<DatasetKind>{"dhp19", DatasetKind::kDhp19}};
+inline constexpr auto kDatasetWords = words_of(kDatasets);
 
 inline constexpr std::array kLayoutWords{
     Word<Human36mLayout>{"fetch", Human36mLayout::kFetch},

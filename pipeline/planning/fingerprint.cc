@@ -112,7 +112,7 @@ bool any_video(const std::vector<PlannedShard>& shards) {
 bool turns_images(const JobManifest& manifest, const Plan& plan) {
   return std::ranges::any_of(plan.shards, [&](const PlannedShard& shard) {
     const SourceSpec& source = manifest.sources[static_cast<std::size_t>(shard.source)];
-    return is_turned_upright(source.dataset) &&
+    return is_own(source.dataset) &&
            std::ranges::any_of(shard.samples, [](const PlannedSample& sample) {
              return sample.pair.next.video_frame < 0 || sample.pair.previous.video_frame < 0;
            });

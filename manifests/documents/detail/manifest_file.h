@@ -37,7 +37,8 @@ class SpecialKeys {
       : object_(object), what_(what), kind_(kind) {}
 
   /// The key's value if it is there. It is a fault where the kind is not one of `owners`.
-  std::optional<StrictValue> find(std::string_view key, std::initializer_list<Kind> owners) {
+  template <class Kinds = std::initializer_list<Kind>>
+  std::optional<StrictValue> find(std::string_view key, const Kinds& owners) {
     std::optional<StrictValue> value = object_.find(key);
     if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
     const auto word = [](Kind owner) { return to_string(owner); };

@@ -14,7 +14,7 @@ namespace eventgan {
 
 /// How the images of a dataset are taken.
 inline ImageOrientation orientation_of(DatasetKind dataset) {
-  return is_turned_upright(dataset) ? ImageOrientation::kUpright : ImageOrientation::kStored;
+  return is_own(dataset) ? ImageOrientation::kUpright : ImageOrientation::kStored;
 }
 
 /// The size of an image, read from its header alone; of a video, the size of its first frame. A
