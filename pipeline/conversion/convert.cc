@@ -49,7 +49,7 @@ FrozenPlan prepare_folder(const fs::path& folder, const JobManifest& manifest, P
                           const ConversionOptions& options) {
   const TraceSpan span(options.trace, "freeze plan", "job");
   if (options.overwrite && options.part.count != 1) {
-    throw UsageError("expected --overwrite without parts, got " + options.part.origin +
+    throw UsageError("expected --overwrite without --shards, got " + options.part.origin +
                      ": every worker would discard the others' shards");
   }
   std::error_code error;

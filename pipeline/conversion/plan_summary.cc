@@ -121,7 +121,7 @@ std::string unpaired_text(const SourceSpec& spec, const SourceSummary& summary,
   std::int64_t places = 0;
   for (const auto& [gap, count] : by_gap) places += count;
   const std::string text =
-      fmt::format("  no paired frame  {} of {} labelled frames x gaps{}\n", places,
+      fmt::format("  no paired frame  {} of {} possible pairs (labelled frames x gaps){}\n", places,
                   summary.labelled_frames * std::ssize(spec.pairs.gaps), by_gap_text(by_gap));
   const std::vector<std::string>& ids = summary.unpaired_ids;
   if (ids.empty()) return text;

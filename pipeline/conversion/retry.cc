@@ -86,8 +86,8 @@ Fingerprint changed_inputs(const fs::path& folder, Fingerprint accepted, const F
   }
   const auto differences = fingerprint_differences(accepted, now);
   if (differences.empty()) return changed;
-  std::string message = "expected the job that " + (folder / "plan.json").string() +
-                        " was frozen by, with at most its inputs fixed, got another one:";
+  std::string message = "expected the job of " + (folder / "plan.json").string() +
+                        ", in which only inputs may have changed, got another one:";
   for (const std::string& difference : differences) message += "\n  " + difference;
   throw UsageError(message);
 }

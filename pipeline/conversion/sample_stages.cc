@@ -147,7 +147,7 @@ void SampleStages::take_placement(SampleMessage& message) const {
   if (placement.volume == message.shard->volume_size) return;
   message.fail("expected frames of " + to_string(message.shard->volume_size) + ", got " +
                to_string(placement.volume) + ", in " + frame_names(message.planned().pair) +
-               " (a new plan would have it in another shard: convert into another folder, or with "
+               " (a new plan would put it into another shard: convert into another folder, or with "
                "--overwrite)");
 }
 

@@ -159,8 +159,8 @@ int in_child(const fs::path& shard, const std::function<int()>& read) {
   }
   const std::string name = ::strsignal(signal);
   if (std::ranges::find(kCrashes, signal) != kCrashes.end()) fail(shard, "HDF5 ended with " + name);
-  throw std::runtime_error("expected to read " + shard.string() +
-                           " to its end, got stopped by a signal from outside (" + name + ")");
+  throw std::runtime_error("reading " + shard.string() + " was stopped by a signal from outside (" +
+                           name + ")");
 }
 
 }  // namespace

@@ -182,7 +182,7 @@ const char* to_string(ShardCondition condition) {
     case ShardCondition::kDamagedRecord:
       return "damaged commit record";
     case ShardCondition::kForeignRecord:
-      return "foreign commit record";
+      return "commit record of another plan or shard";
     case ShardCondition::kOtherSize:
       return "of another size";
     case ShardCondition::kOtherBytes:

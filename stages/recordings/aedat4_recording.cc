@@ -433,7 +433,7 @@ class Aedat4Events final : public EventStore {
       try {
         check_time(time_us);
         if (time_us < last_us_) {
-          throw EventFault(fmt::format("expected times that never fall, got {} µs after {} µs",
+          throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
                                        time_us, last_us_));
         }
       } catch (const EventFault& fault) {

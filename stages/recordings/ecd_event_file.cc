@@ -217,7 +217,7 @@ std::optional<std::array<double, 2>> EcdEventFile::span() const {
 
 std::vector<Event> EcdEventFile::events(std::int64_t begin, std::int64_t end,
                                         EventCheck check) const {
-  if (end < begin) refuse(EventFault("expected times that never fall, got others"), end);
+  if (end < begin) refuse(EventFault("expected times that never decrease, got others"), end);
   std::vector<Event> events;
   events.reserve(static_cast<std::size_t>((end - begin) / kUsualLine));
   while (begin < end) {

@@ -20,7 +20,7 @@ bool is_index(double value, int count) {
 void check_event_time(double previous_s, double time_s) {
   if (!std::isfinite(time_s)) throw EventFault("expected a finite time, got " + number(time_s));
   if (time_s >= previous_s) return;
-  throw EventFault("expected times that never fall, got " + number(time_s) + " s after " +
+  throw EventFault("expected times that never decrease, got " + number(time_s) + " s after " +
                    number(previous_s) + " s");
 }
 
@@ -49,7 +49,7 @@ void EventCheck::refuse(const StoredEvent& stored) const {
     throw EventFault("expected a time after " + number(last_s_) + " s, got the same");
   }
   if (stored.t_s > until_s_) {
-    throw EventFault("expected times that never fall, got " + number(stored.t_s) +
+    throw EventFault("expected times that never decrease, got " + number(stored.t_s) +
                      " s before an event at or before " + number(until_s_) + " s");
   }
   throw EventFault("expected polarities -1 and 1 or 0 and 1, got " + number(stored.polarity) +

@@ -165,8 +165,8 @@ std::int64_t counted(const WordState& state, int bits) {
 
 StoredEvent event_at(WordState& state, std::int64_t time_us, int x, int y, std::uint32_t on) {
   if (time_us < state.last_us) {
-    throw EventFault(fmt::format("expected times that never fall, got {} µs after {} µs", time_us,
-                                 state.last_us));
+    throw EventFault(fmt::format("expected times that never decrease, got {} µs after {} µs",
+                                 time_us, state.last_us));
   }
   state.last_us = time_us;
   return {static_cast<double>(x), static_cast<double>(y), static_cast<double>(time_us) / 1e6,

@@ -119,8 +119,8 @@ class StoredRecording final : public Recording {
 
   std::vector<Event> read_events(std::int64_t begin, std::int64_t end, EventCheck check) const {
     if (end < begin) {
-      throw InputError("expected times that never fall, got others, in " + name() + " (events " +
-                       std::to_string(end) + ".." + std::to_string(begin) + ")");
+      throw InputError("expected times that never decrease, got others, in " + name() +
+                       " (events " + std::to_string(end) + ".." + std::to_string(begin) + ")");
     }
     std::vector<Event> events;
     events.reserve(static_cast<std::size_t>(end - begin));

@@ -147,7 +147,8 @@ std::string describe_sample(const ShardReader& reader, int slot) {
   const ShardSample sample = reader.sample(slot);
   const FramePair& pair = sample.pair;
   Lines line(fmt::format("sample {} of {}", slot, reader.header().name));
-  line("id", "{}, sequence {}", sample.sample_id, sample.sequence);
+  line("id", "{}{}{}", sample.sample_id, sample.sequence.empty() ? "" : ", sequence ",
+       sample.sequence);
   line.add("valid",
            sample.valid ? "yes" : "no: quarantined, the commit record beside the shard says why");
   line.add("previous", text_of(pair.previous));
@@ -158,7 +159,7 @@ std::string describe_sample(const ShardReader& reader, int slot) {
   line(is_window ? "window" : "gap", "{}{}{}",
        is_window ? "" : fmt::format("{} frames", pair.gap_frames),
        is_window || seconds.empty() ? "" : ", ", seconds);
-  line("label", "frame {}, at {:g} of the way from previous to next", pair.label_index,
+  line("label", "frame {}, position {:g} (0 = previous frame, 1 = next frame)", pair.label_index,
        pair.label_position);
   if (const auto& motion = pair.motion) {
     line("motion", "of a still: ({:.4g} {:.4g}) px, {:.4g} degrees, scale {:.6g}", motion->x_px,

@@ -83,10 +83,10 @@ ShardReceipt ShardWriter::State::flush() {
   } catch (const std::runtime_error&) {
     std::error_code unknown;
     if (std::filesystem::exists(temporary, unknown) || unknown) throw;
-    std::throw_with_nested(
-        UnfinishedShardLost("expected the file that was being written, got nothing: it was not "
-                            "written to for so long that another process deleted it, in " +
-                            file.target().string()));
+    std::throw_with_nested(UnfinishedShardLost(
+        "expected the file that was being written, got nothing: another process "
+        "deleted it after an hour without a write, in " +
+        file.target().string()));
   }
 }
 

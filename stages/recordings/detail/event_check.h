@@ -26,7 +26,7 @@ class EventFault : public std::runtime_error {
 void check_event_time(double previous_s, double time_s);
 
 /// What holds for the events of one stretch of a recording: whole coordinates inside the image,
-/// finite times that never fall, in (after_s, until_s], polarities of {-1, +1} or of {0, 1}.
+/// finite times that never decrease, in (after_s, until_s], polarities of {-1, +1} or of {0, 1}.
 class EventCheck {
  public:
   EventCheck(ImageSize size, double after_s, double until_s)

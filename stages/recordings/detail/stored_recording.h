@@ -61,9 +61,9 @@ struct StoredParts {
   std::vector<std::string> notes = {};
 };
 
-/// The recording of these parts, with the checks that Recording promises: times that never fall,
-/// pixels inside the image, finite values. Where a frame's events end is looked up by time, a
-/// file's own event index being only a guess, since its meaning differs among files.
+/// The recording of these parts, with the checks that Recording promises: times that never
+/// decrease, pixels inside the image, finite values. Where a frame's events end is looked up by
+/// time, a file's own event index being only a guess, since its meaning differs among files.
 std::unique_ptr<Recording> make_stored_recording(StoredParts parts);
 
 }  // namespace eventgan

@@ -43,7 +43,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "kitti_object kitti/training (train)\n"
       "  labelled frames  12\n"
       "  pairs            3  (gap 1: 2, gap 3: 1)\n"
-      "  no paired frame  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
+      "  no paired frame  9 of 24 possible pairs (labelled frames x gaps)  (gap 1: 3, gap 3: 6)\n"
       "  lacking a gap    6 of 12 labelled frames  (a, b, c, d, e, ...)\n"
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 images without labels\n"
@@ -92,16 +92,17 @@ TEST_F(PlanSummary, OfOneGapAFrameItNamesThoseThatGiveNoPair) {
   job_.plan.sources[0].unpaired = 2;
   job_.plan.sources[0].unpaired_ids = {"a", "b"};
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
-              ::testing::HasSubstr(
-                  "  no paired frame  9 of 24 labelled frames x gaps  (gap 1: 3, gap 3: 6)\n"
-                  "  no pair at all   2 of 12 labelled frames  (a, b)\n"));
+              ::testing::HasSubstr("  no paired frame  9 of 24 possible pairs (labelled frames x "
+                                   "gaps)  (gap 1: 3, gap 3: 6)\n"
+                                   "  no pair at all   2 of 12 labelled frames  (a, b)\n"));
 }
 
 TEST_F(PlanSummary, SaysThatNothingIsMissing) {
   job_.plan.sources[0].unpaired_ids = {};
   job_.unpaired_by_gap = {{}};
   EXPECT_THAT(plan_text(manifest_, job_, {}, 1),
-              ::testing::HasSubstr("  no paired frame  0 of 24 labelled frames x gaps\n  to "));
+              ::testing::HasSubstr(
+                  "  no paired frame  0 of 24 possible pairs (labelled frames x gaps)\n  to "));
 }
 
 TEST(MeasureTrial, ScalesAFewPairsToTheWholePlan) {

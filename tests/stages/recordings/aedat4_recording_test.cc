@@ -278,7 +278,7 @@ TEST_F(Aedat4Test, RefusesTimesThatFallOrCannotBe) {
   TestFile file = small();
   file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {999'999, 0, 0, 1}});
   expect_refused(file.bytes(),
-                 "expected times that never fall, got 999999 µs after 1000000 µs, in " +
+                 "expected times that never decrease, got 999999 µs after 1000000 µs, in " +
                      path_.string() + " (event 1)");
   file.packets[0] = events_packet({{1'000'000, 0, 0, 1}, {1'000'002, 0, 0, 1}});
   expect_refused(file.bytes(),

@@ -206,7 +206,7 @@ TEST_F(EcdEventFileTest, RefusesAStretchThatEndsBeforeItBegins) {
       [&] {
         file.events(8, 0, EventCheck({1, 1}, 0, 9));
       },
-      ThrowsMessage<InputError>(HasSubstr("times that never fall")));
+      ThrowsMessage<InputError>(HasSubstr("times that never decrease")));
 }
 
 TEST_F(EcdEventFileTest, RefusesFilesThatAreNoText) {

@@ -133,9 +133,9 @@ TEST_F(DsecTest, NamesTheEventThatIsWrong) {
   changed("events/x", {0, 1, 4, 3, 0}, "got x = 4, y = 2");
   changed("events/y", {0, 1, 2, -1, 1}, "got x = 3, y = -1");
   changed("events/p", {0, 1, 2, 0, 1}, "got 2");
-  changed("events/t", {0, 1000, 900, 2500, 3000}, "expected times that never fall");
+  changed("events/t", {0, 1000, 900, 2500, 3000}, "expected times that never decrease");
   changed("events/t", {0, 1000, 1000, 4294967295, 500},
-          "expected times that never fall");  // wrapped
+          "expected times that never decrease");  // wrapped
   const std::int64_t most = std::numeric_limits<std::int64_t>::max();
   changed("events/t", {0, 1000, 1000, 2500, most}, "expected a time of fewer than 2^53 us");
 }

@@ -230,7 +230,7 @@ TEST_F(Hdf5RecordingTest, NamesTheEventThatIsWrong) {
   cell(4, 1) = std::nan("");
   refused("expected a pixel", 4);
   cell(3, 2) = 1.125;  // the one before is at 1.25
-  refused("times that never fall", 3);
+  refused("times that never decrease", 3);
   cell(3, 2) = std::nan("");
   refused("a finite time", 3);
   cell(2, 3) = 2;

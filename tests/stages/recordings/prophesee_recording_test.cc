@@ -107,7 +107,7 @@ TEST_F(PropheseeTest, GoesOnWhereEvt2Wraps) {
                  "got 8 after 9 of 268435456");
   expect_refused(
       kEvt2Header + words<std::uint32_t>({evt2_high(9), evt2(3, 1, 1, 1), evt2(2, 1, 1, 1)}),
-      "expected times that never fall, got 578 µs after 579 µs");
+      "expected times that never decrease, got 578 µs after 579 µs");
 }
 
 TEST_F(PropheseeTest, CountsEventsBeforeTheFirstTime) {

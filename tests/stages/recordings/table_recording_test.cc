@@ -147,7 +147,7 @@ TEST_F(TableRecordingTest, NamesWhatIsWrong) {
   refuses("d.csv", "t,x,y,p\n1,2,1,1\n1,2,one,1\n", "expected a number of y, got another field");
   refuses("e.csv", "t,x,y,p\n1,2,1,1\n1,4,1,1\n", "got x = 4, y = 1");
   refuses("f.csv", "t,x,y,p\n1,2,1,1\n1,1.5,1,1\n", "got x = 1.5, y = 1");
-  refuses("g.csv", "t,x,y,p\n3,2,1,1\n2,2,1,1\n", "expected times that never fall");
+  refuses("g.csv", "t,x,y,p\n3,2,1,1\n2,2,1,1\n", "expected times that never decrease");
   refuses("h.csv", "t,x,y,p\n3,2,1,1\nnan,2,1,1\n", "expected a finite time, got nan");
   refuses("i.csv", "t,x,y,p\n3,2,1,0\n4,2,1,-1\n", "got -1 after 0");
   refuses("j.npy", structured({{5, 0, 2, 1}}) + "x", "expected 1 rows of 16 bytes");
