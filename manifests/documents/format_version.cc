@@ -5,8 +5,9 @@
 namespace eventgan {
 namespace {
 
-/// Takes digits without leading zeros off the front of `text`; none where there are no such.
-std::optional<int> take_number(std::string_view& text) {
+/// Takes a part of a version, digits without leading zeros, off the front of `text`; none where
+/// there are no such.
+std::optional<int> take_part(std::string_view& text) {
   int number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
   const auto digits = static_cast<std::size_t>(end - text.data());
@@ -22,10 +23,10 @@ std::string to_string(FormatVersion version) {
 }
 
 std::optional<FormatVersion> readable_version(std::string_view text, FormatVersion own) {
-  const auto major = take_number(text);
+  const auto major = take_part(text);
   if (major != own.major || !text.starts_with('.')) return std::nullopt;
   text.remove_prefix(1);
-  const auto minor = take_number(text);
+  const auto minor = take_part(text);
   if (!minor || !text.empty()) return std::nullopt;
   return FormatVersion{*major, *minor};
 }
