@@ -1,34 +1,18 @@
 #include "manifests/documents/detail/manifest_file.h"
 
 #include <algorithm>
-#include <cerrno>
-#include <fstream>
 #include <limits>
-#include <sstream>
-#include <system_error>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 
 std::string read_manifest_text(const std::filesystem::path& file, std::string_view what) {
-  const auto fail = [&](const std::string& why) {
-    throw InputError("expected " + std::string(what) + ", got \"" + why + "\", in " +
-                     file.string());
-  };
-  std::error_code ignored;
-  const auto status = std::filesystem::status(file, ignored);
-  if (std::filesystem::is_directory(status)) fail("a folder");
-  // A FIFO would wait for its writer, for ever perhaps.
-  if (std::filesystem::exists(status) && !std::filesystem::is_regular_file(status)) {
-    fail("not a regular file");
-  }
-  errno = 0;
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (stream && stream.peek() != std::ifstream::traits_type::eof()) text << stream.rdbuf();
-  if (!stream.is_open() || stream.bad()) fail(std::generic_category().message(errno));
-  return std::move(text).str();
+  std::string reason;
+  if (auto text = try_read_file(file, reason)) return *std::move(text);
+  throw InputError("expected " + std::string(what) + ", got \"" + reason + "\", in " +
+                   file.string());
 }
 
 std::filesystem::path manifest_folder(const std::filesystem::path& file) {

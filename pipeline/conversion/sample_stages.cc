@@ -96,15 +96,14 @@ void SampleStages::read(SampleMessage& message) const try {
 
 void SampleStages::read_frames(SampleMessage& message) const {
   const auto slot = static_cast<std::size_t>(message.slot);
+  const SourceSpec& source = manifest_.sources[static_cast<std::size_t>(message.shard->source)];
+  const ImageOrientation orientation = orientation_of(source.dataset);
   const std::vector<PlannedSample>& samples = message.shard->samples;
   for (std::size_t i = slot == 0 ? 1 : slot + in_flight_;
        i <= slot + in_flight_ && i < samples.size(); ++i) {
-    reader_.expect(samples[i].pair);
+    reader_.expect(samples[i].pair, orientation);
   }
-  const auto source = static_cast<std::size_t>(message.shard->source);
-  Outcome<PreparedPair> prepared =
-      reader_.read(message.planned().pair, orientation_of(manifest_.sources[source].dataset),
-                   manifest_.sources[source].every);
+  Outcome<PreparedPair> prepared = reader_.read(message.planned().pair, orientation, source.every);
   if (is_fault(prepared)) {
     message.fail(std::get<SampleFault>(prepared).reason);
   } else {

@@ -6,9 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cstdio>
-#include <fstream>
 #include <istream>
-#include <iterator>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <streambuf>
@@ -43,13 +41,10 @@ constexpr char kManifestFolderBytes[] = "manifest_folder_bytes";  // of a name t
 /// naming the path, which the stream passes on if its exceptions include badbit.
 class HashedFile : public std::streambuf {
  public:
-  explicit HashedFile(const fs::path& file) : path_(file), block_(std::size_t{1} << 20) {
-    std::error_code unknown;
-    // Opening a FIFO would wait for its writer, for ever perhaps.
-    if (!fs::is_other(file, unknown)) file_.open(file, std::ios::binary);
-  }
+  explicit HashedFile(const fs::path& file)
+      : path_(file), file_(InputFile::open(file, reason_)), block_(std::size_t{1} << 20) {}
 
-  bool is_open() const { return file_.is_open(); }
+  bool is_open() const { return file_.has_value(); }
 
   /// SHA-256 of the file up to where the last block read ends: of the whole file once the stream
   /// has met its end.
@@ -57,12 +52,14 @@ class HashedFile : public std::streambuf {
 
  protected:
   int_type underflow() override {
-    file_.read(block_.data(), static_cast<std::streamsize>(block_.size()));
-    const auto size = static_cast<std::size_t>(file_.gcount());
-    if (file_.bad() || (size < block_.size() && !file_.eof())) {
+    std::size_t size = 0;
+    try {
+      size = file_->read_some(offset_, block_);
+    } catch (const InputError&) {
       throw std::system_error(errno, std::generic_category(), "cannot read " + path_.string());
     }
     if (size == 0) return traits_type::eof();
+    offset_ += size;
     hash_.update(std::string_view(block_.data(), size));
     setg(block_.data(), block_.data(), block_.data() + size);
     return traits_type::to_int_type(block_.front());
@@ -70,18 +67,20 @@ class HashedFile : public std::streambuf {
 
  private:
   fs::path path_;
-  std::ifstream file_;
+  std::string reason_;  ///< why it is not open
+  std::optional<InputFile> file_;
+  std::uint64_t offset_ = 0;
   std::vector<char> block_;
   Sha256 hash_;
 };
 
 /// The version that the last line of a plan states, `"version":1}`; none if that line is another.
 std::optional<int> stated_version(const fs::path& file) {
-  constexpr std::streamoff kLastLine = 24;  // of a version with so many digits as an int has
+  constexpr std::uint64_t kLastLine = 24;  // of a version with so many digits as an int has
   constexpr std::string_view kStart = "\"version\":";
-  std::ifstream stream(file, std::ios::binary | std::ios::ate);
-  stream.seekg(-std::min<std::streamoff>(kLastLine, stream.tellg()), std::ios::end);
-  const std::string end(std::istreambuf_iterator<char>(stream), {});
+  const InputFile opened(file);
+  const std::uint64_t size = std::min(kLastLine, opened.size_bytes());
+  const std::string end = opened.read(opened.size_bytes() - size, size);
   const std::size_t start = end.rfind(kStart);
   int version = 0;
   if (start == end.npos || std::sscanf(end.c_str() + start + kStart.size(), "%d}", &version) != 1) {
@@ -149,9 +148,9 @@ using Fingerprint = std::map<std::string, std::string>;
 /// further on; empty if that line is.
 Fingerprint stated_fingerprint(const fs::path& folder) {
   const fs::path file = folder / kPlanName;
-  std::error_code unknown;
-  if (!fs::is_regular_file(file, unknown)) return {};
-  std::ifstream stream(file, std::ios::binary);
+  HashedFile bytes(file);
+  if (!bytes.is_open()) return {};
+  std::istream stream(&bytes);
   std::string line;
   std::getline(stream, line);
   if (line.ends_with(',')) line.back() = '}';

@@ -148,10 +148,7 @@ SafetensorsFile parse_safetensors(std::string_view bytes, const std::string& nam
 }
 
 SafetensorsFile read_safetensors(const std::filesystem::path& file) {
-  const FileBytes bytes(file);
-  const std::vector<std::byte> whole = bytes.read(0, bytes.size_bytes());
-  return parse_safetensors({reinterpret_cast<const char*>(whole.data()), whole.size()},
-                           file.string());
+  return parse_safetensors(InputFile(file).read_all(), file.string());
 }
 
 }  // namespace eventgan

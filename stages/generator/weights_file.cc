@@ -219,10 +219,9 @@ namespace {
 /// are the header's length, of which the upper half is 0.
 bool is_pytorch_checkpoint(const std::filesystem::path& file) {
   constexpr std::size_t kLengthBytes = 8;
-  const FileBytes bytes(file);
+  const InputFile bytes(file);
   if (bytes.size_bytes() < kLengthBytes) return false;
-  const std::vector<std::byte> start = bytes.read(0, kLengthBytes);
-  const std::string_view text(reinterpret_cast<const char*>(start.data()), start.size());
+  const std::string text = bytes.read(0, kLengthBytes);
   const bool has_length = text.ends_with(std::string_view("\0\0\0\0", 4));
   return !has_length && (text.starts_with("PK\3\4") || text.starts_with('\x80'));
 }

@@ -100,8 +100,8 @@ Events from_columns(const std::array<TypedArray, kColumns>& arrays, const EventF
 
 Events read_npy(const fs::path& path, const EventFields& columns) {
   const std::string name = path.string();
-  const FileBytes file(path);
-  const std::vector<std::byte> bytes = file.read(0, file.size_bytes());
+  const InputFile file(path);
+  const std::vector<std::byte> bytes = file.read_bytes(0, file.size_bytes());
   std::size_t begin = 0;
   if (parse_npy_header(bytes, name, begin).fields.empty()) {
     const std::array<std::size_t, kColumns> places = places_of(columns, name);
@@ -322,8 +322,9 @@ bool is_event_table(const fs::path& path, const EventFields& columns) try {
   const bool is_npy = path.extension() == ".npy";
   if (!is_npy && path.extension() != ".csv") return false;
   constexpr std::uint64_t kLongestHeader = 1 << 16;
-  const FileBytes file(path);
-  const std::vector<std::byte> bytes = file.read(0, std::min(file.size_bytes(), kLongestHeader));
+  const InputFile file(path);
+  const std::vector<std::byte> bytes =
+      file.read_bytes(0, std::min(file.size_bytes(), kLongestHeader));
   if (is_npy) {
     std::size_t begin = 0;
     const NumpyLayout layout = parse_npy_header(bytes, path.string(), begin);

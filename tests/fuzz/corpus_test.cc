@@ -84,7 +84,7 @@ TEST(FuzzCorpusSeeds, AreReadWhereTheyAreSound) {
   EXPECT_EQ(parse_mot_labels(labels("mot/two"), "two").size(), 2u);
   EXPECT_EQ(parse_mot_sequence(labels("mot/seqinfo"), "seqinfo").frames_per_second, 30);
   EXPECT_EQ(parse_csv_labels(labels("csv/three"), "three").size(), 3u);
-  const CocoIndex coco = index_coco(corpus / "coco" / "persons", "persons");
+  const CocoIndex coco = index_coco(InputFile(corpus / "coco" / "persons"), "persons");
   EXPECT_EQ(coco.annotations.size(), 1u);
   Annotation annotation;
   add_coco_annotation(

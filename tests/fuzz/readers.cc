@@ -188,7 +188,7 @@ void read_coco_input(std::span<const std::uint8_t> input, const std::filesystem:
   CocoIndex index;
   LabelSchema schema;
   try {
-    index = index_coco(scratch, "input");
+    index = index_coco(InputFile(scratch), "input");
     schema = coco_schema(index, "input");
   } catch (const InputError&) {
     return;

@@ -10,8 +10,9 @@ SOURCE = pathlib.Path(os.environ["EVENTGAN_SOURCE_DIR"])
 # From the lowest up. A room may include itself and what lies below; rooms of one floor do not know each other.
 FLOORS = [
     ["manifests/values"],
+    ["stages/base/files"],
     ["manifests/documents"],
-    ["stages/base/charts", "stages/base/files", "stages/base/processor", "stages/base/processor_clones.h"],
+    ["stages/base/charts", "stages/base/processor", "stages/base/processor_clones.h"],
     ["stages/base/hdf5", "stages/base/images"],
     ["stages/base/archives", "stages/base/videos"],
     ["stages/recordings"],

@@ -245,12 +245,12 @@ TypedArray matrix_of(Bytes file, const std::string& name) {
 }  // namespace
 
 TypedArray read_cdf_matrix(const std::filesystem::path& file, const std::string& variable) try {
-  const FileBytes content(file);
+  const InputFile content(file);
   if (content.size_bytes() > kMostBytes) {
     refuse("a file of at most " + std::to_string(kMostBytes) + " bytes",
            std::to_string(content.size_bytes()));
   }
-  return matrix_of(without_compression(content.read(0, content.size_bytes())), variable);
+  return matrix_of(without_compression(content.read_bytes(0, content.size_bytes())), variable);
 } catch (const std::invalid_argument& error) {
   throw std::runtime_error(std::string(error.what()) + ", in " + file.string() + " (" + variable +
                            ")");

@@ -1,5 +1,6 @@
 #include "stages/base/archives/zip_archive.h"
 
+#include <unistd.h>
 #include <zip.h>
 
 #include <algorithm>
@@ -20,13 +21,12 @@ constexpr std::size_t kMostMembers = 65536;
 // Every entry of the directory begins with this; wherever the file says that it is.
 constexpr std::string_view kEntrySignature = "PK\1\2";
 
-std::size_t count_signatures(const FileBytes& file) {
+std::size_t count_signatures(const InputFile& file) {
   constexpr std::uint64_t kBlock = 1 << 20;
   constexpr std::uint64_t kOverlap = kEntrySignature.size() - 1;
   std::size_t count = 0;
   for (std::uint64_t at = 0; at < file.size_bytes(); at += kBlock) {
-    const auto bytes = file.read(at, std::min(kBlock + kOverlap, file.size_bytes() - at));
-    const std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+    const std::string text = file.read(at, std::min(kBlock + kOverlap, file.size_bytes() - at));
     for (std::size_t hit = text.find(kEntrySignature); hit != std::string_view::npos;
          hit = text.find(kEntrySignature, hit + 1)) {
       ++count;
@@ -51,15 +51,17 @@ std::string text_of(int code) {
 
 struct ZipArchive::State {
   explicit State(const std::filesystem::path& file) : path(file.string()) {
-    const FileBytes bytes(file);
+    const InputFile bytes(file);
     size_bytes = bytes.size_bytes();
     if (count_signatures(bytes) > kMostMembers) {
       throw std::runtime_error("expected a zip file of at most " + std::to_string(kMostMembers) +
                                " members, got more, in " + path);
     }
     int code = 0;
-    archive = zip_open(path.c_str(), ZIP_RDONLY, &code);
+    const int descriptor = ::dup(bytes.descriptor());  // libzip's, unless it fails
+    archive = zip_fdopen(descriptor, 0, &code);
     if (archive == nullptr) {
+      ::close(descriptor);
       throw std::runtime_error("expected a zip file, got \"" + text_of(code) + "\", in " + path);
     }
     const zip_int64_t count = zip_get_num_entries(archive, 0);

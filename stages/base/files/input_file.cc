@@ -4,64 +4,189 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <array>
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <new>
 #include <stdexcept>
-#include <system_error>
+
+#include "manifests/values/faults.h"
 
 namespace eventgan {
+namespace {
 
-InputFile open_input(const std::filesystem::path& file, std::string& reason) {
+[[noreturn]] void refuse(const std::string& reason, const std::string& name) {
+  throw InputError("expected a readable file, got '" + reason + "', in " + name);
+}
+
+std::span<char> characters(std::vector<std::byte>& bytes) {
+  return {reinterpret_cast<char*>(bytes.data()), bytes.size()};
+}
+
+}  // namespace
+
+std::optional<InputFile> InputFile::open(const std::filesystem::path& file, std::string& reason) {
   const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor < 0) {
     reason = std::strerror(errno);
-    return nullptr;
+    return std::nullopt;
   }
   struct stat status {};
-  const bool known = ::fstat(descriptor, &status) == 0;
-  if (known && S_ISREG(status.st_mode)) {
-    if (InputFile opened{::fdopen(descriptor, "rb")}) return opened;
+  const int error = ::fstat(descriptor, &status) == 0 ? 0 : errno;
+  if (error == 0 && S_ISREG(status.st_mode)) {
+    InputCounter::add(file, {.opens = 1, .bytes = 0});
+    return InputFile(file, descriptor, static_cast<std::uint64_t>(status.st_size));
   }
-  reason = !known || S_ISREG(status.st_mode) ? std::strerror(errno)
-           : S_ISDIR(status.st_mode)         ? std::strerror(EISDIR)
-                                             : "Not a regular file";
   ::close(descriptor);
-  return nullptr;
+  const bool is_folder = error == 0 && S_ISDIR(status.st_mode);
+  reason = error != 0  ? std::strerror(error)
+           : is_folder ? std::strerror(EISDIR)
+                       : "Not a regular file";
+  return std::nullopt;
 }
 
-void require_regular_file(const std::filesystem::path& file) {
-  std::string reason;
-  if (!open_input(file, reason)) {
-    throw std::runtime_error("expected a readable file, got '" + reason + "', in " + file.string());
+InputFile::InputFile(const std::filesystem::path& file, std::string name)
+    : InputFile([&] {
+        std::string reason;
+        if (auto opened = open(file, reason)) return *std::move(opened);
+        refuse(reason, name.empty() ? file.string() : name);
+      }()) {
+  if (!name.empty()) name_ = std::move(name);
+}
+
+InputFile::~InputFile() {
+  if (descriptor_ >= 0) ::close(descriptor_);
+}
+
+void InputFile::fail() const { refuse(std::strerror(errno), name_); }
+
+std::optional<std::size_t> InputFile::try_read(std::uint64_t offset, std::span<char> to) const {
+  std::size_t have = 0;
+  while (have < to.size()) {
+    const ssize_t got =
+        ::pread(descriptor_, to.data() + have, to.size() - have, static_cast<off_t>(offset + have));
+    if (got < 0 && errno == EINTR) continue;
+    if (got < 0) return std::nullopt;
+    if (got == 0) break;
+    have += static_cast<std::size_t>(got);
+  }
+  InputCounter::add(path_, {.opens = 0, .bytes = have});
+  return have;
+}
+
+std::size_t InputFile::read_some(std::uint64_t offset, std::span<char> to) const {
+  const auto got = try_read(offset, to);
+  if (!got) fail();
+  return *got;
+}
+
+void InputFile::require(std::uint64_t offset, std::uint64_t count) const {
+  if (offset <= size_bytes_ && count <= size_bytes_ - offset) return;
+  throw InputError("expected " + std::to_string(count) + " bytes from byte " +
+                   std::to_string(offset) + " on, got a file of " + std::to_string(size_bytes_) +
+                   " bytes, in " + name_);
+}
+
+void InputFile::read_exactly(std::uint64_t offset, std::span<char> to) const {
+  const std::size_t got = read_some(offset, to);
+  if (got == to.size()) return;
+  throw InputError("expected " + std::to_string(to.size()) + " bytes from byte " +
+                   std::to_string(offset) + " on, got a file that has shrunk to " +
+                   std::to_string(offset + got) + " bytes, in " + name_);
+}
+
+std::string InputFile::read(std::uint64_t offset, std::uint64_t count) const {
+  require(offset, count);
+  std::string bytes(count, '\0');
+  read_exactly(offset, bytes);
+  return bytes;
+}
+
+std::vector<std::byte> InputFile::read_bytes(std::uint64_t offset, std::uint64_t count) const {
+  require(offset, count);
+  std::vector<std::byte> bytes(count);
+  read_exactly(offset, characters(bytes));
+  return bytes;
+}
+
+std::optional<std::string> InputFile::try_read_all() const {
+  std::string bytes(std::max<std::size_t>(size_bytes_ + 1, 4096), '\0');  // one more tells the end
+  std::size_t have = 0;
+  for (;;) {
+    const auto got = try_read(have, std::span(bytes).subspan(have));
+    if (!got) return std::nullopt;
+    have += *got;
+    if (have < bytes.size()) break;
+    bytes.resize(2 * bytes.size());  // it has grown, or tells no size, as those of /proc
+  }
+  bytes.resize(have);
+  return bytes;
+}
+
+std::string InputFile::read_all() const {
+  if (auto bytes = try_read_all()) return *std::move(bytes);
+  fail();
+}
+
+namespace {
+
+/// Where a stream of C is in its file.
+struct StreamPlace {
+  const InputFile& file;
+  std::uint64_t offset = 0;
+};
+
+ssize_t read_stream(void* cookie, char* to, std::size_t count) {
+  auto& [file, offset] = *static_cast<StreamPlace*>(cookie);
+  try {
+    const std::size_t got = file.read_some(offset, {to, count});
+    offset += got;
+    return static_cast<ssize_t>(got);
+  } catch (const InputError&) {  // the library sees ferror()
+    return -1;
   }
 }
 
-void load_ahead(const std::filesystem::path& file) {
-  std::string nobody_asks;
-  const InputFile opened = open_input(file, nobody_asks);
-  struct stat status {};
-  if (!opened || ::fstat(::fileno(opened.get()), &status) != 0) return;
+int seek_stream(void* cookie, off64_t* to, int from) {
+  auto& [file, offset] = *static_cast<StreamPlace*>(cookie);
+  if (from == SEEK_CUR) *to += static_cast<off64_t>(offset);
+  if (from == SEEK_END) *to += static_cast<off64_t>(file.size_bytes());
+  if (*to < 0) return -1;
+  offset = static_cast<std::uint64_t>(*to);
+  return 0;
+}
+
+int close_stream(void* cookie) {
+  delete static_cast<StreamPlace*>(cookie);
+  return 0;
+}
+
+}  // namespace
+
+InputFile::Stream InputFile::stream() const {
+  auto place = std::make_unique<StreamPlace>(StreamPlace{*this});
+  Stream stream(
+      ::fopencookie(place.get(), "rb", {read_stream, nullptr, seek_stream, close_stream}));
+  if (!stream) throw std::bad_alloc();
+  place.release();
+  return stream;
+}
+
+void InputFile::load_ahead() const {
   // At one call Linux loads no more than the file system's window for reading ahead: 128 KiB is the
   // smallest in use.
   constexpr off_t kWindow = 1 << 17;
-  for (off_t at = 0; at < status.st_size; at += kWindow) {
-    ::posix_fadvise(::fileno(opened.get()), at, kWindow, POSIX_FADV_WILLNEED);
+  for (off_t at = 0; at < static_cast<off_t>(size_bytes_); at += kWindow) {
+    ::posix_fadvise(descriptor_, at, kWindow, POSIX_FADV_WILLNEED);
   }
 }
 
 std::optional<std::string> try_read_file(const std::filesystem::path& file, std::string& reason) {
-  const InputFile opened = open_input(file, reason);
+  const auto opened = InputFile::open(file, reason);
   if (!opened) return std::nullopt;
-  std::string bytes;
-  std::array<char, 1 << 14> block;
-  std::size_t count = 0;
-  while ((count = std::fread(block.data(), 1, block.size(), opened.get())) > 0) {
-    bytes.append(block.data(), count);
-  }
-  if (!std::ferror(opened.get())) return bytes;
-  reason = std::strerror(errno);
-  return std::nullopt;
+  auto bytes = opened->try_read_all();
+  if (!bytes) reason = std::strerror(errno);
+  return bytes;
 }
 
 std::string read_text_file(const std::filesystem::path& file) {
@@ -70,31 +195,27 @@ std::string read_text_file(const std::filesystem::path& file) {
   throw std::runtime_error("cannot read " + file.string() + ": " + reason);
 }
 
-FileBytes::FileBytes(const std::filesystem::path& file) : path_(file.string()) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  if (error) {
-    throw std::runtime_error("expected a file, got \"" + error.message() + "\", in " + path_);
-  }
-  size_bytes_ = size;
-  stream_.open(file, std::ios::binary);
+void require_regular_file(const std::filesystem::path& file) { InputFile{file}; }
+
+std::atomic<InputCounter*> InputCounter::current_ = nullptr;
+
+InputCounter::InputCounter() { current_ = this; }
+
+InputCounter::~InputCounter() { current_ = nullptr; }
+
+InputCounter::Count InputCounter::of(const std::filesystem::path& file) const {
+  const std::lock_guard lock(mutex_);
+  const auto found = counts_.find(std::filesystem::absolute(file).lexically_normal());
+  return found == counts_.end() ? Count() : found->second;
 }
 
-std::vector<std::byte> FileBytes::read(std::uint64_t offset, std::uint64_t count) const {
-  if (offset > size_bytes_ || count > size_bytes_ - offset) {
-    throw std::runtime_error("expected " + std::to_string(count) + " bytes from byte " +
-                             std::to_string(offset) + " on, got a file of " +
-                             std::to_string(size_bytes_) + " bytes, in " + path_);
-  }
-  std::vector<std::byte> bytes(count);
-  stream_.clear();
-  stream_.seekg(static_cast<std::streamoff>(offset));
-  stream_.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(count));
-  if (!stream_.is_open() || !stream_) {
-    throw std::runtime_error("expected " + std::to_string(count) + " readable bytes from byte " +
-                             std::to_string(offset) + " on, got fewer, in " + path_);
-  }
-  return bytes;
+void InputCounter::add(const std::filesystem::path& file, Count more) {
+  InputCounter* const counter = current_.load(std::memory_order_relaxed);
+  if (counter == nullptr) return;
+  const std::lock_guard lock(counter->mutex_);
+  Count& count = counter->counts_[std::filesystem::absolute(file).lexically_normal()];
+  count.opens += more.opens;
+  count.bytes += more.bytes;
 }
 
 }  // namespace eventgan

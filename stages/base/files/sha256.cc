@@ -3,14 +3,10 @@
 #include <openssl/evp.h>
 
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <memory>
 #include <new>
 #include <stdexcept>
 #include <vector>
-
-#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 namespace {
@@ -73,18 +69,19 @@ std::string sha256_hex(std::string_view text) {
   return sha256_hex(std::as_bytes(std::span(text.data(), text.size())));
 }
 
+std::string sha256_of(const InputFile& file) {
+  std::vector<char> block(std::size_t{1} << 20);
+  Sha256 hash;
+  std::size_t count = 0;
+  for (std::uint64_t at = 0; (count = file.read_some(at, block)) > 0; at += count) {
+    hash.update(std::string_view(block.data(), count));
+  }
+  return hash.hex();
+}
+
 std::string sha256_of_file(const std::filesystem::path& file) {
   std::string reason;
-  if (const InputFile opened = open_input(file, reason)) {
-    std::vector<char> block(std::size_t{1} << 20);
-    Sha256 hash;
-    std::size_t count = 0;
-    while ((count = std::fread(block.data(), 1, block.size(), opened.get())) > 0) {
-      hash.update(std::string_view(block.data(), count));
-    }
-    if (!std::ferror(opened.get())) return hash.hex();
-    reason = std::strerror(errno);
-  }
+  if (const auto opened = InputFile::open(file, reason)) return sha256_of(*opened);
   throw std::runtime_error("cannot read " + file.string() + ": " + reason);
 }
 

@@ -7,6 +7,8 @@
 #include <string>
 #include <string_view>
 
+#include "stages/base/files/input_file.h"
+
 namespace eventgan {
 
 /// SHA-256 of bytes that come in pieces. For one thread at a time.
@@ -32,7 +34,9 @@ class Sha256 {
 std::string sha256_hex(std::span<const std::byte> bytes);
 std::string sha256_hex(std::string_view text);
 
-/// Of a regular file's content, read in blocks. Throws std::runtime_error naming the path.
+/// Of a file's content, read in blocks. The second throws std::runtime_error "cannot read PATH:
+/// REASON" if it cannot be opened.
+std::string sha256_of(const InputFile& file);
 std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace eventgan

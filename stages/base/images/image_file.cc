@@ -4,11 +4,9 @@
 #include <array>
 #include <cctype>
 #include <cstdio>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <system_error>
 #include <utility>
 
 #include "stages/base/images/image_codecs.h"
@@ -22,23 +20,6 @@ void check_image_size(ImageSize size) {
 }
 
 namespace {
-
-struct FileCloser {
-  void operator()(std::FILE* file) const { std::fclose(file); }
-};
-using OpenFile = std::unique_ptr<std::FILE, FileCloser>;
-
-OpenFile open_file(const std::filesystem::path& path) {
-  std::error_code error;
-  const auto status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) throw std::runtime_error("expected a file, got none");
-  if (!std::filesystem::is_regular_file(status)) {
-    throw std::runtime_error("expected a file, got a folder or device");
-  }
-  OpenFile file(std::fopen(path.c_str(), "rb"));
-  if (file == nullptr) throw std::runtime_error("expected a readable file, got no permission");
-  return file;
-}
 
 struct Format {
   const char* name;
@@ -73,12 +54,11 @@ constexpr std::array<Format, 6> kFormats = {{
      decode_pnm, pnm_size, nullptr},
 }};
 
-/// None: the file is no image. Leaves `file` at its start.
-const Format* format_of(std::FILE* file) {
-  std::array<char, 12> start{};
-  const std::size_t length = std::fread(start.data(), 1, start.size(), file);
+/// None: the file is no image.
+const Format* format_of(const InputFile& file) {
+  std::array<char, 12> start;
+  const std::size_t length = file.read_some(0, start);
   if (length == 0) throw std::runtime_error("expected an image, got an empty file");
-  std::rewind(file);
   const auto* const format = std::ranges::find_if(kFormats, [&](const Format& one) {
     return one.starts(std::string_view(start.data(), length));
   });
@@ -88,22 +68,22 @@ const Format* format_of(std::FILE* file) {
 /// What one of a format's functions makes of the file, turned as is wanted; with its errors
 /// completed.
 template <class Result>
-Result read_by_format(const std::filesystem::path& path, Result (*Format::*read)(std::FILE*),
+Result read_by_format(const InputFile& file, Result (*Format::*read)(std::FILE*),
                       ImageOrientation wanted) {
-  const OpenFile file = open_file(path);
-  const Format* const format = format_of(file.get());
+  const Format* const format = format_of(file);
   if (format == nullptr) {
     throw std::runtime_error(
         "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind");
   }
+  const InputFile::Stream stream = file.stream();
   int orientation = 1;
   Result result;
   try {
     if (wanted == ImageOrientation::kUpright && format->orientation != nullptr) {
-      orientation = format->orientation(file.get());
-      std::rewind(file.get());
+      orientation = format->orientation(stream.get());
+      std::rewind(stream.get());
     }
-    result = (format->*read)(file.get());
+    result = (format->*read)(stream.get());
   } catch (const std::runtime_error& error) {
     throw std::runtime_error(std::string("expected a whole ") + format->name + ", got " +
                              error.what());
@@ -127,16 +107,28 @@ Buffer whole_file(std::FILE* file, std::size_t most) {
   return bytes;
 }
 
-bool is_image_file(const std::filesystem::path& file) {
-  return format_of(open_file(file).get()) != nullptr;
+InputFile open_image_file(const std::filesystem::path& file) {
+  std::string reason;
+  if (auto opened = InputFile::open(file, reason)) return *std::move(opened);
+  throw std::runtime_error("expected a readable file, got '" + reason + "'");
 }
 
-ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
+bool is_image(const InputFile& file) { return format_of(file) != nullptr; }
+
+ColourFrame decode_image(const InputFile& file, ImageOrientation orientation) {
   return read_by_format(file, &Format::decode, orientation);
 }
 
-ImageSize image_file_size(const std::filesystem::path& file, ImageOrientation orientation) {
+ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
+  return decode_image(open_image_file(file), orientation);
+}
+
+ImageSize image_size(const InputFile& file, ImageOrientation orientation) {
   return read_by_format(file, &Format::size, orientation);
+}
+
+ImageSize image_file_size(const std::filesystem::path& file, ImageOrientation orientation) {
+  return image_size(open_image_file(file), orientation);
 }
 
 }  // namespace eventgan

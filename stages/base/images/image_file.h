@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "manifests/values/frames.h"
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 
@@ -29,10 +30,13 @@ inline constexpr std::size_t kMaxImagePixels = std::size_t{1} << 26;
 /// the limit.
 void check_image_size(ImageSize size);
 
+/// The file, open. Throws std::runtime_error "expected a readable file, got 'REASON'", without the
+/// file's name, as all of these do.
+InputFile open_image_file(const std::filesystem::path& file);
+
 /// True if the file is an image by its first bytes, whatever its name. Throws std::runtime_error
-/// saying what is wrong ("expected an image, got an empty file") if it is missing, empty or a
-/// folder.
-bool is_image_file(const std::filesystem::path& file);
+/// "expected an image, got an empty file". Thread safe.
+bool is_image(const InputFile& file);
 
 /// How an image is taken: as it is stored, or turned as its orientation says (EXIF 2.32, tag
 /// 0x0112), which cameras write that were held upright.
@@ -40,16 +44,18 @@ enum class ImageOrientation { kStored, kUpright };
 
 /// Decodes a JPEG, PNG, WebP, TIFF, BMP or PNM file, told by its first bytes, strictly
 /// (image_codecs.h). Throws std::runtime_error saying what is wrong ("expected a whole PNG, got
-/// ..."), without the file's name. Thread safe.
+/// ..."). Thread safe.
 ///
 /// Upright, orientations 3, 6 and 8 are turned by 180, 90 and 270 degrees clockwise. Those that
 /// mirror (2, 4, 5, 7) throw too, "expected an image that is not mirrored, got EXIF orientation 2":
 /// one that was drawn from the other side is no other view of the scene. A file that tells none, or
 /// a number beyond 1 to 8, is taken as stored, as all do.
+ColourFrame decode_image(const InputFile& file, ImageOrientation orientation);
 ColourFrame decode_image_file(const std::filesystem::path& file,
                               ImageOrientation orientation = ImageOrientation::kStored);
 
 /// The size alone, from the header, turned as the image would be. Throws as above. Thread safe.
+ImageSize image_size(const InputFile& file, ImageOrientation orientation);
 ImageSize image_file_size(const std::filesystem::path& file,
                           ImageOrientation orientation = ImageOrientation::kStored);
 

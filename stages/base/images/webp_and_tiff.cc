@@ -1,5 +1,4 @@
 #include <tiffio.h>
-#include <unistd.h>
 #include <webp/decode.h>
 
 #include <algorithm>
@@ -60,17 +59,14 @@ class TiffFile {
   explicit TiffFile(std::FILE* file) {
     const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(
         TIFFOpenOptionsAlloc(), &TIFFOpenOptionsFree);
-    const int descriptor = dup(fileno(file));
-    if (options == nullptr || descriptor < 0) throw std::runtime_error("cannot start libtiff");
+    if (options == nullptr) throw std::runtime_error("cannot start libtiff");
     TIFFOpenOptionsSetMaxSingleMemAlloc(options.get(), 8 * kMaxImagePixels);
     TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_error, this);
     TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning, this);
     // Not mapped into memory ("m"): a file that is cut while it is read would end the program.
-    tiff_ = TIFFFdOpenExt(descriptor, "", "rm", options.get());
-    if (tiff_ == nullptr) {
-      close(descriptor);
-      fail("a damaged header");
-    }
+    tiff_ = TIFFClientOpenExt("", "rm", file, read_bytes, write_nothing, seek, keep_open,
+                              size_bytes, nullptr, nullptr, options.get());
+    if (tiff_ == nullptr) fail("a damaged header");
   }
   ~TiffFile() { TIFFClose(tiff_); }
   TiffFile(const TiffFile&) = delete;
@@ -123,6 +119,20 @@ class TiffFile {
   [[noreturn]] void fail(const std::string& otherwise) const {
     throw std::runtime_error(error_.empty() ? otherwise : error_);
   }
+
+  static tmsize_t read_bytes(void* file, void* to, tmsize_t count) {
+    return static_cast<tmsize_t>(
+        std::fread(to, 1, static_cast<std::size_t>(count), static_cast<std::FILE*>(file)));
+  }
+  static tmsize_t write_nothing(void*, void*, tmsize_t) { return 0; }
+  static toff_t seek(void* file, toff_t to, int from) {
+    auto* const stream = static_cast<std::FILE*>(file);
+    const bool done = fseeko(stream, static_cast<off_t>(to), from) == 0;
+    return done ? static_cast<toff_t>(ftello(stream)) : static_cast<toff_t>(-1);
+  }
+  static int keep_open(void*) { return 0; }
+  /// libtiff moves to where it reads before each reading.
+  static toff_t size_bytes(void* file) { return seek(file, 0, SEEK_END); }
 
   static int keep_error(TIFF*, void* file, const char*, const char* format, std::va_list values) {
     auto& error = static_cast<TiffFile*>(file)->error_;

@@ -11,13 +11,11 @@ extern "C" {
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <new>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 #include <thread>
 
 #include "stages/base/files/input_file.h"
@@ -26,9 +24,9 @@ namespace eventgan {
 namespace {
 
 /// FFmpeg takes plain text for a video (it draws the letters), so text is kept from it.
-bool is_text(std::FILE* file) {
-  std::array<char, 512> start{};
-  const auto end = start.begin() + std::fread(start.data(), 1, start.size(), file);
+bool is_text(const InputFile& file) {
+  std::array<char, 512> start;
+  const auto end = start.begin() + file.read_some(0, start);
   return std::find(start.begin(), end, '\0') == end;
 }
 
@@ -158,15 +156,11 @@ struct VideoFile::Decoder {
 VideoFile::VideoFile(const std::filesystem::path& path) {
   // What is wrong with a file is thrown, not told on the standard error stream as well.
   av_log_set_level(AV_LOG_QUIET);
-  std::error_code unknown;
-  if (!std::filesystem::exists(path, unknown)) {
-    throw std::runtime_error("expected a file, got none");
-  }
   std::string reason;
-  const InputFile file = open_input(path, reason);
+  const auto file = InputFile::open(path, reason);
   if (!file) throw std::runtime_error("expected a readable file, got '" + reason + "'");
   decoder_ = std::make_unique<Decoder>();
-  if (is_text(file.get()) || !decoder_->open(path)) {
+  if (is_text(*file) || !decoder_->open(path)) {
     throw std::runtime_error("expected a video, got a file that cannot be read as one");
   }
 }

@@ -12,7 +12,9 @@ namespace eventgan {
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
                                     ImageOrientation orientation) {
   try {
-    if (is_image_file(file)) return image_file_size(file, orientation);
+    if (const InputFile opened = open_image_file(file); is_image(opened)) {
+      return image_size(opened, orientation);
+    }
     const auto size_of = [](const ColourView& frame) { return frame.size; };
     return VideoWindow<ImageSize>(file, 1, size_of).frame(0);
   } catch (const std::runtime_error& error) {

@@ -37,12 +37,49 @@ SharedFrame SharedImages::get(const std::string& name, const std::function<Share
   }
 }
 
+bool SharedImages::has(const std::string& name) {
+  const std::lock_guard lock(mutex_);
+  return by_name_.contains(name);
+}
+
 void SharedImages::add(const std::string& name, std::shared_future<SharedFrame> frame) {
   images_.push_front({name, std::move(frame)});
   by_name_[images_.front().name] = images_.begin();
   if (images_.size() <= most_) return;
   by_name_.erase(images_.back().name);
   images_.pop_back();
+}
+
+void FilesAhead::expect(const std::filesystem::path& file) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (by_path_.contains(file.native())) return;
+  }
+  std::string nobody_asks;
+  auto opened = InputFile::open(file, nobody_asks);
+  if (!opened) return;
+  opened->load_ahead();
+  const std::lock_guard lock(mutex_);
+  if (by_path_.contains(file.native())) return;
+  files_.emplace_front(file.native(), *std::move(opened));
+  by_path_[files_.front().first] = files_.begin();
+  if (files_.size() <= kMost) return;
+  by_path_.erase(files_.back().first);
+  files_.pop_back();
+}
+
+InputFile FilesAhead::take(const std::filesystem::path& file) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = by_path_.find(file.native()); found != by_path_.end()) {
+      const auto place = found->second;
+      by_path_.erase(found);
+      InputFile taken = std::move(place->second);
+      files_.erase(place);
+      return taken;
+    }
+  }
+  return open_image_file(file);
 }
 
 namespace {
@@ -61,6 +98,11 @@ SharedFrame frame_or_fault(Prepare prepare) {
   }
 }
 
+/// What SharedImages call an image.
+std::string name_of(const FrameRef& frame, ImageOrientation orientation) {
+  return (orientation == ImageOrientation::kUpright ? "upright " : "stored ") + frame.path;
+}
+
 SampleFault fault_in(const FrameRef& frame, const std::string& reason) {
   return {reason + ", in " + frame.path};
 }
@@ -71,6 +113,7 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
     : base_(std::move(base)),
       spec_(std::move(spec)),
       images_(std::make_unique<SharedImages>(2 * pairs_under_way + kLongestGap + kMargin)),
+      files_(std::make_unique<FilesAhead>()),
       stills_(base_, pairs_under_way + kMargin),
       videos_(std::make_unique<OpenVideos<SharedFrame>>(
           pairs_under_way + kLongestGap + kMargin, [spec = spec_](const ColourView& view) {
@@ -79,10 +122,9 @@ PairReader::PairReader(std::filesystem::path base, ImageSpec spec, int pairs_und
 
 SharedFrame PairReader::frame(const FrameRef& ref, ImageOrientation orientation) const {
   if (ref.video_frame >= 0) return videos_->frames<1>(base_ / ref.path, {ref.video_frame})[0];
-  const char* how = orientation == ImageOrientation::kUpright ? "upright " : "stored ";
-  return images_->get(how + ref.path, [&] {
+  return images_->get(name_of(ref, orientation), [&] {
     return frame_or_fault([&] {
-      const ColourFrame image = decode_image_file(base_ / ref.path, orientation);
+      const ColourFrame image = decode_image(files_->take(base_ / ref.path), orientation);
       return prepare_frame({image.size, image.bgr.data()}, spec_);
     });
   });
@@ -111,20 +153,25 @@ Outcome<std::array<SharedFrame, 2>> PairReader::frames(const FramePair& pair,
 Outcome<std::array<PreparedFrame, 2>> PairReader::still(const FramePair& pair,
                                                         ImageOrientation orientation,
                                                         std::int64_t stride) const {
-  const Outcome<ColourFrame> image = stills_.decode(pair.next, stride, orientation);
-  if (is_fault(image)) return std::get<SampleFault>(image);
-  const ColourFrame& colour = std::get<ColourFrame>(image);
   try {
+    if (pair.next.video_frame < 0) {
+      const ColourFrame image = decode_image(files_->take(base_ / pair.next.path), orientation);
+      return prepare_still({image.size, image.bgr.data()}, pair, spec_);
+    }
+    const Outcome<ColourFrame> image = stills_.decode(pair.next, stride);
+    if (is_fault(image)) return std::get<SampleFault>(image);
+    const ColourFrame& colour = std::get<ColourFrame>(image);
     return prepare_still({colour.size, colour.bgr.data()}, pair, spec_);
   } catch (const std::runtime_error& error) {
     return fault_in(pair.next, error.what());
   }
 }
 
-void PairReader::expect(const FramePair& pair) const {
+void PairReader::expect(const FramePair& pair, ImageOrientation orientation) const {
   for (const FrameRef* frame : {&pair.previous, &pair.next}) {
     if (pair.motion && frame == &pair.next) break;  // both are one image
-    if (frame->video_frame < 0) load_ahead(base_ / frame->path);
+    if (frame->video_frame >= 0 || images_->has(name_of(*frame, orientation))) continue;
+    files_->expect(base_ / frame->path);
   }
 }
 

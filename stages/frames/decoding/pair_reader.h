@@ -40,6 +40,9 @@ class SharedImages {
   /// (as an algorithm that runs in parallel in the same thread pool does).
   SharedFrame get(const std::string& name, const std::function<SharedFrame()>& make);
 
+  /// Whether `get` would not call `make`, at this moment.
+  bool has(const std::string& name);
+
  private:
   struct Image {
     std::string name;
@@ -55,10 +58,31 @@ class SharedImages {
   std::unordered_map<std::string_view, std::list<Image>::iterator> by_name_;
 };
 
+/// Files of images that will be read soon: open, and being loaded by the system. Thread safe.
+class FilesAhead {
+ public:
+  /// Opens the file, unless it is open here already. Of one that cannot be opened nothing is kept,
+  /// nor told: who reads it says why. Beyond kMost, the one that has waited longest is closed.
+  void expect(const std::filesystem::path& file);
+
+  /// The file, which is forgotten here; opened now if it was not expected. Throws as
+  /// open_image_file.
+  InputFile take(const std::filesystem::path& file);
+
+  /// Of the 1024 files that a process may have open unless its user asks for more.
+  static constexpr std::size_t kMost = 256;
+
+ private:
+  std::mutex mutex_;
+  std::list<std::pair<std::string, InputFile>> files_;  ///< by path; the latest first
+  std::unordered_map<std::string_view, std::list<std::pair<std::string, InputFile>>::iterator>
+      by_path_;
+};
+
 /// Decodes frame pairs from images and videos, as FrameDecoder does, and prepares them as `spec`
 /// says (prepare_frame). Pairs near each other in the plan share frames: the prepared frames used
-/// last are kept, so that each is decoded once. A file that changes meanwhile may be seen as it
-/// was.
+/// last are kept, so that each is opened and decoded once. A file that changes meanwhile may be
+/// seen as it was.
 ///
 /// A still's pair (FramePair::motion) is made of its one image (prepare_still); of a video,
 /// besides, as many whole colour frames are kept as prepared ones.
@@ -83,7 +107,8 @@ class PairReader {
 
   /// Has the system load the images of a pair that will be read soon, so that reading it does not
   /// wait for the disk. (Videos are read in order; the system looks ahead in these by itself.)
-  void expect(const FramePair& pair) const;
+  void expect(const FramePair& pair,
+              ImageOrientation orientation = ImageOrientation::kStored) const;
 
  private:
   Outcome<std::array<SharedFrame, 2>> frames(const FramePair& pair,
@@ -95,6 +120,7 @@ class PairReader {
   std::filesystem::path base_;
   ImageSpec spec_;
   std::unique_ptr<SharedImages> images_;
+  std::unique_ptr<FilesAhead> files_;
   FrameDecoder stills_;
   std::unique_ptr<OpenVideos<SharedFrame>> videos_;
 };

@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <optional>
 #include <ranges>
 #include <stdexcept>
@@ -14,6 +12,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/base/files/input_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/source_folders.h"
 
@@ -91,9 +90,9 @@ bool same_bytes(const std::filesystem::path& a, const std::filesystem::path& b) 
   const auto size_a = std::filesystem::file_size(a, error_a);
   const auto size_b = std::filesystem::file_size(b, error_b);
   if (error_a || error_b || size_a != size_b) return false;
-  std::ifstream stream_a(a, std::ios::binary), stream_b(b, std::ios::binary);
-  using Bytes = std::istreambuf_iterator<char>;
-  return stream_a && stream_b && std::equal(Bytes(stream_a), Bytes(), Bytes(stream_b), Bytes());
+  std::string nobody_asks;
+  const auto text = try_read_file(a, nobody_asks);
+  return text && text == try_read_file(b, nobody_asks);
 }
 
 namespace {

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <cstring>
 #include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -15,7 +13,6 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
-#include "stages/base/files/input_file.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/source_folders.h"
 
@@ -25,12 +22,7 @@ namespace {
 /// A file read byte for byte, which knows how many the parser has taken.
 class CountedBytes {
  public:
-  CountedBytes(const std::filesystem::path& file, const std::string& written) : written_(written) {
-    std::string reason;
-    file_ = open_input(file, reason);
-    if (!file_) throw InputError("expected a COCO file, got '" + reason + "', in " + written);
-    fill();
-  }
+  explicit CountedBytes(const InputFile& file) : file_(file) { fill(); }
 
   bool at_end() const { return next_ == end_; }
   char current() const { return block_[next_]; }
@@ -44,15 +36,10 @@ class CountedBytes {
  private:
   void fill() {
     next_ = 0;
-    end_ = std::fread(block_.data(), 1, block_.size(), file_.get());
-    if (end_ == 0 && std::ferror(file_.get())) {
-      throw InputError("expected a readable file, got '" + std::string(std::strerror(errno)) +
-                       "', in " + written_);
-    }
+    end_ = file_.read_some(taken_, block_);
   }
 
-  std::string written_;
-  InputFile file_;
+  const InputFile& file_;
   std::array<char, 1 << 16> block_;
   std::size_t next_ = 0, end_ = 0;
   std::uint64_t taken_ = 0;
@@ -365,8 +352,8 @@ void join(const std::vector<CocoReader::Annotation>& annotations, CocoIndex& ind
 
 }  // namespace
 
-CocoIndex index_coco(const std::filesystem::path& file, const std::string& written) {
-  CountedBytes bytes(file, written);
+CocoIndex index_coco(const InputFile& file, const std::string& written) {
+  CountedBytes bytes(file);
   CocoReader reader(bytes, written);
   nlohmann::json::sax_parse(CountedIterator(bytes), CountedIterator(), &reader);
   // The parser takes a NUL for the end.

@@ -3,7 +3,6 @@
 #include <unordered_map>
 #include <utility>
 
-#include "stages/base/files/input_file.h"
 #include "stages/frames/own_labels/detail/coco_entry.h"
 #include "stages/frames/own_labels/detail/frame_names.h"
 #include "stages/frames/own_labels/own_labels.h"
@@ -15,7 +14,7 @@ class CocoLabels : public OwnLabels {
  public:
   CocoLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
       : OwnLabels(std::move(labelled)),
-        file_(base / spec.path),
+        file_(base / spec.path, spec.path),
         written_(spec.path),
         index_(index_coco(file_, written_)) {
     annotation_files_.push_back(written_);
@@ -26,10 +25,8 @@ class CocoLabels : public OwnLabels {
 
   Outcome<Annotation> annotation(const std::string& label_key) const override try {
     const CocoIndex::Image& image = find(label_key);
-    const FileBytes bytes(file_);
     const auto read = [&](const ByteRange& range) {
-      const auto part = bytes.read(range.offset, range.length);
-      return std::string(reinterpret_cast<const char*>(part.data()), part.size());
+      return file_.read(range.offset, range.length);
     };
     std::string text = read(image.entry);
     Outcome<ImageSize> size = image_size(label_key, read_coco_image(text, image.id, written_));
@@ -85,7 +82,7 @@ class CocoLabels : public OwnLabels {
     return index_.images[place->second];
   }
 
-  std::filesystem::path file_;
+  InputFile file_;
   std::string written_;
   CocoIndex index_;
   std::unordered_map<std::int64_t, std::size_t> place_of_id_;

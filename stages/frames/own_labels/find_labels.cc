@@ -59,8 +59,8 @@ class WholeFiles {
 std::string beginning_of(const fs::path& file) {
   std::string text(1 << 16, '\0');
   std::string reason;
-  const InputFile opened = open_input(file, reason);
-  text.resize(opened ? std::fread(text.data(), 1, text.size(), opened.get()) : 0);
+  const auto opened = InputFile::open(file, reason);
+  text.resize(opened ? opened->read_some(0, text) : 0);
   return text;
 }
 

@@ -26,10 +26,8 @@ constexpr std::uint64_t kBytesPerTensor = 1024;
 }
 
 std::unique_ptr<CheckpointArchive> open_checkpoint(const std::filesystem::path& file) {
-  const FileBytes bytes(file);
-  const std::vector<std::byte> head =
-      bytes.read(0, std::min<std::uint64_t>(bytes.size_bytes(), 512));
-  const std::string_view text(reinterpret_cast<const char*>(head.data()), head.size());
+  const InputFile bytes(file);
+  const std::string text = bytes.read(0, std::min<std::uint64_t>(bytes.size_bytes(), 512));
   if (text.starts_with("PK")) return open_zip_checkpoint(file);
   if (text.starts_with('\x80')) return open_legacy_checkpoint(file);
   const bool is_tar = text.size() > 262 && text.substr(257, 5) == "ustar";
@@ -137,7 +135,7 @@ StateDict convert(const CheckpointArchive& archive,
 StateDict read_checkpoint(const std::filesystem::path& file, const std::string& network) try {
   const auto archive = open_checkpoint(file);
   const PickleDocument& document = archive->document();
-  CheckpointMemory memory(most_checkpoint_memory(FileBytes(file).size_bytes()));
+  CheckpointMemory memory(most_checkpoint_memory(InputFile(file).size_bytes()));
   memory.take(document.memory_bytes());
   const auto tensors = stored_tensors(choose_network(document.root(), network), memory);
   return convert(*archive, tensors, memory);

@@ -38,7 +38,7 @@ class ZipCheckpoint : public CheckpointArchive {
   }
 
   PickleDocument read_pickle(const std::filesystem::path& file) const {
-    const std::uint64_t size = FileBytes(file).size_bytes();
+    const std::uint64_t size = InputFile(file).size_bytes();
     const std::string name = prefix_ + std::string(kPickle);
     const std::vector<std::byte> pickle = archive_.read(name, most_pickle_bytes(size));
     return PickleDocument(pickle, checkpoint_globals(), file.string() + ":" + name, nullptr,
@@ -88,7 +88,7 @@ class LegacyCheckpoint : public CheckpointArchive {
       fail("a storage of at most " + std::to_string(most_bytes) + " bytes",
            std::to_string(extent.size_bytes));
     }
-    return bytes_.read(extent.begin, extent.size_bytes);
+    return bytes_.read_bytes(extent.begin, extent.size_bytes);
   }
 
  private:
@@ -99,7 +99,8 @@ class LegacyCheckpoint : public CheckpointArchive {
   /// Reads the five pickles; sets keys_ and values_begin_.
   PickleDocument read_pickles() {
     const std::uint64_t size = bytes_.size_bytes();
-    const std::vector<std::byte> head = bytes_.read(0, std::min(size, most_pickle_bytes(size)));
+    const std::vector<std::byte> head =
+        bytes_.read_bytes(0, std::min(size, most_pickle_bytes(size)));
     std::uint64_t memory = most_pickle_memory(size);
     const auto next = [&](const char* what, const std::set<std::string>& globals) {
       std::size_t used = 0;
@@ -188,7 +189,7 @@ class LegacyCheckpoint : public CheckpointArchive {
     return count;
   }
 
-  FileBytes bytes_;
+  InputFile bytes_;
   std::string name_;
   std::uint64_t values_begin_ = 0;
   std::unique_ptr<PickleDocument> keys_;

@@ -358,7 +358,7 @@ TEST(ManifestFile, ThatCannotBeReadIsMissingInput) {
       ThrowsMessage<InputError>("expected a manifest, got \"No such file or directory\", in " +
                                 (folder / "none.json").string()));
   EXPECT_THAT([&] { read_job_manifest(folder.path()); },
-              ThrowsMessage<InputError>(HasSubstr("got \"a folder\"")));
+              ThrowsMessage<InputError>(HasSubstr("got \"Is a directory\"")));
 }
 
 TEST(ManifestFile, FaultsNameTheFile) {

@@ -2,9 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <string>
 #include <vector>
+
+#include "stages/base/files/input_file.h"
 
 namespace eventgan {
 
@@ -40,6 +41,6 @@ struct CocoIndex {
 /// (images[].id and file_name, annotations[].image_id, categories[].id and name); if an image, a
 /// category or a category's name is there twice, or an annotation is of no image: these all
 /// counted, and the first twenty named.
-CocoIndex index_coco(const std::filesystem::path& file, const std::string& written);
+CocoIndex index_coco(const InputFile& file, const std::string& written);
 
 }  // namespace eventgan

@@ -8,17 +8,26 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
+#include <cstdio>
 #include <stdexcept>
+#include <string_view>
 #include <thread>
+#include <utility>
 #include <vector>
 
+#include "manifests/values/faults.h"
 #include "stages/base/files/sha256.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
 namespace eventgan {
 namespace {
+
+using ::testing::ElementsAre;
+using ::testing::ThrowsMessage;
 
 TEST(ReadTextFile, GivesEveryByte) {
   const testing::TemporaryFolder folder;
@@ -48,16 +57,19 @@ TEST(ReadTextFile, NamesWhatItCannotRead) {
 }
 
 /// Opening a FIFO waits for its writer, and a device need not end.
-TEST(OpenInput, TakesRegularFilesOnlyAndNeverWaits) {
+TEST(InputFile, TakesRegularFilesOnlyAndNeverWaits) {
   const testing::TemporaryFolder folder;
   ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
   std::filesystem::create_symlink("/dev/zero", folder / "device");
   std::string reason;
   for (const char* name : {"fifo", "device"}) {
-    EXPECT_EQ(open_input(folder / name, reason), nullptr) << name;
+    EXPECT_FALSE(InputFile::open(folder / name, reason)) << name;
     EXPECT_EQ(reason, "Not a regular file") << name;
     EXPECT_THROW(read_text_file(folder / name), std::runtime_error) << name;
-    EXPECT_THROW(require_regular_file(folder / name), std::runtime_error) << name;
+    EXPECT_THAT(
+        [&] { require_regular_file(folder / name); },
+        ThrowsMessage<InputError>("expected a readable file, got 'Not a regular file', in " +
+                                  (folder / name).string()));
   }
   testing::write_file(folder / "file", "text");
   std::filesystem::create_symlink("file", folder / "link");
@@ -67,10 +79,9 @@ TEST(OpenInput, TakesRegularFilesOnlyAndNeverWaits) {
 
 /// Whether all of the file lies in the system's cache.
 bool is_cached(const std::filesystem::path& file) {
-  std::string reason;
-  const InputFile opened = open_input(file, reason);
+  const InputFile opened(file);
   const std::size_t size = std::filesystem::file_size(file);
-  void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, ::fileno(opened.get()), 0);
+  void* const mapped = ::mmap(nullptr, size, PROT_READ, MAP_SHARED, opened.descriptor(), 0);
   const auto page = static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
   std::vector<unsigned char> pages((size + page - 1) / page);
   const bool known = mapped != MAP_FAILED && ::mincore(mapped, size, pages.data()) == 0;
@@ -78,18 +89,17 @@ bool is_cached(const std::filesystem::path& file) {
   return known && std::ranges::all_of(pages, [](unsigned char state) { return state & 1; });
 }
 
-TEST(LoadAhead, BringsAllOfAFileIntoTheCache) {
+TEST(InputFile, IsLoadedAheadIntoTheCache) {
   const testing::TemporaryFolder folder;
   const std::filesystem::path file = folder / "file";
   testing::write_file(file, std::string(3'000'001, 'x'));
   {
-    std::string reason;
-    const InputFile opened = open_input(file, reason);
-    ::fdatasync(::fileno(opened.get()));
-    ::posix_fadvise(::fileno(opened.get()), 0, 0, POSIX_FADV_DONTNEED);
+    const InputFile opened(file);
+    ::fdatasync(opened.descriptor());
+    ::posix_fadvise(opened.descriptor(), 0, 0, POSIX_FADV_DONTNEED);
   }
   if (is_cached(file)) GTEST_SKIP() << "this file system keeps its files in memory";
-  load_ahead(file);
+  InputFile(file).load_ahead();
   const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(20);
   while (!is_cached(file) && std::chrono::steady_clock::now() < end) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
@@ -97,46 +107,108 @@ TEST(LoadAhead, BringsAllOfAFileIntoTheCache) {
   EXPECT_TRUE(is_cached(file));
 }
 
-TEST(LoadAhead, OfWhatIsNoFileDoesNothing) {
-  const testing::TemporaryFolder folder;
-  ASSERT_EQ(::mkfifo((folder / "fifo").c_str(), 0600), 0);
-  testing::write_file(folder / "empty", "");
-  for (const char* name : {"fifo", "empty", "none", "."}) load_ahead(folder / name);
-}
-
-TEST(FileBytes, ReadsParts) {
+TEST(InputFile, ReadsParts) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "f", "abcdef");
-  const FileBytes file(folder / "f");
+  const InputFile file(folder / "f");
   EXPECT_EQ(file.size_bytes(), 6u);
-  EXPECT_THAT(file.read(2, 3),
-              ::testing::ElementsAre(std::byte{'c'}, std::byte{'d'}, std::byte{'e'}));
-  EXPECT_EQ(file.read(0, 6).size(), 6u);
-  EXPECT_TRUE(file.read(6, 0).empty());
+  EXPECT_EQ(file.read(2, 3), "cde");
+  EXPECT_THAT(file.read_bytes(2, 2), ElementsAre(std::byte{'c'}, std::byte{'d'}));
+  EXPECT_EQ(file.read(0, 6), "abcdef");
+  EXPECT_EQ(file.read(6, 0), "");
+  std::array<char, 4> part{};
+  EXPECT_EQ(file.read_some(3, part), 3u);
+  EXPECT_EQ(std::string_view(part.data(), 3), "def");
+  EXPECT_EQ(file.read_some(7, part), 0u);
 }
 
-TEST(FileBytes, RefusesPartsBeyondTheEnd) {
+TEST(InputFile, RefusesPartsBeyondTheEnd) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "f", "abcdef");
-  const FileBytes file(folder / "f");
-  EXPECT_THROW(file.read(0, 7), std::runtime_error);
-  EXPECT_THROW(file.read(7, 0), std::runtime_error);
-  EXPECT_THROW(file.read(1, ~std::uint64_t{0}), std::runtime_error);
-  EXPECT_EQ(file.read(5, 1).size(), 1u);  // a refusal leaves the file readable
+  const InputFile file(folder / "f", "f");
+  EXPECT_THAT(
+      [&] { file.read(0, 7); },
+      ThrowsMessage<InputError>("expected 7 bytes from byte 0 on, got a file of 6 bytes, in f"));
+  EXPECT_THROW(file.read(7, 0), InputError);
+  EXPECT_THROW(file.read_bytes(1, ~std::uint64_t{0}), InputError);
+  EXPECT_EQ(file.read(5, 1), "f");
 }
 
-TEST(FileBytes, SaysThatAFileBecameShorter) {
+TEST(InputFile, SaysThatAFileBecameShorter) {
   const testing::TemporaryFolder folder;
   testing::write_file(folder / "f", "abcdef");
-  const FileBytes file(folder / "f");
+  const InputFile file(folder / "f", "f");
   std::filesystem::resize_file(folder / "f", 2);
-  EXPECT_THROW(file.read(0, 6), std::runtime_error);
+  EXPECT_THAT([&] { file.read(1, 5); },
+              ThrowsMessage<InputError>("expected 5 bytes from byte 1 on, got a file that has "
+                                        "shrunk to 2 bytes, in f"));
+  EXPECT_EQ(file.read_all(), "ab");
 }
 
-TEST(FileBytes, RefusesFoldersAndAbsentFiles) {
+TEST(InputFile, ReadsAllOfAFileThatHasGrownOrTellsNoSize) {
   const testing::TemporaryFolder folder;
-  EXPECT_THROW(FileBytes(folder.path()), std::runtime_error);
-  EXPECT_THROW(FileBytes(folder / "none"), std::runtime_error);
+  testing::write_file(folder / "f", "abc");
+  const InputFile file(folder / "f");
+  const std::string longer(10'000, 'x');
+  testing::write_file(folder / "f", longer);
+  EXPECT_EQ(file.read_all(), longer);
+  const InputFile told("/proc/self/status");
+  EXPECT_EQ(told.size_bytes(), 0u);
+  EXPECT_THAT(told.read_all(), ::testing::StartsWith("Name:"));
+}
+
+TEST(InputFile, RefusesFoldersAndAbsentFiles) {
+  const testing::TemporaryFolder folder;
+  EXPECT_THAT([&] { InputFile(folder.path(), "it"); },
+              ThrowsMessage<InputError>("expected a readable file, got 'Is a directory', in it"));
+  EXPECT_THROW(InputFile(folder / "none"), InputError);
+}
+
+/// What a library does to a stream of C.
+TEST(InputFile, IsAStreamOfCThatMovesAndEnds) {
+  const testing::TemporaryFolder folder;
+  std::string text;
+  for (int i = 0; i < 20'000; ++i) text += static_cast<char>(i * 7 + i / 256);
+  testing::write_file(folder / "f", text);
+  const InputFile file(folder / "f");
+  const InputFile::Stream stream = file.stream();
+  std::FILE* const c = stream.get();
+  std::string got(text.size() + 1, '\0');
+  EXPECT_EQ(std::fread(got.data(), 1, got.size(), c), text.size());
+  EXPECT_NE(std::feof(c), 0);
+  EXPECT_EQ(std::ftell(c), 20'000);
+  got.pop_back();
+  EXPECT_EQ(got, text);
+  std::rewind(c);
+  EXPECT_EQ(std::fgetc(c), static_cast<unsigned char>(text[0]));
+  ASSERT_EQ(std::fseek(c, 12'000, SEEK_CUR), 0);
+  EXPECT_EQ(std::fgetc(c), static_cast<unsigned char>(text[12'001]));
+  ASSERT_EQ(std::fseek(c, -3, SEEK_END), 0);
+  EXPECT_EQ(std::ftell(c), 19'997);
+  EXPECT_EQ(std::fgetc(c), static_cast<unsigned char>(text[19'997]));
+  EXPECT_NE(std::fseek(c, -1, SEEK_SET), 0);
+}
+
+TEST(InputCounter, CountsOpensAndBytesOfEachFile) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "f", "abcdef");
+  testing::write_file(folder / "g", std::string(3'000'000, 'x'));
+  const InputFile before(folder / "f");
+  const InputCounter counter;
+  const auto of = [&](const char* name) {
+    const InputCounter::Count count = counter.of(folder / name);
+    return std::pair(count.opens, count.bytes);
+  };
+  EXPECT_EQ(of("f"), std::pair(0ul, 0ul));
+  before.read(1, 2);
+  EXPECT_EQ(of("f"), std::pair(0ul, 2ul));
+  read_text_file(folder / "." / "f");
+  EXPECT_EQ(of("f"), std::pair(1ul, 8ul));
+  sha256_of_file(folder / "g");
+  require_regular_file(folder / "g");
+  EXPECT_EQ(of("g"), std::pair(2ul, 3'000'000ul));
+  EXPECT_THROW(InputFile(folder / "none"), InputError);
+  EXPECT_EQ(of("none"), std::pair(0ul, 0ul));
 }
 
 // FIPS 180-4 and the examples NIST publishes with it.

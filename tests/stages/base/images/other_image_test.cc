@@ -240,10 +240,10 @@ TEST(OtherImages, AreToldByTheirFirstBytes) {
   for (const std::string& bytes :
        {"P7 1 1 255\n\1"s, "P5"s, "RIFF\4\0\0\0WAVE"s, "II*"s, "GIF89a"s, "B"s}) {
     EXPECT_EQ(why_refused(folder, bytes), other) << bytes;
-    EXPECT_FALSE(is_image_file(folder / "image"));
+    EXPECT_FALSE(is_image(InputFile(folder / "image")));
   }
   write_file(folder / "image", "BM");
-  EXPECT_TRUE(is_image_file(folder / "image"));
+  EXPECT_TRUE(is_image(InputFile(folder / "image")));
 }
 
 }  // namespace

@@ -132,12 +132,13 @@ TEST(FrameDecoder, FaultsSayWhatIsWrongAndNameTheFile) {
 
   EXPECT_EQ(fault(decoder.decode(image_ref("sub/empty.png"))),
             "expected an image, got an empty file, in sub/empty.png");
-  EXPECT_EQ(fault(decoder.decode(image_ref("none.png"))), "expected a file, got none, in none.png");
+  EXPECT_EQ(fault(decoder.decode(image_ref("none.png"))),
+            "expected a readable file, got 'No such file or directory', in none.png");
   EXPECT_EQ(fault(decoder.decode(image_ref("text.png"))),
             "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind, in "
             "text.png");
   EXPECT_EQ(fault(decoder.decode(image_ref("folder.png"))),
-            "expected a file, got a folder or device, in folder.png");
+            "expected a readable file, got 'Is a directory', in folder.png");
   EXPECT_THAT(fault(decoder.decode(image_ref("short.jpg"))),
               AllOf(HasSubstr("expected a whole JPEG, got "), HasSubstr(", in short.jpg")));
   EXPECT_EQ(fault(decoder.decode(image_ref("cut.bmp"))),
@@ -169,7 +170,7 @@ TEST(FrameDecoder, KeepsAsManyFramesAsToldAndOpensAnewForEarlierOnes) {
     EXPECT_EQ(testing::counted(std::get<ColourFrame>(outcome)), position);
   }
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("clip.avi", 29))),
-            "expected a file, got none, in clip.avi");
+            "expected a readable file, got 'No such file or directory', in clip.avi");
 }
 
 TEST(FrameDecoder, SeveralVideosByTurns) {
@@ -216,7 +217,7 @@ TEST(FrameDecoder, VideoFaults) {
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("clip.avi", 9))), "no fault")
       << "the frames before the end are still there";
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("none.mp4", 0))),
-            "expected a file, got none, in none.mp4");
+            "expected a readable file, got 'No such file or directory', in none.mp4");
   EXPECT_EQ(fault(decoder.decode(testing::video_ref("words.txt", 0))),
             "expected a video, got a file that cannot be read as one, in words.txt");
 }

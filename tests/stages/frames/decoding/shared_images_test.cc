@@ -196,7 +196,46 @@ TEST(PairSharing, PairsThatShareAFrameDecodeItOnce) {
   EXPECT_EQ(std::get<PreparedPair>(reader.read(shared_pair("a.png", "b.png"))).input,
             std::get<PreparedPair>(first).input);
   EXPECT_THAT(why_none(PairReader(folder.path(), {}).read(shared_pair("a.png", "c.png"))),
-              HasSubstr("got none, in a.png"));
+              HasSubstr("got 'No such file or directory', in a.png"));
+}
+
+TEST(PairSharing, AnExpectedFileIsOpenedOnce) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    cv::imwrite((folder / name).string(), testing::gradient_image({5, 7}));
+  }
+  const PairReader reader(folder.path(), {});
+  const InputCounter counter;
+  for (const auto& pair : {shared_pair("a.png", "b.png"), shared_pair("b.png", "c.png"),
+                           shared_pair("none.png", "b.png")}) {
+    reader.expect(pair);
+  }
+  EXPECT_EQ(counter.of(folder / "b.png").opens, 1u);
+  EXPECT_EQ(why_none(reader.read(shared_pair("a.png", "b.png"))), "no fault");
+  reader.expect(shared_pair("b.png", "a.png"));  // both are kept
+  EXPECT_EQ(why_none(reader.read(shared_pair("b.png", "c.png"))), "no fault");
+  EXPECT_THAT(why_none(reader.read(shared_pair("none.png", "b.png"))),
+              HasSubstr("got 'No such file or directory', in none.png"));
+  for (const char* name : {"a.png", "b.png", "c.png"}) {
+    EXPECT_EQ(counter.of(folder / name).opens, 1u) << name;
+  }
+}
+
+TEST(FilesAhead, OfTooManyTheOneThatWaitedLongestIsClosed) {
+  const TemporaryFolder folder;
+  for (std::size_t i = 0; i <= FilesAhead::kMost; ++i) {
+    testing::write_file(folder / std::to_string(i), "x");
+  }
+  FilesAhead ahead;
+  const InputCounter counter;
+  const auto opens = [&](std::size_t i) { return counter.of(folder / std::to_string(i)).opens; };
+  for (std::size_t i = 0; i <= FilesAhead::kMost; ++i) ahead.expect(folder / std::to_string(i));
+  for (std::size_t i = 0; i <= FilesAhead::kMost; ++i) {
+    EXPECT_EQ(ahead.take(folder / std::to_string(i)).read_all(), "x");
+    EXPECT_EQ(opens(i), i == 0 ? 2u : 1u);
+  }
+  ahead.take(folder / "1");
+  EXPECT_EQ(opens(1), 2u);
 }
 
 TEST(PairSharing, SharedFramesMakeTheSameInputsAsUnsharedOnes) {
