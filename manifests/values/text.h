@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <sstream>
 #include <string>
@@ -28,6 +29,17 @@ std::string counts_text(const std::map<Key, std::int64_t>& counts, std::string_v
   const char* between = "";
   for (const auto& [key, count] : counts) {
     text << std::exchange(between, ", ") << name << key << ": " << count;
+  }
+  return text.str();
+}
+
+/// What `text_of`, a function or a member, says of each of the items, with `between` between them.
+template <class Items, class TextOf>
+std::string joined(const Items& items, std::string_view between, TextOf text_of) {
+  std::ostringstream text;
+  std::string_view before;
+  for (const auto& item : items) {
+    text << std::exchange(before, between) << std::invoke(text_of, item);
   }
   return text.str();
 }

@@ -8,12 +8,12 @@
 #include <iostream>
 #include <memory>
 #include <optional>
-#include <ranges>
 #include <string>
 #include <vector>
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/commands/options.h"
@@ -51,8 +51,7 @@ T value_of(const std::array<Word<T>, N>& words, const std::string& text, const c
     if (entry.word == text) return entry.value;
   }
   throw UsageError(fmt::format("{}: expected one of {}, got \"{}\"", option,
-                               fmt::join(words | std::views::transform(&Word<T>::word), ", "),
-                               text));
+                               joined(words, ", ", &Word<T>::word), text));
 }
 
 /// Replaces an axis by what the user names, if that is anything.

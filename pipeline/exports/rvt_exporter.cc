@@ -62,7 +62,8 @@ void put_box(std::string& rows, const RecordedBox& box) {
 std::vector<std::uint16_t> negative_first(const std::vector<float>& volume) {
   std::vector<std::uint16_t> halves(volume.size());
   to_halves(volume, halves.data());
-  std::ranges::rotate(halves, halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2));
+  std::rotate(halves.begin(), halves.begin() + static_cast<std::ptrdiff_t>(halves.size() / 2),
+              halves.end());
   return halves;
 }
 

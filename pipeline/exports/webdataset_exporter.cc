@@ -290,8 +290,8 @@ std::string card_text(const ExportWork& work, const std::vector<const ExportShar
   }
   text += "\n## Counts\n\n| split | what | count |\n|---|---|---|\n";
   for (const auto& [split, count] : counts) {
-    const auto row = [&](const std::string& what, std::int64_t number) {
-      text += fmt::format("| {} | {} | {} |\n", markdown(split), what, number);
+    const auto row = [&, name = markdown(split)](const std::string& what, std::int64_t number) {
+      text += fmt::format("| {} | {} | {} |\n", name, what, number);
     };
     row("samples", count.samples);
     for (const auto& [name, boxes] : count.boxes) row("boxes of class " + markdown(name), boxes);

@@ -38,10 +38,10 @@ ChosenPairs choose_pairs_of(const FitPart& part, const std::vector<int>& gaps, s
   });
   const std::size_t fitted = all.size() - all.size() / 4;
   const std::int64_t end = all[fitted - 1].last;
-  const auto later =
-      std::ranges::partition(std::span(all).subspan(fitted),
-                             [&](const FrameInterval& interval) { return interval.first >= end; });
-  const std::size_t kept = all.size() - fitted - later.size();
+  const auto rest = all.begin() + static_cast<std::ptrdiff_t>(fitted);
+  const auto later = std::partition(
+      rest, all.end(), [&](const FrameInterval& interval) { return interval.first >= end; });
+  const std::size_t kept = static_cast<std::size_t>(later - rest);
   return {some_of(std::span(all).first(fitted), most),
           some_of(std::span(all).subspan(fitted, kept), most)};
 }

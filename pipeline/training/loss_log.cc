@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <optional>
-#include <ranges>
 #include <span>
 #include <string>
 #include <utility>
@@ -86,7 +85,8 @@ std::map<std::string, double> mean_losses(std::span<const LossRow> rows, Trainin
                                           std::size_t count) {
   std::array<double, kLossNames.size()> sums{};
   std::array<std::size_t, kLossNames.size()> found{};
-  for (const LossRow& row : rows | std::views::reverse) {
+  for (auto last = rows.rbegin(); last != rows.rend(); ++last) {
+    const LossRow& row = *last;
     if (row.position.phase != phase || count-- == 0) break;
     for (std::size_t i = 0; i < sums.size(); ++i) {
       if (std::isnan(row.losses[i])) continue;

@@ -8,11 +8,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <ranges>
 #include <string>
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "manifests/values/training.h"
 #include "stages/training/detail/training_batch.h"
 #include "stages/training/detail/training_networks.h"
@@ -230,9 +230,8 @@ StepLosses Trainer::Learners::update(TrainingPhase phase, std::int64_t step,
   networks.generator->set_output_slope(
       faded(manifest.network.output_slope, step, 0.5 * double(manifest.steps.generator)));
 
-  const std::string where =
-      fmt::format(", in {} step {} of {}", to_string(phase), step,
-                  fmt::join(samples | std::views::transform(&TrainingSample::origin), "; "));
+  const std::string where = fmt::format(", in {} step {} of {}", to_string(phase), step,
+                                        joined(samples, "; ", &TrainingSample::origin));
   const UpdateLoss update_loss = loss(learner, batch, step);
   StepLosses result = values(update_loss, where);
   update_loss.total.backward();

@@ -7,13 +7,13 @@
 #include <filesystem>
 #include <initializer_list>
 #include <optional>
-#include <ranges>
 #include <string>
 #include <string_view>
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 
 namespace eventgan {
 
@@ -43,7 +43,7 @@ class SpecialKeys {
     if (!value || !kind_ || std::ranges::find(owners, *kind_) != owners.end()) return value;
     const auto word = [](Kind owner) { return to_string(owner); };
     value->fault(fmt::format("no such key for {} \"{}\" (only for {})", what_, to_string(*kind_),
-                             fmt::join(owners | std::views::transform(word), ", ")));
+                             joined(owners, ", ", word)));
     return std::nullopt;
   }
 

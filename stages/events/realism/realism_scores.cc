@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <ranges>
+#include <numeric>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -314,9 +314,10 @@ double share_distance(const RealismScores& scores, const RealismScores& real) {
 }
 
 RealismScores mean_scores(std::span<const RealismScores> scores) {
-  return field_by_field(scores, [&](const auto& value_of) {
-    return mean_of_numbers(std::views::iota(std::size_t{0}, scores.size()), value_of);
-  });
+  std::vector<std::size_t> all(scores.size());
+  std::iota(all.begin(), all.end(), std::size_t{0});
+  return field_by_field(scores,
+                        [&](const auto& value_of) { return mean_of_numbers(all, value_of); });
 }
 
 namespace {

@@ -80,8 +80,7 @@ FrameFolder::FrameFolder(std::string folder, std::string prefix, NumberedSequenc
       numbers_(labelled) {
   for (const auto& [number, name] : stored_.frames()) numbers_.push_back(number);
   std::ranges::sort(numbers_);
-  const auto repeated = std::ranges::unique(numbers_);
-  numbers_.erase(repeated.begin(), repeated.end());
+  numbers_.erase(std::unique(numbers_.begin(), numbers_.end()), numbers_.end());
 }
 
 FrameRef FrameFolder::frame(std::int64_t number) const {

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <ranges>
 #include <utility>
 
+#include "manifests/values/text.h"
 #include "stages/base/archives/detail/typed_array.h"
 
 namespace eventgan {
@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 
 std::string wanted_text(const std::vector<std::optional<std::size_t>>& shape) {
   const auto text = [](const auto& size) { return size ? std::to_string(*size) : "at least 1"; };
-  return fmt::format("[{}]", fmt::join(shape | std::views::transform(text), ", "));
+  return fmt::format("[{}]", joined(shape, ", ", text));
 }
 
 bool fits(const std::vector<std::size_t>& shape,

@@ -1,5 +1,6 @@
 #include "stages/frames/kitti/detail/calibration_file.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -14,7 +15,7 @@ bool has_full_rank(std::span<const double> matrix) {
   std::array<std::array<double, 3>, 3> m{};
   for (std::size_t i = 0; i < 3; ++i) {
     const auto row = matrix.subspan(i * matrix.size() / 3, 3);
-    const double scale = std::ranges::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2])});
+    const double scale = std::max({std::abs(row[0]), std::abs(row[1]), std::abs(row[2])});
     for (std::size_t j = 0; j < 3; ++j) m[i][j] = row[j] / scale;  // 0/0 is NaN
   }
   const double determinant = m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1]) -

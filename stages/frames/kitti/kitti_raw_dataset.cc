@@ -96,10 +96,11 @@ class KittiRawDataset : public Dataset {
 
   void add_date(const std::string& date) {
     std::vector<std::string> names = root_.folders_in(date);
-    const auto others = std::ranges::stable_partition(
-        names, [&](const std::string& name) { return is_drive_of(name, date); });
-    note({others.begin(), others.end()}, "folders that are no drive left out in", date);
-    names.erase(others.begin(), others.end());
+    const auto others =
+        std::stable_partition(names.begin(), names.end(),
+                              [&](const std::string& name) { return is_drive_of(name, date); });
+    note({others, names.end()}, "folders that are no drive left out in", date);
+    names.erase(others, names.end());
     if (names.empty()) return;
 
     const RawCalibration* calibration = nullptr;

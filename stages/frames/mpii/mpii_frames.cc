@@ -6,12 +6,12 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
-#include <ranges>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/images/image_file.h"
 #include "stages/frames/source_folders.h"
@@ -40,8 +40,8 @@ std::vector<std::string> annotation_folders(const SourceRoot& root) {
 [[noreturn]] void refuse_missing(const char* name, const std::vector<std::string>& folders,
                                  const fs::path& base) {
   const auto place = [&](const std::string& folder) { return (base / folder).string(); };
-  throw InputError(fmt::format("expected {}, got none, in {}", name,
-                               fmt::join(folders | std::views::transform(place), " or ")));
+  throw InputError(
+      fmt::format("expected {}, got none, in {}", name, joined(folders, " or ", place)));
 }
 
 }  // namespace

@@ -18,7 +18,7 @@
 #else
 #define EVENTGAN_AVX512
 #endif
-#define EVENTGAN_LANES_INLINE EVENTGAN_AVX512 [[gnu::always_inline]] inline
+#define EVENTGAN_LANES_INLINE EVENTGAN_AVX512 __attribute__((always_inline)) inline
 
 namespace eventgan {
 namespace {

@@ -39,6 +39,14 @@ TEST(Text, HasCountsByKey) {
   EXPECT_EQ(counts_text(Gaps{}, "gap "), "");
 }
 
+TEST(Text, JoinsWhatAFunctionOrAMemberSays) {
+  const auto doubled = [](int value) { return 2 * value; };
+  EXPECT_EQ(joined(std::vector{1, 2, 3}, " or ", doubled), "2 or 4 or 6");
+  EXPECT_EQ(joined(std::map<int, int>{{1, 7}, {2, 8}}, "; ", &std::pair<const int, int>::second),
+            "7; 8");
+  EXPECT_EQ(joined(std::vector<int>{}, ", ", doubled), "");
+}
+
 TEST(Text, NamesTheFirst) {
   EXPECT_EQ(some_of({"a", "b"}, 2), "a, b");
   EXPECT_EQ(some_of({"a", "b", "c"}, 2), "a, b, ...");
