@@ -149,7 +149,7 @@ struct PreviewReader::State {
   }
 };
 
-PreviewReader::PreviewReader(fs::path frames, std::vector<std::string>& warnings)
+PreviewReader::PreviewReader(const fs::path& frames, std::vector<std::string>& warnings)
     : state_(new State{frames, warnings, FrameDecoder(frames)}) {}
 PreviewReader::~PreviewReader() = default;
 PreviewReader::PreviewReader(PreviewReader&&) noexcept = default;

@@ -14,7 +14,7 @@ class PreviewReader {
  public:
   /// Relative frame paths start at `frames`. `warnings`, which outlives this, gets a line for each
   /// frame that cannot be shown.
-  PreviewReader(std::filesystem::path frames, std::vector<std::string>& warnings);
+  PreviewReader(const std::filesystem::path& frames, std::vector<std::string>& warnings);
   ~PreviewReader();
   PreviewReader(PreviewReader&&) noexcept;
 

@@ -484,6 +484,7 @@ PYBIND11_MODULE(_engine, module) {
   }
 #endif
   PYBIND11_NUMPY_DTYPE(EventRow, t, x, y, p);
+  // NOLINTNEXTLINE(performance-unnecessary-value-param): pybind11 wants it so
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(thrown);

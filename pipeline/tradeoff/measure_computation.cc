@@ -161,6 +161,7 @@ std::vector<RoundCost> take_turn(ComparedPairs& pairs, const Computation& comput
          const double generated_s = seconds(message, Stage::kGenerate);
          for (std::size_t k = 0; k < runners.size(); ++k) {
            // The last takes the volume itself, so that one type alone needs no more than convert.
+           // NOLINTNEXTLINE(bugprone-use-after-move): moved in the last round
            SampleMessage part = k + 1 < runners.size() ? message : std::move(message);
            runners[k]->stages.finish(part);
            const std::lock_guard lock(adding);

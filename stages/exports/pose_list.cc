@@ -91,7 +91,7 @@ std::string short_name(const std::string& name) {
 
 }  // namespace
 
-PckhTruth::PckhTruth(std::vector<std::string> joint_names) {
+PckhTruth::PckhTruth(const std::vector<std::string>& joint_names) {
   for (const std::string& name : joint_names) short_names_.push_back(short_name(name));
 }
 

@@ -41,7 +41,7 @@ std::string mpii_entry(const std::string& image, const ListedPerson& person);
 class PckhTruth {
  public:
   /// `joint_names` as JointChoice has them.
-  explicit PckhTruth(std::vector<std::string> joint_names);
+  explicit PckhTruth(const std::vector<std::string>& joint_names);
 
   /// The next person of the list. The head box is its own; without one, a square about the middle
   /// of its neck and its head's top, whose diagonal is the distance of the two / 0.6, so that the

@@ -103,7 +103,7 @@ std::vector<std::filesystem::path> files_of(const std::filesystem::path& folder,
 EcdRecording::EcdRecording(const std::filesystem::path& folder)
     : EcdRecording(folder, list_of_present_images(folder)) {}
 
-EcdRecording::EcdRecording(const std::filesystem::path& folder, EcdImageList images)
+EcdRecording::EcdRecording(const std::filesystem::path& folder, const EcdImageList& images)
     : name_(folder.string()),
       events_(folder / "events.txt"),
       frames_(files_of(folder, images), images.times_s),

@@ -227,7 +227,7 @@ std::optional<std::string> inflated(std::string_view stream, bool little) {
 }
 
 /// Finds the variable `name`; `bytes` is the whole file. Null `bytes` in the answer: there is none.
-MatVariable find_variable(std::shared_ptr<const std::string> file, const std::string& name) {
+MatVariable find_variable(const std::shared_ptr<const std::string>& file, const std::string& name) {
   const std::string_view bytes = *file;
   const std::string_view mark = bytes.size() < kHeaderBytes ? "" : bytes.substr(126, 2);
   const bool little = mark == "IM";

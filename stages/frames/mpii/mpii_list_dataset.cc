@@ -317,7 +317,7 @@ std::vector<fs::path> find_mpii_lists(const fs::path& root) {
   std::vector<fs::path> lists;
   for (const fs::path& folder : {root, root / "annot"}) {
     std::vector<std::string> files = list_folder(folder).files;
-    std::erase_if(files, [&](const fs::path name) {
+    std::erase_if(files, [&](const fs::path& name) {
       std::error_code unknown;
       return (name.extension() != ".json" && name.extension() != ".h5") ||
              fs::file_size(folder / name, unknown) > kLargestBytes;

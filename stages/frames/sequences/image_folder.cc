@@ -133,7 +133,7 @@ ImageFolder list_image_folder(const fs::path& folder) {
   }
   std::ranges::sort(listed.left_out);
   // A folder in a label's place is a label that cannot be read, not one that is not there.
-  std::erase_if(listed.folders, [&](const fs::path name) {
+  std::erase_if(listed.folders, [&](const fs::path& name) {
     return lower_extension(name) == ".json" && images.contains(name.stem().string()) &&
            listed.sidecars.try_emplace(name.stem().string(), name.string()).second;
   });

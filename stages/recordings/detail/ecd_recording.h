@@ -44,7 +44,7 @@ class EcdRecording final : public Recording {
   std::vector<std::string> notes() const override { return frames_.notes(); }
 
  private:
-  EcdRecording(const std::filesystem::path& folder, EcdImageList images);
+  EcdRecording(const std::filesystem::path& folder, const EcdImageList& images);
   std::int64_t first_byte_after(std::size_t frame) const;
 
   std::string name_;
