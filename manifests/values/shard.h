@@ -14,9 +14,6 @@
 
 namespace eventgan {
 
-inline constexpr char kShardFormat[] = "eventgan-shard";
-inline constexpr int kShardFormatVersion = 1;
-
 /// What the values of a volume, as generated, are.
 enum class VolumeUnit {
   kLearned,  ///< a network's: dimensionless, as the volumes of its training were normalised
@@ -39,11 +36,14 @@ struct ShardHeader {
   std::string scope;  ///< "motion"; empty if whole volumes are generated
   int tile_px = 0;    ///< side of the tiles of ShardSample::tiles; 0 if whole ones are
   LabelSchema label_schema;
+  std::string format_version;  ///< of a shard that is read, as its writer says it: "1.0"
+  /// The same: what it has that not every shard has.
+  std::vector<std::string> features;
   std::string preprocessing;  ///< JSON: fit, grey, blur, preset
   std::string plan_hash;      ///< SHA-256 of the frozen plan, hex
   std::string manifest_text;
   /// The weights' name: "shipped:8", "untrained:8", or the file as the manifest has it; empty for a
-  /// simulator, and of shards from before it was kept.
+  /// simulator.
   std::string weights;
   std::string weights_hash;  ///< SHA-256 of the weights (simulators: of `generator`), hex
   std::string generator;     ///< Generator::description()

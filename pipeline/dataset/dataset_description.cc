@@ -18,6 +18,7 @@
 #include "manifests/values/text.h"
 #include "pipeline/folder/shard_guard.h"
 #include "stages/shards/shard_reader.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 namespace {
@@ -156,9 +157,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr char kDatasetFormat[] = "eventgan-dataset";
-constexpr int kDatasetVersion = 1;
-
 Json counts_json(const DatasetCounts& counts) {
   Json gaps = Json::object();
   for (const auto& [gap, samples] : counts.gaps) gaps[std::to_string(gap)] = samples;
@@ -271,11 +269,25 @@ Json settings(const std::string& manifest_text) {
   return Json::parse(manifest_text, nullptr, /*allow_exceptions=*/true, /*ignore_comments=*/true);
 }
 
+/// Those of any of the shards.
+std::set<std::string> features(const DatasetParts& parts) {
+  std::set<std::string> features;
+  for (const ShardState& shard : parts.done) {
+    const auto header = parts.headers.find(shard.outline.source);
+    const bool is_known = header != parts.headers.end();
+    const auto names = features_of(shard.record->contents.optional_columns,
+                                   is_known ? header->second.label_schema : LabelSchema());
+    features.insert(names.begin(), names.end());
+  }
+  return features;
+}
+
 /// dataset.json but for its view.
 Json description(const DatasetParts& parts) {
   const ShardHeader& header = parts.headers.begin()->second;
   Json json = {{"format", kDatasetFormat},
-               {"version", kDatasetVersion},
+               {"version", to_string(kDatasetVersion)},
+               {"features", features(parts)},
                {"name", parts.frozen.plan.name},
                {"complete", parts.missing.empty()},
                {"plan_hash", parts.frozen.hash},

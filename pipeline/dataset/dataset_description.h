@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "manifests/documents/format_version.h"
 #include "manifests/values/job.h"
 #include "manifests/values/shard.h"
 #include "pipeline/folder/amendments.h"
@@ -16,6 +17,8 @@
 namespace eventgan {
 
 inline constexpr char kDescriptionName[] = "dataset.json";
+inline constexpr char kDatasetFormat[] = "eventgan-dataset";
+inline constexpr FormatVersion kDatasetVersion{1, 0};
 inline constexpr char kViewName[] = "dataset.h5";
 
 /// What a dataset is put together from.

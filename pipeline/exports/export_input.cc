@@ -17,6 +17,7 @@
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_scan.h"
 #include "stages/base/files/input_file.h"
+#include "stages/base/files/sha256.h"
 
 namespace eventgan {
 namespace {
@@ -74,9 +75,15 @@ ExportInput::ExportInput(const fs::path& folder, const std::vector<std::string>&
 void ExportInput::read_description(const std::vector<std::string>& splits) {
   const nlohmann::json json = read_dataset_json(folder_);
   const fs::path file = folder_ / kDescriptionName;
-  if (json.at("format") != "eventgan-dataset" || json.at("version") != 1) {
-    throw InputError("expected eventgan-dataset, version 1, got another document, in " +
+  if (json.at("format") != kDatasetFormat) {
+    throw InputError("expected format " + std::string(kDatasetFormat) + ", got another, in " +
                      file.string());
+  }
+  const auto& version = json.at("version");
+  const std::string found = version.is_string() ? version.get<std::string>() : "";
+  if (!readable_version(found, kDatasetVersion)) {
+    throw InputError("expected version " + readable_versions(kDatasetVersion) + ", got " +
+                     dump_json(version) + ", in " + file.string());
   }
   const FrozenOutline frozen = read_frozen_outline(folder_);
   name_ = json.at("name");

@@ -144,7 +144,7 @@ const RowRange& rows_of(const PlacedShard& shard, Rows rows) {
 }
 
 bool has_column(const CommitRecord& record, const ColumnSpec& spec) {
-  return !spec.optional || std::ranges::count(record.contents.optional_columns, spec.path) > 0;
+  return !spec.optional() || std::ranges::count(record.contents.optional_columns, spec.path) > 0;
 }
 
 /// The view's columns in its group.
@@ -188,7 +188,7 @@ class ViewColumns {
   void add(const ColumnSpec& spec, const std::vector<Element>& column) {
     const std::string path = below_group(spec.path);
     const std::vector<MappedRows> rows = mapped_rows(spec);
-    if (spec.optional && rows.empty()) return;
+    if (spec.optional() && rows.empty()) return;
     const Dims shape = dims(spec);
     const bool has_elements = std::ranges::count(shape, hsize_t{0}) == 0;
     if (!column.empty() || !has_elements) {
@@ -264,14 +264,22 @@ void write_view(hid_t group, const DatasetView& view) {
       [](const PlacedShard& placed) { return placed.shard.record.shard; }, level);
   create_groups(group);
   write_view_columns(group, view);
-  describe_columns(group, view.header);
+  std::vector<std::string> optional_columns;
+  for (const PlacedShard& placed : view.layout.shards) {
+    const auto& columns = placed.shard.record.contents.optional_columns;
+    optional_columns.insert(optional_columns.end(), columns.begin(), columns.end());
+  }
+  describe_columns(group, view.header, optional_columns);
 }
+
+constexpr char kViewFormat[] = "eventgan-view";
+constexpr FormatVersion kViewFormatVersion{1, 0};
 
 void write_file(hid_t file, const std::vector<DatasetView>& views) {
   std::vector<std::string> names;
   for (const DatasetView& view : views) names.push_back(view.group.empty() ? "/" : view.group);
   write_attribute(file, "format", std::string(kViewFormat));
-  write_attribute(file, "format_version", std::int32_t{kViewFormatVersion});
+  write_attribute(file, "format_version", to_string(kViewFormatVersion));
   write_attribute(file, "views", names);
   describe_origin(file, views.front().header);
   for (const DatasetView& view : views) {

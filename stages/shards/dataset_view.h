@@ -53,9 +53,6 @@ struct ViewLayout {
 /// the shard if its commit record's numbers of rows do not go with its number of samples.
 ViewLayout lay_out_view(std::vector<ViewShard> shards);
 
-inline constexpr char kViewFormat[] = "eventgan-view";
-inline constexpr int kViewFormatVersion = 1;
-
 /// Shards that are alike (dataset kind, volume shape, label names), read as one.
 struct DatasetView {
   std::string group;   ///< name of its group in the file; empty: the file's root

@@ -89,6 +89,8 @@ class Check {
     if (!same_bytes()) return faults_;
     const ShardReader reader(path_);
     check_header(reader.header());
+    const ShardContents contents = reader.contents();
+    check_features(reader.header(), contents);
     std::vector<QuarantinedSample> invalid;
     for (int slot = 0; slot < reader.header().sample_count; ++slot) {
       const ShardSample sample = reader.sample(slot);
@@ -96,7 +98,7 @@ class Check {
       check_sample(reader, slot, sample);
     }
     check_quarantined(invalid);
-    for (const std::string& found : contents_faults(record_.contents, reader.contents())) {
+    for (const std::string& found : contents_faults(record_.contents, contents)) {
       fault(found);
     }
     return faults_;
@@ -146,6 +148,13 @@ class Check {
     expect("name", record_.shard, header.name);
     expect("plan hash", record_.plan_hash, header.plan_hash);
     expect("number of samples", record_.samples, header.sample_count);
+  }
+
+  void check_features(const ShardHeader& header, const ShardContents& contents) {
+    std::vector<std::string> known = header.features;
+    for (const auto& unknown : unknown_features(known)) std::erase(known, unknown);
+    expect("features", text_of(features_of(contents.optional_columns, header.label_schema)),
+           text_of(known));
   }
 
   void check_sample(const ShardReader& reader, int slot, const ShardSample& sample) {

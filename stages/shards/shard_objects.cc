@@ -1,12 +1,17 @@
 #include "stages/shards/detail/shard_objects.h"
 
 #include <cstdint>
+#include <iostream>
 #include <limits>
+#include <mutex>
+#include <set>
 #include <stdexcept>
 #include <string>
 
+#include "manifests/documents/detail/json_text.h"
 #include "stages/shards/codec/quantization.h"
 #include "stages/shards/shard_summary.h"
+#include "stages/shards/shard_tables.h"
 
 namespace eventgan {
 
@@ -39,7 +44,7 @@ namespace {
 
 void write_root_attributes(hid_t file, const ShardHeader& header) {
   write_attribute(file, "format", std::string(kShardFormat));
-  write_attribute(file, "format_version", std::int32_t{kShardFormatVersion});
+  write_attribute(file, "format_version", to_string(kShardFormatVersion));
   write_attribute(file, "name", header.name);
   write_attribute(file, "dataset", header.dataset);
   write_attribute(file, "split", header.split);
@@ -130,8 +135,10 @@ Hdf5Handle create_objects(hid_t file, const ShardHeader& header) {
   return volume;
 }
 
-void describe_columns(hid_t location, const ShardHeader& header) {
+void describe_columns(hid_t location, const ShardHeader& header,
+                      const std::vector<std::string>& optional_columns) {
   const LabelSchema& schema = header.label_schema;
+  write_attribute(location, "features", features_of(optional_columns, schema));
   write_attribute(open_object(location, "labels/boxes/class_id"), "class_names",
                   schema.class_names);
   write_attribute(open_object(location, "labels/poses"), "joint_names", schema.joint_names);
@@ -156,20 +163,33 @@ void describe_columns(hid_t location, const ShardHeader& header) {
 
 namespace {
 
-/// Some came after the first shards were written.
 bool has_attribute(hid_t object, const char* name) {
   return checked(H5Aexists(object, name), "look for", name) > 0;
 }
 
-void check_format(hid_t file) {
+/// The format's version.
+std::string check_format(hid_t file) {
   const std::string format = read_text_attribute(file, "format");
   if (format != kShardFormat) {
     throw Hdf5Error("expected format " + std::string(kShardFormat) + ", got " + format);
   }
-  const int version = read_number_attribute(file, "format_version");
-  if (version != kShardFormatVersion) {
-    throw Hdf5Error("expected format version " + std::to_string(kShardFormatVersion) + ", got " +
-                    std::to_string(version));
+  const std::string version = read_text_attribute(file, "format_version");
+  if (!readable_version(version, kShardFormatVersion)) {
+    throw Hdf5Error("expected format_version " + readable_versions(kShardFormatVersion) +
+                    ", got \"" + version + "\"");
+  }
+  return version;
+}
+
+void warn_of_features(const ShardHeader& header) {
+  static std::mutex lock;
+  static std::set<std::string> told;
+  const std::lock_guard guard(lock);
+  for (const std::string& name : unknown_features(header.features)) {
+    if (!told.insert(name).second) continue;
+    std::cerr << "warning: " << escape_controls(header.name + ": has \"" + name)
+              << "\", which this "
+              << "program does not know and leaves out\n";
   }
 }
 
@@ -242,8 +262,8 @@ void read_tiles(hid_t file, ShardHeader& header) {
 }  // namespace
 
 ShardHeader read_header(hid_t file) {
-  check_format(file);
   ShardHeader header;
+  header.format_version = check_format(file);
   read_tiles(file, header);
   header.name = read_text_attribute(file, "name");
   header.dataset = read_text_attribute(file, "dataset");
@@ -251,7 +271,7 @@ ShardHeader read_header(hid_t file) {
   header.plan_hash = read_text_attribute(file, "plan_hash");
   header.manifest_text = read_text_attribute(file, "manifest");
   header.weights_hash = read_text_attribute(file, "weights_hash");
-  if (has_attribute(file, "weights")) header.weights = read_text_attribute(file, "weights");
+  header.weights = read_text_attribute(file, "weights");
   header.generator = read_text_attribute(file, "generator");
   header.program_version = read_text_attribute(file, "program_version");
   header.preprocessing = read_text_attribute(file, "preprocessing");
@@ -264,6 +284,8 @@ ShardHeader read_header(hid_t file) {
       has_attribute(poses, "joint_aliases")) {
     header.label_schema.joint_aliases = read_texts_attribute(poses, "joint_aliases");
   }
+  header.features = read_texts_attribute(file, "features");
+  warn_of_features(header);
   return header;
 }
 

@@ -48,7 +48,7 @@ bool is_counted(const ColumnSpec& spec) {
   constexpr const char* kCounted[] = {"/pairs/sample_id",      "/pairs/gap_frames",
                                       "/labels/boxes/offsets", "/labels/boxes/class_id",
                                       "/labels/poses/offsets", "/valid"};
-  return spec.optional ||
+  return spec.optional() ||
          std::ranges::find(kCounted, std::string_view(spec.path)) != std::end(kCounted);
 }
 
@@ -80,7 +80,7 @@ class ColumnReader {
   void operator()(const ColumnSpec& spec, std::vector<Element>& column) {
     if (columns_ == Columns::kCounted && !is_counted(spec)) return;
     if (columns_ == Columns::kOverview && !is_overview(spec)) return;
-    if (spec.optional && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
+    if (spec.optional() && H5Lexists(shard_.file, spec.path, H5P_DEFAULT) <= 0) return;
     Dims dims;
     try {
       column = read_dataset<Element>(shard_.file, spec.path, dims);

@@ -31,8 +31,7 @@ class ShardReader {
   ShardContents contents() const;
 
   /// Everything about slot `slot` but its volume. `fault` is empty, since it is in the commit
-  /// record; in a shard from before frame times were kept they are relative to the previous frame.
-  /// Throws std::out_of_range.
+  /// record. Throws std::out_of_range.
   ShardSample sample(int slot) const;
 
   /// The volume of slot `slot`, decoded to float32 [2 bins, H, W], C order.

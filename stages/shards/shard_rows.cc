@@ -282,17 +282,15 @@ std::optional<LensDistortion> distortion_if_any(const std::vector<double>& colum
   return LensDistortion{number[0], number[1], number[2], number[3], number[4]};
 }
 
-/// A shard from before times were kept tells the gap: then the previous frame's is 0.
 FramePair pair_at(const PairColumns& from, std::size_t row) {
-  const auto time_s = [row](const std::vector<double>& column, double otherwise) {
-    return column.empty() ? otherwise : column[row];
+  const auto time_s = [row](const std::vector<double>& column) {
+    return column.empty() ? kNan : column[row];
   };
-  const double gap_s = from.gap_s[row];
   FramePair pair;
   pair.previous = {from.prev_path[row], from.prev_index[row], from.prev_video_frame[row],
-                   time_s(from.prev_time_s, std::isnan(gap_s) ? kNan : 0)};
+                   time_s(from.prev_time_s)};
   pair.next = {from.next_path[row], from.next_index[row], from.next_video_frame[row],
-               time_s(from.next_time_s, gap_s)};
+               time_s(from.next_time_s)};
   pair.gap_frames = from.gap_frames[row];
   pair.label_index = from.label_index[row];
   pair.label_position = from.label_position[row];

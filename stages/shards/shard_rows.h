@@ -11,8 +11,7 @@ namespace eventgan {
 /// annotation is kept of it.
 void append_row(const ShardHeader& header, const ShardSample& sample, ShardTables& tables);
 
-/// Row `slot` as it was appended; in tables from before frame times were kept these are relative to
-/// the previous frame. The tables must be consistent, as ShardReader sees to.
+/// Row `slot` as it was appended. The tables must be consistent, as ShardReader sees to.
 ShardSample extract_row(const ShardHeader& header, const ShardTables& tables, int slot);
 
 }  // namespace eventgan

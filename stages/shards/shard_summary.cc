@@ -16,6 +16,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/events.h"
 #include "manifests/values/text.h"
+#include "stages/shards/detail/shard_objects.h"
 #include "stages/shards/shard_tables.h"
 
 namespace eventgan {
@@ -120,7 +121,8 @@ std::string describe_shard(const ShardReader& reader) {
   const ShardHeader& header = reader.header();
   const ShardCounts counts = count_shard(reader);
   Lines line(header.name);
-  line("format", "{} {}, written by {}", kShardFormat, kShardFormatVersion, header.program_version);
+  line("format", "{} {}, written by {}", kShardFormat, header.format_version,
+       header.program_version);
   line("dataset", "{}, split {}", header.dataset, header.split);
   line("samples", "{}, valid {}, without any event {}", header.sample_count, counts.valid,
        counts.empty_volumes);
@@ -135,6 +137,7 @@ std::string describe_shard(const ShardReader& reader) {
   if (!header.label_schema.joint_names.empty()) {
     line("joints", "{}", fmt::join(header.label_schema.joint_names, ", "));
   }
+  if (!header.features.empty()) line("features", "{}", fmt::join(header.features, ", "));
   line.add("preprocessing", header.preprocessing);
   line.add("generator", header.generator);
   line.add("weights", header.weights.empty() ? header.weights_hash
@@ -279,7 +282,7 @@ std::string shard_json(const ShardReader& reader) {
   const ShardCounts counts = count_shard(reader);
   return text({{"name", header.name},
                {"format", kShardFormat},
-               {"format_version", kShardFormatVersion},
+               {"format_version", header.format_version},
                {"dataset", header.dataset},
                {"split", header.split},
                {"samples", header.sample_count},
@@ -301,6 +304,7 @@ std::string shard_json(const ShardReader& reader) {
                {"generator", header.generator},
                {"weights", header.weights},
                {"weights_hash", header.weights_hash},
+               {"features", header.features},
                {"plan_hash", header.plan_hash},
                {"program_version", header.program_version},
                {"manifest", header.manifest_text}});

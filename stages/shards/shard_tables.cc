@@ -41,9 +41,32 @@ ShardContents contents_of(const ShardTables& tables, const ShardHeader& header) 
   }
   for (const std::int32_t gap : tables.pairs.gap_frames) ++contents.gaps[gap];
   visit_columns(tables, header, [&](const ColumnSpec& spec, const auto& column) {
-    if (spec.optional && !column.empty()) contents.optional_columns.push_back(spec.path);
+    if (spec.optional() && !column.empty()) contents.optional_columns.push_back(spec.path);
   });
   return contents;
+}
+
+std::vector<std::string> features_of(const std::vector<std::string>& optional_columns,
+                                     const LabelSchema& schema) {
+  std::vector<std::string> features;
+  const ShardTables none;
+  visit_columns(none, ShardHeader(), [&](const ColumnSpec& spec, const auto&) {
+    if (!spec.optional() || std::ranges::count(optional_columns, spec.path) == 0) return;
+    if (std::ranges::count(features, spec.feature) == 0) features.emplace_back(spec.feature);
+  });
+  if (!schema.joint_aliases.empty()) features.emplace_back("joint_aliases");
+  return features;
+}
+
+std::vector<std::string> unknown_features(const std::vector<std::string>& features) {
+  std::vector<std::string> all;
+  const ShardTables none;
+  visit_columns(none, ShardHeader(),
+                [&](const ColumnSpec& spec, const auto&) { all.emplace_back(spec.path); });
+  const std::vector<std::string> known = features_of(all, {{}, {}, {""}});
+  std::vector<std::string> unknown = features;
+  std::erase_if(unknown, [&](const auto& name) { return std::ranges::count(known, name) > 0; });
+  return unknown;
 }
 
 }  // namespace eventgan

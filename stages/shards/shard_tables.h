@@ -93,7 +93,11 @@ struct ColumnSpec {
   const char* path;
   Rows rows;
   std::vector<std::size_t> inner;
-  bool optional = false;  ///< not in the shard if no row has a value
+  /// Not in the shard if no row has a value; if there, the shard's `features` have this name. Null:
+  /// always there.
+  const char* feature = nullptr;
+
+  bool optional() const { return feature != nullptr; }
 };
 
 /// Calls visit(ColumnSpec, column) for every column, offsets before the rows they lead to. Writer,
@@ -114,9 +118,9 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/events/tiles",
                    Rows::kSamples,
                    {static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)},
-                   true},
+                   "tiles"},
         e.tiles);
-  visit(ColumnSpec{"/events/statistics/generated_fraction", Rows::kSamples, {}, true},
+  visit(ColumnSpec{"/events/statistics/generated_fraction", Rows::kSamples, {}, "tiles"},
         e.generated_fraction);
 
   auto& p = tables.pairs;
@@ -135,18 +139,18 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/pairs/label_position", Rows::kSamples, {}}, p.label_position);
   visit(ColumnSpec{"/pairs/source_size", Rows::kSamples, {2}}, p.source_size);
   visit(ColumnSpec{"/pairs/source_to_volume", Rows::kSamples, {2, 3}}, p.source_to_volume);
-  visit(ColumnSpec{"/pairs/prev_time_s", Rows::kSamples, {}, true}, p.prev_time_s);
-  visit(ColumnSpec{"/pairs/next_time_s", Rows::kSamples, {}, true}, p.next_time_s);
-  visit(ColumnSpec{"/pairs/subject", Rows::kSamples, {}, true}, p.subject);
-  visit(ColumnSpec{"/pairs/action", Rows::kSamples, {}, true}, p.action);
-  visit(ColumnSpec{"/pairs/camera", Rows::kSamples, {}, true}, p.camera);
-  visit(ColumnSpec{"/pairs/drive", Rows::kSamples, {}, true}, p.drive);
-  visit(ColumnSpec{"/pairs/motion", Rows::kSamples, {4}, true}, p.motion);
-  visit(ColumnSpec{"/pairs/threshold", Rows::kSamples, {}, true}, p.threshold);
+  visit(ColumnSpec{"/pairs/prev_time_s", Rows::kSamples, {}, "times"}, p.prev_time_s);
+  visit(ColumnSpec{"/pairs/next_time_s", Rows::kSamples, {}, "times"}, p.next_time_s);
+  visit(ColumnSpec{"/pairs/subject", Rows::kSamples, {}, "origin"}, p.subject);
+  visit(ColumnSpec{"/pairs/action", Rows::kSamples, {}, "origin"}, p.action);
+  visit(ColumnSpec{"/pairs/camera", Rows::kSamples, {}, "origin"}, p.camera);
+  visit(ColumnSpec{"/pairs/drive", Rows::kSamples, {}, "origin"}, p.drive);
+  visit(ColumnSpec{"/pairs/motion", Rows::kSamples, {4}, "motion"}, p.motion);
+  visit(ColumnSpec{"/pairs/threshold", Rows::kSamples, {}, "threshold"}, p.threshold);
 
   visit(ColumnSpec{"/labels/original", Rows::kSamples, {}}, tables.original);
-  visit(ColumnSpec{"/labels/projection", Rows::kSamples, {3, 4}, true}, tables.projection);
-  visit(ColumnSpec{"/labels/projection_source", Rows::kSamples, {3, 4}, true},
+  visit(ColumnSpec{"/labels/projection", Rows::kSamples, {3, 4}, "projection"}, tables.projection);
+  visit(ColumnSpec{"/labels/projection_source", Rows::kSamples, {3, 4}, "projection"},
         tables.projection_source);
 
   auto& b = tables.boxes;
@@ -162,7 +166,7 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/labels/boxes/ignore", Rows::kBoxes, {}}, b.ignore);
   visit(ColumnSpec{"/labels/boxes/ignore_source", Rows::kBoxes, {}}, b.ignore_source);
   visit(ColumnSpec{"/labels/boxes/track_id", Rows::kBoxes, {}}, b.track_id);
-  visit(ColumnSpec{"/labels/boxes/difficulty", Rows::kBoxes, {}, true}, b.difficulty);
+  visit(ColumnSpec{"/labels/boxes/difficulty", Rows::kBoxes, {}, "difficulty"}, b.difficulty);
 
   auto& h = tables.poses;
   visit(ColumnSpec{"/labels/poses/offsets", Rows::kOffsets, {}}, h.offsets);
@@ -175,12 +179,13 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   visit(ColumnSpec{"/labels/poses/scale_volume", Rows::kPersons, {}}, h.scale_volume);
   visit(ColumnSpec{"/labels/poses/head_box", Rows::kPersons, {4}}, h.head_box);
   visit(ColumnSpec{"/labels/poses/head_box_source", Rows::kPersons, {4}}, h.head_box_source);
-  visit(ColumnSpec{"/labels/poses/box", Rows::kPersons, {4}, true}, h.box);
-  visit(ColumnSpec{"/labels/poses/box_source", Rows::kPersons, {4}, true}, h.box_source);
-  visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, true}, h.joints3d_mm);
-  visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, true}, h.camera);
-  visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, true}, h.camera_source);
-  visit(ColumnSpec{"/labels/poses/camera_distortion", Rows::kPersons, {5}, true},
+  visit(ColumnSpec{"/labels/poses/box", Rows::kPersons, {4}, "person_boxes"}, h.box);
+  visit(ColumnSpec{"/labels/poses/box_source", Rows::kPersons, {4}, "person_boxes"}, h.box_source);
+  visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, "joints3d"},
+        h.joints3d_mm);
+  visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, "camera"}, h.camera);
+  visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, "camera"}, h.camera_source);
+  visit(ColumnSpec{"/labels/poses/camera_distortion", Rows::kPersons, {5}, "camera"},
         h.camera_distortion);
 
   visit(ColumnSpec{"/valid", Rows::kSamples, {}}, tables.valid);
@@ -188,5 +193,13 @@ void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
 
 /// Counts the rows of consistent tables; a box whose class has no name is of no class.
 ShardContents contents_of(const ShardTables& tables, const ShardHeader& header);
+
+/// Names of what not every shard has, and one with these columns (paths) and names of joints has:
+/// the columns' features and "joint_aliases". Each once, in the order of the columns.
+std::vector<std::string> features_of(const std::vector<std::string>& optional_columns,
+                                     const LabelSchema& schema);
+
+/// Those of `features` that this program does not know.
+std::vector<std::string> unknown_features(const std::vector<std::string>& features);
 
 }  // namespace eventgan

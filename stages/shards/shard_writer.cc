@@ -65,7 +65,7 @@ void ShardWriter::State::write_columns() {
     throw std::logic_error("unknown kind of rows");
   };
   visit_columns(columns, header, [&](const ColumnSpec& spec, const auto& column) {
-    if (spec.optional && column.empty()) return;
+    if (spec.optional() && column.empty()) return;
     Dims dims{rows(spec.rows)};
     dims.insert(dims.end(), spec.inner.begin(), spec.inner.end());
     write_dataset(file.id(), spec.path, column, dims, header.deflate_level);
@@ -122,7 +122,8 @@ ShardReceipt ShardWriter::commit() {
   }
   state.write([&] {
     state.write_columns();
-    describe_columns(state.file.id(), state.header);
+    describe_columns(state.file.id(), state.header,
+                     contents_of(state.tables, state.header).optional_columns);
     state.volume.close("/events/volume");
     state.file.close();
   });

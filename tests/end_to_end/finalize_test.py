@@ -277,8 +277,8 @@ class Reading(unittest.TestCase):
         self.assertEqual(len(eventgan.Shards(self.out)), 14)
 
     def test_other_descriptions_are_refused(self):
-        (self.out / "dataset.json").write_text('{"format": "eventgan-dataset", "version": 2}')
-        with self.assertRaisesRegex(ValueError, "expected eventgan-dataset 1, got eventgan-dataset 2"):
+        (self.out / "dataset.json").write_text('{"format": "eventgan-dataset", "version": "2.0"}')
+        with self.assertRaisesRegex(ValueError, "expected eventgan-dataset 1.x, got eventgan-dataset 2.0"):
             eventgan.Shards(self.out)
 
 

@@ -139,15 +139,15 @@ class ForeignFolders(program.InFolder):
     def test_a_shard_of_a_newer_format(self):
         shard = sorted(self.out.glob("*-of-*.h5"))[0]
         with h5py.File(shard, "r+") as file:
-            file.attrs["format_version"] = file.attrs["format_version"].dtype.type(NEWER)
+            file.attrs["format_version"] = f"{NEWER}.0"
         data = shard.read_bytes()
         record = shard.with_suffix(".json")
         said = json.loads(record.read_text())
         record.write_text(json.dumps({**said, "size_bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}))
         for command, rest in ON_SHARDS.items():
-            self.assertRegex(self.one_line(command, shard, *rest), r"expected format version 1, got 99")
+            self.assertRegex(self.one_line(command, shard, *rest), r'this program reads versions 1.x\), got "99.0"')
         for command in ["verify", "finalize"]:
-            self.assertIn("expected format version 1, got 99", self.reports(shard, command, self.out, code=1))
+            self.assertIn('this program reads versions 1.x), got "99.0"', self.reports(shard, command, self.out, code=1))
 
     def test_a_shard_that_no_commit_record_vouches_for(self):
         shard = self.folder / "alone.h5"
@@ -160,8 +160,9 @@ class ForeignFolders(program.InFolder):
     def test_a_description_or_amendments_of_a_newer_version(self):
         description = self.out / "dataset.json"
         whole = description.read_text()
-        description.write_text(json.dumps({**json.loads(whole), "version": NEWER}))
-        self.assertRegex(self.one_line("export", self.out, *ON_FOLDERS["export"]), "version 1.*dataset.json")
+        description.write_text(json.dumps({**json.loads(whole), "version": f"{NEWER}.0"}))
+        self.assertRegex(self.one_line("export", self.out, *ON_FOLDERS["export"]),
+                         r'reads versions 1.x\), got "99.0", in .*dataset.json')
         self.reports(description, "verify", self.out, code=1)
         description.write_text(whole)
 

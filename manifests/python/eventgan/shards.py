@@ -16,9 +16,11 @@ from typing import Any, NamedTuple, Union
 import h5py
 import numpy as np
 
-FORMAT, FORMAT_VERSION = "eventgan-shard", 1
+FORMAT, FORMAT_VERSION = "eventgan-shard", "1.0"
+FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projection", "difficulty", "person_boxes",
+                      "joints3d", "camera", "joint_aliases"))
 PLAN = "plan.json"
-DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", 1
+DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
 VIEW = "dataset.h5"
 SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # nothing that leads elsewhere
 FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "original")
@@ -681,14 +683,30 @@ def open_shard(path: PathLike) -> h5py.File:
     Raises
     ------
     ValueError
-        It is none of a known version.
+        It is none, or of another major version.
     """
     file = h5py.File(path, "r", rdcc_nbytes=0)  # a volume is a chunk of its own: nothing to keep
-    found = file.attrs.get("format"), int(file.attrs.get("format_version", 0))
-    if found != (FORMAT, FORMAT_VERSION):
+    try:
+        _check_version(file.attrs, "format_version", FORMAT, FORMAT_VERSION, path)
+    except ValueError:
         file.close()
-        raise ValueError(f"expected {FORMAT} {FORMAT_VERSION}, got {found[0]} {found[1]}, in {path}")
+        raise
     return file
+
+
+def _check_version(found: Mapping[str, Any], key: str, name: str, version: str, path: PathLike) -> None:
+    """Takes every minor version of this major one, and warns once of each feature that is not known."""
+    major = version.partition(".")[0]
+    got = found.get("format"), found.get(key)
+    if got[0] != name or not re.fullmatch(major + r"\.[0-9]+", str(got[1])):
+        raise ValueError(f"expected {name} {major}.x, got {got[0]} {got[1]}, in {path}")
+    for feature in sorted(set(found.get("features", ())) - FEATURES - _told):
+        _told.add(feature)
+        warnings.warn(f"{path} has {feature!r}, which this version of eventgan does not know and leaves out",
+                      stacklevel=3)
+
+
+_told: set[str] = set()
 
 
 def _one_of(what: str, words: Iterable[str], known: Sequence[str]) -> None:
@@ -795,13 +813,11 @@ def read_description(folder: PathLike) -> dict[str, Any]:
     Raises
     ------
     ValueError
-        It is of no known version.
+        It is of another major version.
     """
     path = pathlib.Path(folder, DESCRIPTION)
     description = json.loads(path.read_text(encoding="utf-8"))
-    found = description.get("format"), description.get("version")
-    if found != (DESCRIPTION_FORMAT, DESCRIPTION_VERSION):
-        raise ValueError(f"expected {DESCRIPTION_FORMAT} {DESCRIPTION_VERSION}, got {found[0]} {found[1]}, in {path}")
+    _check_version(description, "version", DESCRIPTION_FORMAT, DESCRIPTION_VERSION, path)
     return description
 
 

@@ -2,10 +2,14 @@
 
 #include <string>
 
+#include "manifests/documents/format_version.h"
 #include "manifests/values/shard.h"
 #include "stages/base/hdf5/detail/hdf5.h"
 
 namespace eventgan {
+
+inline constexpr char kShardFormat[] = "eventgan-shard";
+inline constexpr FormatVersion kShardFormatVersion{1, 0};
 
 inline constexpr char kVolumePath[] = "/events/volume";
 
@@ -29,9 +33,10 @@ Hdf5Handle volume_type(StoredType type);
 /// Everything that is known before the first sample. Returns the open dataset `/events/volume`.
 Hdf5Handle create_objects(hid_t file, const ShardHeader& header);
 
-/// Attributes of the columns below `location` (a shard, or a group built like one), once these are
-/// written.
-void describe_columns(hid_t location, const ShardHeader& header);
+/// Attributes of the columns below `location` (a shard, or a group built like one), and its
+/// `features`, once these are written. `optional_columns`: those that are there.
+void describe_columns(hid_t location, const ShardHeader& header,
+                      const std::vector<std::string>& optional_columns);
 
 // Parts of create_objects that a view of many shards shares with a shard.
 
@@ -44,8 +49,8 @@ void create_groups(hid_t location);
 /// Attributes of the open dataset `events/volume`.
 void describe_volume(hid_t volume, const ShardHeader& header);
 
-/// The header again. `name` stays empty if the file does not have it. Throws also if the format or
-/// its version is not ours.
+/// The header again. Features that this program does not know are named on standard error, each
+/// once a process. Throws also if the format is not ours, or its version another major.
 ShardHeader read_header(hid_t file);
 
 }  // namespace eventgan

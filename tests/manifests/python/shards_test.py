@@ -355,7 +355,7 @@ def test_a_description_that_misses_shards(folder):
     record = json.loads((folder / NAME).with_suffix(".json").read_text())
     entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
     quarantined = [{"shard": NAME, "slot": 2}]
-    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "missing": [SECOND],
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry], "missing": [SECOND],
                                                      "quarantined": quarantined}))
     with pytest.raises(ValueError, match=f"expected 2 finished shards, got 1 unfinished .{SECOND}."):
         Shards(folder)
@@ -368,7 +368,7 @@ def test_names_in_a_description_that_are_no_shards_are_refused(folder, name):
     name = name.format(folder=folder) if isinstance(name, str) else name
     (folder / "other.h5").write_bytes((folder / NAME).read_bytes())
     entry = {"name": name, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
-    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": 1, "shards": [entry], "quarantined": []}))
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry], "quarantined": []}))
     with pytest.raises(ValueError, match="expected the name of a shard beside it, got .*dataset.json"):
         Shards(folder)
 
@@ -390,11 +390,31 @@ def test_other_files_and_words_are_refused(folder):
             Shards(folder, **wrong)
     with h5py.File(folder / "other.h5", "w"):
         pass
-    with pytest.raises(ValueError, match="expected eventgan-shard 1.*other.h5"):
+    with pytest.raises(ValueError, match="expected eventgan-shard 1.x, got None None, in .*other.h5"):
         Shards(folder / "other.h5")
     (folder / "dataset.h5").touch()
     with pytest.raises(ValueError, match="expected dataset.json beside dataset.h5, got none"):
         Shards(folder / "dataset.h5")
+
+
+@pytest.mark.parametrize("version", ["2.0", "1", "1.", "1.0.0", "11.0", 1])
+def test_another_major_version_is_refused(folder, version):
+    with h5py.File(folder / NAME, "r+") as file:
+        file.attrs["format_version"] = version
+    with pytest.raises(ValueError, match=f"expected eventgan-shard 1.x, got eventgan-shard {version}, in .*{NAME}"):
+        Shards(folder / NAME)
+
+
+def test_another_minor_version_is_read_and_features_unknown_are_named_once(folder):
+    plain = Shards(folder / NAME)[0]
+    with h5py.File(folder / NAME, "r+") as file:
+        file.attrs["format_version"] = "1.7"
+        file.attrs["features"] = ["tiles", "masks"]
+    with pytest.warns(UserWarning, match="has 'masks', which this version of eventgan does not know") as told:
+        sample = Shards(folder / NAME)[0]
+        Shards(folder / NAME)
+    assert len(told) == 1
+    np.testing.assert_array_equal(sample["volume"], plain["volume"])
 
 
 @pytest.mark.parametrize("start", ["fork", "spawn"])

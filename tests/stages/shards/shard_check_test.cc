@@ -11,6 +11,8 @@
 #include <utility>
 
 #include "stages/base/files/sha256.h"
+#include "stages/base/hdf5/detail/hdf5.h"
+#include "stages/shards/shard_reader.h"
 #include "tests/stages/shards/example_shard.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
@@ -262,6 +264,59 @@ TEST_F(ShardCheck, RowsOtherThanTheCommitRecordSaysAreFound) {
   EXPECT_THAT(faults(), ElementsAre(HasSubstr("boxes in slot 0"), HasSubstr("persons in slot 4"),
                                     HasSubstr("boxes by class"), HasSubstr("samples by gap 1: 5"),
                                     HasSubstr("optional columns none")));
+}
+
+/// Puts another attribute of the same name in the place of a root's.
+template <class Value>
+void replace(hid_t file, const char* name, const Value& value) {
+  const Hdf5Lock lock;
+  const Hdf5Handle root = open_object(file, "/");
+  ASSERT_GE(H5Adelete(root, name), 0);
+  write_attribute(root, name, value);
+}
+
+using Names = std::vector<std::string>;
+
+const Names kFeatures{"tiles",     "times",      "origin",       "motion",
+                      "threshold", "projection", "difficulty",   "person_boxes",
+                      "joints3d",  "camera",     "joint_aliases"};
+
+TEST_F(ShardCheck, FeaturesAreThoseOfTheColumns) {
+  write(testing::example_shard());
+  EXPECT_EQ(ShardReader(shard_).header().features, kFeatures);
+  Names less = kFeatures;
+  less.erase(less.begin());
+  change([&](hid_t file) { replace(file, "features", less); });
+  EXPECT_THAT(faults(), ElementsAre(AllOf(HasSubstr("expected features tiles, times"),
+                                          HasSubstr("got times, origin"))));
+  write(testing::unlabelled_shard());
+  EXPECT_THAT(ShardReader(shard_).header().features, ElementsAre("times", "origin"));
+}
+
+TEST_F(ShardCheck, AnotherMinorVersionIsSoundAndItsUnknownFeaturesAreNamedOnce) {
+  write(testing::example_shard());
+  Names more = kFeatures;
+  more.insert(more.begin(), "masks");
+  change([&](hid_t file) {
+    replace(file, "features", more);
+    replace(file, "format_version", std::string("1.7"));
+  });
+  ::testing::internal::CaptureStderr();
+  EXPECT_THAT(faults(), IsEmpty());
+  EXPECT_EQ(ShardReader(shard_).header().features, more);
+  EXPECT_EQ(
+      ::testing::internal::GetCapturedStderr(),
+      "warning: demo-train-00000-of-00001.h5: has \"masks\", which this program does not know "
+      "and leaves out\n");
+}
+
+TEST_F(ShardCheck, AnotherMajorVersionIsRefused) {
+  write(testing::example_shard());
+  change([&](hid_t file) { replace(file, "format_version", std::string("2.0")); });
+  EXPECT_THAT(
+      faults(),
+      ElementsAre(HasSubstr(
+          R"(expected format_version "1.0" (this program reads versions 1.x), got "2.0")")));
 }
 
 TEST_F(ShardCheck, MissingDatasetsAreFoundAllAtOnce) {

@@ -5,6 +5,7 @@ import unittest
 
 import h5py
 
+import eventgan.shards
 from example_shards import SOURCE, ExampleShards
 
 PAGE = SOURCE / "manifests" / "guides" / "shard_format.md"
@@ -68,6 +69,23 @@ class ShardFormatPage(unittest.TestCase):
         look_at(self.file)
         self.file.visititems(lambda _, item: look_at(item))
         self.assertEqual(found, {tuple(row[:3]) for row in self.attributes})
+
+    def test_features_of_the_page_are_the_shards_and_the_readers(self):
+        rows = re.findall(r"(?m)^\| `(\w+)` \| (.*) \|$", PAGE.read_text(encoding="utf-8").split("## Versions")[1])
+        features = [name for name, _ in rows]
+        self.assertEqual(list(self.file.attrs["features"]), features)  # this shard has everything
+        self.assertEqual(eventgan.shards.FEATURES, set(features))
+        told = {path for _, what in rows for path in re.findall(r"`(/[\w/]+)`", what)}
+        optional = {path for path, _, _, what in self.datasets
+                    if what.startswith(("optional", "1 = tile", "share of the sample"))}
+        self.assertEqual(told - {"/labels/poses"}, optional)
+        with h5py.File(self.example.path("unlabelled"), "r") as plain:
+            self.assertEqual(list(plain.attrs["features"]), ["times", "origin"])
+
+    def test_the_version_is_that_of_the_page(self):
+        version = self.file.attrs["format_version"]
+        self.assertTrue(PAGE.read_text(encoding="utf-8").startswith(f"# Shard format, version {version}\n"))
+        self.assertEqual(version, eventgan.shards.FORMAT_VERSION)
 
     def test_the_lines_of_python_on_the_page_run(self):
         code = "\n".join(line[4:] for line in re.findall(

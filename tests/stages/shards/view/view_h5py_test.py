@@ -108,9 +108,11 @@ class View(unittest.TestCase):
                 np.testing.assert_array_equal(view[name].attrs[key], value, f"{name} {key}")
 
         shard.visititems(look_at)
-        for key in set(shard.attrs) - {"format", "name", "split"}:
+        for key in set(shard.attrs) - {"format", "name", "split", "features"}:
             self.assertEqual(view.attrs[key], shard.attrs[key], key)
         self.assertEqual(view.attrs["format"], "eventgan-view")
+        found = [set(self.open(f"uint8/{name}").attrs["features"]) for name in SHARDS]
+        self.assertEqual(set(view.attrs["features"]), set.union(*found))
 
     def test_a_moved_folder_read_from_another_one(self):
         moved = self.folder / "elsewhere" / "deep"
