@@ -96,10 +96,19 @@ void read_camera(const StrictValue& value, GeneratorSpec& spec) {
   if (camera.threshold) set_threshold(*camera.threshold, spec);
 }
 
+/// The kinds of generator for which `holds` does.
+template <class Holds>
+std::vector<GeneratorKind> kinds_where(const Holds& holds) {
+  std::vector<GeneratorKind> kinds;
+  for (const GeneratorRow& row : kGenerators) {
+    if (holds(row)) kinds.push_back(row.value);
+  }
+  return kinds;
+}
+
 /// Reads a generator's `sensor`: what is asked of any, and of a simulator its settings.
 void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind> kind,
                            GeneratorSpec& spec) {
-  using enum GeneratorKind;
   if (value.is_text()) {  // a document would be here in its place (with_sensor_document)
     value.fault(fmt::format("{} or the path of a sensor's document (*.json)",
                             fmt::join(shipped_sensors(), ", ")));
@@ -109,9 +118,8 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
   if (object.find("format")) return read_camera(value, spec);
   if (const auto noise = object.find("noise")) spec.noise = read_noise(*noise);
   SpecialKeys keys(object, "kind", kind);
-  spec.sensor = read_sensor_keys([&](const char* key) {
-    return keys.find(key, {kEsim, kDifference});
-  });
+  const auto owners = kinds_where([](const GeneratorRow& row) { return row.has_sensor_settings; });
+  spec.sensor = read_sensor_keys([&](const char* key) { return keys.find(key, owners); });
   const auto ratio = object.find("threshold_ratio");
   if (const auto found = object.find("threshold")) {
     ThresholdSpec threshold = read_threshold(*found, ratio);
@@ -132,7 +140,6 @@ void read_generator_sensor(const StrictValue& value, std::optional<GeneratorKind
 }  // namespace
 
 GeneratorSpec read_generator(const StrictValue& value) {
-  using enum GeneratorKind;
   GeneratorSpec spec;
   StrictObject object = value.object();
   std::optional<GeneratorKind> kind = spec.kind;
@@ -140,46 +147,49 @@ GeneratorSpec read_generator(const StrictValue& value) {
   spec.kind = kind.value_or(spec.kind);
 
   SpecialKeys keys(object, "kind", kind);
-  if (const auto weights = keys.find("weights", {kNetwork})) {
+  const auto find = [&](std::string_view key) {
+    return keys.find(key, kinds_where([key](const GeneratorRow& row) { return takes(row, key); }));
+  };
+  if (const auto weights = find("weights")) {
     spec.weights = weights->text(
         "the path of a .safetensors file, \"shipped\", \"shipped:sensor\", or \"shipped:WIDTH\" or "
         "\"untrained:WIDTH\" with WIDTH in 1..64",
         [](std::string_view text) { return parse_weights_name(text).has_value(); });
   }
-  if (const auto engine = keys.find("engine", {kNetwork})) {
+  if (const auto engine = find("engine")) {
     spec.engine = engine->choice(kEngineWords);
   }
-  if (const auto device = keys.find("device", {kNetwork})) {
+  if (const auto device = find("device")) {
     spec.device = device->choice(kDeviceWords);
   }
-  if (const auto precision = keys.find("precision", {kNetwork})) {
+  if (const auto precision = find("precision")) {
     spec.precision = precision->choice(kPrecisionWords);
   }
-  if (const auto sample = keys.find("sample", {kNetwork})) spec.sample = sample->boolean();
-  if (const auto scope = keys.find("scope", {kNetwork})) {
+  if (const auto sample = find("sample")) spec.sample = sample->boolean();
+  if (const auto scope = find("scope")) {
     spec.scope.scope = scope->choice(kScopeWords);
   }
-  if (const auto threshold = keys.find("motion_threshold", {kNetwork})) {
+  if (const auto threshold = find("motion_threshold")) {
     spec.scope.motion_threshold = threshold->number(0, 255);
   }
-  if (const auto margin = keys.find("motion_margin_px", {kNetwork})) {
+  if (const auto margin = find("motion_margin_px")) {
     spec.scope.motion_margin_px = margin->integer(0, 64);
   }
-  if (const auto margin = keys.find("label_margin_px", {kNetwork})) {
+  if (const auto margin = find("label_margin_px")) {
     spec.scope.label_margin_px = margin->integer(0, 1024);
   }
-  if (const auto tile = keys.find("tile_px", {kNetwork}))
-    spec.scope.tile_px = tile->integer(8, 128);
-  if (const auto sensor = keys.find("sensor", {kNetwork, kEsim, kDifference})) {
+  if (const auto tile = find("tile_px")) spec.scope.tile_px = tile->integer(8, 128);
+  if (const auto sensor = find("sensor")) {
     read_generator_sensor(*sensor, kind, spec);
   }
-  if (const auto duration = keys.find("duration_s", {kNetwork, kEsim, kDifference})) {
+  if (const auto duration = find("duration_s")) {
     spec.duration_s = duration->number(1e-4, 10);
-    if (kind == kNetwork && !spec.noise) {
-      duration->fault("no such key for kind \"network\" without sensor.noise");
+    if (kind && has_weights(*kind) && !spec.noise) {
+      duration->fault(
+          fmt::format("no such key for kind \"{}\" without sensor.noise", to_string(*kind)));
     }
   }
-  if (const auto displacement = keys.find("max_displacement_px", {kEsim})) {
+  if (const auto displacement = find("max_displacement_px")) {
     spec.max_displacement_px = displacement->number(0.1, 100);
   }
   object.finish();

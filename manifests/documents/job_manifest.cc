@@ -339,7 +339,7 @@ namespace {
 
 /// Events are the only volumes that a dataset of events can give, and no other dataset has them.
 void check_kind(const JobManifest& manifest, const std::vector<StrictValue>& sources) {
-  const bool wants_events = manifest.generator.kind == GeneratorKind::kEvents;
+  const bool wants_events = !needs_frames(manifest.generator.kind);
   std::string of_events;
   for (const DatasetRow& row : kDatasets) {
     if (row.has_events) of_events += (of_events.empty() ? "" : ", ") + std::string(row.word);
@@ -439,7 +439,7 @@ JobManifest read_pair_document(const StrictValue& document) {
   }
   if (const auto generator = object.find("generator")) {
     manifest.generator = read_generator(*generator);
-    if (manifest.generator.kind == GeneratorKind::kEvents) {
+    if (!needs_frames(manifest.generator.kind)) {
       generator->object().at("kind").fault("a generator that makes events of frames");
     }
     if (manifest.generator.device != Device::kCpu || manifest.generator.engine == Engine::kTorch) {

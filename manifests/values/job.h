@@ -12,6 +12,7 @@
 #include "manifests/values/datasets.h"
 #include "manifests/values/events.h"
 #include "manifests/values/frames.h"
+#include "manifests/values/generators.h"
 
 namespace eventgan {
 
@@ -152,14 +153,6 @@ struct ImageSpec {
   std::string preset;  ///< "kitti", "mpii", "demo", or empty when the keys were given one by one
   GreyOrder grey = GreyOrder::kBeforeResize;
   int blur = 0;  ///< side of the Gaussian kernel in pixels, odd, 3..31; 0 = none
-};
-
-/// What makes the volumes: the EventGAN network, a model to compare it with, or a camera.
-enum class GeneratorKind {
-  kNetwork,
-  kEsim,        ///< a random affine motion of the previous frame (stages/events/simulation)
-  kDifference,  ///< log intensity on a line from the previous frame to the next
-  kEvents       ///< none: the camera's own events, of datasets that have them
 };
 
 /// Which part of a volume is generated; the rest is zeros.

@@ -76,11 +76,7 @@ inline constexpr std::array kFitWords{Word<ImageFit>{"stretch", ImageFit::kStret
 inline constexpr std::array kGreyWords{Word<GreyOrder>{"before_resize", GreyOrder::kBeforeResize},
                                        Word<GreyOrder>{"after_resize", GreyOrder::kAfterResize}};
 
-inline constexpr std::array kGeneratorWords{
-    Word<GeneratorKind>{"network", GeneratorKind::kNetwork},
-    Word<GeneratorKind>{"esim", GeneratorKind::kEsim},
-    Word<GeneratorKind>{"difference", GeneratorKind::kDifference},
-    Word<GeneratorKind>{"events", GeneratorKind::kEvents}};
+inline constexpr auto kGeneratorWords = words_of(kGenerators);
 
 inline constexpr std::array kEngineWords{Word<std::optional<Engine>>{"auto", std::nullopt},
                                          Word<std::optional<Engine>>{"torch", Engine::kTorch},

@@ -61,7 +61,7 @@ CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobM
 int run(const CalibrateArguments& arguments) {
   const StopSignal signal(stopping_line("finishing the current pair"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
-  if (manifest.generator.kind != GeneratorKind::kNetwork) {
+  if (!has_weights(manifest.generator.kind)) {
     throw UsageError(
         "$.generator.kind: expected \"network\", the only kind with weights to calibrate, got \"" +
         std::string(to_string(manifest.generator.kind)) + "\"");

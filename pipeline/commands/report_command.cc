@@ -8,7 +8,7 @@
 #include "pipeline/commands/standard_streams.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
-#include "pipeline/generators/weights_warning.h"
+#include "pipeline/generators/load_generator.h"
 #include "pipeline/preview/preview_reader.h"
 #include "pipeline/report/report_page.h"
 #include "pipeline/runtime/errors.h"

@@ -115,7 +115,7 @@ Computation reference_of(const std::string& text) {
 int run(TradeoffArguments& arguments) {
   const StopSignal signal(stopping_line("finishing the current pair"));
   const JobManifest manifest = read_job_manifest(arguments.manifest);
-  if (manifest.generator.kind == GeneratorKind::kEvents) {
+  if (!needs_frames(manifest.generator.kind)) {
     throw UsageError(
         "$.generator.kind: expected a generator that makes events from frames, got \"events\", "
         "which has only one configuration");

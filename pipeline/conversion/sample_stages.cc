@@ -196,7 +196,7 @@ void SampleStages::generate(SampleMessage& message) const try {
   if (message.failed()) return;
   const Stopwatch stopwatch(message, Stage::kGenerate);
   const PreparedPair& prepared = message.prepared;
-  if (manifest_.generator.kind == GeneratorKind::kEvents) {
+  if (!needs_frames(manifest_.generator.kind)) {
     message.volume =
         event_volume(message.events, {generator_.bins(), prepared.content}, message.event_times_s);
     free_memory(message.events);

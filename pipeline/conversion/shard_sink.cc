@@ -23,7 +23,7 @@ namespace eventgan {
 namespace {
 
 VolumeUnit unit_of(const GeneratorSpec& spec, const Generator& generator) {
-  if (spec.kind != GeneratorKind::kNetwork) return VolumeUnit::kEvents;
+  if (!has_weights(spec.kind)) return VolumeUnit::kEvents;
   if (!generator.thresholds()) return VolumeUnit::kLearned;
   return spec.sample ? VolumeUnit::kDrawn : VolumeUnit::kRates;
 }
@@ -63,12 +63,12 @@ ShardHeader header_of(const PlannedShard& shard, const ConversionJob& job) {
   header.preprocessing = preprocessing_json(manifest.image);
   header.plan_hash = job.frozen.hash;
   header.manifest_text = job.frozen.plan.manifest_text;
-  if (manifest.generator.kind == GeneratorKind::kNetwork) {
+  if (has_weights(manifest.generator.kind)) {
     header.weights = shipped_weights_name(manifest.generator.weights);
-    if (const ScopeSpec& scope = manifest.generator.scope; scope.scope != Scope::kWhole) {
-      header.scope = to_string(scope.scope);
-      header.tile_px = scope.tile_px;
-    }
+  }
+  if (const ScopeSpec& scope = manifest.generator.scope; scope.scope != Scope::kWhole) {
+    header.scope = to_string(scope.scope);
+    header.tile_px = scope.tile_px;
   }
   header.weights_hash = job.weights_hash;
   header.generator = job.generator.description() + sensor_text(manifest.generator);

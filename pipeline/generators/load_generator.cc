@@ -19,7 +19,6 @@
 #include "manifests/values/weights.h"
 #include "pipeline/generators/choose_engine.h"
 #include "pipeline/generators/simulated_generator.h"
-#include "pipeline/generators/weights_warning.h"
 #include "stages/base/files/sha256.h"
 #include "stages/generator/onednn/onednn_generator.h"
 #include "stages/generator/shipped_weights.h"
@@ -34,6 +33,10 @@ namespace {
 bool are_untrained(const Weights& weights) {
   const auto origin = weights.metadata.find("origin");
   return origin != weights.metadata.end() && origin->second.starts_with("untrained");
+}
+
+std::string untrained_warning(const std::string& name) {
+  return "the generator is UNTRAINED (" + name + "): random patterns, not events";
 }
 
 /// A training may put newer weights in place meanwhile: what is hashed must be what was read.
@@ -68,6 +71,16 @@ LoadedWeights named_weights(const JobManifest& manifest) {
 
 }  // namespace
 
+std::string weights_warning(const JobManifest& manifest) {
+  const std::string& weights = manifest.generator.weights;
+  const std::optional<WeightsName> name = parse_weights_name(weights);
+  if (!has_weights(manifest.generator.kind) || !name) return "";
+  if (name->origin == WeightsOrigin::kUntrained) return untrained_warning(weights);
+  if (name->origin == WeightsOrigin::kFile) return "";
+  return shipped_weights_name(weights) +
+         " are stand-in weights; import or train your own to publish";
+}
+
 LoadedWeights load_weights(const JobManifest& manifest) {
   LoadedWeights loaded = named_weights(manifest);
   if (loaded.weights.bins != manifest.volume.bins) {
@@ -97,7 +110,9 @@ class CameraEvents final : public Generator {
     throw std::logic_error("expected frames to generate events from, got events");
   }
 
-  std::string description() const override { return "events of a camera"; }
+  std::string description() const override {
+    return std::string(generator_row(GeneratorKind::kEvents).title);
+  }
 
  private:
   int bins_;
@@ -106,11 +121,9 @@ class CameraEvents final : public Generator {
 LoadedGenerator load_without_weights(const JobManifest& manifest) {
   const int bins = manifest.volume.bins;
   LoadedGenerator loaded;
-  if (manifest.generator.kind == GeneratorKind::kEvents) {
-    loaded.generator = std::make_unique<CameraEvents>(bins);
-  } else {
-    loaded.generator = make_simulated_generator(manifest.generator, bins, manifest.seed);
-  }
+  loaded.generator = needs_frames(manifest.generator.kind)
+                         ? make_simulated_generator(manifest.generator, bins, manifest.seed)
+                         : std::make_unique<CameraEvents>(bins);
   loaded.weights_hash = sha256_hex(loaded.generator->description());
   return loaded;
 }
@@ -163,7 +176,7 @@ std::unique_ptr<Generator> make_engine(Engine engine, const Weights& weights,
 
 LoadedGenerator load_generator(const JobManifest& manifest) {
   const GeneratorSpec& spec = manifest.generator;
-  if (spec.kind != GeneratorKind::kNetwork) return load_without_weights(manifest);
+  if (!has_weights(spec.kind)) return load_without_weights(manifest);
   LoadedWeights loaded = load_weights(manifest);
   check_threshold(loaded.weights, spec);
   const EngineSupport support = engine_support(spec.precision, spec.device);

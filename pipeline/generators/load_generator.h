@@ -10,6 +10,11 @@
 
 namespace eventgan {
 
+/// What the user must know of the weights that a manifest asks for, by their name alone, in a short
+/// line: that they are untrained, or those that come with the program. Empty for others, and for
+/// kinds without weights.
+std::string weights_warning(const JobManifest& manifest);
+
 /// The weights a manifest asks for.
 struct LoadedWeights {
   Weights weights;
@@ -25,8 +30,8 @@ LoadedWeights load_weights(const JobManifest& manifest);
 /// The generator a manifest asks for.
 struct LoadedGenerator {
   std::unique_ptr<Generator> generator;
-  /// SHA-256 of the weights file (untrained: of what the file would be; a simulator, which has
-  /// none: of its description).
+  /// SHA-256 of the weights file (untrained: of what the file would be; of a kind without
+  /// weights: of its description).
   std::string weights_hash;
   /// The engine that was chosen, for people: "generator: onednn float32 on avx2, trained on gaps
   /// 1-6"; empty for a simulator.
@@ -34,8 +39,9 @@ struct LoadedGenerator {
   std::vector<std::string> warnings;  ///< what the user must know before trusting the volumes
 };
 
-/// Loads the weights and makes the engine for them (load_weights, choose_engine), or sets up the
-/// manifest's simulator; throws as they do, and InputError if the engine refuses the weights.
+/// Loads the weights and makes the engine for them (load_weights, choose_engine), or sets up what
+/// has none, as the kind's row says (manifests/values/generators.h); throws as they do, and
+/// InputError if the engine refuses the weights.
 LoadedGenerator load_generator(const JobManifest& manifest);
 
 /// The fastest engine of this processor in float32. Throws as the engines do.

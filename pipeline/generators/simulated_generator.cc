@@ -47,10 +47,41 @@ std::string content_key(const GreyImage& previous, const GreyImage& next) {
   return content.hex();
 }
 
+/// Two frames and what their events depend on beside them.
+struct SimulatedPair {
+  const GreyImage& previous;
+  const GreyImage& next;
+  const GeneratorSpec& spec;
+  SensorSpec sensor;  ///< the pair's
+  CounterRandom random;
+};
+
+std::vector<Event> esim_events(const SimulatedPair& pair) {
+  return simulate_affine(pair.previous, pair.spec.max_displacement_px, pair.sensor,
+                         pair.spec.duration_s, pair.random, EventOrder::kPixel);
+}
+
+std::vector<Event> difference_events(const SimulatedPair& pair) {
+  return simulate_difference(pair.previous, pair.next, pair.sensor, pair.spec.duration_s,
+                             pair.random, EventOrder::kPixel);
+}
+
+struct Model {
+  GeneratorKind kind;
+  std::vector<Event> (*events)(const SimulatedPair&);
+};
+
+constexpr Model kModels[] = {{GeneratorKind::kEsim, esim_events},
+                             {GeneratorKind::kDifference, difference_events}};
+
 class SimulatedGenerator final : public Generator {
  public:
-  SimulatedGenerator(const GeneratorSpec& spec, int bins, std::uint64_t seed)
-      : spec_(spec), bins_(bins), random_(seed), memory_bytes_(memory_limit_bytes()) {}
+  SimulatedGenerator(const Model& model, const GeneratorSpec& spec, int bins, std::uint64_t seed)
+      : model_(model),
+        spec_(spec),
+        bins_(bins),
+        random_(seed),
+        memory_bytes_(memory_limit_bytes()) {}
 
   int bins() const override { return bins_; }
 
@@ -66,7 +97,9 @@ class SimulatedGenerator final : public Generator {
     const std::size_t pixels = pair.size.pixel_count();
     const GreyImage previous = grey_image(pair.frames.first(pixels), pair.size);
     const GreyImage next = grey_image(pair.frames.last(pixels), pair.size);
-    pixel_event_volume(events(previous, next, sensor_of(pair)), {bins_, pair.size}, volume);
+    const CounterRandom random = random_.keyed(content_key(previous, next));
+    pixel_event_volume(model_.events({previous, next, spec_, sensor_of(pair), random}),
+                       {bins_, pair.size}, volume);
     return {};
   }
 
@@ -74,7 +107,7 @@ class SimulatedGenerator final : public Generator {
     nlohmann::json json = {{"model", to_string(spec_.kind)},
                            {"duration_s", spec_.duration_s},
                            {"sensor", nlohmann::json::parse(to_json(spec_.sensor))}};
-    if (spec_.kind == GeneratorKind::kEsim) {
+    if (takes(generator_row(spec_.kind), "max_displacement_px")) {
       json["max_displacement_px"] = spec_.max_displacement_px;
     }
     if (spec_.threshold) {
@@ -90,17 +123,7 @@ class SimulatedGenerator final : public Generator {
     return spec_.threshold.value_or(ThresholdSpec()).applied(spec_.sensor, *pair.threshold);
   }
 
-  std::vector<Event> events(const GreyImage& previous, const GreyImage& next,
-                            const SensorSpec& sensor) const {
-    const CounterRandom random = random_.keyed(content_key(previous, next));
-    if (spec_.kind == GeneratorKind::kEsim) {
-      return simulate_affine(previous, spec_.max_displacement_px, sensor, spec_.duration_s, random,
-                             EventOrder::kPixel);
-    }
-    return simulate_difference(previous, next, sensor, spec_.duration_s, random,
-                               EventOrder::kPixel);
-  }
-
+  Model model_;
   GeneratorSpec spec_;
   int bins_;
   CounterRandom random_;
@@ -111,10 +134,12 @@ class SimulatedGenerator final : public Generator {
 
 std::unique_ptr<Generator> make_simulated_generator(const GeneratorSpec& spec, int bins,
                                                     std::uint64_t seed) {
-  if (spec.kind == GeneratorKind::kNetwork) {
-    throw std::invalid_argument("expected a kind of simulator, got the network");
+  const auto* const model = std::ranges::find(kModels, spec.kind, &Model::kind);
+  if (model == std::end(kModels)) {
+    throw std::invalid_argument("expected a kind of simulator, got " +
+                                std::string(to_string(spec.kind)));
   }
-  return std::make_unique<SimulatedGenerator>(spec, bins, seed);
+  return std::make_unique<SimulatedGenerator>(*model, spec, bins, seed);
 }
 
 }  // namespace eventgan

@@ -197,15 +197,6 @@ std::map<std::string, std::string> make_fingerprint(
       {"cpu", instruction_sets()},
       {"libraries", libraries(any_video(plan.shards))},
       {"program", program_version()}};
-  // Rules that have changed within one version of the program: a folder that was begun with the
-  // earlier one must not be resumed.
-  const GeneratorSpec& generator = manifest.generator;
-  if (generator.kind == GeneratorKind::kEvents && manifest.image.fit == ImageFit::kCrop) {
-    fingerprint["time axis"] = "the window's first event to its last";
-  }
-  if (generator.scope.scope == Scope::kLabels || generator.scope.scope == Scope::kLabelsOnly) {
-    fingerprint["persons' tiles"] = "all that pose trainers cut out";
-  }
   if (turns_images(manifest, plan)) {
     fingerprint["orientation"] = "upright, by " + loaded_library("libexif");
   }

@@ -110,7 +110,7 @@ struct PreviewReader::State {
     reader.emplace(file);
     lift_time_limit();
     manifest = parse_job_manifest(reader->header().manifest_text, frames, file.string());
-    has_events = manifest.generator.kind == GeneratorKind::kEvents;
+    has_events = !needs_frames(manifest.generator.kind);
     shard = file;
     if (has_events) find_source();
   }

@@ -216,7 +216,7 @@ std::string origin(const Survey& survey, const PageContext& context) {
                              to_string(source.pairs.choose)));
   }
   html += fact("generator", escaped(header.generator));
-  if (manifest.generator.kind == GeneratorKind::kNetwork) {
+  if (!header.weights.empty()) {
     html += fact("weights", fmt::format("<code>{}</code>, SHA-256 <code>{}</code>",
                                         escaped(header.weights), escaped(header.weights_hash)));
   }

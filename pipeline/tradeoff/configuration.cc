@@ -14,7 +14,7 @@ namespace eventgan {
 std::vector<Computation> computations(const TradeoffAxes& axes) {
   std::vector<Computation> all;
   for (const GeneratorKind method : axes.methods) {
-    const bool is_network = method == GeneratorKind::kNetwork;
+    const bool is_network = has_weights(method);
     for (const std::string& weights : is_network ? axes.weights : std::vector<std::string>{""}) {
       for (const Precision precision :
            is_network ? axes.precisions : std::vector{Precision::kFloat32}) {
@@ -31,7 +31,7 @@ std::vector<Computation> computations(const TradeoffAxes& axes) {
 
 std::string name_of(const Computation& computation) {
   std::string method =
-      computation.method == GeneratorKind::kNetwork
+      has_weights(computation.method)
           ? fmt::format("{} {}", computation.weights, to_string(computation.precision))
           : std::string(to_string(computation.method));
   if (computation.scope != Scope::kWhole) method.append(" ").append(to_string(computation.scope));
@@ -48,8 +48,8 @@ using Json = nlohmann::ordered_json;
 
 Json generator_keys(const Json& manifest, const JobManifest& job, const Computation& computation) {
   Json keys = manifest.value("generator", Json::object());
-  const bool is_network = computation.method == GeneratorKind::kNetwork;
-  if (is_network != (job.generator.kind == GeneratorKind::kNetwork)) keys = Json::object();
+  const bool is_network = has_weights(computation.method);
+  if (is_network != has_weights(job.generator.kind)) keys = Json::object();
   if (is_network) {
     keys["weights"] = computation.weights;
     keys["precision"] = to_string(computation.precision);
@@ -57,7 +57,12 @@ Json generator_keys(const Json& manifest, const JobManifest& job, const Computat
     return keys;
   }
   keys["kind"] = to_string(computation.method);
-  if (computation.method == GeneratorKind::kDifference) keys.erase("max_displacement_px");
+  const GeneratorRow& row = generator_row(computation.method);
+  for (const GeneratorRow& other : kGenerators) {  // of which it was made
+    for (const std::string_view key : other.keys) {
+      if (!takes(row, key)) keys.erase(std::string(key));
+    }
+  }
   return keys;
 }
 

@@ -45,9 +45,9 @@ struct Runner {
     const StoredType type = manifest.output.dtype;
     const auto bytes = decode_chunk(message.chunk, type, manifest.output.deflate_level,
                                     shape.value_count() * stored_size(type));
-    return comparable(dequantize(bytes.value(), type, message.sample.scale),
-                      manifest.generator.kind != GeneratorKind::kNetwork &&
-                          manifest.volume.normalize == Normalization::kNone);
+    return comparable(
+        dequantize(bytes.value(), type, message.sample.scale),
+        !has_weights(manifest.generator.kind) && manifest.volume.normalize == Normalization::kNone);
   }
 };
 

@@ -86,7 +86,7 @@ std::vector<RealismScores> real_scores(const RealPart& part, const JobManifest& 
       const auto bytes = decode_chunk(stored.chunk, dtypes[k], 0,
                                       own_shape.value_count() * stored_size(dtypes[k]));
       std::vector<float> volume = dequantize(bytes.value(), dtypes[k], stored.scale);
-      if (job.generator.kind != GeneratorKind::kNetwork) volume = normalized(std::move(volume));
+      if (!has_weights(job.generator.kind)) volume = normalized(std::move(volume));
       volume = on_grid(std::move(volume), shape.channels(), from, to);
       scores[k][i] =
           realism_scores(volume, real.volume, shape, real.frames.previous, real.frames.next);

@@ -28,13 +28,12 @@ TradeoffAxes default_axes(const JobManifest& manifest) {
   TradeoffAxes axes;
   const GeneratorSpec& generator = manifest.generator;
   axes.methods = {GeneratorKind::kNetwork};
-  if (generator.kind != GeneratorKind::kNetwork) axes.methods.push_back(generator.kind);
+  if (!has_weights(generator.kind)) axes.methods.push_back(generator.kind);
   for (const int width : shipped_widths()) {
     axes.weights.push_back("shipped:" + std::to_string(width));
   }
   const std::string own = shipped_weights_name(generator.weights);
-  if (generator.kind == GeneratorKind::kNetwork &&
-      std::ranges::find(axes.weights, own) == axes.weights.end()) {
+  if (has_weights(generator.kind) && std::ranges::find(axes.weights, own) == axes.weights.end()) {
     axes.weights.push_back(own);
   }
   axes.precisions = {Precision::kFloat32, Precision::kBfloat16, Precision::kInt8};
@@ -126,7 +125,7 @@ Comparison::Able Comparison::look_at(const Computation& computation) const {
     able.reason = error.what();
     return able;
   }
-  if (computation.method == GeneratorKind::kNetwork) {
+  if (has_weights(computation.method)) {
     able.base_channels = load_weights(job).weights.base_channels;  // throws: a slip of the user's
     const EngineSupport support = engine_support(computation.precision);
     if (options_.only_native && computation.precision != Precision::kFloat32 && !support.native) {

@@ -14,8 +14,8 @@ constexpr double kLeastError = 1e-4;  // what is nearer is drawn there
 
 /// Method and weights, which share a colour.
 std::string family_of(const Computation& computation) {
-  return computation.method == GeneratorKind::kNetwork ? computation.weights
-                                                       : std::string(to_string(computation.method));
+  return has_weights(computation.method) ? computation.weights
+                                         : std::string(to_string(computation.method));
 }
 
 void add(ChartSeries& series, const TrialSummary& trial, const std::string& caption) {

@@ -336,7 +336,7 @@ nlohmann::json json_of(const Spread& spread) {
 
 nlohmann::json json_of(const Trial& trial, const TrialSummary& summary, bool on_front) {
   const Computation& computation = trial.configuration.computation;
-  const bool is_network = computation.method == GeneratorKind::kNetwork;
+  const bool is_network = has_weights(computation.method);
   nlohmann::json real = nlohmann::json::object();
   const auto add_real = [&](const std::string& name, const RealismScores& scores) {
     for (const ScoreRow& row : kScoreRows) real[name][row.key] = scores.*row.member;

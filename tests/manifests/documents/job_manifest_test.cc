@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <tuple>
 
 #include "manifests/documents/detail/job_manifest.h"
@@ -149,6 +150,24 @@ TEST(JobManifest, WithoutAGeneratorHasTheShippedOne) {
   const JobManifest manifest = parse(testing::edited(kSoundManifest, {{"/generator", ""}}));
   EXPECT_EQ(manifest.generator.kind, GeneratorKind::kNetwork);
   EXPECT_EQ(manifest.generator.weights, "shipped");
+}
+
+TEST(JobManifest, TakesTheKeysOfTheGeneratorsRow) {
+  std::set<std::string> keys;
+  for (const GeneratorRow& row : kGenerators) keys.insert(row.keys.begin(), row.keys.end());
+  keys.erase("");
+  for (const GeneratorRow& row : kGenerators) {
+    for (const std::string& key : keys) {
+      const std::string generator =
+          R"({"kind": ")" + std::string(row.word) + R"(", ")" + key + R"(": null})";
+      const std::string faults =
+          faults_of(testing::edited(kSoundManifest, {{"/generator", generator}}));
+      const std::string at = "$.generator." + key + ": expected ";
+      EXPECT_THAT(faults, HasSubstr(at)) << row.word;
+      EXPECT_EQ(faults.find("(only for ") == faults.npos, takes(row, key)) << faults;
+      EXPECT_EQ(faults.find("an unknown key"), faults.npos) << faults;
+    }
+  }
 }
 
 TEST(JobManifest, HoldsASimulatorsSettings) {

@@ -5,6 +5,7 @@
 
 #include <limits>
 #include <memory>
+#include <set>
 
 #include "manifests/values/faults.h"
 #include "pipeline/generators/choose_engine.h"
@@ -374,6 +375,21 @@ TEST(LoadGenerator, SetsUpSimulators) {
   EXPECT_EQ(loaded.weights_hash, sha256_hex(loaded.generator->description()));
   manifest.generator.kind = GeneratorKind::kEsim;
   EXPECT_NE(load_generator(manifest).weights_hash, loaded.weights_hash);
+}
+
+TEST(LoadGenerator, MakesEveryKind) {
+  std::set<std::string> hashes;
+  for (const GeneratorRow& row : kGenerators) {
+    JobManifest manifest;
+    manifest.generator.kind = row.value;
+    manifest.generator.weights = "untrained:1";
+    const LoadedGenerator loaded = load_generator(manifest);
+    EXPECT_EQ(loaded.generator->bins(), 9) << row.word;
+    EXPECT_EQ(loaded.choice.empty(), !row.has_weights) << row.word;
+    EXPECT_EQ(weights_warning(manifest).empty(), !row.has_weights) << row.word;
+    hashes.insert(loaded.weights_hash);
+  }
+  EXPECT_EQ(hashes.size(), kGenerators.size());
 }
 
 TEST(LoadGenerator, OfACamerasEventsGeneratesNone) {

@@ -135,25 +135,6 @@ TEST_F(Fingerprint, NoticesTheManifestAndThePreprocessing) {
                                      ::testing::StartsWith("preprocessing: ")));
 }
 
-// Their volumes had the times of the events that the crop left, in folders without the field.
-TEST_F(Fingerprint, SaysWhichTimeAxisCroppedEventsHave) {
-  EXPECT_FALSE(make().contains("time axis"));
-  manifest_.generator.kind = GeneratorKind::kEvents;
-  EXPECT_FALSE(make().contains("time axis"));
-  manifest_.image.fit = ImageFit::kCrop;
-  EXPECT_EQ(make().at("time axis"), "the window's first event to its last");
-  manifest_.generator.kind = GeneratorKind::kNetwork;
-  EXPECT_FALSE(make().contains("time axis"));
-}
-
-// Their tiles left out a part of what pose trainers cut out, in folders without the field.
-TEST_F(Fingerprint, SaysWhichTilesPersonsHave) {
-  for (const Scope scope : {Scope::kWhole, Scope::kMotion, Scope::kLabels, Scope::kLabelsOnly}) {
-    manifest_.generator.scope.scope = scope;
-    EXPECT_EQ(make().contains("persons' tiles"), scope >= Scope::kLabels);
-  }
-}
-
 // Images of one's own were taken as stored, in folders without the field.
 TEST_F(Fingerprint, SaysThatImagesAreTurned) {
   EXPECT_FALSE(make().contains("orientation"));
