@@ -6,6 +6,9 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 
 #include "manifests/values/placement.h"
 #include "stages/shards/codec/quantization.h"
@@ -21,148 +24,186 @@ bool near(double a, double b) {  // false for NaN
   return std::abs(a - b) <= kTolerance_px + 1e-12 * std::abs(b);
 }
 
-std::array<double, 2> numbers(const Point& p) { return {p.x, p.y}; }
-std::array<double, 4> numbers(const Rectangle& r) { return {r.left, r.top, r.right, r.bottom}; }
-std::array<double, 4> numbers(const Intrinsics& camera) {
-  return {camera.focal_x, camera.focal_y, camera.centre_x, camera.centre_y};
-}
-std::array<double, 5> numbers(const LensDistortion& lens) {
-  return {lens.k1, lens.k2, lens.k3, lens.p1, lens.p2};
-}
-std::array<double, 4> numbers(const ImageMotion& motion) {
-  return {motion.x_px, motion.y_px, motion.angle_deg, motion.scale};
-}
-std::array<double, 1> numbers(double x) { return {x}; }
-template <class Number, std::size_t kCount>
-std::array<Number, kCount> numbers(const std::array<Number, kCount>& all) {
-  return all;
+using Row = std::span<const double>;
+
+bool near(Row a, Row b) {
+  return std::ranges::equal(a, b, [](double x, double y) { return near(x, y); });
 }
 
-template <class Label>
-bool near(const Label& a, const Label& b) {
-  return std::ranges::equal(numbers(a), numbers(b), [](double x, double y) { return near(x, y); });
-}
-
-/// `/pairs/source_to_volume` as a map of points and of edges (manifests/values/placement.h has the
+/// `/pairs/source_to_volume` as a map of the rows of columns (manifests/values/placement.h has the
 /// equations).
 class SourceToVolume {
  public:
   explicit SourceToVolume(const std::array<double, 6>& matrix) : m_(matrix) {}
 
-  Point operator()(const Point& p) const {
-    if (p == kMissingPoint) return p;
-    return {m_[0] * p.x + m_[1] * p.y + m_[2], m_[3] * p.x + m_[4] * p.y + m_[5]};
-  }
-
-  /// The geometric mean of both axes' scales: one number for a person.
-  double scaled(double scale) const { return scale < 0 ? scale : scale * std::sqrt(m_[0] * m_[4]); }
-
-  /// Focal lengths scale.
-  Intrinsics operator()(const Intrinsics& camera) const {
-    const Point centre = (*this)(Point{camera.centre_x, camera.centre_y});
-    return {camera.focal_x * m_[0], camera.focal_y * m_[4], centre.x, centre.y};
-  }
-
-  /// P' = M P: its rows are combined as points' x, y and 1 are.
-  std::array<double, 12> operator()(const std::array<double, 12>& projection) const {
-    std::array<double, 12> mapped = projection;
-    for (std::size_t i = 0; i < 4; ++i) {
-      const auto row = [&](std::size_t first) {
-        return m_[first] * projection[i] + m_[first + 1] * projection[4 + i] +
-               m_[first + 2] * projection[8 + i];
-      };
-      mapped[i] = row(0);
-      mapped[4 + i] = row(3);
+  std::vector<double> operator()(Mapped how, Row row) const {
+    std::vector<double> mapped(row.begin(), row.end());
+    switch (how) {
+      case Mapped::kPoints:
+        for (std::size_t i = 0; i < mapped.size(); i += 2) {
+          if (Point{mapped[i], mapped[i + 1]} != kMissingPoint) move(mapped[i], mapped[i + 1]);
+        }
+        break;
+      case Mapped::kEdges:
+      case Mapped::kEdgesIfAny:
+        // An edge lies half a pixel before the centre of the pixel with its number, here and there.
+        for (double& edge : mapped) edge -= 0.5;
+        for (std::size_t i = 0; i < mapped.size(); i += 2) move(mapped[i], mapped[i + 1]);
+        for (double& edge : mapped) edge += 0.5;
+        break;
+      case Mapped::kScale:  // the geometric mean of both axes' scales: one number for a person
+        if (mapped[0] >= 0) mapped[0] *= std::sqrt(m_[0] * m_[4]);
+        break;
+      case Mapped::kCamera:  // focal lengths scale
+        mapped[0] *= m_[0];
+        mapped[1] *= m_[4];
+        move(mapped[2], mapped[3]);
+        break;
+      case Mapped::kProjection:  // P' = M P: its rows are combined as points' x, y and 1 are
+        for (std::size_t i = 0; i < 4; ++i) {
+          mapped[i] = m_[0] * row[i] + m_[1] * row[4 + i] + m_[2] * row[8 + i];
+          mapped[4 + i] = m_[3] * row[i] + m_[4] * row[4 + i] + m_[5] * row[8 + i];
+        }
+        break;
+      case Mapped::kNot:
+        break;
     }
     return mapped;
   }
 
-  /// An edge lies half a pixel before the centre of the pixel with its number, here and there.
-  Rectangle operator()(const Rectangle& r) const {
-    const Point first = (*this)(Point{r.left - 0.5, r.top - 0.5});
-    const Point last = (*this)(Point{r.right - 0.5, r.bottom - 0.5});
-    return {first.x + 0.5, first.y + 0.5, last.x + 0.5, last.y + 0.5};
+ private:
+  void move(double& x, double& y) const {
+    const Point p{x, y};
+    x = m_[0] * p.x + m_[1] * p.y + m_[2];
+    y = m_[3] * p.x + m_[4] * p.y + m_[5];
   }
 
- private:
   const std::array<double, 6>& m_;
 };
 
-Rectangle cut(const Rectangle& box, const Rectangle& area) {
-  return {std::clamp(box.left, area.left, area.right), std::clamp(box.top, area.top, area.bottom),
-          std::clamp(box.right, area.left, area.right),
-          std::clamp(box.bottom, area.top, area.bottom)};
+/// A box [left, top, right, bottom] cut to another.
+std::array<double, 4> cut(Row box, const std::array<double, 4>& area) {
+  return {std::clamp(box[0], area[0], area[2]), std::clamp(box[1], area[1], area[3]),
+          std::clamp(box[2], area[0], area[2]), std::clamp(box[3], area[1], area[3])};
 }
 
 /// What boxes are cut to: the volume, or what it shows of a still's image.
-Rectangle area_of(const ShardSample& sample, const SourceToVolume& map, const Rectangle& volume) {
+std::array<double, 4> area_of(const ShardSample& sample, const SourceToVolume& map,
+                              const std::array<double, 4>& volume) {
   const auto [height, width] = sample.source_size;
   const auto border = sample.pair.motion ? still_border(sample.source_size, sample.pair)
                                          : std::optional<ImageSize>();
   if (!border || *border == ImageSize{}) return volume;
   const auto [rows, columns] = *border;
-  return cut(
-      map(Rectangle{static_cast<double>(columns), static_cast<double>(rows),
-                    static_cast<double>(width - columns), static_cast<double>(height - rows)}),
-      volume);
+  const double seen[] = {static_cast<double>(columns), static_cast<double>(rows),
+                         static_cast<double>(width - columns), static_cast<double>(height - rows)};
+  return cut(map(Mapped::kEdges, seen), volume);
 }
 
-/// Columns in which a number is not finite.
-std::vector<std::string> not_finite(const ShardSample& sample) {
-  std::vector<std::string> faults;
-  std::string whose;
-  const auto expect_finite = [&](const char* column, const auto& value) {
-    for (const double number : numbers(value)) {
-      if (std::isfinite(number)) continue;
-      faults.push_back("expected finite numbers in " + (column + whose) + ", got " +
-                       std::to_string(number));
-      return;
+/// The rows of one sample in the columns of floats that a shard has.
+class SampleRows {
+ public:
+  SampleRows(const ShardHeader& header, const ShardTables& tables, int slot) {
+    const auto i = static_cast<std::size_t>(slot);
+    const auto ragged = [i](const std::vector<std::int64_t>& offsets) {
+      return std::pair(static_cast<std::size_t>(offsets[i]),
+                       static_cast<std::size_t>(offsets[i + 1]));
+    };
+    visit_columns(tables, header, [&](const ColumnSpec& spec, const auto& column) {
+      using Element = typename std::remove_cvref_t<decltype(column)>::value_type;
+      if constexpr (std::is_floating_point_v<Element>) {
+        if (column.empty()) return;
+        const auto [first, end] = spec.rows == Rows::kBoxes     ? ragged(tables.boxes.offsets)
+                                  : spec.rows == Rows::kPersons ? ragged(tables.poses.offsets)
+                                                                : std::pair(i, i + 1);
+        columns_.push_back(
+            {spec,
+             {column.data() + first * spec.width(), column.data() + end * spec.width()},
+             end - first});
+      }
+    });
+  }
+
+  /// Calls each(spec, name, k, row) for every row: box k's, person k's, or the sample's. name: "box
+  /// of person 1".
+  template <class Each>
+  void visit(const Each& each) const {
+    for (const Column& column : columns_) {
+      const ColumnSpec& spec = column.spec;
+      for (std::size_t k = 0; k < column.rows; ++k) {
+        std::string name(spec.name());
+        if (spec.rows == Rows::kBoxes) name += " of box " + std::to_string(k);
+        if (spec.rows == Rows::kPersons) name += " of person " + std::to_string(k);
+        each(spec, name, k, Row(column.numbers).subspan(k * spec.width(), spec.width()));
+      }
     }
+  }
+
+  /// Row k of a column; empty if the column is not there.
+  Row row(std::string_view group, std::string_view name, std::size_t k) const {
+    for (const auto& [spec, numbers, rows] : columns_) {
+      if (spec.group() != group || spec.name() != name) continue;
+      return Row(numbers).subspan(k * spec.width(), spec.width());
+    }
+    return {};
+  }
+
+ private:
+  struct Column {
+    ColumnSpec spec;
+    std::vector<double> numbers;
+    std::size_t rows;
   };
-  const auto expect_finite_if_any = [&](const char* column, const auto& value) {
-    if (value) expect_finite(column, *value);
-  };
-  expect_finite_if_any("motion", sample.pair.motion);
-  if (sample.valid) {  // of a quarantined one the source's alone may be there, as it is
-    expect_finite_if_any("projection_source", sample.annotation.projection);
-    expect_finite_if_any("projection", sample.labels.projection);
+  std::vector<Column> columns_;
+};
+
+bool is_nan(double number) { return std::isnan(number); }
+
+/// The first number that the column's rule does not allow.
+std::optional<double> wrong_number(const ColumnSpec& spec, Row row) {
+  if (spec.numbers == Numbers::kAny || row.empty()) return std::nullopt;
+  const bool is_each = spec.numbers == Numbers::kFiniteOrNoneEach;
+  const std::size_t size = is_each ? spec.inner.back() : row.size();
+  for (; !row.empty(); row = row.subspan(size)) {
+    const Row part = row.first(size);
+    if (spec.numbers != Numbers::kFinite && std::ranges::all_of(part, is_nan)) continue;
+    for (const double number : part) {
+      if (!std::isfinite(number)) return number;
+    }
   }
-  for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
-    whose = " of box " + std::to_string(i);
-    const Box& source = sample.annotation.boxes[i];
-    expect_finite("xyxy_source", source.xyxy);
-    expect_finite("xyxy_unclipped", sample.labels.boxes[i].unclipped);
-    expect_finite("xyxy", sample.labels.boxes[i].clipped);
-    expect_finite("truncation", source.truncation);
-    expect_finite("alpha", source.alpha);
-    expect_finite("box3d", source.box3d);
+  return std::nullopt;
+}
+
+/// Whether a row stands for a value: not if it is not there, or is all NaN, or a head box of -1.
+bool has_value(const ColumnSpec& spec, Row row) {
+  if (spec.mapped.how == Mapped::kEdgesIfAny) {
+    return !std::ranges::all_of(row, [](double edge) { return edge == -1; });
   }
-  for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
-    whose = " of person " + std::to_string(i);
-    const Person& source = sample.annotation.persons[i];
-    const VolumePerson& person = sample.labels.persons[i];
-    for (const Joint& joint : source.joints) expect_finite("joints_source", joint.at);
-    for (const Point& joint : person.joints) expect_finite("joints", joint);
-    expect_finite("center_source", source.center);
-    expect_finite("center", person.center);
-    expect_finite("scale", source.scale);
-    expect_finite("scale_volume", person.scale);
-    expect_finite_if_any("head_box_source", source.head_box);
-    expect_finite_if_any("head_box", person.head_box);
-    expect_finite_if_any("box_source", source.box);
-    expect_finite_if_any("box", person.box);
-    for (const auto& joint : source.joints3d_mm) expect_finite_if_any("joints3d_mm", joint);
-    expect_finite_if_any("camera_source", source.camera);
-    expect_finite_if_any("camera", person.camera);
-    expect_finite_if_any("camera_distortion", source.distortion);
-  }
-  return faults;
+  return !std::ranges::all_of(row, is_nan);
+}
+
+/// `number`: which of a row's innermost lines of two, in "joints[2] of person 1".
+std::string part_name(const ColumnSpec& spec, const std::string& name, std::size_t number) {
+  const std::size_t size = spec.name().size();
+  return name.substr(0, size) + "[" + std::to_string(number) + "]" + name.substr(size);
 }
 
 }  // namespace
 
-std::vector<std::string> label_faults(const ShardHeader& header, const ShardSample& sample) {
-  std::vector<std::string> faults = not_finite(sample);
+std::vector<std::string> label_faults(const ShardHeader& header, const ShardTables& tables,
+                                      int slot, const ShardSample& sample) {
+  std::vector<std::string> faults;
+  const SampleRows rows(header, tables, slot);
+  // Of a quarantined sample the source's labels of the whole image may be there, as they are.
+  const auto is_checked = [&](const ColumnSpec& spec) {
+    return sample.valid || spec.rows != Rows::kSamples || spec.group() != "/labels/";
+  };
+  rows.visit([&](const ColumnSpec& spec, const std::string& name, std::size_t, Row row) {
+    const auto wrong = is_checked(spec) ? wrong_number(spec, row) : std::nullopt;
+    if (wrong) {
+      faults.push_back("expected finite numbers in " + name + ", got " + std::to_string(*wrong));
+    }
+  });
   if (!faults.empty()) return faults;
   const auto expect = [&](bool holds, const std::string& what) {
     if (!holds) faults.push_back("expected " + what + ", got another place");
@@ -177,50 +218,37 @@ std::vector<std::string> label_faults(const ShardHeader& header, const ShardSamp
   if (sample.threshold && !(std::isfinite(*sample.threshold) && *sample.threshold > 0)) {
     faults.push_back("expected a finite threshold > 0, got " + std::to_string(*sample.threshold));
   }
-  const SourceToVolume map(sample.source_to_volume);
-  const auto expect_mapped = [&](const std::string& name, const std::string& of, const auto& mapped,
-                                 const auto& source) {
-    expect(mapped.has_value() == source.has_value(), name + " if there is " + of);
-    if (!mapped || !source) return;
-    expect(near(*mapped, map(*source)), name + " where source_to_volume puts " + of);
-  };
-
-  const Rectangle volume{0, 0, static_cast<double>(header.volume.size.width),
-                         static_cast<double>(header.volume.size.height)};
-  const Rectangle area = area_of(sample, map, volume);
-  for (std::size_t i = 0; i < sample.labels.boxes.size(); ++i) {
-    const VolumeBox& box = sample.labels.boxes[i];
-    const std::string name = " of box " + std::to_string(i);
+  for (std::size_t i = 0; i < sample.annotation.boxes.size(); ++i) {
     const int class_id = sample.annotation.boxes[i].class_id;
     if (class_id < 0 || class_id >= static_cast<int>(header.label_schema.class_names.size())) {
-      faults.push_back("expected class_id" + name + " to have a name, got " +
+      faults.push_back("expected class_id of box " + std::to_string(i) + " to have a name, got " +
                        std::to_string(class_id));
     }
-    expect(near(box.unclipped, map(sample.annotation.boxes[i].xyxy)),
-           "xyxy_unclipped" + name + " where source_to_volume puts xyxy_source");
-    expect(near(box.clipped, cut(box.unclipped, area)) && box.clipped == cut(box.clipped, volume),
-           "xyxy" + name + " to be xyxy_unclipped cut to the volume");
   }
-  for (std::size_t i = 0; i < sample.labels.persons.size(); ++i) {
-    const Person& source = sample.annotation.persons[i];
-    const VolumePerson& person = sample.labels.persons[i];
-    const std::string name = " of person " + std::to_string(i);
-    for (std::size_t j = 0; j < person.joints.size(); ++j) {
-      expect(near(person.joints[j], map(source.joints[j].at)),
-             "joint " + std::to_string(j) + name + " where source_to_volume puts joints_source");
+
+  const SourceToVolume map(sample.source_to_volume);
+  const std::array<double, 4> volume{0, 0, static_cast<double>(header.volume.size.width),
+                                     static_cast<double>(header.volume.size.height)};
+  const std::array<double, 4> area = area_of(sample, map, volume);
+  rows.visit([&](const ColumnSpec& spec, const std::string& name, std::size_t k, Row row) {
+    if (spec.path == std::string_view("/labels/boxes/xyxy")) {
+      expect(near(row, cut(rows.row(spec.group(), "xyxy_unclipped", k), area)) &&
+                 std::ranges::equal(row, cut(row, volume)),
+             name + " to be xyxy_unclipped cut to the volume");
     }
-    expect(near(person.center, map(source.center)),
-           "center" + name + " where source_to_volume puts center_source");
-    expect(near(person.scale, map.scaled(source.scale)),
-           "scale_volume" + name + " as source_to_volume makes it of scale");
-    expect_mapped("head_box" + name, "head_box_source", person.head_box, source.head_box);
-    expect_mapped("box" + name, "box_source", person.box, source.box);
-    expect_mapped("camera" + name, "camera_source", person.camera, source.camera);
-  }
-  if (sample.valid) {
-    expect_mapped("projection", "projection_source", sample.labels.projection,
-                  sample.annotation.projection);
-  }
+    if (spec.mapped.how == Mapped::kNot || !is_checked(spec)) return;
+    const std::string of = spec.mapped.source;
+    const Row source = rows.row(spec.group(), of, k);
+    expect(has_value(spec, row) == has_value(spec, source), name + " if there is " + of);
+    if (!has_value(spec, row) || !has_value(spec, source)) return;
+    const std::vector<double> expected = map(spec.mapped.how, source);
+    const std::size_t size = spec.mapped.how == Mapped::kPoints ? 2 : row.size();
+    for (std::size_t i = 0; i < row.size(); i += size) {
+      expect(near(row.subspan(i, size), Row(expected).subspan(i, size)),
+             (size < row.size() ? part_name(spec, name, i / size) : name) +
+                 " where source_to_volume puts " + of);
+    }
+  });
   return faults;
 }
 

@@ -171,7 +171,9 @@ class Check {
       expect("generated_fraction" + where, static_cast<float>(fraction),
              fractions[static_cast<std::size_t>(slot)]);
     }
-    for (const std::string& found : label_faults(reader.header(), sample)) fault(found + where);
+    for (const auto& found : label_faults(reader.header(), reader.tables(), slot, sample)) {
+      fault(found + where);
+    }
   }
 
   void check_quarantined(const std::vector<QuarantinedSample>& invalid) {

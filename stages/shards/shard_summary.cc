@@ -2,12 +2,12 @@
 
 #include <fmt/format.h>
 
-#include <array>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <optional>
+#include <span>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -84,6 +84,32 @@ std::string text_of(const FrameRef& frame) {
   const std::string text = fmt::format("{}, frame {}", frame.path, frame.index);
   if (frame.video_frame < 0) return text;
   return fmt::format("{} (frame {} of the file)", text, frame.video_frame);
+}
+
+/// Row `row` of a column, as text; empty if it has no value there.
+template <class Element>
+std::string row_text(const ColumnSpec& spec, const std::vector<Element>& column, std::size_t row) {
+  if constexpr (std::is_same_v<Element, std::string>) {
+    return column[row];
+  } else if constexpr (std::is_floating_point_v<Element>) {
+    const std::span numbers = std::span(column).subspan(row * spec.width(), spec.width());
+    if (std::ranges::all_of(numbers, [](Element x) { return std::isnan(x); })) return "";
+    return fmt::format("{}", fmt::join(numbers, " "));
+  } else {
+    return "";  // tiles: their share is told
+  }
+}
+
+/// What not every shard has of its samples, under the columns' names.
+void describe_optional(const ShardReader& reader, int slot, Lines& line) {
+  visit_columns(reader.tables(), reader.header(), [&](const ColumnSpec& spec, const auto& column) {
+    constexpr std::size_t kFew = 4;  // a matrix is for --json
+    if (!spec.optional() || spec.rows != Rows::kSamples || column.empty()) return;
+    if (spec.width() > kFew) return;
+    const std::string text = row_text(spec, column, static_cast<std::size_t>(slot));
+    const char* between = *spec.unit == '\0' ? "" : " ";
+    if (!text.empty()) line.add(spec.name(), text + between + spec.unit);
+  });
 }
 
 void describe_boxes(const ShardHeader& header, const ShardSample& sample, Lines& line) {
@@ -164,21 +190,15 @@ std::string describe_sample(const ShardReader& reader, int slot) {
        is_window || seconds.empty() ? "" : ", ", seconds);
   line("label", "frame {}, position {:g} (0 = previous frame, 1 = next frame)", pair.label_index,
        pair.label_position);
-  if (const auto& motion = pair.motion) {
-    line("motion", "of a still: ({:.4g} {:.4g}) px, {:.4g} degrees, scale {:.6g}", motion->x_px,
-         motion->y_px, motion->angle_deg, motion->scale);
-  }
-  if (sample.threshold) line("threshold", "{:.4g} of the sensor", *sample.threshold);
   line("source size", "{} pixels", to_string(sample.source_size));
   if (sample.valid) {
     const VolumeStatistics& statistics = sample.statistics;
     line("volume", "largest {:g}, 98th percentile {:g}, non-zero {:g} %, sums +{:g} -{:g}",
          statistics.max, statistics.eta98, 100 * statistics.nonzero_fraction,
          statistics.sum_positive, statistics.sum_negative);
-    if (!sample.tiles.empty())
-      line("generated", "{:.3g} % of its tiles", 100 * generated_fraction(sample));
     if (statistics.flags != 0) line("flags", "{}", fmt::join(flag_names(statistics.flags), ", "));
   }
+  describe_optional(reader, slot, line);
   line("original", "{} bytes", sample.annotation.original.size());
   describe_boxes(reader.header(), sample, line);
   describe_persons(reader.header(), sample, line);
@@ -189,38 +209,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json json(const Point& p) { return {p.x, p.y}; }
-Json json(const Rectangle& r) { return {r.left, r.top, r.right, r.bottom}; }
 Json json(const ImageSize& size) { return {{"height", size.height}, {"width", size.width}}; }
-
-Json json(const Intrinsics& camera) {
-  return {{"focal_x", camera.focal_x},
-          {"focal_y", camera.focal_y},
-          {"centre_x", camera.centre_x},
-          {"centre_y", camera.centre_y}};
-}
-
-Json json(const LensDistortion& lens) {
-  return {{"k1", lens.k1}, {"k2", lens.k2}, {"k3", lens.k3}, {"p1", lens.p1}, {"p2", lens.p2}};
-}
-
-Json json(const ImageMotion& motion) {
-  return {{"x_px", motion.x_px},
-          {"y_px", motion.y_px},
-          {"angle_deg", motion.angle_deg},
-          {"scale", motion.scale}};
-}
-
-Json json(const std::array<double, 3>& place) { return place; }
-
-template <class Value>
-Json json(const std::optional<Value>& value) {
-  return value ? json(*value) : Json();
-}
-
-Json json(const FrameRef& frame) {
-  return {{"path", frame.path}, {"index", frame.index}, {"video_frame", frame.video_frame}};
-}
 
 template <class Key>
 Json by_name(const std::map<Key, std::int64_t>& counts) {
@@ -235,41 +224,31 @@ Json by_name(const std::map<Key, std::int64_t>& counts) {
   return object;
 }
 
-Json json(const ShardHeader& header, const Box& box, const VolumeBox& mapped) {
-  return {{"class", header.label_schema.class_names.at(static_cast<std::size_t>(box.class_id))},
-          {"xyxy", json(mapped.clipped)},
-          {"xyxy_unclipped", json(mapped.unclipped)},
-          {"xyxy_source", json(box.xyxy)},
-          {"truncation", box.truncation},
-          {"occlusion", box.occlusion},
-          {"alpha", box.alpha},
-          {"box3d", box.box3d},
-          {"ignore", mapped.ignore},
-          {"ignore_source", box.ignore},
-          {"track_id", box.track_id}};
+/// `inner` dimensions of a row, nested.
+template <class Element>
+Json nested(std::span<const std::size_t> inner, std::span<const Element> elements) {
+  if (inner.empty()) return elements.front();
+  Json list = Json::array();
+  const std::size_t size = inner.front() == 0 ? 0 : elements.size() / inner.front();
+  for (std::size_t i = 0; i < inner.front(); ++i) {
+    list.push_back(nested(inner.subspan(1), elements.subspan(i * size, size)));
+  }
+  return list;
 }
 
-Json json(const ShardHeader& header, const Person& person, const VolumePerson& mapped) {
-  Json joints = Json::array();
-  for (std::size_t j = 0; j < person.joints.size(); ++j) {
-    joints.push_back({{"name", header.label_schema.joint_names.at(j)},
-                      {"at", json(mapped.joints[j])},
-                      {"at_source", json(person.joints[j].at)},
-                      {"visible", person.joints[j].visible}});
+/// A row as it is stored; null if it is all NaN.
+template <class Element>
+Json row_json(const ColumnSpec& spec, const std::vector<Element>& column, std::size_t row) {
+  if constexpr (std::is_same_v<Element, std::vector<char>>) {
+    return std::string(column[row].begin(), column[row].end());
+  } else {
+    const std::span elements = std::span(column).subspan(row * spec.width(), spec.width());
+    if constexpr (std::is_floating_point_v<Element>) {
+      const auto is_nan = [](Element number) { return std::isnan(number); };
+      if (!elements.empty() && std::ranges::all_of(elements, is_nan)) return nullptr;
+    }
+    return nested(std::span<const std::size_t>(spec.inner), std::span<const Element>(elements));
   }
-  Json joints3d = Json::array();
-  for (const auto& joint : person.joints3d_mm) joints3d.push_back(json(joint));
-  return {{"center", json(mapped.center)},
-          {"center_source", json(person.center)},
-          {"scale", person.scale},
-          {"scale_volume", mapped.scale},
-          {"head_box", json(mapped.head_box)},
-          {"head_box_source", json(person.head_box)},
-          {"camera", json(mapped.camera)},
-          {"camera_source", json(person.camera)},
-          {"camera_distortion", json(person.distortion)},
-          {"joints", joints},
-          {"joints3d_mm", joints3d}};
 }
 
 /// Annotations and paths need not be UTF-8, but JSON must be.
@@ -312,43 +291,38 @@ std::string shard_json(const ShardReader& reader) {
 
 std::string sample_json(const ShardReader& reader, int slot) {
   const ShardHeader& header = reader.header();
+  const ShardTables& tables = reader.tables();
   const ShardSample sample = reader.sample(slot);
+  const auto index = static_cast<std::size_t>(slot);
+  Json json = {{"shard", header.name}, {"slot", slot}};
+  Json statistics;
   Json boxes = Json::array();
-  for (std::size_t i = 0; i < sample.annotation.boxes.size(); ++i) {
-    boxes.push_back(json(header, sample.annotation.boxes[i], sample.labels.boxes[i]));
-  }
   Json persons = Json::array();
-  for (std::size_t i = 0; i < sample.annotation.persons.size(); ++i) {
-    persons.push_back(json(header, sample.annotation.persons[i], sample.labels.persons[i]));
+  visit_columns(tables, header, [&](const ColumnSpec& spec, const auto& column) {
+    const std::string name(spec.name());
+    const auto add_rows = [&](const std::vector<std::int64_t>& offsets, Json& list) {
+      for (auto row = offsets[index]; row < offsets[index + 1] && !column.empty(); ++row) {
+        list[static_cast<std::size_t>(row - offsets[index])][name] =
+            row_json(spec, column, static_cast<std::size_t>(row));
+      }
+    };
+    if (spec.rows == Rows::kBoxes) return add_rows(tables.boxes.offsets, boxes);
+    if (spec.rows == Rows::kPersons) return add_rows(tables.poses.offsets, persons);
+    if (spec.rows == Rows::kOffsets || column.empty()) return;
+    const bool is_of_events = spec.group().starts_with("/events/");
+    (is_of_events ? statistics : json)[name] = row_json(spec, column, index);
+  });
+  json["valid"] = sample.valid;
+  statistics["flags"] = flag_names(sample.statistics.flags);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    const auto id = static_cast<std::size_t>(sample.annotation.boxes[i].class_id);
+    boxes[i]["class"] = header.label_schema.class_names.at(id);
   }
-  const VolumeStatistics& statistics = sample.statistics;
-  return text({{"shard", header.name},
-               {"slot", slot},
-               {"sample_id", sample.sample_id},
-               {"valid", sample.valid},
-               {"sequence", sample.sequence},
-               {"previous", json(sample.pair.previous)},
-               {"next", json(sample.pair.next)},
-               {"gap_frames", sample.pair.gap_frames},
-               {"gap_s", sample.pair.gap_s()},
-               {"label_index", sample.pair.label_index},
-               {"label_position", sample.pair.label_position},
-               {"motion", json(sample.pair.motion)},
-               {"threshold", sample.threshold ? Json(*sample.threshold) : Json()},
-               {"source_size", json(sample.source_size)},
-               {"source_to_volume", sample.source_to_volume},
-               {"scale", sample.scale},
-               {"statistics",
-                {{"eta98", statistics.eta98},
-                 {"max", statistics.max},
-                 {"nonzero_fraction", statistics.nonzero_fraction},
-                 {"sum_positive", statistics.sum_positive},
-                 {"sum_negative", statistics.sum_negative},
-                 {"generated_fraction", generated_fraction(sample)},
-                 {"flags", flag_names(statistics.flags)}}},
-               {"original", sample.annotation.original},
-               {"boxes", boxes},
-               {"persons", persons}});
+  json["statistics"] = std::move(statistics);
+  json["boxes"] = std::move(boxes);
+  json["persons"] = std::move(persons);
+  json["joint_names"] = header.label_schema.joint_names;
+  return text(json);
 }
 
 }  // namespace eventgan

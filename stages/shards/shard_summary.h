@@ -35,6 +35,10 @@ std::string describe_sample(const ShardReader& reader, int slot);
 /// The same for machines: JSON objects, indented, newline at the end; numbers that are not finite
 /// are null.
 std::string shard_json(const ShardReader& reader);
+
+/// Every column of the sample under its name, as it is stored, those of /events in "statistics",
+/// and the original annotation; rows of boxes and persons in lists, boxes with the name of their
+/// class.
 std::string sample_json(const ShardReader& reader, int slot);
 
 }  // namespace eventgan

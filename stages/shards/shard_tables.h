@@ -2,7 +2,10 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <numeric>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/values/labels.h"
@@ -88,107 +91,174 @@ double generated_fraction(const ShardSample& sample);
 /// What a column has one row for. kOffsets: one more row than samples.
 enum class Rows { kSamples, kOffsets, kBoxes, kPersons };
 
-/// Where a column is in a shard, and its shape [rows, inner...].
+/// Which numbers a sound column of floats has.
+enum class Numbers {
+  kAny,  ///< a rule of its own (sample_check.cc), or none
+  kFinite,
+  kFiniteOrNone,     ///< or a row of NaN
+  kFiniteOrNoneEach  ///< or NaN in a row's innermost lines, each for itself
+};
+
+/// What `source_to_volume` makes of the numbers of a row, in manifests/guides/shard_format.md,
+/// "Geometry". Points of (-1, -1) and scales below 0 stay what they are.
+enum class Mapped { kNot, kPoints, kEdges, kEdgesIfAny, kScale, kCamera, kProjection };
+
+/// A column: where it is in a shard, its shape [rows, inner...], and the rules for what is in it.
 struct ColumnSpec {
   const char* path;
   Rows rows;
-  std::vector<std::size_t> inner;
+  std::vector<std::size_t> inner = {};
+  Numbers numbers = Numbers::kAny;
+  struct {
+    Mapped how = Mapped::kNot;
+    const char* source = "";  ///< name of the column of the same group that it is made of
+  } mapped = {};
   /// Not in the shard if no row has a value; if there, the shard's `features` have this name. Null:
   /// always there.
   const char* feature = nullptr;
+  const char* unit = "";  ///< of an optional column of samples, for people
 
   bool optional() const { return feature != nullptr; }
+
+  /// The path without its groups, and these with a "/" behind them.
+  std::string_view name() const { return std::string_view(path).substr(group().size()); }
+  std::string_view group() const {
+    return std::string_view(path).substr(0, std::string_view(path).rfind('/') + 1);
+  }
+
+  /// Elements a row.
+  std::size_t width() const {
+    return std::accumulate(inner.begin(), inner.end(), std::size_t{1}, std::multiplies());
+  }
 };
 
 /// Calls visit(ColumnSpec, column) for every column, offsets before the rows they lead to. Writer,
-/// reader and check all go through this list, so it is the one place where the layout of a shard
-/// is in the code. Tables: ShardTables or const ShardTables.
+/// reader, checks and summaries all go through this list, so it is the one place where a shard's
+/// columns are described. Tables: ShardTables or const ShardTables.
 template <class Tables, class Visit>
 void visit_columns(Tables& tables, const ShardHeader& header, Visit&& visit) {
   const std::size_t joints = header.label_schema.joint_names.size();
-  const ImageSize grid = tile_grid(header);
+  const auto rows = static_cast<std::size_t>(tile_grid(header).height);
+  const auto columns = static_cast<std::size_t>(tile_grid(header).width);
+  using enum Rows;
+  using enum Numbers;
+  using enum Mapped;
+
   auto& e = tables.events;
-  visit(ColumnSpec{"/events/eta98", Rows::kSamples, {}}, e.eta98);
-  visit(ColumnSpec{"/events/scale", Rows::kSamples, {}}, e.scale);
-  visit(ColumnSpec{"/events/statistics/nonzero_fraction", Rows::kSamples, {}}, e.nonzero_fraction);
-  visit(ColumnSpec{"/events/statistics/sum_positive", Rows::kSamples, {}}, e.sum_positive);
-  visit(ColumnSpec{"/events/statistics/sum_negative", Rows::kSamples, {}}, e.sum_negative);
-  visit(ColumnSpec{"/events/statistics/max", Rows::kSamples, {}}, e.max);
-  visit(ColumnSpec{"/events/statistics/flags", Rows::kSamples, {}}, e.flags);
-  visit(ColumnSpec{"/events/tiles",
-                   Rows::kSamples,
-                   {static_cast<std::size_t>(grid.height), static_cast<std::size_t>(grid.width)},
-                   "tiles"},
-        e.tiles);
-  visit(ColumnSpec{"/events/statistics/generated_fraction", Rows::kSamples, {}, "tiles"},
-        e.generated_fraction);
+  visit(ColumnSpec{"/events/eta98", kSamples}, e.eta98);
+  visit(ColumnSpec{"/events/scale", kSamples}, e.scale);
+  visit(ColumnSpec{"/events/statistics/nonzero_fraction", kSamples}, e.nonzero_fraction);
+  visit(ColumnSpec{"/events/statistics/sum_positive", kSamples}, e.sum_positive);
+  visit(ColumnSpec{"/events/statistics/sum_negative", kSamples}, e.sum_negative);
+  visit(ColumnSpec{"/events/statistics/max", kSamples}, e.max);
+  visit(ColumnSpec{"/events/statistics/flags", kSamples}, e.flags);
+  visit(ColumnSpec{"/events/tiles", kSamples, {rows, columns}, kAny, {}, "tiles"}, e.tiles);
+  visit(
+      ColumnSpec{
+          "/events/statistics/generated_fraction", kSamples, {}, kAny, {}, "tiles", "of its tiles"},
+      e.generated_fraction);
 
   auto& p = tables.pairs;
-  visit(ColumnSpec{"/pairs/sample_id", Rows::kSamples, {}}, p.sample_id);
-  visit(ColumnSpec{"/pairs/dataset", Rows::kSamples, {}}, p.dataset);
-  visit(ColumnSpec{"/pairs/sequence", Rows::kSamples, {}}, p.sequence);
-  visit(ColumnSpec{"/pairs/prev_path", Rows::kSamples, {}}, p.prev_path);
-  visit(ColumnSpec{"/pairs/next_path", Rows::kSamples, {}}, p.next_path);
-  visit(ColumnSpec{"/pairs/prev_index", Rows::kSamples, {}}, p.prev_index);
-  visit(ColumnSpec{"/pairs/next_index", Rows::kSamples, {}}, p.next_index);
-  visit(ColumnSpec{"/pairs/prev_video_frame", Rows::kSamples, {}}, p.prev_video_frame);
-  visit(ColumnSpec{"/pairs/next_video_frame", Rows::kSamples, {}}, p.next_video_frame);
-  visit(ColumnSpec{"/pairs/gap_frames", Rows::kSamples, {}}, p.gap_frames);
-  visit(ColumnSpec{"/pairs/gap_s", Rows::kSamples, {}}, p.gap_s);
-  visit(ColumnSpec{"/pairs/label_index", Rows::kSamples, {}}, p.label_index);
-  visit(ColumnSpec{"/pairs/label_position", Rows::kSamples, {}}, p.label_position);
-  visit(ColumnSpec{"/pairs/source_size", Rows::kSamples, {2}}, p.source_size);
-  visit(ColumnSpec{"/pairs/source_to_volume", Rows::kSamples, {2, 3}}, p.source_to_volume);
-  visit(ColumnSpec{"/pairs/prev_time_s", Rows::kSamples, {}, "times"}, p.prev_time_s);
-  visit(ColumnSpec{"/pairs/next_time_s", Rows::kSamples, {}, "times"}, p.next_time_s);
-  visit(ColumnSpec{"/pairs/subject", Rows::kSamples, {}, "origin"}, p.subject);
-  visit(ColumnSpec{"/pairs/action", Rows::kSamples, {}, "origin"}, p.action);
-  visit(ColumnSpec{"/pairs/camera", Rows::kSamples, {}, "origin"}, p.camera);
-  visit(ColumnSpec{"/pairs/drive", Rows::kSamples, {}, "origin"}, p.drive);
-  visit(ColumnSpec{"/pairs/motion", Rows::kSamples, {4}, "motion"}, p.motion);
-  visit(ColumnSpec{"/pairs/threshold", Rows::kSamples, {}, "threshold"}, p.threshold);
+  visit(ColumnSpec{"/pairs/sample_id", kSamples}, p.sample_id);
+  visit(ColumnSpec{"/pairs/dataset", kSamples}, p.dataset);
+  visit(ColumnSpec{"/pairs/sequence", kSamples}, p.sequence);
+  visit(ColumnSpec{"/pairs/prev_path", kSamples}, p.prev_path);
+  visit(ColumnSpec{"/pairs/next_path", kSamples}, p.next_path);
+  visit(ColumnSpec{"/pairs/prev_index", kSamples}, p.prev_index);
+  visit(ColumnSpec{"/pairs/next_index", kSamples}, p.next_index);
+  visit(ColumnSpec{"/pairs/prev_video_frame", kSamples}, p.prev_video_frame);
+  visit(ColumnSpec{"/pairs/next_video_frame", kSamples}, p.next_video_frame);
+  visit(ColumnSpec{"/pairs/gap_frames", kSamples}, p.gap_frames);
+  visit(ColumnSpec{"/pairs/gap_s", kSamples}, p.gap_s);
+  visit(ColumnSpec{"/pairs/label_index", kSamples}, p.label_index);
+  visit(ColumnSpec{"/pairs/label_position", kSamples}, p.label_position);
+  visit(ColumnSpec{"/pairs/source_size", kSamples, {2}}, p.source_size);
+  visit(ColumnSpec{"/pairs/source_to_volume", kSamples, {2, 3}}, p.source_to_volume);
+  visit(ColumnSpec{"/pairs/prev_time_s", kSamples, {}, kAny, {}, "times", "s"}, p.prev_time_s);
+  visit(ColumnSpec{"/pairs/next_time_s", kSamples, {}, kAny, {}, "times", "s"}, p.next_time_s);
+  visit(ColumnSpec{"/pairs/subject", kSamples, {}, kAny, {}, "origin"}, p.subject);
+  visit(ColumnSpec{"/pairs/action", kSamples, {}, kAny, {}, "origin"}, p.action);
+  visit(ColumnSpec{"/pairs/camera", kSamples, {}, kAny, {}, "origin"}, p.camera);
+  visit(ColumnSpec{"/pairs/drive", kSamples, {}, kAny, {}, "origin"}, p.drive);
+  visit(
+      ColumnSpec{
+          "/pairs/motion", kSamples, {4}, kFiniteOrNone, {}, "motion", "px, px, degrees, factor"},
+      p.motion);
+  visit(ColumnSpec{"/pairs/threshold", kSamples, {}, kAny, {}, "threshold", "of the log intensity"},
+        p.threshold);
 
-  visit(ColumnSpec{"/labels/original", Rows::kSamples, {}}, tables.original);
-  visit(ColumnSpec{"/labels/projection", Rows::kSamples, {3, 4}, "projection"}, tables.projection);
-  visit(ColumnSpec{"/labels/projection_source", Rows::kSamples, {3, 4}, "projection"},
+  visit(ColumnSpec{"/labels/original", kSamples}, tables.original);
+  visit(ColumnSpec{"/labels/projection",
+                   kSamples,
+                   {3, 4},
+                   kFiniteOrNone,
+                   {kProjection, "projection_source"},
+                   "projection"},
+        tables.projection);
+  visit(ColumnSpec{"/labels/projection_source", kSamples, {3, 4}, kFiniteOrNone, {}, "projection"},
         tables.projection_source);
 
   auto& b = tables.boxes;
-  visit(ColumnSpec{"/labels/boxes/offsets", Rows::kOffsets, {}}, b.offsets);
-  visit(ColumnSpec{"/labels/boxes/xyxy", Rows::kBoxes, {4}}, b.xyxy);
-  visit(ColumnSpec{"/labels/boxes/xyxy_unclipped", Rows::kBoxes, {4}}, b.xyxy_unclipped);
-  visit(ColumnSpec{"/labels/boxes/xyxy_source", Rows::kBoxes, {4}}, b.xyxy_source);
-  visit(ColumnSpec{"/labels/boxes/class_id", Rows::kBoxes, {}}, b.class_id);
-  visit(ColumnSpec{"/labels/boxes/truncation", Rows::kBoxes, {}}, b.truncation);
-  visit(ColumnSpec{"/labels/boxes/occlusion", Rows::kBoxes, {}}, b.occlusion);
-  visit(ColumnSpec{"/labels/boxes/alpha", Rows::kBoxes, {}}, b.alpha);
-  visit(ColumnSpec{"/labels/boxes/box3d", Rows::kBoxes, {7}}, b.box3d);
-  visit(ColumnSpec{"/labels/boxes/ignore", Rows::kBoxes, {}}, b.ignore);
-  visit(ColumnSpec{"/labels/boxes/ignore_source", Rows::kBoxes, {}}, b.ignore_source);
-  visit(ColumnSpec{"/labels/boxes/track_id", Rows::kBoxes, {}}, b.track_id);
-  visit(ColumnSpec{"/labels/boxes/difficulty", Rows::kBoxes, {}, "difficulty"}, b.difficulty);
+  visit(ColumnSpec{"/labels/boxes/offsets", kOffsets}, b.offsets);
+  visit(ColumnSpec{"/labels/boxes/xyxy", kBoxes, {4}, kFinite}, b.xyxy);
+  visit(ColumnSpec{"/labels/boxes/xyxy_unclipped", kBoxes, {4}, kFinite, {kEdges, "xyxy_source"}},
+        b.xyxy_unclipped);
+  visit(ColumnSpec{"/labels/boxes/xyxy_source", kBoxes, {4}, kFinite}, b.xyxy_source);
+  visit(ColumnSpec{"/labels/boxes/class_id", kBoxes}, b.class_id);
+  visit(ColumnSpec{"/labels/boxes/truncation", kBoxes, {}, kFinite}, b.truncation);
+  visit(ColumnSpec{"/labels/boxes/occlusion", kBoxes}, b.occlusion);
+  visit(ColumnSpec{"/labels/boxes/alpha", kBoxes, {}, kFinite}, b.alpha);
+  visit(ColumnSpec{"/labels/boxes/box3d", kBoxes, {7}, kFinite}, b.box3d);
+  visit(ColumnSpec{"/labels/boxes/ignore", kBoxes}, b.ignore);
+  visit(ColumnSpec{"/labels/boxes/ignore_source", kBoxes}, b.ignore_source);
+  visit(ColumnSpec{"/labels/boxes/track_id", kBoxes}, b.track_id);
+  visit(ColumnSpec{"/labels/boxes/difficulty", kBoxes, {}, kAny, {}, "difficulty"}, b.difficulty);
 
   auto& h = tables.poses;
-  visit(ColumnSpec{"/labels/poses/offsets", Rows::kOffsets, {}}, h.offsets);
-  visit(ColumnSpec{"/labels/poses/joints", Rows::kPersons, {joints, 2}}, h.joints);
-  visit(ColumnSpec{"/labels/poses/joints_source", Rows::kPersons, {joints, 2}}, h.joints_source);
-  visit(ColumnSpec{"/labels/poses/visible", Rows::kPersons, {joints}}, h.visible);
-  visit(ColumnSpec{"/labels/poses/center", Rows::kPersons, {2}}, h.center);
-  visit(ColumnSpec{"/labels/poses/center_source", Rows::kPersons, {2}}, h.center_source);
-  visit(ColumnSpec{"/labels/poses/scale", Rows::kPersons, {}}, h.scale);
-  visit(ColumnSpec{"/labels/poses/scale_volume", Rows::kPersons, {}}, h.scale_volume);
-  visit(ColumnSpec{"/labels/poses/head_box", Rows::kPersons, {4}}, h.head_box);
-  visit(ColumnSpec{"/labels/poses/head_box_source", Rows::kPersons, {4}}, h.head_box_source);
-  visit(ColumnSpec{"/labels/poses/box", Rows::kPersons, {4}, "person_boxes"}, h.box);
-  visit(ColumnSpec{"/labels/poses/box_source", Rows::kPersons, {4}, "person_boxes"}, h.box_source);
-  visit(ColumnSpec{"/labels/poses/joints3d_mm", Rows::kPersons, {joints, 3}, "joints3d"},
-        h.joints3d_mm);
-  visit(ColumnSpec{"/labels/poses/camera", Rows::kPersons, {4}, "camera"}, h.camera);
-  visit(ColumnSpec{"/labels/poses/camera_source", Rows::kPersons, {4}, "camera"}, h.camera_source);
-  visit(ColumnSpec{"/labels/poses/camera_distortion", Rows::kPersons, {5}, "camera"},
+  visit(ColumnSpec{"/labels/poses/offsets", kOffsets}, h.offsets);
+  visit(
+      ColumnSpec{
+          "/labels/poses/joints", kPersons, {joints, 2}, kFinite, {kPoints, "joints_source"}},
+      h.joints);
+  visit(ColumnSpec{"/labels/poses/joints_source", kPersons, {joints, 2}, kFinite}, h.joints_source);
+  visit(ColumnSpec{"/labels/poses/visible", kPersons, {joints}}, h.visible);
+  visit(ColumnSpec{"/labels/poses/center", kPersons, {2}, kFinite, {kPoints, "center_source"}},
+        h.center);
+  visit(ColumnSpec{"/labels/poses/center_source", kPersons, {2}, kFinite}, h.center_source);
+  visit(ColumnSpec{"/labels/poses/scale", kPersons, {}, kFinite}, h.scale);
+  visit(ColumnSpec{"/labels/poses/scale_volume", kPersons, {}, kFinite, {kScale, "scale"}},
+        h.scale_volume);
+  visit(
+      ColumnSpec{
+          "/labels/poses/head_box", kPersons, {4}, kFinite, {kEdgesIfAny, "head_box_source"}},
+      h.head_box);
+  visit(ColumnSpec{"/labels/poses/head_box_source", kPersons, {4}, kFinite}, h.head_box_source);
+  visit(ColumnSpec{"/labels/poses/box",
+                   kPersons,
+                   {4},
+                   kFiniteOrNone,
+                   {kEdges, "box_source"},
+                   "person_boxes"},
+        h.box);
+  visit(ColumnSpec{"/labels/poses/box_source", kPersons, {4}, kFiniteOrNone, {}, "person_boxes"},
+        h.box_source);
+  visit(
+      ColumnSpec{
+          "/labels/poses/joints3d_mm", kPersons, {joints, 3}, kFiniteOrNoneEach, {}, "joints3d"},
+      h.joints3d_mm);
+  visit(ColumnSpec{"/labels/poses/camera",
+                   kPersons,
+                   {4},
+                   kFiniteOrNone,
+                   {kCamera, "camera_source"},
+                   "camera"},
+        h.camera);
+  visit(ColumnSpec{"/labels/poses/camera_source", kPersons, {4}, kFiniteOrNone, {}, "camera"},
+        h.camera_source);
+  visit(ColumnSpec{"/labels/poses/camera_distortion", kPersons, {5}, kFiniteOrNone, {}, "camera"},
         h.camera_distortion);
 
-  visit(ColumnSpec{"/valid", Rows::kSamples, {}}, tables.valid);
+  visit(ColumnSpec{"/valid", kSamples}, tables.valid);
 }
 
 /// Counts the rows of consistent tables; a box whose class has no name is of no class.

@@ -139,11 +139,10 @@ TEST_F(ShardSummary, TextSaysWhatIsInASample) {
   EXPECT_THAT(first, HasSubstr("DontCare [0 0 0.5 0.5], source [0 0 1 1], ignore\n"));
   EXPECT_THAT(first, HasSubstr("nose (1.5 1.75), visible\n"));
   EXPECT_THAT(first, HasSubstr("0.2 s"));
-  EXPECT_THAT(first, HasSubstr("75 % of its tiles"));  // 3 of 4
+  EXPECT_THAT(first, HasSubstr("generated_fraction 0.75 of its tiles\n"));  // 3 of 4
   EXPECT_THAT(first, Not(HasSubstr("motion")));
-  EXPECT_THAT(
-      describe_sample(reader_, 4),
-      HasSubstr("motion         of a still: (-1.5 0.25) px, 0.75 degrees, scale 1.00781\n"));
+  EXPECT_THAT(describe_sample(reader_, 4),
+              HasSubstr("motion         -1.5 0.25 0.75 1.0078125 px, px, degrees, factor\n"));
   EXPECT_THAT(describe_sample(reader_, 1), Not(HasSubstr("nan")));
   EXPECT_THAT(describe_sample(reader_, 2), HasSubstr("no: quarantined"));
   EXPECT_THROW(describe_sample(reader_, 5), std::out_of_range);
@@ -180,19 +179,31 @@ TEST_F(ShardSummary, JsonHoldsTheSame) {
 
   const auto first = nlohmann::json::parse(sample_json(reader_, 0));
   EXPECT_EQ(first["boxes"][0]["xyxy"], (nlohmann::json{1, 1, 4.25, 4.5}));
-  EXPECT_EQ(first["persons"][1]["joints"][0]["at_source"], (nlohmann::json{3.5, 4}));
-  EXPECT_TRUE(first["persons"][0]["head_box"].is_null());
+  EXPECT_EQ(first["boxes"][0]["class"], "Car");
+  EXPECT_EQ(first["joint_names"][0], "nose");
+  EXPECT_EQ(first["persons"][1]["joints_source"][0], (nlohmann::json{3.5, 4}));
+  EXPECT_EQ(first["persons"][0]["head_box"], (nlohmann::json{-1, -1, -1, -1}));
   EXPECT_TRUE(first["persons"][0]["camera_distortion"].is_null());
-  EXPECT_EQ(first["persons"][1]["camera_distortion"]["p1"], -0.0014);
+  EXPECT_EQ(first["persons"][1]["camera_distortion"][3], -0.0014);  // p1
   EXPECT_EQ(first["persons"][1]["joints3d_mm"],
-            nlohmann::json::parse("[null, [4, 5, 3001], [7, 8, 3002]]"));
+            nlohmann::json::parse("[[null, null, null], [4, 5, 3001], [7, 8, 3002]]"));
   EXPECT_TRUE(first["motion"].is_null());
   EXPECT_TRUE(first["threshold"].is_null());
   EXPECT_EQ(nlohmann::json::parse(sample_json(reader_, 4))["motion"],
-            nlohmann::json::parse(
-                R"({"x_px": -1.5, "y_px": 0.25, "angle_deg": 0.75, "scale": 1.0078125})"));
+            (nlohmann::json{-1.5, 0.25, 0.75, 1.0078125}));
   EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 1))["gap_s"].is_null());
-  EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 2))["source_to_volume"][0].is_null());
+  EXPECT_TRUE(nlohmann::json::parse(sample_json(reader_, 2))["source_to_volume"].is_null());
+}
+
+TEST_F(ShardSummary, JsonHasEveryColumnUnderItsName) {
+  const auto first = nlohmann::json::parse(sample_json(reader_, 0));
+  visit_columns(reader_.tables(), reader_.header(), [&](const ColumnSpec& spec, const auto&) {
+    const auto& holder = spec.rows == Rows::kBoxes              ? first["boxes"][0]
+                         : spec.rows == Rows::kPersons          ? first["persons"][0]
+                         : spec.group().starts_with("/events/") ? first["statistics"]
+                                                                : first;
+    EXPECT_EQ(holder.contains(std::string(spec.name())), spec.rows != Rows::kOffsets) << spec.path;
+  });
 }
 
 }  // namespace
