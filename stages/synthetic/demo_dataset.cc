@@ -8,9 +8,7 @@
 
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
-#include "stages/synthetic/layouts/human36m_layout_writer.h"
-#include "stages/synthetic/layouts/kitti_layout_writer.h"
-#include "stages/synthetic/layouts/mpii_layout_writer.h"
+#include "stages/synthetic/layouts/layout_writers.h"
 #include "stages/synthetic/layouts/output_files.h"
 
 namespace eventgan {

@@ -1,4 +1,4 @@
-#include "stages/synthetic/layouts/kitti_layout_writer.h"
+#include "stages/synthetic/layouts/layout_writers.h"
 
 #include <fmt/core.h>
 

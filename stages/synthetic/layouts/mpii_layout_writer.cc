@@ -1,4 +1,4 @@
-#include "stages/synthetic/layouts/mpii_layout_writer.h"
+#include "stages/synthetic/layouts/layout_writers.h"
 
 #include <string.h>
 
