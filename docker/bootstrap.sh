@@ -9,6 +9,7 @@
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 jobs=${JOBS:-$(nproc)}
+umask 022  # what is packed is for everybody
 
 say() { printf '\n== %s\n' "$*"; }
 

@@ -32,7 +32,7 @@ class Install(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.root)
         # As packagers do: into a folder that stands for the system's root.
         cls.prefix = cls.root / "opt" / "eventgan"
-        run("cmake", "--install", BUILD, "--prefix", "/opt/eventgan", env={**os.environ, "DESTDIR": str(cls.root)})
+        run("cmake", "--install", BUILD, "--prefix", "/opt/eventgan", env={**os.environ, "DESTDIR": str(cls.root)}, umask=0o022)
         cls.program = cls.prefix / "bin" / "eventgan"
         cls.help = run(cls.program, "--help")
         cls.commands = re.findall(r"(?m)^  ([a-z-]+) {2,}", cls.help.split("Subcommands:")[1])
@@ -88,6 +88,13 @@ class Install(unittest.TestCase):
                 self.assertTrue((page.parent / link).exists(), f"{page}: {link}")
         self.assertIn("MIT License", (self.prefix / "share" / "doc" / "eventgan" / "copyright").read_text())
 
+    def test_everybody_may_read_it(self):
+        installed = [path for folder in ("bin", "lib", "libexec", "share") for path in (self.prefix / folder).rglob("*")]
+        self.assertGreater(len(installed), 100)
+        for path in installed:
+            wanted = 0o055 if path.is_dir() or path.stat().st_mode & 0o100 else 0o044
+            self.assertEqual(path.stat().st_mode & 0o077, wanted, path)
+
     def test_python_takes_the_installed_package(self):
         code = "import eventgan; print(eventgan.__file__, len(eventgan.Shards.__mro__))"
         if ENGINES:
@@ -127,8 +134,13 @@ class Packages(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="eventgan-"))
         cls.addClassCleanup(shutil.rmtree, cls.folder)
-        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=BUILD)
+        run("cpack", "-B", cls.folder, "-D", "CPACK_DEBIAN_COMPRESSION_TYPE=gzip", cwd=BUILD, umask=0o022)
         cls.files = {path.name.split("_")[0]: path for path in cls.folder.glob("*.deb")}
+
+    def test_everybody_may_read_what_they_hold(self):
+        for path in self.files.values():
+            modes = set(re.findall(r"(?m)^(\S{10}) ", run("dpkg-deb", "--contents", path)))
+            self.assertLessEqual(modes, {"drwxr-xr-x", "-rw-r--r--", "-rwxr-xr-x"}, path)
 
     def field(self, package, name):
         return run("dpkg-deb", "--field", self.files[package], name).strip()
