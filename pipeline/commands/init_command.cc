@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/datasets.h"
 #include "manifests/values/faults.h"
-#include "manifests/values/words.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "pipeline/runtime/errors.h"
@@ -31,27 +31,20 @@ struct InitArguments {
   bool has_out = false;  ///< --out was given
 };
 
-/// The first of several arguments, if it is the word of a dataset that find_source knows.
-std::optional<DatasetKind> dataset_word(const std::vector<std::string>& where) {
-  if (where.size() < 2) return std::nullopt;
-  const auto known = std::ranges::find(kDatasetWords, where.front(), &Word<DatasetKind>::word);
-  if (known == kDatasetWords.end()) return std::nullopt;
-  if (known->value != DatasetKind::kDhp19) return known->value;
-  throw UsageError(
-      "DATASET: expected one that init recognises, got dhp19 (manifests/guides/real_events.md has "
-      "a manifest for it)");
-}
-
 std::vector<FoundSource> find_all(const std::vector<std::string>& where) {
-  const auto dataset = dataset_word(where);
+  const std::vector<std::string_view> words = recognised_datasets();
+  const DatasetRow* const named = where.size() < 2 ? nullptr : find_dataset(where.front());
+  if (named != nullptr && std::ranges::find(words, named->word) == words.end()) {
+    throw UsageError(
+        fmt::format("DATASET: expected one that init recognises, got {} "
+                    "(manifests/examples has a manifest for it)",
+                    named->word));
+  }
+  const auto dataset = named == nullptr ? std::nullopt : std::optional(named->value);
   std::vector<FoundSource> found;
   for (std::size_t i = dataset ? 1 : 0; i < where.size(); ++i) {
     if (where[i].empty()) throw UsageError("PATH: expected a folder or a video, got nothing");
     if (i == 0 && where.size() > 1 && !fs::exists(where[i])) {  // it may have been meant as a word
-      std::vector<std::string_view> words;
-      for (const Word<DatasetKind>& known : kDatasetWords) {
-        if (known.value != DatasetKind::kDhp19) words.push_back(known.word);
-      }
       throw UsageError(fmt::format("DATASET or PATH: expected one of {}, or what exists, got {}",
                                    fmt::join(words, ", "), where[i]));
     }
@@ -95,10 +88,10 @@ void add_init_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<InitArguments>();
   command
       ->add_option("PATH", arguments->where,
-                   "Folders, videos and recordings, each a source of the one manifest; before them "
-                   "the dataset "
-                   "that they should be: kitti_object, kitti_tracking, kitti_raw, mpii, mpii_list, "
-                   "human36m, frames or recording (a folder of such a name is ./frames)")
+                   fmt::format("Folders, videos and recordings, each a source of the one manifest; "
+                               "before them the dataset that they should be, one of {} (a folder "
+                               "of such a name is ./frames)",
+                               fmt::join(recognised_datasets(), ", ")))
       ->required()
       ->expected(-1)
       ->option_text("[DATASET] PATH...");

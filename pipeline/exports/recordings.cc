@@ -39,7 +39,8 @@ struct LaidSample {
 /// name.
 std::optional<std::string> sequence_of(const OutgoingSample& sample) {
   if (!sample.labels.sequence.empty()) return sample.labels.sequence;
-  if (sample.source.dataset == to_string(DatasetKind::kFrames)) return sample.source.dataset;
+  const DatasetRow* const dataset = find_dataset(sample.source.dataset);
+  if (dataset != nullptr && dataset->is_own) return sample.source.dataset;
   return std::nullopt;
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -25,6 +26,7 @@
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/planning/spread.h"
 #include "stages/frames/dataset.h"
+#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/decoding/frame_decoder.h"
 
 namespace eventgan {
@@ -32,65 +34,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What manifests/examples say for a dataset, and why.
-struct Habits {
-  std::string_view name;  ///< where the folder's own does not serve
-  PairSide side;
-  std::vector<int> gaps;  ///< those of them that have paired frames
-  std::string_view size_comment;
-  std::string_view size;
-};
-
-constexpr std::string_view kDavisSize = R"("width": 346, "height": 260, "fit": "letterbox")";
-
-Habits habits_of(DatasetKind dataset) {
-  constexpr std::string_view kKittiComment =
-      "The size that the generator's authors trained with; boxes are scaled with the images.";
-  constexpr std::string_view kKittiSize = R"("width": 861, "height": 260, "fit": "stretch")";
-  constexpr std::string_view kMpiiComment =
-      "Images come in many shapes; letterboxing keeps each one's shape and adds borders.";
-  constexpr std::string_view kMpiiSize = R"("width": 640, "height": 480, "fit": "letterbox")";
-  switch (dataset) {
-    case DatasetKind::kKittiObject:
-      return {"kitti-events", PairSide::kBefore, {1, 2}, kKittiComment, kKittiSize};
-    case DatasetKind::kKittiTracking:
-      return {"kitti-tracking-events", PairSide::kBefore, {1, 2}, kKittiComment, kKittiSize};
-    case DatasetKind::kKittiRaw:
-      return {"kitti-raw-events", PairSide::kBefore, {1, 2}, kKittiComment, kKittiSize};
-    case DatasetKind::kMpii:
-      return {"mpii-events", PairSide::kAround, {2, 4}, kMpiiComment, kMpiiSize};
-    case DatasetKind::kMpiiList:
-      return {"mpii-list-events", PairSide::kAround, {2, 4}, kMpiiComment, kMpiiSize};
-    case DatasetKind::kHuman36m:
-      return {
-          "h36m-events",
-          PairSide::kAfter,
-          {1, 2},
-          "The size of a DAVIS346 camera; letterboxing keeps the images' shape and adds borders.",
-          kDavisSize};
-    case DatasetKind::kFrames:
-      return {"frames-events",
-              PairSide::kBefore,
-              {1},
-              "No width and height: volumes are as large as the images.",
-              ""};
-    case DatasetKind::kRecording:
-      return {"recording-events",
-              PairSide::kBefore,
-              {},
-              "No width and height: volumes are as large as the sensor.",
-              ""};
-    case DatasetKind::kDhp19:
-      break;  // find_sources does not know it
-  }
-  throw std::logic_error("habits_of: not a kind of dataset");
-}
-
 /// What is known of a source when its part of the manifest is written.
 struct SourceDraft {
+  explicit SourceDraft(const FoundSource& source)
+      : found(source), habits(dataset_reader(source.dataset).habits) {
+    std::ranges::copy_if(habits.gaps, std::back_inserter(gaps), [](int gap) { return gap > 0; });
+  }
+
   const FoundSource& found;
-  Habits habits;
-  std::vector<int> gaps;
+  const DraftHabits& habits;
+  std::vector<int> gaps = {};
   std::string preset = {};  ///< of its dataset; empty of events
   std::vector<std::string> findings = {};
   bool is_stills = false;
@@ -157,14 +110,14 @@ Survey survey(const Dataset& dataset, SourceSpec spec) {
   return counted;
 }
 
-std::vector<int> gaps_to_take(const Survey& survey, const Habits& habits) {
+std::vector<int> gaps_to_take(const Survey& survey, const std::vector<int>& habits) {
   std::vector<int> usual, any;
   for (const auto& [gap, count] : survey.pairs_by_gap) {
     if (count == 0) continue;
     any.push_back(gap);
-    if (std::ranges::find(habits.gaps, gap) != habits.gaps.end()) usual.push_back(gap);
+    if (std::ranges::find(habits, gap) != habits.end()) usual.push_back(gap);
   }
-  return !usual.empty() ? usual : !any.empty() ? any : habits.gaps;
+  return !usual.empty() ? usual : !any.empty() ? any : habits;
 }
 
 std::string where_text(PairSide side) {
@@ -284,7 +237,7 @@ void consider_stills(const Dataset& dataset, const fs::path& folder, SourceDraft
   const auto& frames = dataset.labelled_frames();
   const auto is_of_video = [](const LabelledFrame& frame) { return frame.frame.video_frame >= 0; };
   if (frames.empty() || std::ranges::any_of(frames, is_of_video)) return;
-  if (draft.found.dataset == DatasetKind::kFrames) {
+  if (is_own(draft.found.dataset)) {
     compare_sizes(dataset, folder, draft);
     compare_neighbours(dataset, folder, draft);
   }
@@ -328,7 +281,7 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
 
 /// Says so where no frame has a time, which the manifest can give.
 void note_unknown_times(const Dataset& dataset, SourceDraft& draft) {
-  if (draft.found.dataset != DatasetKind::kFrames) return;
+  if (!takes(dataset_row(draft.found.dataset), "frames_per_second")) return;
   const auto has_time = [](const LabelledFrame& frame) { return !std::isnan(frame.frame.time_s); };
   if (std::ranges::any_of(dataset.labelled_frames(), has_time)) return;
   draft.findings.emplace_back("no times, since images have none (set \"frames_per_second\")");
@@ -422,9 +375,7 @@ class Draft {
     if (!found.layout.empty()) {
       keys += fmt::format("      \"layout\": \"{}\",\n", found.layout);
     }
-    if (found.layout == "official") {
-      keys += "      \"every\": 5,  // of 50 frames a second: a gap of 1 is a tenth of a second\n";
-    }
+    keys += found.more_keys;
     if (found.raw_root) keys += key("raw_root", *found.raw_root);
     if (found.devkit) keys += key("devkit", *found.devkit);
     if (found.annotations) keys += key("annotations", *found.annotations);
@@ -546,7 +497,7 @@ std::string draft_name(const std::vector<FoundSource>& sources) {
     name = name_after(above);
   }
   if (name.empty()) name = name_after(first);
-  return name.empty() ? std::string(habits_of(sources.front().dataset).name) : name;
+  return name.empty() ? std::string(to_string(sources.front().dataset)) + "-events" : name;
 }
 
 ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const DraftPlace& place) {
@@ -556,8 +507,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
   ManifestDraft made;
   made.has_samples = true;
   for (const FoundSource& found : sources) {
-    Habits habits = habits_of(found.dataset);
-    SourceDraft source{found, habits, habits.gaps};
+    SourceDraft source(found);
     const JobManifest alone = parse_job_manifest(draft.text({source}), place.folder,
                                                  "the manifest for " + found.root.string());
     const SourceSpec& spec = alone.sources.front();
@@ -568,7 +518,7 @@ ManifestDraft draft_manifest(const std::vector<FoundSource>& sources, const Draf
       source.has_frames = all_have_frames(*dataset);
       source.has_samples = counted.labelled_frames > 0 && !source.needs_sensor;
     } else {
-      source.gaps = gaps_to_take(counted, source.habits);
+      source.gaps = gaps_to_take(counted, source.gaps);
       source.has_samples =
           std::ranges::any_of(counted.pairs_by_gap, [](const auto& gap) { return gap.second > 0; });
       consider_stills(*dataset, place.folder, source);

@@ -164,10 +164,9 @@ PreviewContent PreviewReader::content(const fs::path& shard, int slot) {
   content.shape = header.volume;
   if (sample.valid) content.volume = reader.volume(slot);
   lift_time_limit();
-  const auto* const dataset =
-      std::ranges::find(kDatasetWords, header.dataset, &Word<DatasetKind>::word);
+  const DatasetRow* const dataset = find_dataset(header.dataset);
   const ImageOrientation orientation =
-      dataset == kDatasetWords.end() ? ImageOrientation::kStored : orientation_of(dataset->value);
+      dataset == nullptr ? ImageOrientation::kStored : orientation_of(dataset->value);
   const auto frame = [&](const FrameRef& which) {
     // Of events there may be no frames, or none yet.
     if (!sample.valid || (state_->has_events && which.video_frame < 0)) {

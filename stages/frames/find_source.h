@@ -26,6 +26,7 @@ struct FoundSource {
   std::string_view split = {};  ///< frames: "val" or "test" where its folder says so; empty: train
   std::optional<std::filesystem::path> raw_root, devkit, annotations, sequences;
   std::optional<FoundLabels> labels;  ///< frames
+  std::string_view more_keys = {};    ///< lines of a manifest's source
   EventFields columns;                ///< recording: a table's, by what its columns are called
   /// What is not there and what that costs, or is left out; a line each.
   std::vector<std::string> remarks;
@@ -49,5 +50,8 @@ std::vector<FoundSource> find_sources(const std::filesystem::path& path,
 /// Whether find_sources may find something at `path`: a folder, or a file that is a dataset by its
 /// name, such as a video; also a video's name where nothing is.
 bool may_be_source(const std::filesystem::path& path);
+
+/// The words of the datasets that find_sources can find, in the order of kDatasets.
+std::vector<std::string_view> recognised_datasets();
 
 }  // namespace eventgan

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -28,6 +29,12 @@ bool has_file(const std::filesystem::path& path);
 
 /// As list_folder; nothing of what is no folder or cannot be listed, since it is somebody else's.
 FolderListing look_into(const std::filesystem::path& folder);
+
+/// Whether a folder in it, of what look_into finds, has a name that fits.
+template <class Fits>
+bool any_folder(const std::filesystem::path& folder, Fits fits) {
+  return std::ranges::any_of(look_into(folder).folders, fits);
+}
 
 /// A source's root folder under both its names: as the manifest writes it, for records and
 /// messages, and where it lies on disk. Relative paths have forward slashes. A value.

@@ -261,14 +261,15 @@ class Init(program.InFolder):
         empty.mkdir()
         (self.folder / "notes.txt").write_text("notes")
         for path in [empty, self.folder / "notes.txt", pathlib.Path("/proc/self/fd")]:
-            self.assertIn("expected KITTI object, tracking or raw, MPII, Human3.6M, recordings of an event camera, images or videos, got none of these, "
+            self.assertIn("expected KITTI object, KITTI tracking, KITTI raw, MPII Human Pose, Human3.6M, MPII as a list "
+                          "of people, recording of an event camera, images or videos, got none of these, "
                           f"in {path}", self.init(path, expect=66))
         self.assertIn("expected a folder or a video", self.init(self.folder / "absent", expect=66))
         self.assertIn("expected a folder or a video, got nothing", self.init("", expect=64))
         write_cars(self.folder / "k", 1, np.random.default_rng(7))
         self.assertIn("expected a folder or a video, got nothing", self.init(self.folder / "k", "", expect=64))
         self.assertIn("DATASET or PATH: expected one of kitti_object, ", self.init("kitti", empty, expect=64))
-        self.assertIn("real_events.md has a manifest", self.init("dhp19", empty, expect=64))
+        self.assertIn("manifests/examples has a manifest", self.init("dhp19", empty, expect=64))
         self.assertIn("expected mpii, got kitti_object, in ", self.init("mpii", self.folder / "k", expect=66))
         shutil.rmtree(self.folder / "k" / "image_2")
         self.assertIn("expected a folder, got nothing that can be read, in ", self.init(self.folder / "k", expect=66))

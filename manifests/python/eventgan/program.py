@@ -51,7 +51,7 @@ def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
     ----------
     *paths : str or path
         Folders, videos and recordings, each a source of the manifest. Of several, the first may be the kind of dataset that the others are:
-        "kitti_object", "kitti_tracking", "kitti_raw", "mpii", "mpii_list", "human36m", "frames" or "recording".
+        "kitti_object", "kitti_tracking", "kitti_raw", "mpii", "human36m", "mpii_list", "recording" or "frames".
     out : str or path
         The manifest to write, a new file.
 

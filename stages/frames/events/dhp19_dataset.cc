@@ -21,7 +21,9 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
 #include "stages/base/archives/numpy_arrays.h"
+#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/human36m/detail/pose_table.h"
+#include "stages/frames/human36m/human36m_dataset.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/mpii/detail/mat_file.h"
 #include "stages/frames/mpii/detail/mat_json.h"
@@ -366,5 +368,8 @@ class Dhp19Dataset final : public Dataset {
 std::unique_ptr<Dataset> open_dhp19_dataset(const SourceSpec& spec, const fs::path& base) {
   return std::make_unique<Dhp19Dataset>(spec, base);
 }
+
+constinit const DatasetReader kDhp19Reader{
+    .kind = DatasetKind::kDhp19, .open = open_dhp19_dataset, .origin = human36m_origin};
 
 }  // namespace eventgan

@@ -8,7 +8,10 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/human36m/detail/human36m_dataset.h"
+#include "stages/frames/numbered_sequence.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -206,5 +209,90 @@ std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
   }
   throw std::logic_error("open_human36m_dataset: not a layout");
 }
+
+namespace {
+
+bool is_subject(std::string_view name) {
+  return name.size() > 1 && name[0] == 'S' && is_digit(name[1]);
+}
+
+/// Whether a folder S1, S5, ... of the root holds a folder that fits.
+template <class Fits>
+bool any_of_a_subject(const std::filesystem::path& root, Fits fits) {
+  return any_folder(root, [&](const std::string& subject) {
+    return is_subject(subject) && any_folder(root / subject, [&](const std::string& name) {
+             return fits(root / subject / name);
+           });
+  });
+}
+
+bool is_human36m_fetch(const std::filesystem::path& root) {
+  return any_of_a_subject(root, [](const std::filesystem::path& action) {
+    return has_file(action / "annot.h5") || has_folder(action / "imageSequence");
+  });
+}
+
+bool is_human36m_extracted(const std::filesystem::path& root) {
+  return any_of_a_subject(
+      root, [](const std::filesystem::path& sequence) {  // S1_Directions_1.54138969
+        const std::string camera = sequence.extension();
+        return camera.size() > 1 && std::all_of(camera.begin() + 1, camera.end(), is_digit) &&
+               sequence.stem().string().starts_with(sequence.parent_path().filename().string() +
+                                                    "_");
+      });
+}
+
+bool is_human36m_official(const std::filesystem::path& root) {
+  return any_of_a_subject(root, [](const std::filesystem::path& folder) {
+    return folder.filename() == "MyPoseFeatures";
+  });
+}
+
+std::vector<FoundSource> complete_official(FoundSource found) {
+  found.more_keys =
+      "      \"every\": 5,  // of 50 frames a second: a gap of 1 is a tenth of a second\n";
+  return {std::move(found)};
+}
+
+bool may_be_of_human36m(std::string_view name) {
+  return is_subject(name) || name.starts_with("image");
+}
+
+constexpr std::array kHuman36mLayouts{DatasetLayout{.word = "fetch",
+                                                    .title = "Human3.6M as h36m-fetch unpacks it",
+                                                    .fits = is_human36m_fetch,
+                                                    .may_be_part = may_be_of_human36m},
+                                      DatasetLayout{.word = "official",
+                                                    .title = "Human3.6M as downloaded",
+                                                    .fits = is_human36m_official,
+                                                    .complete = complete_official,
+                                                    .may_be_part = may_be_of_human36m},
+                                      DatasetLayout{.word = "extracted",
+                                                    .title = "Human3.6M as extracted images",
+                                                    .fits = is_human36m_extracted,
+                                                    .may_be_part = may_be_of_human36m}};
+
+}  // namespace
+
+FrameOrigin human36m_origin(const std::string& sequence) {
+  const bool fetched = sequence.find('/') != std::string::npos;
+  const std::size_t first = sequence.find(fetched ? '/' : '_');
+  const std::size_t last = sequence.rfind(fetched ? '/' : '.');
+  if (first == std::string::npos || last == std::string::npos || first >= last) return {};
+  return {.subject = sequence.substr(0, first),
+          .action = sequence.substr(first + 1, last - first - 1),
+          .camera = sequence.substr(last + 1)};
+}
+
+constinit const DatasetReader kHuman36mReader{
+    .kind = DatasetKind::kHuman36m,
+    .open = open_human36m_dataset,
+    .origin = human36m_origin,
+    .layouts = kHuman36mLayouts,
+    .habits = {
+        .side = PairSide::kAfter,
+        .size_comment =
+            "The size of a DAVIS346 camera; letterboxing keeps the images' shape and adds borders.",
+        .size = kDavisSize}};
 
 }  // namespace eventgan

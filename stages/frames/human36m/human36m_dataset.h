@@ -54,4 +54,8 @@ namespace eventgan {
 std::unique_ptr<Dataset> open_human36m_dataset(const SourceSpec& spec,
                                                const std::filesystem::path& base);
 
+/// What the name of a sequence tells: SUBJECT, separator, ACTION, last separator, CAMERA, with "/"
+/// or "_" and "." as separators.
+FrameOrigin human36m_origin(const std::string& sequence);
+
 }  // namespace eventgan

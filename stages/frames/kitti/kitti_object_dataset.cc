@@ -10,6 +10,7 @@
 #include "stages/base/images/image_file.h"
 #include "stages/frames/kitti/detail/calibration_file.h"
 #include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/kitti/kitti_raw_dataset.h"
 #include "stages/frames/kitti/raw_drive.h"
 #include "stages/frames/source_folders.h"
 
@@ -312,5 +313,60 @@ std::unique_ptr<Dataset> open_kitti_object_dataset(const SourceSpec& spec,
   }
   return std::make_unique<KittiObjectDataset>(spec, base);
 }
+
+namespace {
+
+bool is_kitti_object(const std::filesystem::path& root) { return has_folder(root / "label_2"); }
+
+bool is_devkit(const std::filesystem::path& folder) {
+  return has_file(folder / "mapping/train_mapping.txt");
+}
+
+/// The first that fits of the two folders above `root`, and of the folders in these.
+template <class Fits>
+std::optional<std::filesystem::path> find_beside(const std::filesystem::path& root, Fits fits) {
+  for (const std::filesystem::path& above :
+       {root.parent_path(), root.parent_path().parent_path()}) {
+    if (fits(above)) return above;
+    for (const std::string& name : look_into(above).folders) {
+      if (fits(above / name)) return above / name;
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<FoundSource> complete_kitti_object(FoundSource found) {
+  found.devkit = find_beside(found.root, is_devkit);
+  if (found.devkit) found.raw_root = find_beside(found.root, is_kitti_raw);
+  if (!has_folder(found.root / "prev_2")) {
+    found.remarks.push_back("no prev_2: no previous frames from KITTI object itself");
+  }
+  if (!found.devkit) {
+    found.remarks.push_back(
+        "no devkit (a folder with mapping/train_mapping.txt): no gaps 4-6 through KITTI raw, no "
+        "names of drives");
+  } else if (!found.raw_root) {
+    found.remarks.push_back("no raw_root (KITTI raw, DATE/DATE_drive_NNNN_sync): no gaps 4-6");
+  }
+  if (!has_folder(found.root / "calib")) found.remarks.push_back("no calib: no projections");
+  return {std::move(found)};
+}
+
+constexpr std::array kKittiObjectLayouts{DatasetLayout{.fits = is_kitti_object,
+                                                       .complete = complete_kitti_object,
+                                                       .may_be_part =
+                                                           [](std::string_view name) {
+                                                             return name.starts_with("image") ||
+                                                                    name.starts_with("prev_");
+                                                           },
+                                                       .image_folder = "image_2"}};
+
+}  // namespace
+
+constinit const DatasetReader kKittiObjectReader{.kind = DatasetKind::kKittiObject,
+                                                 .open = open_kitti_object_dataset,
+                                                 .origin = kitti_origin,
+                                                 .layouts = kKittiObjectLayouts,
+                                                 .habits = kKittiHabits};
 
 }  // namespace eventgan

@@ -198,4 +198,31 @@ std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,
   return std::make_unique<KittiRawDataset>(spec, base);
 }
 
+namespace {
+
+std::vector<FoundSource> complete_kitti_raw(FoundSource found) {
+  const bool has_tracklets = any_folder(found.root, [&](const std::string& date) {
+    return any_folder(found.root / date, [&](const std::string& drive) {
+      return has_file(found.root / date / drive / "tracklet_labels.xml");
+    });
+  });
+  if (!has_tracklets) found.remarks.push_back("no tracklet_labels.xml: no labels");
+  return {std::move(found)};
+}
+
+constexpr std::array kKittiRawLayouts{DatasetLayout{
+    .fits = is_kitti_raw, .complete = complete_kitti_raw, .may_be_part = [](std::string_view name) {
+      return name.starts_with("image") || is_kitti_date(std::string(name));
+    }}};
+
+}  // namespace
+
+bool is_kitti_raw(const std::filesystem::path& root) { return any_folder(root, is_kitti_date); }
+
+constinit const DatasetReader kKittiRawReader{.kind = DatasetKind::kKittiRaw,
+                                              .open = open_kitti_raw_dataset,
+                                              .origin = kitti_origin,
+                                              .layouts = kKittiRawLayouts,
+                                              .habits = kKittiHabits};
+
 }  // namespace eventgan

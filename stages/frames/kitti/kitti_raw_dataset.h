@@ -18,4 +18,7 @@ namespace eventgan {
 std::unique_ptr<Dataset> open_kitti_raw_dataset(const SourceSpec& spec,
                                                 const std::filesystem::path& base);
 
+/// Whether KITTI raw lies there, by its folders' names.
+bool is_kitti_raw(const std::filesystem::path& root);
+
 }  // namespace eventgan

@@ -194,4 +194,26 @@ std::unique_ptr<Dataset> open_kitti_tracking_dataset(const SourceSpec& spec,
   return std::make_unique<KittiTrackingDataset>(spec, base);
 }
 
+namespace {
+
+bool is_kitti_tracking(const std::filesystem::path& root) { return has_folder(root / "label_02"); }
+
+std::vector<FoundSource> complete_kitti_tracking(FoundSource found) {
+  if (!has_folder(found.root / "calib")) found.remarks.push_back("no calib: no projections");
+  return {std::move(found)};
+}
+
+constexpr std::array kKittiTrackingLayouts{
+    DatasetLayout{.fits = is_kitti_tracking,
+                  .complete = complete_kitti_tracking,
+                  .may_be_part = [](std::string_view name) { return name.starts_with("image"); }}};
+
+}  // namespace
+
+constinit const DatasetReader kKittiTrackingReader{.kind = DatasetKind::kKittiTracking,
+                                                   .open = open_kitti_tracking_dataset,
+                                                   .origin = kitti_origin,
+                                                   .layouts = kKittiTrackingLayouts,
+                                                   .habits = kKittiHabits};
+
 }  // namespace eventgan

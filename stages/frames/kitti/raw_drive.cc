@@ -62,6 +62,8 @@ std::string_view without_end(std::string_view line) {
 
 }  // namespace
 
+FrameOrigin kitti_origin(const std::string& drive) { return {.drive = drive}; }
+
 bool is_kitti_date(const std::string& folder) {
   constexpr std::size_t kLength = std::string_view("2011_09_26").size();
   return folder.size() == kLength && folder[4] == '_' && folder[7] == '_' &&

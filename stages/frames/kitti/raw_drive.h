@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/numbered_sequence.h"
 #include "stages/frames/source_folders.h"
 
@@ -24,6 +24,15 @@ Outcome<std::vector<double>> parse_timestamps(std::string_view text, const std::
 
 /// Whether a folder of KITTI raw is named as those that hold the drives of a day: "2011_09_26".
 bool is_kitti_date(const std::string& folder);
+
+/// DatasetReader::origin of KITTI, whose sequences are drives.
+FrameOrigin kitti_origin(const std::string& drive);
+
+/// What manifests of KITTI say, but for a kind's own.
+inline constexpr DraftHabits kKittiHabits{
+    .size_comment =
+        "The size that the generator's authors trained with; boxes are scaled with the images.",
+    .size = R"("width": 861, "height": 260, "fit": "stretch")"};
 
 /// The left colour camera's frames of one drive of KITTI raw:
 /// DATE/DRIVE/image_02/data/NNNNNNNNNN.png, and image_02/timestamps.txt if it is there. Thread-safe

@@ -11,6 +11,7 @@
 #include "manifests/values/faults.h"
 #include "stages/frames/mpii/detail/mpii_annotations.h"
 #include "stages/frames/mpii/mpii_frames.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
@@ -116,5 +117,29 @@ std::unique_ptr<Dataset> open_mpii_dataset(const SourceSpec& spec,
 #endif
   return dataset;
 }
+
+namespace {
+
+bool is_mpii(const std::filesystem::path& root) { return !find_mpii_annotations(root).empty(); }
+
+std::vector<FoundSource> complete_mpii(FoundSource found) {
+  const bool has_sequences = any_folder(found.root, [](const std::string& name) {
+    return name == "sequences" || name.starts_with(kMpiiBatchPrefix);
+  });
+  if (!has_sequences) found.remarks.push_back("no sequences (video frames): no pairs");
+  return {std::move(found)};
+}
+
+constexpr std::array kMpiiLayouts{DatasetLayout{
+    .fits = is_mpii, .complete = complete_mpii, .may_be_part = [](std::string_view name) {
+      return name.starts_with("image") || name == "sequences";
+    }}};
+
+}  // namespace
+
+constinit const DatasetReader kMpiiReader{.kind = DatasetKind::kMpii,
+                                          .open = open_mpii_dataset,
+                                          .layouts = kMpiiLayouts,
+                                          .habits = kMpiiHabits};
 
 }  // namespace eventgan

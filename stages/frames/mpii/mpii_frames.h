@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "manifests/values/job.h"
-#include "stages/frames/dataset.h"
+#include "stages/frames/dataset_kinds.h"
 #include "stages/frames/numbered_sequence.h"
 
 namespace eventgan {
@@ -40,6 +40,14 @@ bool same_bytes(const std::filesystem::path& a, const std::filesystem::path& b);
 
 /// How the folders that MPII's sequences are downloaded as begin; each holds many sequences.
 inline constexpr std::string_view kMpiiBatchPrefix = "mpii_human_pose_v1_sequences";
+
+/// What manifests of MPII say, but for a kind's own.
+inline constexpr DraftHabits kMpiiHabits{
+    .side = PairSide::kAround,
+    .gaps = {2, 4},
+    .size_comment =
+        "Images come in many shapes; letterboxing keeps each one's shape and adds borders.",
+    .size = R"("width": 640, "height": 480, "fit": "letterbox")"};
 
 /// The note for the labelled frames of which is_without_image is true.
 inline constexpr const char* kWithoutImage =

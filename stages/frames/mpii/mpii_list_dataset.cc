@@ -333,4 +333,44 @@ std::vector<fs::path> find_mpii_lists(const fs::path& root) {
   return lists;
 }
 
+namespace {
+
+bool is_mpii_list(const fs::path& root) try {
+  return has_folder(root) && !find_mpii_lists(root).empty();
+} catch (const InputError&) {  // cannot be listed
+  return false;
+}
+
+std::vector<FoundSource> complete_mpii_list(FoundSource found) {
+  std::vector<fs::path> lists = find_mpii_lists(found.root);
+  const auto train = std::ranges::find(lists, "train", [](const fs::path& l) { return l.stem(); });
+  const auto chosen = train == lists.end() ? lists.begin() : train;
+  found.annotations = *chosen;
+  lists.erase(chosen);
+  for (const fs::path& other : lists) {
+    found.remarks.push_back("another list of people, left out: " +
+                            other.lexically_relative(found.root).string());
+  }
+  for (const fs::path& above : {found.root, found.root.parent_path()}) {
+    if (!found.sequences && has_folder(above / "sequences")) found.sequences = above / "sequences";
+  }
+  if (!found.sequences) {
+    found.remarks.push_back(
+        "no sequences (MPII's video frames; set \"sequences\" to their folder): no pairs");
+  }
+  return {std::move(found)};
+}
+
+constexpr std::array kMpiiListLayouts{DatasetLayout{
+    .fits = is_mpii_list, .complete = complete_mpii_list, .may_be_part = [](std::string_view name) {
+      return name.starts_with("image") || name == "sequences";
+    }}};
+
+}  // namespace
+
+constinit const DatasetReader kMpiiListReader{.kind = DatasetKind::kMpiiList,
+                                              .open = open_mpii_list_dataset,
+                                              .layouts = kMpiiListLayouts,
+                                              .habits = kMpiiHabits};
+
 }  // namespace eventgan

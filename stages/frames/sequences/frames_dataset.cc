@@ -1,10 +1,14 @@
 #include "stages/frames/sequences/frames_dataset.h"
 
 #include <algorithm>
+#include <array>
 #include <string>
 
 #include "manifests/values/faults.h"
+#include "stages/frames/dataset_kinds.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/sequences/image_folder.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 
@@ -28,5 +32,43 @@ std::unique_ptr<Dataset> open_frames_dataset(const SourceSpec& spec,
       std::string(std::filesystem::exists(status) ? "something else" : "nothing") + ", in " +
       root.string());
 }
+
+namespace {
+
+bool has_images(const std::filesystem::path& folder) {
+  return !look_into(folder).files.empty() && !list_image_folder(folder).frames.empty();
+}
+
+bool is_mot_sequence(const std::filesystem::path& folder) {
+  return has_file(folder / "gt/gt.txt") && has_images(folder / "img1");
+}
+
+constexpr std::array kFramesLayouts{
+    DatasetLayout{.fits = is_frames_root, .complete = find_own_labels}};
+
+}  // namespace
+
+bool is_frames_root(const std::filesystem::path& root) {
+  if (has_file(root)) return is_video_name(root);
+  if (has_folder(root / "image_2")) return false;  // KITTI's test images: no sequence at all
+  const ImageFolder top = has_folder(root) ? list_image_folder(root) : ImageFolder();
+  return !top.frames.empty() || std::ranges::any_of(top.left_out, is_video_name) ||
+         (has_folder(root / "images") && is_frames_root(root / "images")) ||
+         std::ranges::any_of(top.folders,
+                             [&](const std::string& name) { return has_images(root / name); }) ||
+         std::ranges::any_of(top.folders, [&](const std::string& name) {
+           return is_mot_sequence(root / name) ||
+                  (has_folder(root / name / "labels") && has_images(root / name / "images"));
+         });
+}
+
+constinit const DatasetReader kFramesReader{
+    .kind = DatasetKind::kFrames,
+    .open = open_frames_dataset,
+    .may_be_file = is_video_name,
+    .layouts = kFramesLayouts,
+    .habits = {.gaps = {1},
+               .size_comment = "No width and height: volumes are as large as the images.",
+               .size = ""}};
 
 }  // namespace eventgan
