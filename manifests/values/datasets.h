@@ -33,6 +33,24 @@ struct WindowSpec {
   LabelPlace label = LabelPlace::kEnd;
 };
 
+/// How labels of one's own are written (manifests/guides/own_data.md).
+enum class LabelFormat { kMot, kCoco, kYolo, kVoc, kCsv };
+
+/// A format of labels. What finds and reads them is in its own file
+/// (stages/frames/own_labels/own_labels.h).
+struct LabelFormatRow {
+  std::string_view word;  ///< the manifest's
+  LabelFormat value;
+  std::string_view title;  ///< for a person
+};
+
+/// Every format, in the order in which messages list them, and in which `init` looks for them.
+inline constexpr std::array kLabelFormats{LabelFormatRow{"mot", LabelFormat::kMot, "MOT"},
+                                          LabelFormatRow{"coco", LabelFormat::kCoco, "COCO"},
+                                          LabelFormatRow{"yolo", LabelFormat::kYolo, "YOLO"},
+                                          LabelFormatRow{"voc", LabelFormat::kVoc, "Pascal VOC"},
+                                          LabelFormatRow{"csv", LabelFormat::kCsv, "CSV"}};
+
 /// What a manifest may say of a kind of dataset. What finds and reads it is in its own file
 /// (stages/frames/dataset_kinds.h).
 struct DatasetRow {
@@ -109,14 +127,17 @@ inline constexpr std::array kDatasets{
                .keys = {"frames_per_second", "labels"},
                .is_own = true}};
 
-/// The kind's row. Throws std::invalid_argument for a number that is no kind, which only a bad cast
+/// A value's row. Throws std::invalid_argument for a number that is no value, which only a bad cast
 /// can make.
-constexpr const DatasetRow& dataset_row(DatasetKind kind) {
-  for (const DatasetRow& row : kDatasets) {
-    if (row.value == kind) return row;
+template <class Row, std::size_t N>
+constexpr const Row& row_of(const std::array<Row, N>& rows, decltype(Row::value) value) {
+  for (const Row& row : rows) {
+    if (row.value == value) return row;
   }
-  throw std::invalid_argument("expected a kind of dataset, got another number");
+  throw std::invalid_argument("expected a value of the enumeration, got another number");
 }
+
+constexpr const DatasetRow& dataset_row(DatasetKind kind) { return row_of(kDatasets, kind); }
 
 /// The row of that word; null if there is none.
 constexpr const DatasetRow* find_dataset(std::string_view word) {

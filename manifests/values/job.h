@@ -80,9 +80,6 @@ struct PairSpec {
   std::optional<StillsSpec> stills = std::nullopt;
 };
 
-/// How labels of one's own are written (manifests/guides/own_data.md).
-enum class LabelFormat { kCoco, kYolo, kVoc, kMot, kCsv };
-
 /// Labels of one's own for the images or videos of a `frames` source.
 struct LabelSpec {
   LabelFormat format = LabelFormat::kCoco;

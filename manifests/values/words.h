@@ -46,10 +46,7 @@ inline constexpr std::array kLayoutWords{
     Word<Human36mLayout>{"extracted", Human36mLayout::kExtracted},
     Word<Human36mLayout>{"official", Human36mLayout::kOfficial}};
 
-inline constexpr std::array kLabelFormatWords{
-    Word<LabelFormat>{"coco", LabelFormat::kCoco}, Word<LabelFormat>{"yolo", LabelFormat::kYolo},
-    Word<LabelFormat>{"voc", LabelFormat::kVoc}, Word<LabelFormat>{"mot", LabelFormat::kMot},
-    Word<LabelFormat>{"csv", LabelFormat::kCsv}};
+inline constexpr auto kLabelFormatWords = words_of(kLabelFormats);
 
 /// Where pairs come from.
 inline constexpr std::array kPairOriginWords{Word<bool>{"sequence", false},

@@ -271,7 +271,8 @@ std::vector<std::string> findings_of(const SourceDraft& draft, const Survey& sur
     }
   }
   if (found.labels) {
-    lines.push_back(fmt::format("labels: {}, in {}", to_string(found.labels->format),
+    lines.push_back(fmt::format("labels: {}, in {}",
+                                row_of(kLabelFormats, found.labels->format).title,
                                 found.labels->path.string()));
   }
   lines.insert(lines.end(), found.remarks.begin(), found.remarks.end());

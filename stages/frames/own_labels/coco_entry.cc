@@ -11,7 +11,7 @@
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
-#include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
 namespace {
@@ -34,7 +34,7 @@ class CocoEntry {
   const std::string& place() const { return place_; }
   StrictObject object() { return StrictValue(document_, faults_).object(); }
   void check() const {
-    if (!faults_.empty()) throw std::runtime_error(faults_.text());
+    if (!faults_.empty()) throw BadLabel(faults_.text());
   }
 
  private:
@@ -138,7 +138,7 @@ void add_coco_annotation(const std::string& text, std::int64_t image_id, ImageSi
   const bool is_person = read_keypoints(object, schema.joint_names.size(), person);
   entry.check();
   if (!overlaps(box.xyxy, image)) {
-    throw std::runtime_error(outside_text(box.xyxy, image) + ", in " + entry.place());
+    throw BadLabel(outside_text(box.xyxy, image) + ", in " + entry.place());
   }
   if (is_person) {
     person.box = box.xyxy;

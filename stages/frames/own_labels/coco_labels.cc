@@ -1,10 +1,15 @@
+#include <algorithm>
 #include <charconv>
+#include <filesystem>
+#include <optional>
 #include <stdexcept>
 #include <unordered_map>
 #include <utility>
 
 #include "stages/frames/own_labels/detail/coco_entry.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/own_labels/detail/image_labels.h"
 #include "stages/frames/own_labels/own_labels.h"
 
 namespace eventgan {
@@ -88,12 +93,61 @@ class CocoLabels : public OwnLabels {
   std::unordered_map<std::int64_t, std::size_t> place_of_id_;
 };
 
-}  // namespace
+/// Whether the beginning of a JSON file is of COCO's labels of these frames, as far as it shows.
+bool is_coco_of(const FoundFrames& frames, const std::filesystem::path& file) {
+  const std::string text = beginning_of(file);
+  if (!text.starts_with('{') || file.stem().string().starts_with("captions")) return false;
+  const bool has_lists = text.find("\"images\"") != std::string::npos ||
+                         text.find("\"annotations\"") != std::string::npos;
+  if (!has_lists) return false;
+  // instances_train2017.json is of the folder train2017 alone.
+  for (const std::string& folder : frames.folders) {
+    if (file.stem().string().ends_with(folder)) return false;
+  }
+  constexpr std::string_view kKey = "\"file_name\"";
+  bool any = false;
+  for (std::size_t at = text.find(kKey); at != std::string::npos; at = text.find(kKey, at + 1)) {
+    const std::size_t begin = text.find('"', at + kKey.size());
+    const std::size_t end = begin == std::string::npos ? begin : text.find('"', begin + 1);
+    if (end == std::string::npos) break;
+    if (is_among(frames, text.substr(begin + 1, end - begin - 1))) return true;
+    any = true;
+  }
+  // A file that begins with other things than images has to be told by its name.
+  return !any && file.stem().string().ends_with(frames.root.filename().string());
+}
+
+std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
+                                               std::vector<std::string>& remarks) {
+  std::vector<std::filesystem::path> files;
+  for (const std::filesystem::path& folder :
+       {frames.root, frames.root.parent_path(), frames.root / "annotations",
+        frames.root.parent_path() / "annotations"}) {
+    for (const std::filesystem::path& file : frames.files->in(folder, ".json")) {
+      if (is_coco_of(frames, file)) files.push_back(file);
+    }
+  }
+  if (files.empty()) return std::nullopt;
+  const std::string name = frames.root.filename().string();
+  const auto rank = [&](const std::filesystem::path& file) {
+    const std::string stem = file.stem().string();
+    return std::pair(!stem.ends_with(name), !stem.starts_with("instances"));
+  };
+  std::ranges::stable_sort(files, {}, rank);
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    remarks.push_back("other COCO labels left out: " + files[i].string());
+  }
+  return files.front();
+}
 
 std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
                                             const std::filesystem::path& base,
                                             LabelledSource source) {
   return std::make_unique<CocoLabels>(spec, base, std::move(source));
 }
+
+}  // namespace
+
+constinit const LabelReader kCocoReader{LabelFormat::kCoco, open_coco_labels, find_coco};
 
 }  // namespace eventgan

@@ -11,10 +11,12 @@
 #include <utility>
 #include <vector>
 
-#include "manifests/documents/detail/json_text.h"
 #include "stages/frames/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
+#include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
 namespace {
@@ -24,16 +26,10 @@ constexpr std::array<std::string_view, 7> kColumns = {"image", "class",  "left",
                                                       "right", "bottom", "track"};
 using Row = std::array<std::string_view, kColumns.size()>;
 
-std::string quoted(std::string_view text) { return '"' + escape_controls(text) + '"'; }
-
-SampleFault expected(const std::string& what, const std::string& got) {
-  return {"expected " + what + ", got " + got};
-}
-
-Outcome<NamedBox> box_of(const Row& row) {
+NamedBox box_of(const Row& row) {
   NamedBox read;
   if (!is_label_name(row[kClass])) {
-    return expected("a class without control characters", quoted(row[kClass]));
+    throw BadLabel("a class without control characters", in_quotes(row[kClass]));
   }
   read.class_name = row[kClass];
   Rectangle& xyxy = read.box.xyxy;
@@ -41,20 +37,19 @@ Outcome<NamedBox> box_of(const Row& row) {
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const auto edge = parse_number<double>(row[kLeft + i]);
     if (!edge || std::abs(*edge) > kFarthest_px) {
-      return expected(fmt::format("{} within {:g} pixels", kColumns[kLeft + i], kFarthest_px),
-                      quoted(row[kLeft + i]));
+      throw BadLabel(fmt::format("{} within {:g} pixels", kColumns[kLeft + i], kFarthest_px),
+                     in_quotes(row[kLeft + i]));
     }
     *edges[i] = *edge;
   }
   if (xyxy.right <= xyxy.left || xyxy.bottom <= xyxy.top) {
-    return expected(
-        "left < right and top < bottom",
-        fmt::format("{}, {}, {}, {}", row[kLeft], row[kTop], row[kRight], row[kBottom]));
+    throw BadLabel("left < right and top < bottom",
+                   fmt::format("{}, {}, {}, {}", row[kLeft], row[kTop], row[kRight], row[kBottom]));
   }
   if (!row[kTrack].empty()) {
     const auto track = parse_number<std::int64_t>(row[kTrack]);
     if (!track || *track < 0)
-      return expected("a whole number from 0 as track", quoted(row[kTrack]));
+      throw BadLabel("a whole number from 0 as track", in_quotes(row[kTrack]));
     read.box.track_id = *track;
   }
   return read;
@@ -63,23 +58,21 @@ Outcome<NamedBox> box_of(const Row& row) {
 /// An image's rows, one after the other.
 class ImageRows {
  public:
-  /// Beside the rows before it.
-  std::optional<SampleFault> add(const Row& row) {
+  /// Beside the rows before it. Throws BadLabel.
+  void add(const Row& row) {
     const bool is_alone = std::ranges::all_of(row.begin() + 1, row.end(),
                                               [](std::string_view field) { return field.empty(); });
     if (is_without_boxes_ || (is_alone && !labels_.boxes.empty())) {
-      return expected("one row alone of an image without boxes", "another of it");
+      throw BadLabel("one row alone of an image without boxes", "another of it");
     }
     is_without_boxes_ = is_alone;
-    if (is_alone) return std::nullopt;
-    auto box = box_of(row);
-    if (is_fault(box)) return std::get<SampleFault>(box);
-    const std::int64_t track = std::get<NamedBox>(box).box.track_id;
+    if (is_alone) return;
+    NamedBox box = box_of(row);
+    const std::int64_t track = box.box.track_id;
     if (track >= 0 && !tracks_.insert(track).second) {
-      return expected("each track once in an image", std::to_string(track) + " twice");
+      throw BadLabel("each track once in an image", std::to_string(track) + " twice");
     }
-    labels_.boxes.push_back(std::move(std::get<NamedBox>(box)));
-    return std::nullopt;
+    labels_.boxes.push_back(std::move(box));
   }
 
   ImageLabels& labels() { return labels_; }
@@ -91,10 +84,6 @@ class ImageRows {
 };
 
 }  // namespace
-
-bool is_label_header(const CsvRecord& header) {
-  return header.fault.empty() && !is_fault(csv_columns(header, kColumns, kTrack));
-}
 
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path) {
@@ -127,14 +116,18 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
       if (places[i]) row[i] = record->fields[*places[i]];
     }
     if (!is_label_name(row[kImage])) {
-      throw InputError("expected an image without control characters, got " + quoted(row[kImage]) +
-                       ", in " + place);
+      throw InputError("expected an image without control characters, got " +
+                       in_quotes(row[kImage]) + ", in " + place);
     }
     Outcome<ImageRows>& image = images[std::string(row[kImage])];
     if (is_fault(image)) continue;
     auto& rows = std::get<ImageRows>(image);
     rows.labels().original.append(record->bytes);
-    if (const auto fault = rows.add(row)) image = SampleFault{fault->reason + ", in " + place};
+    try {
+      rows.add(row);
+    } catch (const BadLabel& bad) {
+      image = bad.in(place);
+    }
   }
   std::map<std::string, Outcome<ImageLabels>> labels;
   for (auto& [name, rows] : images) {
@@ -146,5 +139,92 @@ std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view te
   }
   return labels;
 }
+
+namespace {
+
+class CsvLabels : public ReadLabels {
+ public:
+  CsvLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
+      : ReadLabels(std::move(labelled)), path_(spec.path) {
+    by_key_ = parse_csv_labels(SourceRoot("", base).read_or_throw(path_), path_);
+    annotation_files_.push_back(path_);
+    ClassList classes;
+    const FrameNames names(source());
+    std::vector<std::string> of_several;
+    for (const auto& [image, labels] : by_key_) {
+      classes.add(labels);
+      const FrameNames::Match match = names.find(image);
+      if (match.frame == FrameNames::kSeveral) {
+        of_several.push_back(image);
+      } else if (match.frame == FrameNames::kNone) {
+        give_absent(match.below_root, image);
+      } else {
+        give(match.frame, image);
+      }
+    }
+    refuse_bare_names(of_several, path_);
+    schema_.class_names = classes.names();
+    note_without_label(path_);
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return path_ + "#" + label_key;
+  }
+
+ private:
+  std::string path_;
+};
+
+/// Whether a table's first record has the columns that parse_csv_labels requires, and no others.
+bool is_label_header(const CsvRecord& header) {
+  return header.fault.empty() && !is_fault(csv_columns(header, kColumns, kTrack));
+}
+
+std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
+                                              std::vector<std::string>& remarks) {
+  std::optional<std::filesystem::path> found;
+  for (const std::filesystem::path& folder : {frames.root, frames.root.parent_path()}) {
+    for (const std::filesystem::path& file : frames.files->in(folder, ".csv")) {
+      const std::string text = beginning_of(file);
+      CsvReader reader(text);
+      const std::optional<CsvRecord> header = reader.next();
+      if (!header) continue;
+      const auto place = [&](std::string_view name) {
+        return static_cast<std::size_t>(std::ranges::find(header->fields, name) -
+                                        header->fields.begin());
+      };
+      const auto is_absent = [&](std::string_view name) {
+        return place(name) == header->fields.size();
+      };
+      if (std::ranges::any_of(std::array{"image", "class", "left", "top", "right", "bottom"},
+                              is_absent)) {
+        continue;
+      }
+      bool any_of_frames = false;
+      const std::size_t image = place("image");
+      while (const std::optional<CsvRecord> row = any_of_frames ? std::nullopt : reader.next()) {
+        any_of_frames = row->fields.size() > image && is_among(frames, row->fields[image]);
+      }
+      if (!any_of_frames) continue;
+      if (!is_label_header(*header)) {
+        remarks.push_back("a table with other columns left out: " + file.string());
+      } else if (found) {
+        remarks.push_back("another table of labels left out: " + file.string());
+      } else {
+        found = file;
+      }
+    }
+  }
+  return found;
+}
+
+std::unique_ptr<OwnLabels> open_csv_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source) {
+  return std::make_unique<CsvLabels>(spec, base, std::move(source));
+}
+
+}  // namespace
+
+constinit const LabelReader kCsvReader{LabelFormat::kCsv, open_csv_labels, find_csv};
 
 }  // namespace eventgan

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/frame_names.h"
 #include "stages/frames/sequences/image_folder.h"
 
@@ -18,6 +19,44 @@ std::string joined(const std::string& folder, const std::string& name) {
 fs::path normal(const fs::path& path) { return fs::absolute(path).lexically_normal(); }
 
 }  // namespace
+
+fs::path label_folder_of(const fs::path& images, const LabelFiles& names) {
+  std::vector<fs::path> parts(images.begin(), images.end());
+  std::erase(parts, "");  // "images/"
+  const auto last = std::find_if(parts.rbegin(), parts.rend(), [&](const fs::path& part) {
+    return std::ranges::find(names.image_folders, part.string()) != names.image_folders.end();
+  });
+  if (last == parts.rend()) return {};
+  for (const std::string_view label_folder : names.label_folders) {
+    *last = label_folder;
+    fs::path path;
+    for (const fs::path& part : parts) path /= part;
+    if (has_folder(path)) return path;
+  }
+  return {};
+}
+
+fs::path find_label_files(const FoundFrames& frames, const LabelFiles& names) {
+  const auto files_in = [&](const fs::path& folder) {
+    std::vector<fs::path> files = names_with(look_into(folder), names.extension);
+    std::erase(files, names.other_file);
+    return files;
+  };
+  for (const fs::path& folder : {label_folder_of(frames.root, names), frames.root}) {
+    const auto is_of_frame = [&](const fs::path& name) {
+      return frames.stems.contains(name.stem().string());
+    };
+    const auto has_files = [&](const std::string& name) {
+      return !files_in(folder / name).empty();
+    };
+    if (folder.empty()) continue;
+    if (frames.stems.empty() ? std::ranges::any_of(frames.folders, has_files)
+                             : std::ranges::any_of(files_in(folder), is_of_frame)) {
+      return folder;
+    }
+  }
+  return {};
+}
 
 FilePerImage::FilePerImage(const LabelSpec& spec, const fs::path& base, LabelledSource labelled,
                            LabelFiles names)
@@ -44,25 +83,24 @@ std::vector<std::string> FilePerImage::files_in(const std::string& folder) const
 
 /// Where the labels of a folder of images lie, below `path`.
 std::string FilePerImage::folder_of(const std::string& images) const {
-  const fs::path on_disk = normal(source().root.on_disk(images));
-  std::vector<fs::path> parts(on_disk.begin(), on_disk.end());
-  const auto last = std::find_if(parts.rbegin(), parts.rend(), [&](const fs::path& part) {
-    return std::ranges::find(names_.image_folders, part.string()) != names_.image_folders.end();
-  });
-  if (last != parts.rend()) {
-    *last = names_.label_folder;
-    fs::path replaced;
-    for (const fs::path& part : parts) {
-      if (!part.empty()) replaced /= part;
-    }
+  const fs::path standing = label_folder_of(normal(source().root.on_disk(images)), names_);
+  if (!standing.empty()) {
     fs::path path = normal(root_.on_disk(""));
     if (!path.has_filename()) path = path.parent_path();  // "data/"
-    const std::string below = replaced.lexically_relative(path).generic_string();
+    const std::string below = standing.lexically_relative(path).generic_string();
     const bool is_below = !below.empty() && below != ".." && !below.starts_with("../");
-    if (is_below && has_folder(replaced)) return below == "." ? "" : below;
+    if (is_below) return below == "." ? "" : below;
   }
-  std::string in_labels = joined(std::string(names_.label_folder), images);
-  return has_folder(root_.on_disk(in_labels)) ? in_labels : images;
+  return in_label_folder(images);
+}
+
+/// A folder of images below the first of the folders of labels that has it; as it is if none has.
+std::string FilePerImage::in_label_folder(const std::string& images) const {
+  for (const std::string_view name : names_.label_folders) {
+    std::string folder = joined(std::string(name), images);
+    if (has_folder(root_.on_disk(folder))) return folder;
+  }
+  return images;
 }
 
 void FilePerImage::find_of_images() {
@@ -106,8 +144,7 @@ void FilePerImage::note_unused(const std::string& folder, const std::set<std::st
 
 void FilePerImage::find_of_videos() {
   const FrameNames names(source());
-  const std::string label_folder(names_.label_folder);
-  const std::string folder = has_folder(root_.on_disk(label_folder)) ? label_folder : "";
+  const std::string folder = in_label_folder("");
   const auto take = [&](const std::string& key, const std::string& frame_name) {
     annotation_files_.push_back(root_.written(key));
     const std::size_t frame = names.find(frame_name).frame;

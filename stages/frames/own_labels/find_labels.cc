@@ -15,18 +15,14 @@
 
 #include "manifests/values/faults.h"
 #include "stages/base/files/input_file.h"
-#include "stages/frames/csv_records.h"
-#include "stages/frames/own_labels/detail/csv_labels.h"
+#include "stages/frames/own_labels/own_labels.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "stages/frames/sequences/image_folder.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
-namespace {
-
 namespace fs = std::filesystem;
 
-/// Names of a folder's files with that extension.
 std::vector<fs::path> names_with(const FolderListing& listing, std::string_view extension) {
   std::vector<fs::path> names;
   for (const fs::path name : listing.files) {
@@ -36,26 +32,17 @@ std::vector<fs::path> names_with(const FolderListing& listing, std::string_view 
   return names;
 }
 
-/// JSON files and tables, which may label all images below a folder. Each folder is listed once:
-/// one is above many places.
-class WholeFiles {
- public:
-  const std::vector<fs::path>& in(const fs::path& folder, std::string_view extension) {
-    const auto [entry, is_new] = listed_.try_emplace(folder);
-    const FolderListing listing = is_new ? look_into(folder) : FolderListing();
-    for (const std::string_view known : {".json", ".csv"}) {
-      for (const fs::path& name : names_with(listing, known)) {
-        entry->second[known].push_back(folder / name);
-      }
+const std::vector<fs::path>& WholeFiles::in(const fs::path& folder, std::string_view extension) {
+  const auto [entry, is_new] = listed_.try_emplace(folder);
+  const FolderListing listing = is_new ? look_into(folder) : FolderListing();
+  for (const std::string_view known : {".json", ".csv"}) {
+    for (const fs::path& name : names_with(listing, known)) {
+      entry->second[known].push_back(folder / name);
     }
-    return entry->second[extension];
   }
+  return entry->second[extension];
+}
 
- private:
-  std::map<fs::path, std::map<std::string_view, std::vector<fs::path>>> listed_;  ///< by extension
-};
-
-/// The first bytes of a file, where a format shows.
 std::string beginning_of(const fs::path& file) {
   std::string text(1 << 16, '\0');
   std::string reason;
@@ -64,16 +51,21 @@ std::string beginning_of(const fs::path& file) {
   return text;
 }
 
-/// Images and folders of images, or videos, as a source has them.
-struct Frames {
-  fs::path root;
-  std::vector<std::string> folders;  ///< with images, or with img1 where MOT's labels are
-  std::set<std::string> stems;       ///< of the images and videos right in the root
-  WholeFiles* files;
-};
+bool is_among(const FoundFrames& frames, const fs::path& name) {
+  if (name.is_relative() && has_file(frames.root / name)) return true;
+  const fs::path folder = name.parent_path().filename();
+  if (frames.stems.contains(folder.string())) return true;  // a video's frame
+  const bool may_be_bare = folder.empty() || folder == frames.root.filename();
+  if (may_be_bare && has_file(frames.root / name.filename())) return true;
+  return folder.empty() && std::ranges::any_of(frames.folders, [&](const std::string& of_it) {
+           return has_file(frames.root / of_it / name);
+         });
+}
 
-Frames frames_in(const fs::path& root, WholeFiles& files) {
-  Frames frames{root, {}, {}, &files};
+namespace {
+
+FoundFrames frames_in(const fs::path& root, WholeFiles& files) {
+  FoundFrames frames{root, {}, {}, &files};
   if (has_file(root)) {
     frames.stems.insert(root.stem().string());
     frames.root = root.parent_path();
@@ -97,188 +89,18 @@ Frames frames_in(const fs::path& root, WholeFiles& files) {
   return frames;
 }
 
-using Found = std::optional<FoundLabels>;
-
-/// Whether the name that a label file has for an image is one of these frames.
-bool is_among(const Frames& frames, const fs::path& name) {
-  if (name.is_relative() && has_file(frames.root / name)) return true;
-  const fs::path folder = name.parent_path().filename();
-  if (frames.stems.contains(folder.string())) return true;  // a video's frame
-  const bool may_be_bare = folder.empty() || folder == frames.root.filename();
-  if (may_be_bare && has_file(frames.root / name.filename())) return true;
-  return folder.empty() && std::ranges::any_of(frames.folders, [&](const std::string& of_it) {
-           return has_file(frames.root / of_it / name);
-         });
-}
-
-/// Whether the beginning of a JSON file is of COCO's labels of these frames, as far as it shows.
-bool is_coco_of(const Frames& frames, const fs::path& file) {
-  const std::string text = beginning_of(file);
-  if (!text.starts_with('{') || file.stem().string().starts_with("captions")) return false;
-  const bool has_lists = text.find("\"images\"") != std::string::npos ||
-                         text.find("\"annotations\"") != std::string::npos;
-  if (!has_lists) return false;
-  // instances_train2017.json is of the folder train2017 alone.
-  for (const std::string& folder : frames.folders) {
-    if (file.stem().string().ends_with(folder)) return false;
-  }
-  constexpr std::string_view kKey = "\"file_name\"";
-  bool any = false;
-  for (std::size_t at = text.find(kKey); at != std::string::npos; at = text.find(kKey, at + 1)) {
-    const std::size_t begin = text.find('"', at + kKey.size());
-    const std::size_t end = begin == std::string::npos ? begin : text.find('"', begin + 1);
-    if (end == std::string::npos) break;
-    if (is_among(frames, text.substr(begin + 1, end - begin - 1))) return true;
-    any = true;
-  }
-  // A file that begins with other things than images has to be told by its name.
-  return !any && file.stem().string().ends_with(frames.root.filename().string());
-}
-
-Found find_coco(const Frames& frames, std::vector<std::string>& remarks) {
-  std::vector<fs::path> files;
-  for (const fs::path& folder :
-       {frames.root, frames.root.parent_path(), frames.root / "annotations",
-        frames.root.parent_path() / "annotations"}) {
-    for (const fs::path& file : frames.files->in(folder, ".json")) {
-      if (is_coco_of(frames, file)) files.push_back(file);
-    }
-  }
-  if (files.empty()) return std::nullopt;
-  const std::string name = frames.root.filename().string();
-  const auto rank = [&](const fs::path& file) {
-    const std::string stem = file.stem().string();
-    return std::pair(!stem.ends_with(name), !stem.starts_with("instances"));
-  };
-  std::ranges::stable_sort(files, {}, rank);
-  for (std::size_t i = 1; i < files.size(); ++i) {
-    remarks.push_back("other COCO labels left out: " + files[i].string());
-  }
-  return FoundLabels{LabelFormat::kCoco, files.front()};
-}
-
-/// The folder of labels that stands for a folder of images; empty if there is none.
-fs::path beside(const fs::path& images, const std::vector<std::string_view>& image_folders,
-                std::string_view label_folder) {
-  std::vector<fs::path> parts(images.begin(), images.end());
-  const auto last = std::find_if(parts.rbegin(), parts.rend(), [&](const fs::path& part) {
-    return std::ranges::find(image_folders, part.string()) != image_folders.end();
-  });
-  if (last == parts.rend()) return {};
-  *last = label_folder;
-  fs::path path;
-  for (const fs::path& part : parts) path /= part;
-  return has_folder(path) ? path : fs::path();
-}
-
-/// Whether a folder has a file of a label, or the folders of it that have images' names.
-bool has_labels(const Frames& frames, const fs::path& folder, std::string_view extension) {
-  if (folder.empty()) return false;
-  const auto has_any = [&](const fs::path& below) {
-    return std::ranges::any_of(names_with(look_into(below), extension),
-                               [](const fs::path& name) { return name != "classes.txt"; });
-  };
-  if (!frames.stems.empty()) {
-    return std::ranges::any_of(names_with(look_into(folder), extension), [&](const fs::path& name) {
-      return frames.stems.contains(name.stem().string());
-    });
-  }
-  return std::ranges::any_of(frames.folders,
-                             [&](const std::string& name) { return has_any(folder / name); });
-}
-
-Found find_yolo(const Frames& frames, std::vector<std::string>& remarks) {
-  for (const fs::path& labels : {beside(frames.root, {"images"}, "labels"), frames.root}) {
-    if (!has_labels(frames, labels, ".txt")) continue;
-    const bool is_beside = labels == frames.root;  // of texts there, folders above have none
-    fs::path folder = labels;
-    for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
-      for (const char* name : {"data.yaml", "classes.txt"}) {
-        if (has_file(folder / name)) {
-          return FoundLabels{LabelFormat::kYolo, is_beside ? labels : folder};
-        }
-      }
-    }
-    if (!is_beside) {
-      remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +
-                        labels.string());
-    }
-  }
-  return std::nullopt;
-}
-
-Found find_voc(const Frames& frames, std::vector<std::string>&) {
-  for (const fs::path& labels : {beside(frames.root, {"JPEGImages", "images"}, "Annotations"),
-                                 beside(frames.root, {"images"}, "annotations"), frames.root}) {
-    if (has_labels(frames, labels, ".xml")) return FoundLabels{LabelFormat::kVoc, labels};
-  }
-  return std::nullopt;
-}
-
-Found find_mot(const Frames& frames, std::vector<std::string>&) {
-  const fs::path above = frames.root.parent_path();
-  if (!frames.stems.empty() && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
-    return FoundLabels{LabelFormat::kMot, above};
-  }
-  for (const fs::path& folder : {frames.root, above}) {
-    for (const std::string& sequence : frames.folders) {
-      for (const char* name : {"gt/gt.txt", "gt.txt"}) {
-        if (has_file(folder / sequence / name)) return FoundLabels{LabelFormat::kMot, folder};
-      }
-    }
-  }
-  return std::nullopt;
-}
-
-Found find_csv(const Frames& frames, std::vector<std::string>& remarks) {
-  Found found;
-  for (const fs::path& folder : {frames.root, frames.root.parent_path()}) {
-    for (const fs::path& file : frames.files->in(folder, ".csv")) {
-      const std::string text = beginning_of(file);
-      CsvReader reader(text);
-      const std::optional<CsvRecord> header = reader.next();
-      if (!header) continue;
-      const auto place = [&](std::string_view name) {
-        return static_cast<std::size_t>(std::ranges::find(header->fields, name) -
-                                        header->fields.begin());
-      };
-      const auto is_absent = [&](std::string_view name) {
-        return place(name) == header->fields.size();
-      };
-      if (std::ranges::any_of(std::array{"image", "class", "left", "top", "right", "bottom"},
-                              is_absent)) {
-        continue;
-      }
-      bool any_of_frames = false;
-      const std::size_t image = place("image");
-      while (const std::optional<CsvRecord> row = any_of_frames ? std::nullopt : reader.next()) {
-        any_of_frames = row->fields.size() > image && is_among(frames, row->fields[image]);
-      }
-      if (!any_of_frames) continue;
-      if (!is_label_header(*header)) {
-        remarks.push_back("a table with other columns left out: " + file.string());
-      } else if (found) {
-        remarks.push_back("another table of labels left out: " + file.string());
-      } else {
-        found = FoundLabels{LabelFormat::kCsv, file};
-      }
-    }
-  }
-  return found;
-}
-
 /// The first of the formats; the others are remarks.
-Found find_any(const Frames& frames, std::vector<std::string>& remarks) {
-  Found found;
-  for (const auto find : {find_mot, find_coco, find_yolo, find_voc, find_csv}) {
-    std::vector<std::string> of_format;
-    const Found other = find(frames, of_format);
-    remarks.insert(remarks.end(), of_format.begin(), of_format.end());
-    if (found && other) {
-      remarks.push_back("labels in another format (" + std::string(to_string(other->format)) +
-                        ") left out: " + other->path.string());
+std::optional<FoundLabels> find_any(const FoundFrames& frames, std::vector<std::string>& remarks) {
+  std::optional<FoundLabels> found;
+  for (const LabelReader* const reader : kLabelReaders) {
+    const std::optional<fs::path> path = reader->find(frames, remarks);
+    if (!path) continue;
+    if (!found) {
+      found = FoundLabels{reader->format, *path};
+    } else {
+      remarks.push_back("labels in another format (" + std::string(to_string(reader->format)) +
+                        ") left out: " + path->string());
     }
-    if (!found) found = other;
   }
   return found;
 }
@@ -337,7 +159,7 @@ std::vector<FoundSource> find_splits(const FoundSource& found, const fs::path& g
       root /= *part;
     }
     if (!has_folder(root)) continue;
-    const Frames frames = frames_in(root, files);
+    const FoundFrames frames = frames_in(root, files);
     if (has_all) with_frames.push_back(root);
     FoundSource source = found;
     source.root = root;
@@ -397,15 +219,15 @@ std::vector<FoundSource> find_own_labels(FoundSource found) {
   std::vector<fs::path> with_frames;
   const fs::path given = found.root;
   WholeFiles files;
-  const Frames whole = frames_in(given, files);
+  const FoundFrames whole = frames_in(given, files);
   const bool is_empty = whole.stems.empty() && whole.folders.empty();
   for (const fs::path& place : places_in(found.root)) {
-    const Frames frames = frames_in(place, files);
+    const FoundFrames frames = frames_in(place, files);
     if (frames.stems.empty() && frames.folders.empty()) continue;
     with_frames.push_back(place);
     if (is_empty && !first_place) first_place = place;
     std::vector<std::string> of_place;
-    const Found labels = find_any(frames, of_place);
+    const auto labels = find_any(frames, of_place);
     if (labels && !found.labels) {
       found.labels = labels;
       root = place;

@@ -1,7 +1,5 @@
 #include "stages/frames/own_labels/detail/frame_names.h"
 
-#include <fmt/core.h>
-
 #include <algorithm>
 
 #include "stages/frames/numbered_sequence.h"
@@ -62,20 +60,6 @@ FrameNames::Match FrameNames::find(const std::string& name) const {
     break;
   }
   return match;
-}
-
-bool overlaps(const Rectangle& box, ImageSize image) {
-  return std::min(box.right, static_cast<double>(image.width)) > std::max(box.left, 0.0) &&
-         std::min(box.bottom, static_cast<double>(image.height)) > std::max(box.top, 0.0);
-}
-
-std::string outside_text(const Rectangle& box, ImageSize image) {
-  if (!(box.right > box.left && box.bottom > box.top)) {
-    return fmt::format("expected a box of a width and height above 0, got {:g} x {:g}",
-                       box.right - box.left, box.bottom - box.top);
-  }
-  return fmt::format("expected a box within the image of {}, got one from ({}, {}) to ({}, {})",
-                     to_string(image), box.left, box.top, box.right, box.bottom);
 }
 
 }  // namespace eventgan

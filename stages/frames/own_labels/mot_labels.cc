@@ -1,5 +1,8 @@
 #include "stages/frames/own_labels/detail/mot_labels.h"
 
+#include <fmt/core.h>
+
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <optional>
@@ -9,6 +12,9 @@
 
 #include "stages/frames/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
+#include "stages/frames/own_labels/detail/image_labels.h"
+#include "stages/frames/source_folders.h"
 
 namespace eventgan {
 namespace {
@@ -33,23 +39,18 @@ constexpr std::array<MotClass, 13> kClasses = {{{"pedestrian"},
                                                 {"reflection", true},
                                                 {"crowd", true}}};
 
-/// The first column that is not as it should be leaves as this.
-struct BadColumn {
-  std::string reason;  ///< "expected X, got Y"
-};
-
 template <class Number>
 Number number(std::string_view column, const char* expected, Number least, Number most) {
   const auto value = parse_number<Number>(column);
   if (value && *value >= least && *value <= most) return *value;
-  throw BadColumn{std::string("expected ") + expected + ", got " + in_quotes(column)};
+  throw BadLabel(std::string("expected ") + expected + ", got " + in_quotes(column));
 }
 
 NamedBox box_of(const std::vector<std::string>& columns) {
   enum { kFrame, kId, kLeft, kTop, kWidth, kHeight, kConf, kClass, kVisibility };
   constexpr std::size_t kOf2015 = 10;  // x, y, z in place of class and visibility
   if (columns.size() <= kConf || columns.size() > kOf2015) {
-    throw BadColumn{"expected 7 to 10 columns, got " + std::to_string(columns.size())};
+    throw BadLabel("expected 7 to 10 columns, got " + std::to_string(columns.size()));
   }
   NamedBox read;
   Box& box = read.box;
@@ -65,8 +66,8 @@ NamedBox box_of(const std::vector<std::string>& columns) {
   box.xyxy.right = box.xyxy.left + width;
   box.xyxy.bottom = box.xyxy.top + height;
   if (!(box.xyxy.right > box.xyxy.left && box.xyxy.bottom > box.xyxy.top)) {
-    throw BadColumn{"expected a box of a width and height above 0, got " + columns[kWidth] + " x " +
-                    columns[kHeight]};
+    throw BadLabel("expected a box of a width and height above 0, got " + columns[kWidth] + " x " +
+                   columns[kHeight]);
   }
   const bool counts = number(columns[kConf], "a conf from 0 to 1", 0.0, 1.0) > 0;
   MotClass mot = kClasses[0];
@@ -135,8 +136,9 @@ MotSequence parse_mot_sequence(std::string_view text, const std::string& path) {
     const TextLine found = line(key);
     try {
       return number(found.bytes, "a number above 0", least, most);
-    } catch (const BadColumn& bad) {
-      throw InputError(bad.reason + " for " + key + ", in " + place_in_file(path, found.number));
+    } catch (const BadLabel& bad) {
+      throw InputError(bad.what() +
+                       (std::string(" for ") + key + ", in " + place_in_file(path, found.number)));
     }
   };
   constexpr int kMostSide = static_cast<int>(kFarthest_px);
@@ -165,17 +167,175 @@ std::map<std::int64_t, Outcome<ImageLabels>> parse_mot_labels(std::string_view t
     try {
       NamedBox box = box_of(line->fields);
       if (!seen.emplace(*frame, box.box.track_id).second) {
-        throw BadColumn{"expected each id once in a frame, got " +
-                        std::to_string(box.box.track_id) + " twice"};
+        throw BadLabel("expected each id once in a frame, got " + std::to_string(box.box.track_id) +
+                       " twice");
       }
       auto& labels = std::get<ImageLabels>(outcome);
       labels.original.append(line->bytes);
       labels.boxes.push_back(std::move(box));
-    } catch (const BadColumn& bad) {
-      outcome = SampleFault{bad.reason + ", in " + place};
+    } catch (const BadLabel& bad) {
+      outcome = bad.in(place);
     }
   }
   return frames;
 }
+
+namespace {
+
+class MotLabels : public ReadLabels {
+ public:
+  MotLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
+      : ReadLabels(std::move(labelled)), root_(spec.path, base) {
+    std::map<std::string, Frames> sequences;
+    for (std::size_t i = 0; i < source().frames.size(); ++i) {
+      const SourceFrame& frame = source().frames[i];
+      sequences[frame.sequence].emplace(frame.number, i);
+    }
+    std::vector<std::string> without;
+    const bool is_file = std::filesystem::is_regular_file(root_.on_disk(""));
+    if (is_file && sequences.size() > 1) {
+      throw InputError("expected a folder of sequences, since there are " +
+                       std::to_string(sequences.size()) + ", got a file, in " + spec.path);
+    }
+    if (!is_file) root_.require_folder("");
+    for (const auto& [sequence, frames] : sequences) {
+      const std::optional<std::string> file = is_file ? "" : find_file(sequence);
+      if (file) {
+        read_sequence(sequence, *file, frames);
+      } else {
+        without.push_back(sequence);
+      }
+    }
+    if (!without.empty()) {
+      notes_.push_back(
+          counted(without, "sequences without gt/gt.txt or gt.txt in " + root_.written("")));
+    }
+    std::vector<std::string> unused;
+    for (const std::string& name : is_file ? std::vector<std::string>() : root_.folders_in("")) {
+      const bool is_other = name != "gt" && !sequences.contains(name);
+      if (is_other && find_file(name)) unused.push_back(name);
+    }
+    if (!unused.empty()) {
+      notes_.push_back(
+          counted(unused, "sequences of labels without images left out in " + root_.written("")));
+    }
+    schema_.class_names = classes_.names();
+    std::ranges::sort(annotation_files_);
+    note_without_label(root_.written(""));
+  }
+
+  std::string label_place(const std::string& label_key) const override {
+    return label_key.starts_with('#') ? root_.written("") + label_key : root_.written(label_key);
+  }
+
+  std::optional<double> frames_per_second(const std::string& sequence) const override {
+    const auto rate = rates_.find(sequence);
+    return rate == rates_.end() ? std::nullopt : std::optional(rate->second);
+  }
+
+ private:
+  using Frames = std::map<std::int64_t, std::size_t>;  ///< by FrameRef::index
+
+  /// SEQUENCE/gt/gt.txt, SEQUENCE/gt.txt; of the only one gt/gt.txt and gt.txt too.
+  std::optional<std::string> find_file(const std::string& sequence) const {
+    const std::string folder = sequence.empty() ? "" : sequence + "/";
+    for (const char* name : {"gt/gt.txt", "gt.txt"}) {
+      if (root_.has_file(folder + name)) return folder + name;
+    }
+    return std::nullopt;
+  }
+
+  /// seqinfo.ini in the folder of gt.txt, or above it where that is named gt.
+  std::optional<MotSequence> read_info(const std::string& file) {
+    SourceRoot folder = root_.above(file);
+    if (folder.name() == "gt") folder = folder.above();
+    if (!folder.has_file("seqinfo.ini")) return std::nullopt;
+    const std::string path = folder.written("seqinfo.ini");
+    annotation_files_.push_back(path);
+    return parse_mot_sequence(folder.read_or_throw("seqinfo.ini"), path);
+  }
+
+  /// Throws InputError if images whose names tell no number, and which are counted in their order
+  /// for that, are not as many as the sequence: one that is missing would shift the labels of all
+  /// behind it.
+  void require_all(const Frames& frames, const std::optional<MotSequence>& info,
+                   std::int64_t last_number, const std::string& path) const {
+    const auto tells_number = [&](const auto& frame) {
+      const std::string stem =
+          std::filesystem::path(source().frames[frame.second].name).stem().string();
+      std::string digits = stem.substr(stem.find_last_not_of("0123456789") + 1);
+      digits.erase(0, std::min(digits.find_first_not_of('0'), digits.size() - 1));
+      return digits == std::to_string(frame.first);
+    };
+    if (source().is_video || std::ranges::all_of(frames, tells_number)) return;
+    const std::int64_t count = std::ssize(frames);
+    if (info ? count == info->length : count >= last_number) return;
+    const std::filesystem::path first(source().frames[frames.begin()->second].name);
+    throw InputError(fmt::format(
+        "expected numbered images, or all {} frames of {}, got {} without numbers, in {}",
+        info ? info->length : last_number, path, count,
+        source().root.written(first.parent_path().generic_string())));
+  }
+
+  void read_sequence(const std::string& sequence, const std::string& file, const Frames& frames) {
+    const std::string path = root_.written(file);
+    annotation_files_.push_back(path);
+    const std::optional<MotSequence> info = read_info(file);
+    if (info) rates_[sequence] = info->frames_per_second;
+    // MOT's first frame is 1: that of a video is 0, and so may that of images be.
+    const bool from_0 = source().is_video || frames.begin()->first == 0;
+    if (from_0 && !source().is_video) {
+      notes_.push_back("frame 1 of " + path + " is " +
+                       source().root.written(source().frames[frames.begin()->second].name));
+    }
+    auto by_number = parse_mot_labels(root_.read_or_throw(file), path);
+    if (from_0) require_all(frames, info, by_number.empty() ? 0 : by_number.rbegin()->first, path);
+    for (auto& [number, labels] : by_number) {
+      const std::string key = file + "#" + std::to_string(number);
+      classes_.add(labels);
+      if (info && !is_fault(labels)) std::get<ImageLabels>(labels).size = info->size;
+      by_key_.emplace(key, std::move(labels));
+      const auto frame = frames.find(from_0 ? number - 1 : number);
+      if (frame != frames.end()) {
+        give(frame->second, key);
+      } else {
+        const std::filesystem::path first(source().frames[frames.begin()->second].name);
+        const std::string name =
+            fmt::format("{:06}{}", from_0 ? number - 1 : number, first.extension().string());
+        give_absent((first.parent_path() / name).generic_string(), key);
+      }
+    }
+  }
+
+  SourceRoot root_;
+  ClassList classes_;
+  std::map<std::string, double> rates_;
+};
+
+std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
+                                              std::vector<std::string>&) {
+  const std::filesystem::path above = frames.root.parent_path();
+  if (!frames.stems.empty() && has_file(above / "gt/gt.txt") && frames.root.filename() == "img1") {
+    return above;
+  }
+  for (const std::filesystem::path& folder : {frames.root, above}) {
+    for (const std::string& sequence : frames.folders) {
+      for (const char* name : {"gt/gt.txt", "gt.txt"}) {
+        if (has_file(folder / sequence / name)) return folder;
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+std::unique_ptr<OwnLabels> open_mot_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source) {
+  return std::make_unique<MotLabels>(spec, base, std::move(source));
+}
+
+}  // namespace
+
+constinit const LabelReader kMotReader{LabelFormat::kMot, open_mot_labels, find_mot,
+                                       /*image_folder=*/"img1"};
 
 }  // namespace eventgan

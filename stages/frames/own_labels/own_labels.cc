@@ -1,5 +1,6 @@
 #include "stages/frames/own_labels/own_labels.h"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -55,21 +56,15 @@ Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,
                      ", in " + source_.root.written(frame.name)};
 }
 
+const LabelReader& label_reader(LabelFormat format) {
+  const auto reader = std::ranges::find(kLabelReaders, format, &LabelReader::format);
+  if (reader != kLabelReaders.end()) return **reader;
+  throw std::logic_error("label_reader: not a format of labels");
+}
+
 std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::filesystem::path& base,
                                            LabelledSource source) {
-  switch (spec.format) {
-    case LabelFormat::kCoco:
-      return open_coco_labels(spec, base, std::move(source));
-    case LabelFormat::kYolo:
-      return open_yolo_labels(spec, base, std::move(source));
-    case LabelFormat::kVoc:
-      return open_voc_labels(spec, base, std::move(source));
-    case LabelFormat::kMot:
-      return open_mot_labels(spec, base, std::move(source));
-    case LabelFormat::kCsv:
-      return open_csv_labels(spec, base, std::move(source));
-  }
-  throw std::logic_error("open_own_labels: not a format of labels");
+  return label_reader(spec.format).open(spec, base, std::move(source));
 }
 
 }  // namespace eventgan

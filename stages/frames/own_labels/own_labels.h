@@ -1,11 +1,13 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <unordered_map>
 #include <vector>
 
@@ -47,7 +49,7 @@ struct AbsentFrame {
 };
 
 /// Labels of one's own for the frames of a source. What `label_key`s are, and where each format's
-/// labels lie, the functions below say. Coordinates are in pixels of the image turned upright as
+/// labels lie, the readers below say. Coordinates are in pixels of the image turned upright as
 /// its EXIF orientation says. A box is a fault of its image if it is nowhere within it; one that
 /// reaches beyond an edge is kept as it is.
 ///
@@ -108,10 +110,29 @@ class OwnLabels {
   std::unordered_map<std::string, std::size_t> frame_of_key_;
 };
 
-/// Opens the labels that `spec` tells of; its path starts at `base`, the manifest's folder. Throws
-/// InputError if a file of them is missing or broken as a whole.
-std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source);
+struct FoundFrames;  // detail/find_labels.h
+
+/// What finds and reads a format of labels. Each format has its own file, which defines its reader.
+struct LabelReader {
+  LabelFormat format;
+  /// As the function open_own_labels.
+  std::unique_ptr<OwnLabels> (*open)(const LabelSpec& spec, const std::filesystem::path& base,
+                                     LabelledSource source);
+  /// LabelSpec::path of labels of these frames, as far as names and beginnings of files tell; adds
+  /// a remark on what is there and left out. Cannot fail: what cannot be read is not found.
+  std::optional<std::filesystem::path> (*find)(const FoundFrames& frames,
+                                               std::vector<std::string>& remarks);
+  std::string_view image_folder = {};  ///< in which a sequence's images may lie, in its own folder
+};
+
+/// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
+/// SEQUENCE/gt/gt.txt or SEQUENCE/gt.txt; of images right in ROOT gt/gt.txt or gt.txt. Frame 1 is
+/// the image numbered 1, or the first where images are numbered from 0 (which a note tells), or a
+/// video's frame 0. Images without numbers are counted in their order, and must be all of the
+/// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
+/// above its folder gt, gives the sequence's rate and the images' size. The label_key is
+/// "GT_FILE#FRAME", GT_FILE below `path`.
+extern const LabelReader kMotReader;
 
 /// COCO's instances and person keypoints: `path` is the JSON file. `file_name` is the image's path
 /// below ROOT; or begins with the folders that ROOT ends in ("val2017/1.jpg" of ROOT/1.jpg in
@@ -129,9 +150,7 @@ std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::fil
 /// bytes an annotation and 200 an image. An entry is read again, and strictly, when its annotation
 /// is asked for. Throws InputError where the file is no COCO file: broken JSON, an id twice, an
 /// annotation of no image, a bare name that several images have.
-std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
-                                            const std::filesystem::path& base,
-                                            LabelledSource source);
+extern const LabelReader kCocoReader;
 
 /// YOLO's text files: `path` is their folder, or one above it, and it or the folder above it has
 /// data.yaml (`names`, a list or a map from number; `kpt_shape`) or classes.txt (a name a line). An
@@ -145,30 +164,28 @@ std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
 /// edge; with kpt_shape [J, 2 or 3] "class xc yc w h" and J times "px py [v]", v as COCO's; a joint
 /// at 0, 0 without v is not annotated. Joints are named by data.yaml's kpt_names, by COCO's names
 /// if there are 17, else "0", "1", ... Outlines (segmentation) are refused.
-std::unique_ptr<OwnLabels> open_yolo_labels(const LabelSpec& spec,
-                                            const std::filesystem::path& base,
-                                            LabelledSource source);
+extern const LabelReader kYoloReader;
 
 /// Pascal VOC's XML files (parse_voc_labels): found as YOLO's texts are, with the last folder
 /// "JPEGImages" or "images" replaced by "Annotations". All are read at opening, since classes are
 /// numbered by their names' order, as with MOT's and tables' labels; an image without boxes has a
 /// file without <object>.
-std::unique_ptr<OwnLabels> open_voc_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source);
-
-/// MOT's gt.txt (parse_mot_labels): `path` is the file of the only sequence, or a folder that has
-/// SEQUENCE/gt/gt.txt or SEQUENCE/gt.txt; of images right in ROOT gt/gt.txt or gt.txt. Frame 1 is
-/// the image numbered 1, or the first where images are numbered from 0 (which a note tells), or a
-/// video's frame 0. Images without numbers are counted in their order, and must be all of the
-/// sequence (seqLength, or the last frame with labels), else InputError. seqinfo.ini beside it, or
-/// above its folder gt, gives the sequence's rate and the images' size. The label_key is
-/// "GT_FILE#FRAME", GT_FILE below `path`.
-std::unique_ptr<OwnLabels> open_mot_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source);
+extern const LabelReader kVocReader;
 
 /// A table (parse_csv_labels): `path` is the file; images are named as by COCO's file_name. The
 /// label_key is the image as the table writes it.
-std::unique_ptr<OwnLabels> open_csv_labels(const LabelSpec& spec, const std::filesystem::path& base,
+extern const LabelReader kCsvReader;
+
+/// Every format's, in the order of kLabelFormats.
+inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReader, &kVocReader,
+                                          &kCsvReader};
+static_assert(kLabelReaders.size() == kLabelFormats.size());
+
+const LabelReader& label_reader(LabelFormat format);
+
+/// Opens the labels that `spec` tells of; its path starts at `base`, the manifest's folder. Throws
+/// InputError if a file of them is missing or broken as a whole.
+std::unique_ptr<OwnLabels> open_own_labels(const LabelSpec& spec, const std::filesystem::path& base,
                                            LabelledSource source);
 
 }  // namespace eventgan

@@ -1,38 +1,34 @@
 #include "stages/frames/own_labels/detail/voc_labels.h"
 
 #include <pugixml.hpp>
-#include <stdexcept>
 #include <string_view>
 #include <type_traits>
 #include <utility>
 
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
+#include "stages/frames/own_labels/detail/file_per_image.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 
 namespace eventgan {
 namespace {
-
-/// Thrown where something is not as it should be, caught at the border of this file.
-struct BadField : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// The child of that name; a null node if there is none.
 pugi::xml_node at_most_one(const pugi::xml_node& parent, const char* name) {
   const pugi::xml_node child = parent.child(name);
   if (!child.next_sibling(name)) return child;
-  throw BadField(std::string("expected <") + name + "> once, got it twice");
+  throw BadLabel(std::string("expected <") + name + "> once, got it twice");
 }
 
 pugi::xml_node one(const pugi::xml_node& parent, const char* name) {
   if (const pugi::xml_node child = at_most_one(parent, name)) return child;
-  throw BadField(std::string("expected <") + name + ">, got none");
+  throw BadLabel(std::string("expected <") + name + ">, got none");
 }
 
 /// What stands in an element, if that is text and nothing else.
 std::string_view text_of(const pugi::xml_node& element) {
   if (element.first_child() == element.last_child()) return element.child_value();
-  throw BadField(std::string("expected text alone in <") + element.name() + ">, got more");
+  throw BadLabel(std::string("expected text alone in <") + element.name() + ">, got more");
 }
 
 template <class Number>
@@ -40,7 +36,7 @@ Number number(const pugi::xml_node& parent, const char* name, Number least, Numb
   const std::string_view text = text_of(one(parent, name));
   const auto value = parse_number<Number>(text);
   if (value && *value >= least && *value <= most) return *value;
-  throw BadField(std::string("expected a ") + (std::is_integral_v<Number> ? "whole " : "") +
+  throw BadLabel(std::string("expected a ") + (std::is_integral_v<Number> ? "whole " : "") +
                  "number of pixels for <" + name + ">, got " + in_quotes(text));
 }
 
@@ -54,7 +50,7 @@ int flag(const pugi::xml_node& object, const char* name) {
   if (!element) return -1;
   const std::string_view text = text_of(element);
   if (text == "0" || text == "1") return text == "1" ? 1 : 0;
-  throw BadField(std::string("expected 0 or 1 for <") + name + ">, got " + in_quotes(text));
+  throw BadLabel(std::string("expected 0 or 1 for <") + name + ">, got " + in_quotes(text));
 }
 
 /// pugixml leaves an entity that it does not know as it is.
@@ -66,7 +62,7 @@ bool has_entity(std::string_view text) {
 std::string class_name(const pugi::xml_node& object) {
   const std::string_view name = text_of(one(object, "name"));
   if (is_label_name(name) && !has_entity(name)) return std::string(name);
-  throw BadField("expected a name without control characters and unknown entities, got " +
+  throw BadLabel("expected a name without control characters and unknown entities, got " +
                  in_quotes(name));
 }
 
@@ -81,7 +77,7 @@ Rectangle rectangle(const pugi::xml_node& object, ImageSize size) {
     return {xmin - 1, ymin - 1, xmax, ymax};
   }
   const auto written = [&](const char* name) { return std::string(box.child_value(name)); };
-  throw BadField("expected a box from 1, 1 to " + std::to_string(size.width) + ", " +
+  throw BadLabel("expected a box from 1, 1 to " + std::to_string(size.width) + ", " +
                  std::to_string(size.height) + ", as VOC counts, got " + written("xmin") + ", " +
                  written("ymin") + " to " + written("xmax") + ", " + written("ymax"));
 }
@@ -99,12 +95,12 @@ NamedBox read_object(const pugi::xml_node& object, ImageSize size) {
 /// The document's element <annotation>, if it is a document of that and nothing before it.
 pugi::xml_node annotation_of(const pugi::xml_document& document) {
   for (const pugi::xml_node& child : document.children()) {
-    if (child.type() == pugi::node_doctype) throw BadField("expected no DOCTYPE, got one");
+    if (child.type() == pugi::node_doctype) throw BadLabel("expected no DOCTYPE, got one");
   }
   const pugi::xml_node annotation = document.document_element();
   const std::string_view name = annotation.name();
   if (name == "annotation" && document.last_child() == annotation) return annotation;
-  throw BadField("expected <annotation> alone, got " +
+  throw BadLabel("expected <annotation> alone, got " +
                  in_quotes(name == "annotation" ? document.last_child().name() : name));
 }
 
@@ -130,18 +126,66 @@ Outcome<ImageLabels> parse_voc_labels(std::string xml, const std::string& path) 
   std::string place = path;
   try {
     // A shard's text ends there.
-    if (xml.find('\0') != std::string::npos) throw BadField("expected text, got a NUL in it");
+    if (xml.find('\0') != std::string::npos) throw BadLabel("expected text, got a NUL in it");
     pugi::xml_document document;
     const auto result =
         document.load_buffer(xml.data(), xml.size(),
                              pugi::parse_default | pugi::parse_doctype | pugi::parse_trim_pcdata);
-    if (!result) throw BadField("expected XML, got '" + std::string(result.description()) + "'");
+    if (!result) throw BadLabel("expected XML, got '" + std::string(result.description()) + "'");
     ImageLabels labels = read_annotation(document, place);
     labels.original = std::move(xml);
     return labels;
-  } catch (const BadField& error) {
-    return SampleFault{error.what() + (", in " + place)};
+  } catch (const BadLabel& bad) {
+    return bad.in(place);
   }
 }
+
+namespace {
+
+const LabelFiles kVocFiles{".xml", {"JPEGImages", "images"}, {"Annotations", "annotations"}, ""};
+
+class VocLabels : public FilePerImage {
+ public:
+  VocLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
+      : FilePerImage(spec, base, std::move(labelled), kVocFiles) {
+    ClassList classes;
+    for (const FrameLabel& label : labels()) {
+      if (!label.key.empty()) classes.add(read(label.key));
+    }
+    schema_.class_names = classes.names();
+  }
+
+  Outcome<Annotation> annotation(const std::string& label_key) const override {
+    Outcome<ImageLabels> labels = read(label_key);
+    if (auto* fault = std::get_if<SampleFault>(&labels)) return std::move(*fault);
+    auto& read = std::get<ImageLabels>(labels);
+    Outcome<ImageSize> size = image_size(label_key, read.size);
+    if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
+    return numbered(std::move(read), schema_.class_names, std::get<ImageSize>(size),
+                    label_place(label_key));
+  }
+
+ private:
+  Outcome<ImageLabels> read(const std::string& label_key) const {
+    Outcome<std::string> text = root().read(label_key);
+    if (auto* fault = std::get_if<SampleFault>(&text)) return std::move(*fault);
+    return parse_voc_labels(std::get<std::string>(std::move(text)), label_place(label_key));
+  }
+};
+
+std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,
+                                              std::vector<std::string>&) {
+  std::filesystem::path labels = find_label_files(frames, kVocFiles);
+  return labels.empty() ? std::nullopt : std::optional(std::move(labels));
+}
+
+std::unique_ptr<OwnLabels> open_voc_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                           LabelledSource source) {
+  return std::make_unique<VocLabels>(spec, base, std::move(source));
+}
+
+}  // namespace
+
+constinit const LabelReader kVocReader{LabelFormat::kVoc, open_voc_labels, find_voc};
 
 }  // namespace eventgan

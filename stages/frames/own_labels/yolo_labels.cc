@@ -1,20 +1,23 @@
 #include <algorithm>
+#include <filesystem>
+#include <optional>
 #include <string_view>
 #include <utility>
 
 #include "stages/frames/own_labels/detail/file_per_image.h"
+#include "stages/frames/own_labels/detail/find_labels.h"
 #include "stages/frames/own_labels/detail/yolo_text.h"
 
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kClassesFile = "classes.txt";
+constexpr std::string_view kNamesFile = "data.yaml", kClassesFile = "classes.txt";
+const LabelFiles kYoloFiles{".txt", {"images"}, {"labels"}, kClassesFile};
 
 class YoloLabels : public FilePerImage {
  public:
   YoloLabels(const LabelSpec& spec, const std::filesystem::path& base, LabelledSource labelled)
-      : FilePerImage(spec, base, std::move(labelled),
-                     {".txt", {"images"}, "labels", kClassesFile}) {
+      : FilePerImage(spec, base, std::move(labelled), kYoloFiles) {
     read_classes();
     std::ranges::sort(annotation_files_);
   }
@@ -31,7 +34,7 @@ class YoloLabels : public FilePerImage {
  private:
   void read_classes() {
     for (const SourceRoot& place : {root(), root().above()}) {
-      for (const std::string_view name : {std::string_view("data.yaml"), kClassesFile}) {
+      for (const std::string_view name : {kNamesFile, kClassesFile}) {
         if (!place.has_file(name)) continue;
         const std::string text = place.read_or_throw(name);
         const std::string path = place.written(name);
@@ -49,12 +52,32 @@ class YoloLabels : public FilePerImage {
   YoloSchema classes_;
 };
 
-}  // namespace
+std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
+                                               std::vector<std::string>& remarks) {
+  const std::filesystem::path labels = find_label_files(frames, kYoloFiles);
+  if (labels.empty()) return std::nullopt;
+  const bool is_beside = labels == frames.root;  // of texts there, folders above have none
+  std::filesystem::path folder = labels;
+  for (int level = 0; level < (is_beside ? 2 : 3); ++level, folder = folder.parent_path()) {
+    for (const std::string_view name : {kNamesFile, kClassesFile}) {
+      if (has_file(folder / name)) return is_beside ? labels : folder;
+    }
+  }
+  if (!is_beside) {
+    remarks.push_back("no data.yaml or classes.txt, so that YOLO's labels are left out: " +
+                      labels.string());
+  }
+  return std::nullopt;
+}
 
 std::unique_ptr<OwnLabels> open_yolo_labels(const LabelSpec& spec,
                                             const std::filesystem::path& base,
                                             LabelledSource source) {
   return std::make_unique<YoloLabels>(spec, base, std::move(source));
 }
+
+}  // namespace
+
+constinit const LabelReader kYoloReader{LabelFormat::kYolo, open_yolo_labels, find_yolo};
 
 }  // namespace eventgan

@@ -8,14 +8,14 @@
 #include <optional>
 #include <set>
 #include <span>
-#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "stages/frames/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
-#include "stages/frames/own_labels/detail/frame_names.h"
+#include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
 namespace {
@@ -155,22 +155,22 @@ class YoloLine {
     const std::size_t numbers = schema_.has_visibility ? 3 : 2;
     const std::size_t expected = 5 + joints * numbers;
     if (columns_.size() != expected) {
-      throw std::runtime_error("expected " + std::to_string(expected) + " columns, got " +
-                               std::to_string(columns_.size()) + surplus(joints));
+      throw BadLabel("expected " + std::to_string(expected) + " columns, got " +
+                     std::to_string(columns_.size()) + surplus(joints));
     }
     Box box;
     const auto number = parse_number<int>(columns_[0]);
     const auto classes = static_cast<int>(schema_.names.class_names.size());
     if (!number || *number < 0 || *number >= classes) {
-      throw std::runtime_error("expected a class 0.." + std::to_string(classes - 1) + ", got " +
-                               in_quotes(columns_[0]));
+      throw BadLabel("expected a class 0.." + std::to_string(classes - 1) + ", got " +
+                     in_quotes(columns_[0]));
     }
     box.class_id = *number;
     const double x = share(1) * image_.width, y = share(2) * image_.height;
     const double half_width = share(3) * image_.width / 2;
     const double half_height = share(4) * image_.height / 2;
     box.xyxy = {x - half_width, y - half_height, x + half_width, y + half_height};
-    if (!overlaps(box.xyxy, image_)) throw std::runtime_error(outside_text(box.xyxy, image_));
+    if (!overlaps(box.xyxy, image_)) throw BadLabel(outside_text(box.xyxy, image_));
     annotation.boxes.push_back(box);
     if (joints == 0) return;
     Person person;
@@ -193,7 +193,7 @@ class YoloLine {
   double number_at(std::size_t column) const {
     const auto number = parse_number<double>(columns_[column]);
     if (!number) {
-      throw std::runtime_error("expected a number, got " + in_quotes(columns_[column]));
+      throw BadLabel("expected a number, got " + in_quotes(columns_[column]));
     }
     return *number;
   }
@@ -202,7 +202,7 @@ class YoloLine {
     constexpr double kRounding = 1e-6;
     const double number = number_at(column);
     if (number >= -kRounding && number <= 1 + kRounding) return number;
-    throw std::runtime_error("expected a share 0..1, got " + in_quotes(columns_[column]));
+    throw BadLabel("expected a share 0..1, got " + in_quotes(columns_[column]));
   }
 
   Joint joint(std::size_t column) const {
@@ -212,8 +212,7 @@ class YoloLine {
     if (schema_.has_visibility) {
       const double given = number_at(column + 2);
       if (given != 0 && given != 1 && given != 2) {
-        throw std::runtime_error("expected a visibility 0, 1 or 2, got " +
-                                 in_quotes(columns_[column + 2]));
+        throw BadLabel("expected a visibility 0, 1 or 2, got " + in_quotes(columns_[column + 2]));
       }
       if (given == 0) return missing;
       visible = given == 2 ? 1 : 0;
@@ -246,10 +245,7 @@ YoloSchema parse_yolo_classes(std::string_view text, const std::string& path) {
   YoloSchema schema;
   std::vector<std::string>& names = schema.names.class_names;
   for (const TextLine& line : split_lines(text)) {
-    const std::size_t begin = line.bytes.find_first_not_of(" \t\r\n");
-    const std::size_t end = line.bytes.find_last_not_of(" \t\r\n");
-    names.emplace_back(begin == std::string_view::npos ? std::string_view()
-                                                       : line.bytes.substr(begin, end - begin + 1));
+    names.emplace_back(trimmed(line.bytes));
   }
   while (!names.empty() && names.back().empty()) names.pop_back();
   if (names.empty()) throw InputError("expected a name a line, got none, in " + path);
@@ -271,8 +267,8 @@ Outcome<Annotation> parse_yolo_text(std::string text, const YoloSchema& schema, 
     if (columns.empty()) continue;
     try {
       YoloLine(columns, schema, image).read(annotation);
-    } catch (const std::runtime_error& error) {
-      return SampleFault{error.what() + (", in " + place_in_file(path, line.number))};
+    } catch (const BadLabel& bad) {
+      return bad.in(place_in_file(path, line.number));
     }
   }
   annotation.original = std::move(text);

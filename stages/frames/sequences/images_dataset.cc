@@ -111,15 +111,17 @@ class ImagesDataset final : public Dataset {
 
   static std::string spelled(const fs::path& path) { return path.generic_string(); }
 
-  /// The folder NAME, or NAME/img1 of a sequence as MOT has them.
+  /// The folder NAME, or NAME/img1 of a sequence as MOT has them (LabelReader::image_folder).
   ListedSequence list_sequence(const std::string& name,
                                const std::optional<LabelSpec>& labels) const {
     ListedSequence listed{name, list_image_folder(root_.on_disk(name))};
-    const bool is_mot =
-        labels && labels->format == LabelFormat::kMot && listed.images.frames.empty() &&
-        std::ranges::find(listed.images.folders, "img1") != listed.images.folders.end();
-    if (!is_mot) return listed;
-    return {name + "/img1", list_image_folder(root_.on_disk(name + "/img1"))};
+    const std::string_view images = labels ? label_reader(labels->format).image_folder : "";
+    const auto& folders = listed.images.folders;
+    const bool is_below =
+        listed.images.frames.empty() && std::ranges::find(folders, images) != folders.end();
+    if (!is_below) return listed;
+    const std::string below = name + "/" + std::string(images);
+    return {below, list_image_folder(root_.on_disk(below))};
   }
 
   FrameRef frame(const std::string& sequence, std::int64_t number, const std::string& name) const {

@@ -136,7 +136,7 @@ TEST_F(DraftManifest, NamesLabelsOfOnesOwn) {
   ASSERT_TRUE(job.sources[0].labels);
   EXPECT_EQ(job.sources[0].labels->format, LabelFormat::kCsv);
   EXPECT_EQ(job.sources[0].labels->path, "walk/boxes.csv");
-  EXPECT_THAT(made.findings, Contains("labels: csv, in " + (folder_ / "walk/boxes.csv").string()));
+  EXPECT_THAT(made.findings, Contains("labels: CSV, in " + (folder_ / "walk/boxes.csv").string()));
 }
 
 TEST_F(DraftManifest, OfARecordingTakesItsEvents) {

@@ -12,6 +12,7 @@
 
 #include "manifests/values/words.h"
 #include "stages/frames/find_source.h"
+#include "stages/frames/own_labels/own_labels.h"
 
 namespace eventgan {
 namespace {
@@ -75,6 +76,35 @@ TEST(DatasetKinds, PagesAndThePackageListThoseThatInitKnows) {
   const std::string package = page("manifests/python/eventgan/program.py");
   const std::size_t begin = package.find("def init("), end = package.find("out : str", begin);
   EXPECT_EQ(found_in(package.substr(begin, end - begin), "\"(\\w+)\""), words);
+}
+
+TEST(LabelFormats, EachHasAReader) {
+  std::set<std::string_view> words, titles;
+  for (std::size_t i = 0; i < kLabelFormats.size(); ++i) {
+    EXPECT_EQ(kLabelReaders[i]->format, kLabelFormats[i].value) << kLabelFormats[i].word;
+    words.insert(kLabelFormats[i].word);
+    titles.insert(kLabelFormats[i].title);
+  }
+  EXPECT_EQ(words.size(), kLabelFormats.size());
+  EXPECT_EQ(titles.size(), kLabelFormats.size());
+}
+
+TEST(LabelFormats, PagesListThem) {
+  std::vector<std::string> titles, words;
+  for (const LabelFormatRow& row : kLabelFormats) {
+    titles.emplace_back(row.title);
+    words.emplace_back(row.word);
+  }
+  using ::testing::UnorderedElementsAreArray;
+  for (const char* path : {"README.md", "manifests/guides/datasets.md"}) {
+    const std::string list = found_in(page(path), "labels as ([\\w ,]+ or \\w+)").at(0);
+    EXPECT_THAT(found_in(list, "(\\w[\\w ]*?)(?:,| or |$)"), UnorderedElementsAreArray(titles))
+        << path;
+  }
+  const std::string own = page("manifests/guides/own_data.md");
+  EXPECT_THAT(found_in(own, "\"labels\": \\{ \"format\": \"(\\w+)\""),
+              UnorderedElementsAreArray(words));
+  for (const std::string& title : titles) EXPECT_THAT(own, ::testing::HasSubstr("### " + title));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace eventgan {
 
 // Entries of a COCO file that was indexed, read strictly; keys that are not needed are passed over.
-// All throw std::runtime_error, "PATH (annotation 17): $.bbox[2]: expected X, got Y", a line a
+// All throw BadLabel, "PATH (annotation 17): $.bbox[2]: expected X, got Y", a line a
 // fault; an id that is another than expected is a fault too, since the file has changed then.
 
 /// What an entry of `images` says of the image's size.

@@ -5,7 +5,6 @@
 #include <string_view>
 
 #include "manifests/values/faults.h"
-#include "stages/frames/csv_records.h"
 #include "stages/frames/own_labels/detail/image_labels.h"
 
 namespace eventgan {
@@ -25,8 +24,5 @@ namespace eventgan {
 /// that do not match, another number of fields, no image. Thread safe.
 std::map<std::string, Outcome<ImageLabels>> parse_csv_labels(std::string_view text,
                                                              const std::string& path);
-
-/// Whether a table's first record has the columns that parse_csv_labels requires, and no others.
-bool is_label_header(const CsvRecord& header);
 
 }  // namespace eventgan

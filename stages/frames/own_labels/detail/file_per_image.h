@@ -16,9 +16,17 @@ namespace eventgan {
 struct LabelFiles {
   std::string_view extension;                   ///< ".txt", in small letters
   std::vector<std::string_view> image_folders;  ///< in an image's path the last of these ...
-  std::string_view label_folder;                ///< ... is this in its label's
+  std::vector<std::string_view> label_folders;  ///< ... is one of these in its label's
   std::string_view other_file;                  ///< no label, though it has the extension
 };
+
+/// The folder of labels that stands for a folder of images, at its own path; empty if there is
+/// none.
+std::filesystem::path label_folder_of(const std::filesystem::path& images, const LabelFiles& names);
+
+/// Where labels of these frames lie that have a file each: in the folder that stands for the root,
+/// or beside the images; empty if there are none.
+std::filesystem::path find_label_files(const FoundFrames& frames, const LabelFiles& names);
 
 /// Labels of which each image has a file, NAME.EXTENSION of NAME.png. It is at the image's own path
 /// with the folder of images replaced by that of labels, if that is below `path`; else at the
@@ -42,6 +50,7 @@ class FilePerImage : public OwnLabels {
  private:
   std::vector<std::string> files_in(const std::string& folder) const;
   std::string folder_of(const std::string& images) const;
+  std::string in_label_folder(const std::string& images) const;
   void find_of_images();
   void find_of_videos();
   void note_unused(const std::string& folder, const std::set<std::string>& used);

@@ -6,7 +6,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "manifests/values/labels.h"
 #include "stages/frames/own_labels/own_labels.h"
 
 namespace eventgan {
@@ -38,11 +37,5 @@ class FrameNames {
 
 /// "STEM/NUMBER" of "STEM/000NUMBER.EXT"; "NUMBER" of a bare number; empty if there is no number.
 std::string video_frame_name(const std::string& name);
-
-/// Whether some of the box is within the image.
-bool overlaps(const Rectangle& box, ImageSize image);
-
-/// "expected a box within the image of 640x480, got one from (LEFT, TOP) to (RIGHT, BOTTOM)".
-std::string outside_text(const Rectangle& box, ImageSize image);
 
 }  // namespace eventgan

@@ -1,13 +1,30 @@
 #pragma once
 
+#include <map>
 #include <optional>
+#include <set>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
 #include "manifests/values/labels.h"
+#include "stages/frames/own_labels/own_labels.h"
 
 namespace eventgan {
+
+/// Thrown where a label is not as it should be, with what was expected and what is there; where the
+/// file and the place in it are known it is caught, and is the fault of one image.
+struct BadLabel : std::runtime_error {
+  explicit BadLabel(const std::string& reason) : std::runtime_error(reason) {}
+  BadLabel(std::string_view expected, std::string_view got)
+      : std::runtime_error("expected " + std::string(expected) + ", got " + std::string(got)) {}
+
+  SampleFault in(const std::string& place) const { return {what() + (", in " + place)}; }
+};
 
 /// A box and its class by name: which number that is shows once all files are read.
 struct NamedBox {
@@ -21,5 +38,39 @@ struct ImageLabels {
   std::vector<NamedBox> boxes;    ///< pixels of the image, edges (manifests/values/labels.h)
   std::optional<ImageSize> size;  ///< of the image, where the file tells it
 };
+
+/// The names of all classes, in the order of their names.
+class ClassList {
+ public:
+  void add(const Outcome<ImageLabels>& labels) {
+    if (is_fault(labels)) return;
+    for (const NamedBox& box : std::get<ImageLabels>(labels).boxes) names_.insert(box.class_name);
+  }
+  std::vector<std::string> names() const { return {names_.begin(), names_.end()}; }
+
+ private:
+  std::set<std::string> names_;
+};
+
+/// The labels of an image of that size, with the classes' numbers. `place` is for a fault.
+Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>& class_names,
+                             ImageSize image, const std::string& place);
+
+/// Labels that are in memory, by label_key.
+class ReadLabels : public OwnLabels {
+ public:
+  Outcome<Annotation> annotation(const std::string& label_key) const override;
+
+ protected:
+  explicit ReadLabels(LabelledSource labelled) : OwnLabels(std::move(labelled)) {}
+
+  std::map<std::string, Outcome<ImageLabels>> by_key_;
+};
+
+/// Whether some of the box is within the image.
+bool overlaps(const Rectangle& box, ImageSize image);
+
+/// "expected a box within the image of 640x480, got one from (LEFT, TOP) to (RIGHT, BOTTOM)".
+std::string outside_text(const Rectangle& box, ImageSize image);
 
 }  // namespace eventgan

@@ -64,24 +64,24 @@ TEST(CsvLabels, ColumnsComeInAnyOrderAndTrackMayBeAbsent) {
 TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
   const std::string place = ", in labels.csv:2";
   EXPECT_EQ(csv_fault("a.png,,1,2,3,4,\n"),
-            "expected a class without control characters, got \"\"" + place);
+            "expected a class without control characters, got ''" + place);
   EXPECT_EQ(csv_fault("a.png,a\x01,1,2,3,4,\n"),
-            "expected a class without control characters, got \"a\\u0001\"" + place);
+            "expected a class without control characters, got 'a?'" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,2,nan,4,\n"),
-            "expected right within 1e+06 pixels, got \"nan\"" + place);
+            "expected right within 1e+06 pixels, got 'nan'" + place);
   EXPECT_EQ(csv_fault("a.png,car,,2,3,4,\n"),
-            "expected left within 1e+06 pixels, got \"\"" + place);
+            "expected left within 1e+06 pixels, got ''" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,2,1e999,4,\n"),
-            "expected right within 1e+06 pixels, got \"1e999\"" + place);
+            "expected right within 1e+06 pixels, got '1e999'" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,-1000001,3,4,\n"),
-            "expected top within 1e+06 pixels, got \"-1000001\"" + place);
+            "expected top within 1e+06 pixels, got '-1000001'" + place);
   EXPECT_EQ(csv_fault("a.png,car,3,2,3,4,\n"),
             "expected left < right and top < bottom, got 3, 2, 3, 4" + place);
   EXPECT_EQ(csv_fault("a.png,car,1,5,3,4,\n"),
             "expected left < right and top < bottom, got 1, 5, 3, 4" + place);
   for (const char* track : {"-1", "1.5", "x", "9223372036854775808"}) {
     EXPECT_EQ(csv_fault("a.png,car,1,2,3,4," + std::string(track) + "\n"),
-              "expected a whole number from 0 as track, got \"" + std::string(track) + '"' + place);
+              "expected a whole number from 0 as track, got '" + std::string(track) + "'" + place);
   }
   EXPECT_EQ(csv_fault("a.png,car,1,2,3,4,5\na.png,bus,1,2,3,4,5\n"),
             "expected each track once in an image, got 5 twice, in labels.csv:3");
@@ -93,7 +93,7 @@ TEST(CsvLabels, ABadRowSpoilsItsImageAlone) {
   }
   // The first fault is told, and what is right beside it does not count.
   EXPECT_THAT(csv_fault("a.png,car,1,2,3,4,\na.png,car,x,2,3,4,\na.png,car,y,2,3,4,\n"),
-              HasSubstr("\"x\", in labels.csv:3"));
+              HasSubstr("'x', in labels.csv:3"));
 }
 
 TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
@@ -109,8 +109,8 @@ TEST(CsvLabels, ARowThatDoesNotTellItsImageIsRefused) {
   refuses("a.png,car,1,2,3,4\n", "got \"a.png\", in labels.csv:1");
   refuses(header + "a.png,car,1,2,3,4\n", "expected 7 fields, got 6, in labels.csv:2");
   refuses(header + "a.png,car,1,2,3,4,,\n", "expected 7 fields, got 8, in labels.csv:2");
-  refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got \"\"");
-  refuses(header + std::string("a\0.png,car,1,2,3,4,\n", 20), "got \"a\\u0000.png\"");
+  refuses(header + ",car,1,2,3,4,\n", "expected an image without control characters, got ''");
+  refuses(header + std::string("a\0.png,car,1,2,3,4,\n", 20), "got 'a?.png'");
   refuses(header + "a.png,\"car,1,2,3,4,\n", "got other quotes, in labels.csv:2");
   refuses(header + "\xff.png,car,1,2,3,4,\n", "expected UTF-8, got other bytes, in labels.csv:2");
 }

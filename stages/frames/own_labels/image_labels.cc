@@ -1,0 +1,56 @@
+#include "stages/frames/own_labels/detail/image_labels.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "manifests/documents/detail/json_text.h"
+
+namespace eventgan {
+
+Outcome<Annotation> numbered(ImageLabels labels, const std::vector<std::string>& class_names,
+                             ImageSize image, const std::string& place) {
+  Annotation annotation;
+  annotation.original = std::move(labels.original);
+  for (NamedBox& named : labels.boxes) {
+    const auto name = std::ranges::lower_bound(class_names, named.class_name);
+    if (name == class_names.end() || *name != named.class_name) {
+      return SampleFault{"expected a class that was there when the labels were opened, got \"" +
+                         escape_controls(named.class_name) + "\", in " + place};
+    }
+    named.box.class_id = static_cast<int>(name - class_names.begin());
+    if (!overlaps(named.box.xyxy, image)) {
+      return SampleFault{outside_text(named.box.xyxy, image) + ", in " + place};
+    }
+    annotation.boxes.push_back(named.box);
+  }
+  return annotation;
+}
+
+Outcome<Annotation> ReadLabels::annotation(const std::string& label_key) const {
+  const auto found = by_key_.find(label_key);
+  if (found == by_key_.end()) {
+    return SampleFault{"expected a label, got none, in " + label_place(label_key)};
+  }
+  if (const auto* fault = std::get_if<SampleFault>(&found->second)) return *fault;
+  const ImageLabels& labels = std::get<ImageLabels>(found->second);
+  Outcome<ImageSize> size = image_size(label_key, labels.size);
+  if (auto* fault = std::get_if<SampleFault>(&size)) return std::move(*fault);
+  return numbered(labels, schema_.class_names, std::get<ImageSize>(size), label_place(label_key));
+}
+
+bool overlaps(const Rectangle& box, ImageSize image) {
+  return std::min(box.right, static_cast<double>(image.width)) > std::max(box.left, 0.0) &&
+         std::min(box.bottom, static_cast<double>(image.height)) > std::max(box.top, 0.0);
+}
+
+std::string outside_text(const Rectangle& box, ImageSize image) {
+  if (!(box.right > box.left && box.bottom > box.top)) {
+    return fmt::format("expected a box of a width and height above 0, got {:g} x {:g}",
+                       box.right - box.left, box.bottom - box.top);
+  }
+  return fmt::format("expected a box within the image of {}, got one from ({}, {}) to ({}, {})",
+                     to_string(image), box.left, box.top, box.right, box.bottom);
+}
+
+}  // namespace eventgan
