@@ -47,4 +47,7 @@ std::string joined(const Items& items, std::string_view between, TextOf text_of)
 /// "a, b, c", or if there are more than `most`, these and "...".
 std::string some_of(const std::vector<std::string>& names, std::size_t most);
 
+/// Without blanks, tabs and line ends around it. A view into `text`.
+std::string_view trimmed(std::string_view text);
+
 }  // namespace eventgan

@@ -7,16 +7,9 @@
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/text.h"
 
 namespace eventgan {
-
-std::string_view trimmed(std::string_view text) {
-  constexpr std::string_view kBlanks = " \t\r\n";
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
-
 namespace {
 
 /// Takes the field at the start of `text`, and what ends it: a comma, a line end, or nothing. None

@@ -11,9 +11,6 @@
 
 namespace eventgan {
 
-/// Without blanks, tabs and line ends around it. A view into `text`.
-std::string_view trimmed(std::string_view text);
-
 /// A record of a table: mostly a line.
 struct CsvRecord {
   std::string_view bytes;           ///< as in the text, with its line end, if it has one

@@ -8,6 +8,7 @@
 #include "manifests/values/counter_random.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
+#include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/source_folders.h"
 
 namespace eventgan {
@@ -15,18 +16,13 @@ namespace {
 
 /// A line each; blank ones, white space around, and a byte order mark are passed over.
 std::set<std::string> read_ids(const SourceRoot& base, const std::string& path) {
-  constexpr std::string_view kBlank = " \t\r";
   constexpr std::string_view kMark = "\xEF\xBB\xBF";
   const std::string text = base.read_or_throw(path);
   std::set<std::string> ids;
-  for (std::size_t begin = text.starts_with(kMark) ? kMark.size() : 0; begin < text.size();) {
-    const std::size_t end = std::min(text.find('\n', begin), text.size());
-    const std::string line = text.substr(begin, end - begin);
-    begin = end + 1;
-    const std::size_t first = line.find_first_not_of(kBlank);
-    if (first != std::string::npos) {
-      ids.insert(line.substr(first, line.find_last_not_of(kBlank) - first + 1));
-    }
+  for (const TextLine& line :
+       split_lines(std::string_view(text).substr(text.starts_with(kMark) ? kMark.size() : 0))) {
+    const std::string_view id = trimmed(line.bytes);
+    if (!id.empty()) ids.emplace(id);
   }
   return ids;
 }

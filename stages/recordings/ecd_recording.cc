@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/frame_intervals.h"
 
@@ -16,12 +17,6 @@ namespace eventgan {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(kBlanks);
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
-}
 
 /// A recording is one folder: what its list names lies in it.
 bool leaves_folder(const std::filesystem::path& path) {

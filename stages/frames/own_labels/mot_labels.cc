@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "manifests/values/text.h"
 #include "stages/frames/csv_records.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/own_labels/detail/find_labels.h"

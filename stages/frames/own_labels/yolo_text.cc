@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
-#include "stages/frames/csv_records.h"
+#include "manifests/values/text.h"
 #include "stages/frames/kitti/kitti_label.h"
 #include "stages/frames/label_name.h"
 #include "stages/frames/own_labels/detail/image_labels.h"

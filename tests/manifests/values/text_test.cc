@@ -53,5 +53,12 @@ TEST(Text, NamesTheFirst) {
   EXPECT_EQ(some_of({}, 2), "");
 }
 
+TEST(Trimmed, LeavesWhatIsBetweenBlanks) {
+  EXPECT_EQ(trimmed(" \t a b\r\n"), "a b");
+  EXPECT_EQ(trimmed("a"), "a");
+  EXPECT_EQ(trimmed(" \r\n"), "");
+  EXPECT_EQ(trimmed(""), "");
+}
+
 }  // namespace
 }  // namespace eventgan
