@@ -2,9 +2,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "stages/base/files/input_file.h"
 #include "stages/frames/sequences/frames_dataset.h"
 #include "tests/testing/image_file.h"
 #include "tests/testing/temporary_folder.h"
@@ -75,6 +77,21 @@ class CocoLabels : public ::testing::Test {
 
   testing::TemporaryFolder folder_;
 };
+
+TEST_F(CocoLabels, TheFileIsOpenedOnceAndOfEachImageItsEntriesAreReadAgain) {
+  const std::string first = image(7, "000001.png"), second = image(9, "000003.png");
+  const std::string of_first = box(1, 7, "[1, 2, 3, 4]"), of_second = box(2, 9, "[0, 0, 40, 30]");
+  write(first + "," + second, of_first + "," + of_second);
+  const InputCounter counter;
+  const auto dataset = open();
+  for (const LabelledFrame& frame : dataset->labelled_frames()) {
+    EXPECT_FALSE(is_fault(dataset->annotation(frame.label_key)));
+  }
+  const InputCounter::Count count = counter.of(folder_ / "instances.json");
+  EXPECT_EQ(count.opens, 1u);
+  EXPECT_EQ(count.bytes, std::filesystem::file_size(folder_ / "instances.json") + first.size() +
+                             second.size() + of_first.size() + of_second.size());
+}
 
 TEST_F(CocoLabels, OfTheImagesThatTheyName) {
   // Ids neither sorted nor dense, annotations between each other's, entries with odd spaces.
