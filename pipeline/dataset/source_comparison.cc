@@ -152,12 +152,13 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
     return {"expected the annotation that the shard holds, got none: " +
             std::get<SampleFault>(read).reason};
   }
-  const std::optional<ImageSize> size = has_events(kind)
-                                            ? std::optional(dataset.sensor_size(planned.label_key))
-                                            : image_size(stored.pair.next.path, kind);
-  if (size && *size != stored.source_size) {
-    return {"expected a source size of " + to_string(*size) + " as in " + stored.pair.next.path +
-            ", got " + to_string(stored.source_size)};
+  ImageSizes& sizes = dataset.image_sizes() ? *dataset.image_sizes() : sizes_;
+  const Outcome<ImageSize> size =
+      has_events(kind) ? Outcome<ImageSize>(dataset.sensor_size(planned.label_key))
+                       : sizes.of(resolve(manifest_, stored.pair.next.path), orientation_of(kind));
+  if (!is_fault(size) && std::get<ImageSize>(size) != stored.source_size) {
+    return {"expected a source size of " + to_string(std::get<ImageSize>(size)) + " as in " +
+            stored.pair.next.path + ", got " + to_string(stored.source_size)};
   }
   if (stored.source_size.height <= 0 || stored.source_size.width <= 0) {
     return {"expected a source size, got " + to_string(stored.source_size)};
@@ -206,17 +207,6 @@ std::vector<std::string> SourceComparison::sample_faults(const PlannedShard& sha
   ShardHeader header = reader.header();
   header.dataset = to_string(kind);
   return row_differences(header, reader.tables(), slot, expected, place);
-}
-
-std::optional<ImageSize> SourceComparison::image_size(const std::string& path,
-                                                      DatasetKind dataset) {
-  const ImageOrientation orientation = orientation_of(dataset);
-  const auto [entry, is_new] = sizes_.try_emplace({path, orientation});
-  if (is_new) {
-    const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path), orientation);
-    if (!is_fault(found)) entry->second = std::get<ImageSize>(found);
-  }
-  return entry->second;
 }
 
 std::vector<std::string> row_differences(const ShardHeader& header, const ShardTables& stored,

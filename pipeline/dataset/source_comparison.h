@@ -1,8 +1,6 @@
 #pragma once
 
-#include <map>
 #include <memory>
-#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -11,8 +9,8 @@
 #include "manifests/values/job.h"
 #include "manifests/values/labels.h"
 #include "manifests/values/shard.h"
-#include "stages/base/images/image_file.h"
 #include "stages/frames/dataset.h"
+#include "stages/frames/decoding/frame_decoder.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_tables.h"
 
@@ -46,13 +44,11 @@ class SourceComparison {
  private:
   std::vector<std::string> sample_faults(const PlannedShard& shard, int slot,
                                          const ShardSample& stored, const ShardReader& reader);
-  std::optional<ImageSize> image_size(const std::string& path, DatasetKind dataset);
 
   JobManifest manifest_;
   std::vector<std::unique_ptr<Dataset>> datasets_;  // null where the source is not there
   std::vector<std::string> notes_;
-  /// By path; a video serves many samples.
-  std::map<std::pair<std::string, ImageOrientation>, std::optional<ImageSize>> sizes_;
+  ImageSizes sizes_;  ///< of the datasets that keep none; a video serves many samples
   long long compared_ = 0;
 };
 

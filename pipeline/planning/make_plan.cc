@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <array>
 #include <charconv>
 #include <cmath>
 #include <iterator>
@@ -12,7 +11,6 @@
 #include <numbers>
 #include <optional>
 #include <string_view>
-#include <unordered_map>
 #include <utility>
 
 #include "manifests/values/counter_random.h"
@@ -265,7 +263,8 @@ void ShardLayout::end_source() {
 
 namespace {
 
-/// Sizes of images, each file asked once (a video serves thousands of samples).
+/// Sizes of images, each file asked once (a video serves thousands of samples): what labels ask for
+/// later, too, the dataset keeps.
 class SizeProbe {
  public:
   explicit SizeProbe(const JobManifest& manifest) : manifest_(manifest) {}
@@ -276,22 +275,18 @@ class SizeProbe {
     if (manifest_.image.size) return *manifest_.image.size;
     if (has_events(source.dataset)) return dataset.sensor_size(sample.label_key);
     const ImageOrientation orientation = orientation_of(source.dataset);
-    const ImageSize size = probe(sample.pair.next.path, orientation);
-    return size == ImageSize{} ? probe(sample.pair.previous.path, orientation) : size;
+    ImageSizes& sizes = dataset.image_sizes() ? *dataset.image_sizes() : sizes_;
+    for (const FrameRef* frame : {&sample.pair.next, &sample.pair.previous}) {
+      if (frame->path.empty()) continue;
+      const Outcome<ImageSize> size = sizes.of(resolve(manifest_, frame->path), orientation);
+      if (!is_fault(size)) return std::get<ImageSize>(size);
+    }
+    return {};
   }
 
  private:
-  ImageSize probe(const std::string& path, ImageOrientation orientation) {
-    const auto [entry, is_new] = sizes_[static_cast<std::size_t>(orientation)].try_emplace(path);
-    if (is_new && !path.empty()) {
-      const Outcome<ImageSize> found = probe_image_size(resolve(manifest_, path), orientation);
-      if (!is_fault(found)) entry->second = std::get<ImageSize>(found);
-    }
-    return entry->second;
-  }
-
   const JobManifest& manifest_;
-  std::array<std::unordered_map<std::string, ImageSize>, 2> sizes_;  ///< by orientation
+  ImageSizes sizes_;  ///< of the other datasets
 };
 
 struct PlannedSource {

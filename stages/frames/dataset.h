@@ -47,6 +47,8 @@ struct EventWindow {
   void tell_times(FramePair& pair) const;
 };
 
+class ImageSizes;  // stages/frames/decoding/frame_decoder.h
+
 /// A labelled frame dataset on disk: which frames are labelled, which lie beside them, and what
 /// their labels say. Opening one lists files and reads annotation files; it decodes no image, but
 /// for KITTI object with its raw drives, an image of each drive, and videos.
@@ -79,6 +81,10 @@ class Dataset {
   virtual ImageSize sensor_size(const std::string& label_key) const;
   /// A fault if what is stored is malformed.
   virtual Outcome<EventWindow> events(const std::string& label_key) const;
+
+  /// The sizes that `annotation` asks for, of a source whose labels are measured by their images:
+  /// who asks these learns them for both. Null: it asks for none.
+  virtual ImageSizes* image_sizes() const { return nullptr; }
 
   /// Where a person finds that annotation: the file's path as FrameRef::path is written, and the
   /// place in it (`kitti/training/label_2/001497.txt`, `h36m/S1/Directions-1/annot.h5#5`,

@@ -22,6 +22,17 @@ Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
   }
 }
 
+Outcome<ImageSize> ImageSizes::of(const std::filesystem::path& file, ImageOrientation orientation) {
+  auto& kept = kept_[static_cast<std::size_t>(orientation)];
+  {
+    const std::lock_guard lock(mutex_);
+    if (const auto found = kept.find(file.native()); found != kept.end()) return found->second;
+  }
+  const Outcome<ImageSize> size = probe_image_size(file, orientation);  // others need not wait
+  const std::lock_guard lock(mutex_);
+  return kept.try_emplace(file.native(), size).first->second;
+}
+
 namespace {
 
 ColourFrame copy_of(const ColourView& frame) {

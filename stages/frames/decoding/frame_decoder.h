@@ -1,8 +1,12 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <mutex>
+#include <string>
+#include <unordered_map>
 
 #include "manifests/values/faults.h"
 #include "manifests/values/frames.h"
@@ -21,6 +25,18 @@ inline ImageOrientation orientation_of(DatasetKind dataset) {
 /// fault names the file. Thread safe.
 Outcome<ImageSize> probe_image_size(const std::filesystem::path& file,
                                     ImageOrientation orientation);
+
+/// The sizes of images and videos: what one reader has learnt of a file, the next need not learn
+/// again. Thread safe.
+class ImageSizes {
+ public:
+  /// As probe_image_size, which is asked once for each file; a fault is kept, too.
+  Outcome<ImageSize> of(const std::filesystem::path& file, ImageOrientation orientation);
+
+ private:
+  std::mutex mutex_;
+  std::array<std::unordered_map<std::string, Outcome<ImageSize>>, 2> kept_;  ///< by orientation
+};
 
 /// Decodes single frames of images and videos. An image that decodes only in part (a truncated
 /// JPEG, a PNG with a bad checksum) is a fault, never an image with a grey rest.

@@ -8,6 +8,13 @@
 
 namespace eventgan {
 
+OwnLabels::OwnLabels(LabelledSource source)
+    : source_(std::move(source)),
+      labels_(source_.frames.size()),
+      image_sizes_(std::make_unique<ImageSizes>()) {}
+
+OwnLabels::~OwnLabels() = default;
+
 void OwnLabels::give(std::size_t frame, const std::string& key) {
   FrameLabel& label = labels_.at(frame);
   frame_of_key_.emplace(key, frame);
@@ -47,9 +54,11 @@ Outcome<ImageSize> OwnLabels::image_size(const std::string& label_key,
                        label_place(label_key)};
   }
   const SourceFrame& frame = source_.frames[found->second];
+  const auto file = source_.root.on_disk(frame.name);
+  constexpr auto kUpright = ImageOrientation::kUpright;
   Outcome<ImageSize> size =
-      frame.size ? Outcome<ImageSize>(*frame.size)
-                 : probe_image_size(source_.root.on_disk(frame.name), ImageOrientation::kUpright);
+      frame.size ? Outcome<ImageSize>(*frame.size) : image_sizes_->of(file, kUpright);
+  if (is_fault(size)) size = probe_image_size(file, kUpright);  // it may have been mended since
   if (is_fault(size) || !claimed || std::get<ImageSize>(size) == *claimed) return size;
   return SampleFault{"expected an image of " + to_string(*claimed) + ", as " +
                      label_place(label_key) + " says, got " + to_string(std::get<ImageSize>(size)) +

@@ -19,6 +19,8 @@
 
 namespace eventgan {
 
+class ImageSizes;  // stages/frames/decoding/frame_decoder.h
+
 /// A frame of a source of images or videos, as labels may name it.
 struct SourceFrame {
   /// Of an image its path below ROOT, with forward slashes ("clip/000012.jpg"); of frame 12 of
@@ -56,7 +58,7 @@ struct AbsentFrame {
 /// Thread safety: all methods may be called from several threads at once.
 class OwnLabels {
  public:
-  virtual ~OwnLabels() = default;
+  virtual ~OwnLabels();
   OwnLabels(const OwnLabels&) = delete;
   OwnLabels& operator=(const OwnLabels&) = delete;
 
@@ -65,6 +67,8 @@ class OwnLabels {
   /// One for each of the source's frames.
   const std::vector<FrameLabel>& labels() const { return labels_; }
   const std::vector<AbsentFrame>& absent() const { return absent_; }
+  /// As that of Dataset.
+  ImageSizes* image_sizes() const { return image_sizes_.get(); }
 
   /// As those of Dataset.
   const std::vector<std::string>& annotation_files() const { return annotation_files_; }
@@ -78,8 +82,7 @@ class OwnLabels {
   }
 
  protected:
-  explicit OwnLabels(LabelledSource source)
-      : source_(std::move(source)), labels_(source_.frames.size()) {}
+  explicit OwnLabels(LabelledSource source);
 
   /// Gives a frame its label. A second one is a fault of the sample, which names both places.
   void give(std::size_t frame, const std::string& key);
@@ -108,6 +111,7 @@ class OwnLabels {
   std::vector<FrameLabel> labels_;
   std::vector<AbsentFrame> absent_;
   std::unordered_map<std::string, std::size_t> frame_of_key_;
+  std::unique_ptr<ImageSizes> image_sizes_;
 };
 
 struct FoundFrames;  // detail/find_labels.h

@@ -99,6 +99,8 @@ class ImagesDataset final : public Dataset {
     return annotation;
   }
 
+  ImageSizes* image_sizes() const override { return labels_ ? labels_->image_sizes() : nullptr; }
+
   std::string label_place(const std::string& label_key) const override {
     return labels_ ? labels_->label_place(label_key) : root_.written(label_key);
   }

@@ -14,6 +14,7 @@
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/memory.h"
+#include "stages/base/files/input_file.h"
 #include "stages/generator/torch/torch_generator.h"
 #include "stages/shards/shard_reader.h"
 #include "stages/shards/shard_summary.h"
@@ -57,6 +58,49 @@ TEST_F(Convert, GivesTheSameBytesForAnyNumberOfThreadsAndAgain) {
   EXPECT_EQ(shards("one"), shards("two"));
   EXPECT_EQ(shards("two"), shards("again"));
   EXPECT_EQ(shards("one"), shards("five"));
+}
+
+/// One thread: of several, two might open an image at the same moment.
+TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
+  const auto opens = [&](const InputCounter& counter) {
+    std::vector<std::uint64_t> of_images;
+    for (int frame = 0; frame < 12; ++frame) of_images.push_back(counter.of(image(frame)).opens);
+    return of_images;
+  };
+  std::vector<std::uint64_t> expected(12, 2);
+  expected[0] = 1;  // no pair's next image, whose size counts
+  {
+    const InputCounter counter;
+    run("plain", 1);
+    EXPECT_EQ(opens(counter), expected);
+  }
+  // Labels that are measured by their images.
+  std::string images, boxes;
+  for (int frame = 0; frame < 12; ++frame) {
+    const std::string id = std::to_string(frame + 1);
+    const std::string comma = frame == 0 ? "" : ", ";
+    images += comma + R"({"file_name": ")" + image(frame).filename().string() + R"(", "id": )" +
+              id + R"(, "width": 30, "height": 20})";
+    boxes += comma + R"({"image_id": )" + id + R"(, "category_id": 1, "bbox": [1, 2, 3, 4]})";
+  }
+  testing::write_file(folder_ / "instances.json",
+                      R"({"images": [)" + images + R"(], "annotations": [)" + boxes +
+                          R"(], "categories": [{"id": 1, "name": "car"}]})");
+  change(R"("root": "clip",)",
+         R"("root": "clip", "labels": {"format": "coco", "path": "instances.json"},)");
+  {
+    const InputCounter counter;
+    EXPECT_EQ(run("coco", 1).written, 11);
+    EXPECT_EQ(opens(counter), expected);
+    // Once for the labels, once for the plan's fingerprint.
+    EXPECT_EQ(counter.of(folder_ / "instances.json").opens, 2u);
+  }
+  // Stills, each of which is both frames of its pair.
+  change(R"("side": "before", "choose": "one")", R"("from": "stills", "side": "before")");
+  change(R"("gaps": [1], )", "");
+  const InputCounter counter;
+  EXPECT_EQ(run("stills", 1).written, 12);
+  EXPECT_EQ(opens(counter), std::vector<std::uint64_t>(12, 2));
 }
 
 TEST_F(Convert, SaysWhetherVolumesAreRatesOrEventsDrawnOfThem) {
