@@ -45,6 +45,7 @@ class HashedFile : public std::streambuf {
       : path_(file), file_(InputFile::open(file, reason_)), block_(std::size_t{1} << 20) {}
 
   bool is_open() const { return file_.has_value(); }
+  const std::string& why_not() const { return reason_; }
 
   /// SHA-256 of the file up to where the last block read ends: of the whole file once the stream
   /// has met its end.
@@ -67,7 +68,7 @@ class HashedFile : public std::streambuf {
 
  private:
   fs::path path_;
-  std::string reason_;  ///< why it is not open
+  std::string reason_;
   std::optional<InputFile> file_;
   std::uint64_t offset_ = 0;
   std::vector<char> block_;
@@ -94,6 +95,9 @@ template <class Frozen, class Read>
 Frozen read_plan_file(const fs::path& folder, const Read& read) {
   const fs::path file = folder / kPlanName;
   HashedFile hashed(file);
+  if (std::error_code unknown; !hashed.is_open() && fs::exists(file, unknown)) {
+    throw std::runtime_error("cannot read " + file.string() + ": " + hashed.why_not());
+  }
   if (!hashed.is_open()) {
     throw InputError("expected a folder that eventgan convert has written, got no " +
                      file.string());

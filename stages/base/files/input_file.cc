@@ -133,22 +133,31 @@ namespace {
 /// Where a stream of C is in its file.
 struct StreamPlace {
   const InputFile& file;
+  std::vector<char> block;
+  std::uint64_t block_begin = 0;
+  std::size_t block_size = 0;  ///< of `block` what is read
   std::uint64_t offset = 0;
 };
 
 ssize_t read_stream(void* cookie, char* to, std::size_t count) {
-  auto& [file, offset] = *static_cast<StreamPlace*>(cookie);
-  try {
-    const std::size_t got = file.read_some(offset, {to, count});
-    offset += got;
-    return static_cast<ssize_t>(got);
-  } catch (const InputError&) {  // the library sees ferror()
-    return -1;
+  auto& [file, block, begin, size, offset] = *static_cast<StreamPlace*>(cookie);
+  if (offset < begin || offset >= begin + size) {
+    try {
+      size = file.read_some(offset, block);
+    } catch (const InputError&) {  // the library sees ferror()
+      return -1;
+    }
+    begin = offset;
   }
+  const std::size_t within = offset - begin;
+  const std::size_t given = std::min(count, size - within);
+  std::copy_n(block.data() + within, given, to);
+  offset += given;
+  return static_cast<ssize_t>(given);
 }
 
 int seek_stream(void* cookie, off64_t* to, int from) {
-  auto& [file, offset] = *static_cast<StreamPlace*>(cookie);
+  auto& [file, block, begin, size, offset] = *static_cast<StreamPlace*>(cookie);
   if (from == SEEK_CUR) *to += static_cast<off64_t>(offset);
   if (from == SEEK_END) *to += static_cast<off64_t>(file.size_bytes());
   if (*to < 0) return -1;
@@ -163,8 +172,9 @@ int close_stream(void* cookie) {
 
 }  // namespace
 
-InputFile::Stream InputFile::stream() const {
-  auto place = std::make_unique<StreamPlace>(StreamPlace{*this});
+InputFile::Stream InputFile::stream(std::size_t block_bytes) const {
+  const auto enough = std::min<std::uint64_t>(block_bytes, size_bytes_ + 1);
+  auto place = std::make_unique<StreamPlace>(StreamPlace{*this, std::vector<char>(enough)});
   Stream stream(
       ::fopencookie(place.get(), "rb", {read_stream, nullptr, seek_stream, close_stream}));
   if (!stream) throw std::bad_alloc();

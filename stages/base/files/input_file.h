@@ -61,9 +61,10 @@ class InputFile {
     void operator()(std::FILE* stream) const { std::fclose(stream); }
   };
   using Stream = std::unique_ptr<std::FILE, CloseStream>;
-  /// From its start, for libraries that take a stream of C. It has no descriptor, may not outlive
-  /// this object, and is one thread's.
-  Stream stream() const;
+  /// From its start, for libraries that take a stream of C. It reads blocks of so many bytes, of
+  /// which the latest is kept: moving within it reads nothing. It has no descriptor, may not
+  /// outlive this object, and is one thread's.
+  Stream stream(std::size_t block_bytes) const;
 
   /// Asks the system to load it all into its cache, and does not wait for that.
   void load_ahead() const;

@@ -69,13 +69,13 @@ const Format* format_of(const InputFile& file) {
 /// completed.
 template <class Result>
 Result read_by_format(const InputFile& file, Result (*Format::*read)(std::FILE*),
-                      ImageOrientation wanted) {
+                      ImageOrientation wanted, std::size_t block_bytes) {
   const Format* const format = format_of(file);
   if (format == nullptr) {
     throw std::runtime_error(
         "expected an image (JPEG, PNG, WebP, TIFF, BMP or PNM), got a file of another kind");
   }
-  const InputFile::Stream stream = file.stream();
+  const InputFile::Stream stream = file.stream(block_bytes);
   int orientation = 1;
   Result result;
   try {
@@ -116,7 +116,7 @@ InputFile open_image_file(const std::filesystem::path& file) {
 bool is_image(const InputFile& file) { return format_of(file) != nullptr; }
 
 ColourFrame decode_image(const InputFile& file, ImageOrientation orientation) {
-  return read_by_format(file, &Format::decode, orientation);
+  return read_by_format(file, &Format::decode, orientation, std::size_t{1} << 20);
 }
 
 ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
@@ -124,7 +124,7 @@ ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientatio
 }
 
 ImageSize image_size(const InputFile& file, ImageOrientation orientation) {
-  return read_by_format(file, &Format::size, orientation);
+  return read_by_format(file, &Format::size, orientation, std::size_t{1} << 13);
 }
 
 ImageSize image_file_size(const std::filesystem::path& file, ImageOrientation orientation) {

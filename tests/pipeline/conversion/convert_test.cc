@@ -96,8 +96,8 @@ TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
     EXPECT_EQ(counter.of(folder_ / "instances.json").opens, 2u);
   }
   // Stills, each of which is both frames of its pair.
-  change(R"("side": "before", "choose": "one")", R"("from": "stills", "side": "before")");
-  change(R"("gaps": [1], )", "");
+  change(R"("gaps": [1], "side": "before", "choose": "one")",
+         R"("from": "stills", "side": "before")");
   const InputCounter counter;
   EXPECT_EQ(run("stills", 1).written, 12);
   EXPECT_EQ(opens(counter), std::vector<std::uint64_t>(12, 2));

@@ -165,13 +165,15 @@ TEST(InputFile, RefusesFoldersAndAbsentFiles) {
 }
 
 /// What a library does to a stream of C.
-TEST(InputFile, IsAStreamOfCThatMovesAndEnds) {
+class StreamOfC : public ::testing::TestWithParam<std::size_t> {};
+
+TEST_P(StreamOfC, MovesAndEnds) {
   const testing::TemporaryFolder folder;
   std::string text;
   for (int i = 0; i < 20'000; ++i) text += static_cast<char>(i * 7 + i / 256);
   testing::write_file(folder / "f", text);
   const InputFile file(folder / "f");
-  const InputFile::Stream stream = file.stream();
+  const InputFile::Stream stream = file.stream(GetParam());
   std::FILE* const c = stream.get();
   std::string got(text.size() + 1, '\0');
   EXPECT_EQ(std::fread(got.data(), 1, got.size(), c), text.size());
@@ -187,6 +189,23 @@ TEST(InputFile, IsAStreamOfCThatMovesAndEnds) {
   EXPECT_EQ(std::ftell(c), 19'997);
   EXPECT_EQ(std::fgetc(c), static_cast<unsigned char>(text[19'997]));
   EXPECT_NE(std::fseek(c, -1, SEEK_SET), 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(InputFile, StreamOfC,
+                         ::testing::Values(std::size_t{1}, 1'000, 20'000, 1'000'000));
+
+TEST(InputFile, AStreamOfCReadsABlockOnce) {
+  const testing::TemporaryFolder folder;
+  testing::write_file(folder / "f", std::string(20'000, 'x'));
+  const InputFile file(folder / "f");
+  const InputCounter counter;
+  const InputFile::Stream stream = file.stream(8'192);
+  std::array<char, 6'000> part;
+  for (int i = 0; i < 3; ++i) {
+    EXPECT_EQ(std::fread(part.data(), 1, part.size(), stream.get()), part.size());
+    std::rewind(stream.get());
+  }
+  EXPECT_EQ(counter.of(folder / "f").bytes, 8'192u);
 }
 
 TEST(InputCounter, CountsOpensAndBytesOfEachFile) {
