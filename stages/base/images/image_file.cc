@@ -116,7 +116,7 @@ InputFile open_image_file(const std::filesystem::path& file) {
 bool is_image(const InputFile& file) { return format_of(file) != nullptr; }
 
 ColourFrame decode_image(const InputFile& file, ImageOrientation orientation) {
-  return read_by_format(file, &Format::decode, orientation, std::size_t{1} << 20);
+  return read_by_format(file, &Format::decode, orientation, std::size_t{1} << 16);
 }
 
 ColourFrame decode_image_file(const std::filesystem::path& file, ImageOrientation orientation) {
