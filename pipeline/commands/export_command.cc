@@ -20,11 +20,6 @@
 namespace eventgan {
 namespace {
 
-const std::map<std::string, ExportFormat> kFormats = {
-    {"yolo", ExportFormat::kYolo},     {"coco", ExportFormat::kCoco},
-    {"mpii", ExportFormat::kMpii},     {"davis", ExportFormat::kDavis},
-    {"events", ExportFormat::kEvents}, {"webdataset", ExportFormat::kWebdataset},
-    {"dsec", ExportFormat::kDsec},     {"rvt", ExportFormat::kRvt}};
 const std::map<std::string, bool> kIgnored = {{"keep", true}, {"drop", false}};
 const std::map<std::string, bool> kIsFloat32 = {{"float16", false}, {"float32", true}};
 const std::map<std::string, EventCounts> kCounts = {{"poisson", EventCounts::kPoisson},
@@ -32,27 +27,24 @@ const std::map<std::string, EventCounts> kCounts = {{"poisson", EventCounts::kPo
 const std::map<std::string, EventFile> kEventFiles = {{"text", EventFile::kText},
                                                       {"mvsec", EventFile::kMvsec}};
 
-/// An option that only some formats have.
-struct OwnOption {
-  const char* name;
-  const char* formats;
-  std::vector<ExportFormat> of;
-};
-const std::vector<ExportFormat> kOfDrawnEvents = {ExportFormat::kEvents, ExportFormat::kDsec,
-                                                  ExportFormat::kRvt};
-const std::vector<OwnOption> kOwnOptions = {
-    {"--classes",
-     "yolo, coco, dsec or rvt",
-     {ExportFormat::kYolo, ExportFormat::kCoco, ExportFormat::kDsec, ExportFormat::kRvt}},
-    {"--ignored", "yolo or coco", {ExportFormat::kYolo, ExportFormat::kCoco}},
-    {"--full-scale", "yolo or mpii", {ExportFormat::kYolo, ExportFormat::kMpii}},
-    {"--dtype", "davis", {ExportFormat::kDavis}},
-    {"--counts", "events, dsec or rvt", kOfDrawnEvents},
-    {"--layout", "events", {ExportFormat::kEvents}},
-    {"--seed", "events, dsec or rvt", kOfDrawnEvents}};
+/// The words of the formats that take an option, "yolo, coco, dsec"; the last one after `last`.
+std::string formats_with(const std::string& option, const std::string& last) {
+  std::vector<std::string_view> words;
+  for (const ExportFormat& format : export_formats()) {
+    if (std::ranges::find(format.options, option) != format.options.end()) {
+      words.push_back(format.word);
+    }
+  }
+  std::string text(words.at(0));
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    text += (i + 1 < words.size() ? ", " : last) + std::string(words[i]);
+  }
+  return text;
+}
 
 struct ExportArguments {
   std::string folder;
+  std::size_t format = 0;  ///< in export_formats()
   std::string out;
   std::string classes;
   bool keep_ignored = false;
@@ -63,11 +55,15 @@ struct ExportArguments {
 
 int run(const CLI::App& command, const ExportArguments& arguments) {
   ExportOptions options = arguments.options;
-  for (const OwnOption& option : kOwnOptions) {
-    const bool has_it = std::ranges::find(option.of, options.to) != option.of.end();
-    if (command.count(option.name) > 0 && !has_it) {
-      throw UsageError(
-          fmt::format("{}: expected --to {}, got another format", option.name, option.formats));
+  options.to = &export_formats().at(arguments.format);
+  for (const ExportFormat& format : export_formats()) {
+    for (const std::string& option : format.options) {
+      const bool has_it =
+          std::ranges::find(options.to->options, option) != options.to->options.end();
+      if (command.count(option) > 0 && !has_it) {
+        throw UsageError(fmt::format("{}: expected --to {}, got --to {}", option,
+                                     formats_with(option, " or "), options.to->word));
+      }
     }
   }
   if (arguments.out.empty()) throw UsageError("--out: expected a folder, got nothing");
@@ -95,9 +91,16 @@ void add_export_command(CLI::App& app, int& exit_code) {
   const auto arguments = std::make_shared<ExportArguments>();
   ExportOptions& options = arguments->options;
   command->add_option("DIR", arguments->folder, "Output folder completed by finalize")->required();
-  take_one_of(
-      command->add_option("--to", options.to, "Format of the export (manifests/guides/exports.md)"),
-      kFormats)
+  std::map<std::string, std::size_t> formats;
+  std::string list = "Formats:\n";
+  for (const ExportFormat& format : export_formats()) {
+    formats.emplace(format.word, formats.size());
+    list += fmt::format("{}: {}\n", format.word, format.title);
+  }
+  command->footer(list);
+  take_one_of(command->add_option("--to", arguments->format,
+                                  "Format of the export (manifests/guides/exports.md)"),
+              formats)
       ->required();
   command->add_option("--out", arguments->out, "Folder for the export")
       ->required()
@@ -105,36 +108,28 @@ void add_export_command(CLI::App& app, int& exit_code) {
   command->add_option("--split", options.splits, "Export only this split; can be repeated")
       ->option_text("NAME")
       ->allow_extra_args(false);
-  command
-      ->add_option("--classes", arguments->classes,
-                   "yolo, coco, dsec, rvt: JSON file that maps each class name to a number, or to "
-                   "null to leave the class out")
+  const auto add = [&](const char* name, auto& value, const std::string& text) {
+    return command->add_option(name, value, formats_with(name, ", ") + ": " + text);
+  };
+  add("--classes", arguments->classes,
+      "JSON file that maps each class name to a number, or to null to leave the class out")
       ->option_text("FILE");
-  take_one_of(
-      command->add_option("--ignored", arguments->keep_ignored,
-                          "yolo, coco: keep or drop boxes to ignore (DontCare). yolo keeps them as "
-                          "a class of their own (default: drop), coco as crowds (default: keep)"),
-      kIgnored);
-  command
-      ->add_option("--full-scale", options.full_scale,
-                   "yolo, mpii: volume value that becomes 255; default: 1")
+  take_one_of(add("--ignored", arguments->keep_ignored,
+                  "keep or drop boxes to ignore (DontCare). yolo keeps them as a class of their "
+                  "own (default: drop), coco as crowds (default: keep)"),
+              kIgnored);
+  add("--full-scale", options.full_scale, "volume value that becomes 255; default: 1")
       ->check(CLI::Range(1e-6, 1e6))
       ->option_text("VALUE");
-  take_one_of(command->add_option("--dtype", arguments->is_float32,
-                                  "davis: type of the values; default: float16"),
+  take_one_of(add("--dtype", arguments->is_float32, "type of the values; default: float16"),
               kIsFloat32);
-  take_one_of(
-      command->add_option(
-          "--counts", options.counts,
-          "events, dsec, rvt: draw the number of events from a Poisson distribution (default) or "
-          "round it"),
-      kCounts);
-  take_one_of(
-      command->add_option("--layout", options.event_file,
-                          "events: lines of text, t x y p (default), or HDF5 as MVSEC has it"),
-      kEventFiles);
-  command->add_option("--seed", options.seed, "events, dsec, rvt: random seed; default: 0")
-      ->option_text("NUMBER");
+  take_one_of(add("--counts", options.counts,
+                  "draw the number of events from a Poisson distribution (default) or round it"),
+              kCounts);
+  take_one_of(add("--layout", options.event_file,
+                  "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
+              kEventFiles);
+  add("--seed", options.seed, "random seed; default: 0")->option_text("NUMBER");
   command->add_option("--threads", options.threads, "Number of threads; default: all cores")
       ->check(CLI::Range(1, 4096));
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");

@@ -166,10 +166,6 @@ class CocoExporter : public Exporter {
                        keep_ignored_ ? "keep" : "drop");
   }
 
-  bool takes(const ExportSource& source) const override {
-    return source.has_boxes() || source.has_joints();
-  }
-
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     work.for_each_sample(shard, reader, [&](const OutgoingSample& sample) {
@@ -340,8 +336,14 @@ class CocoExporter : public Exporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> coco_exporter(const ExportInput& input, const ExportOptions& options) {
-  return std::make_unique<CocoExporter>(input, options);
+ExportFormat coco_format() {
+  return {
+      .word = "coco",
+      .title = "COCO's JSON for boxes and for keypoints of persons, event volumes as .npy",
+      .need = LabelNeed::kBoxesOrJoints,
+      .options = {"--classes", "--ignored"},
+      .files = {"instances_SPLIT.json", "person_keypoints_SPLIT.json", "volumes/SPLIT/NAME.npy"},
+      .make = make_exporter<CocoExporter>};
 }
 
 }  // namespace eventgan

@@ -84,7 +84,7 @@ std::size_t add_row(RowIds& ids, const ExportSource& source, const std::string& 
 /// SET.hdf5, and beside it SET.npz for persons, else SET.txt, a line for each sample.
 class DavisExporter : public Exporter {
  public:
-  explicit DavisExporter(const ExportOptions& options) : dtype_(options.dtype) {}
+  DavisExporter(const ExportInput&, const ExportOptions& options) : dtype_(options.dtype) {}
 
   std::string settings() const override { return fmt::format("dtype {}\n", to_string(dtype_)); }
 
@@ -196,8 +196,13 @@ class DavisExporter : public Exporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> davis_exporter(const ExportOptions& options) {
-  return std::make_unique<DavisExporter>(options);
+ExportFormat davis_format() {
+  return {.word = "davis",
+          .title = "the layout of the EventGAN authors' trainers, one HDF5 file",
+          .need = LabelNeed::kNone,
+          .options = {"--dtype"},
+          .files = {"SET.hdf5", "SET.npz", "SET.txt"},
+          .make = make_exporter<DavisExporter>};
 }
 
 }  // namespace eventgan

@@ -75,8 +75,16 @@ class DsecExporter : public RecordingsExporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> dsec_exporter(const ExportInput& input, const ExportOptions& options) {
-  return std::make_unique<DsecExporter>(input, options);
+ExportFormat dsec_format() {
+  return {.word = "dsec",
+          .title = "the same events as recordings in DSEC's layout, with DSEC-Det's tracks",
+          .need = LabelNeed::kNone,
+          .options = {"--classes", "--counts", "--seed"},
+          .files = {"dsec/SPLIT/RECORDING/events/left/events.h5",
+                    "dsec/SPLIT/RECORDING/images/timestamps.txt",
+                    "dsec/SPLIT/RECORDING/object_detections/left/tracks.npy",
+                    "dsec/SPLIT/RECORDING/windows.txt", "label_map_dictionary.json"},
+          .make = make_exporter<DsecExporter>};
 }
 
 }  // namespace eventgan

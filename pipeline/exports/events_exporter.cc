@@ -28,7 +28,7 @@ void write_recording(const std::filesystem::path& path, ImageSize size, std::vec
 /// events/SPLIT/NAME.txt or .hdf5.
 class EventsExporter : public Exporter {
  public:
-  explicit EventsExporter(const ExportOptions& options) : options_(options) {}
+  EventsExporter(const ExportInput&, const ExportOptions& options) : options_(options) {}
 
   std::string settings() const override {
     return fmt::format("counts {}\nfile {}\nseed {}\n",
@@ -57,8 +57,13 @@ class EventsExporter : public Exporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> events_exporter(const ExportOptions& options) {
-  return std::make_unique<EventsExporter>(options);
+ExportFormat events_format() {
+  return {.word = "events",
+          .title = "events drawn from the volumes, as text or in MVSEC's layout",
+          .need = LabelNeed::kNone,
+          .options = {"--counts", "--layout", "--seed"},
+          .files = {"events/SPLIT/NAME.txt", "events/SPLIT/NAME.hdf5"},
+          .make = make_exporter<EventsExporter>};
 }
 
 }  // namespace eventgan

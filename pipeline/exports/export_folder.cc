@@ -1,7 +1,6 @@
 #include "pipeline/exports/export_folder.h"
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -12,6 +11,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "pipeline/exports/export_job.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/base/files/input_file.h"
 #include "stages/base/files/unfinished_files.h"
@@ -25,40 +25,14 @@ constexpr char kReceipts[] = ".export";
 constexpr char kIdentity[] = "export.txt";
 constexpr char kBegun[] = ".begun";
 
-/// Whether an export has files of this name: the exporters say which.
+/// Whether an export has files of this name, whichever its format.
 bool is_export_name(std::string_view name) {
-  struct Folder {
-    std::string_view name;
-    std::size_t most_parts;  ///< of a file's name, the folder counted
-  };
-  static constexpr std::array<Folder, 9> kFolders{{{"annot", 2},
-                                                   {"dsec", 6},
-                                                   {"events", 3},
-                                                   {"images", 3},
-                                                   {"labels", 3},
-                                                   {"pose", 4},
-                                                   {"preprocessed", 6},
-                                                   {"raw", 3},
-                                                   {"volumes", 3}}};
-  static constexpr std::array<std::string_view, 10> kEndings{
-      ".h5", ".hdf5", ".json", ".mat", ".npy", ".npz", ".png", ".tar", ".txt", ".yaml"};
   const auto is_plain = [](char c) { return c > ' ' && c <= '~'; };
-  if (!std::ranges::all_of(name, is_plain)) return false;
-  std::vector<std::string_view> parts;
-  for (std::size_t begin = 0, end = 0; end != name.npos; begin = end + 1) {
-    end = name.find('/', begin);
-    parts.push_back(name.substr(begin, end == name.npos ? end : end - begin));
-    if (parts.back().empty() || parts.back().starts_with('.')) return false;
-  }
-  if (name == kCard) return true;
-  if (parts.size() > 1) {
-    // There may be several of a kind: "pose-2".
-    const std::string_view kind = parts[0].substr(0, parts[0].find('-'));
-    const auto folder = std::ranges::find(kFolders, kind, &Folder::name);
-    if (folder == kFolders.end() || parts.size() > folder->most_parts) return false;
-  }
-  return std::ranges::any_of(kEndings,
-                             [&](std::string_view ending) { return name.ends_with(ending); });
+  if (!std::ranges::all_of(name, is_plain) || name.starts_with('.')) return false;
+  if (name.find("/.") != name.npos) return false;
+  return name == kExportDescription ||
+         std::ranges::any_of(export_formats(),
+                             [&](const ExportFormat& format) { return writes(format, name); });
 }
 
 /// `record`: the file that the name is in, or the folder that it is for.

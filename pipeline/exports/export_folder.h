@@ -13,9 +13,6 @@ namespace eventgan {
 /// What says that an export is complete.
 inline constexpr char kExportDescription[] = "export.json";
 
-/// What tells people about an export that is to be shared.
-inline constexpr char kCard[] = "README.md";
-
 /// The folder that an export is written to, and what of it is done: .export/export.txt says which
 /// export it is, .export/STEP.json is a receipt, written after all files of a step and listing them
 /// with their sizes. A step is done if its receipt is of the same input and each of its files has
@@ -23,11 +20,10 @@ inline constexpr char kCard[] = "README.md";
 /// is written. .export/STEP.begun, a journal, names each file of a step under way before it is
 /// written, so that a killed run's can be found.
 ///
-/// A name that a receipt or a journal has is believed if it is one that an export writes:
-/// README.md or [FOLDER/[SPLIT/...]]NAME.ENDING, FOLDER and ENDING of those in use, no deeper below
-/// FOLDER than exporters go, no part hidden. Any other is a std::runtime_error that names it and
-/// its record; so is a symbolic link on the way to a file, as require_no_link says. Both come
-/// before anything is removed. Thread safe.
+/// A name that a receipt or a journal has is believed if it is export.json or some format writes
+/// files of this name (ExportFormat::files), and no part of it is hidden. Any other is a
+/// std::runtime_error that names it and its record; so is a symbolic link on the way to a file, as
+/// require_no_link says. Both come before anything is removed. Thread safe.
 class ExportFolder {
  public:
   /// Whether the folder is that of the export already.

@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "manifests/values/job.h"
@@ -15,24 +16,47 @@
 
 namespace eventgan {
 
-/// What an export is made for; manifests/guides/exports.md says what each consists of.
-enum class ExportFormat { kYolo, kCoco, kMpii, kDavis, kWebdataset, kEvents, kDsec, kRvt };
+class Exporter;
+class ExportInput;
+struct ExportOptions;
+
+/// The labels that a source must have for a format to have a use for it.
+enum class LabelNeed { kNone, kBoxes, kJoints, kBoxesOrJoints };
+
+/// A format of exports, described by the file that makes it; manifests/guides/exports.md says what
+/// each consists of.
+struct ExportFormat {
+  std::string_view word;   ///< of --to
+  std::string_view title;  ///< what it writes, in a line
+  LabelNeed need = LabelNeed::kNone;
+  std::vector<std::string> options;  ///< those that it takes of the ones that not all formats take
+  /// The names of its files below the export's folder. SPLIT, NAME, SET, SHARD, RECORDING and BINS
+  /// stand for any text without a slash, and what is in brackets may be missing.
+  std::vector<std::string_view> files;
+  std::unique_ptr<Exporter> (*make)(const ExportInput&, const ExportOptions&) = nullptr;
+};
+
+/// All formats, in the order of the page.
+const std::vector<ExportFormat>& export_formats();
+
+/// Whether a file of the format may have this name.
+bool writes(const ExportFormat& format, std::string_view name);
 
 enum class EventFile { kText, kMvsec };
 
+/// An option that not all formats take says nothing to the others.
 struct ExportOptions {
-  ExportFormat to = ExportFormat::kYolo;
+  const ExportFormat* to = nullptr;  ///< one of export_formats()
   std::filesystem::path out;
-  std::vector<std::string> splits;  ///< none: all
-  std::optional<std::filesystem::path>
-      classes;  ///< kYolo, kCoco, kDsec, kRvt: JSON, class name → number or null
-  /// kYolo, kCoco: whether boxes to ignore are kept; unset: kCoco keeps them, kYolo does not.
-  std::optional<bool> keep_ignored;
-  double full_scale = 1;                       ///< kYolo, kMpii: the value that becomes 255, > 0
-  StoredType dtype = StoredType::kFloat16;     ///< kDavis: or kFloat32
-  EventCounts counts = EventCounts::kPoisson;  ///< kEvents, kDsec, kRvt
-  EventFile event_file = EventFile::kText;     ///< kEvents
-  std::uint64_t seed = 0;                      ///< kEvents, kDsec, kRvt
+  std::vector<std::string> splits;               ///< none: all
+  std::optional<std::filesystem::path> classes;  ///< JSON, class name → number or null
+  std::optional<bool>
+      keep_ignored;       ///< whether boxes to ignore are kept; unset: as the format does
+  double full_scale = 1;  ///< the value that becomes 255, > 0
+  StoredType dtype = StoredType::kFloat16;  ///< or kFloat32
+  EventCounts counts = EventCounts::kPoisson;
+  EventFile event_file = EventFile::kText;
+  std::uint64_t seed = 0;
   bool overwrite = false;
   int threads = 0;  ///< 0: all cores; changes no byte
   std::function<std::unique_ptr<Progress>(std::int64_t)> make_progress;  ///< none: silent

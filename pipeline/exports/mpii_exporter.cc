@@ -9,11 +9,10 @@ namespace {
 /// annot/SET.json, annot/gt_SET.mat, images/SPLIT/NAME.{png,npy}.
 class MpiiExporter : public Exporter {
  public:
-  explicit MpiiExporter(const ExportOptions& options) : full_scale_(options.full_scale) {}
+  MpiiExporter(const ExportInput&, const ExportOptions& options)
+      : full_scale_(options.full_scale) {}
 
   std::string settings() const override { return fmt::format("full scale {}\n", full_scale_); }
-
-  bool takes(const ExportSource& source) const override { return source.has_joints(); }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
@@ -68,8 +67,14 @@ class MpiiExporter : public Exporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> mpii_exporter(const ExportOptions& options) {
-  return std::make_unique<MpiiExporter>(options);
+ExportFormat mpii_format() {
+  return {.word = "mpii",
+          .title = "the annotation list for Microsoft's pose_resnet, and the ground truth for PCKh",
+          .need = LabelNeed::kJoints,
+          .options = {"--full-scale"},
+          .files = {"annot/SET.json", "annot/gt_SET.mat", "images/SPLIT/NAME.png",
+                    "images/SPLIT/NAME.npy"},
+          .make = make_exporter<MpiiExporter>};
 }
 
 }  // namespace eventgan

@@ -77,8 +77,6 @@ class RvtExporter : public RecordingsExporter {
   RvtExporter(const ExportInput& input, const ExportOptions& options)
       : RecordingsExporter(input, options, /*keeps_volumes=*/true) {}
 
-  bool takes(const ExportSource& source) const override { return source.has_boxes(); }
-
   void account(const OutgoingSample& sample, LeftOut& left_out) const override {
     RecordingsExporter::account(sample, left_out);
     const ImageSize size = sample.reader.header().volume.size;
@@ -186,8 +184,23 @@ class RvtExporter : public RecordingsExporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> rvt_exporter(const ExportInput& input, const ExportOptions& options) {
-  return std::make_unique<RvtExporter>(input, options);
+ExportFormat rvt_format() {
+  return {.word = "rvt",
+          .title = "the same for RVT and eTraM, as events and as the event volumes",
+          .need = LabelNeed::kBoxes,
+          .options = {"--classes", "--counts", "--seed"},
+          .files = {"raw/SPLIT/RECORDING_td.h5", "raw/SPLIT/RECORDING_td.dat.h5",
+                    "raw/SPLIT/RECORDING_bbox.npy", "raw/SPLIT/RECORDING_windows.txt",
+                    "preprocessed/SPLIT/RECORDING/labels_v2/labels.npz",
+                    "preprocessed/SPLIT/RECORDING/labels_v2/timestamps_us.npy",
+                    "preprocessed/SPLIT/RECORDING/event_representations_v2/eventgan_nbins=BINS/"
+                    "event_representations.h5",
+                    "preprocessed/SPLIT/RECORDING/event_representations_v2/eventgan_nbins=BINS/"
+                    "objframe_idx_2_repr_idx.npy",
+                    "preprocessed/SPLIT/RECORDING/event_representations_v2/eventgan_nbins=BINS/"
+                    "timestamps_us.npy",
+                    "label_map_dictionary.json"},
+          .make = make_exporter<RvtExporter>};
 }
 
 }  // namespace eventgan

@@ -318,6 +318,8 @@ std::string card_text(const ExportWork& work, const std::vector<const ExportShar
 /// SHARD.tar with NAME.npz and NAME.json, and README.md.
 class WebdatasetExporter : public Exporter {
  public:
+  WebdatasetExporter(const ExportInput&, const ExportOptions&) {}
+
   std::string settings() const override { return ""; }
 
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
@@ -363,13 +365,20 @@ class WebdatasetExporter : public Exporter {
       }
       count.persons += std::ssize(labels.annotation.persons);
     });
-    step.write(kCard, card_text(work, shards, counts));
+    step.write("README.md", card_text(work, shards, counts));
     step.finish();
   }
 };
 
 }  // namespace
 
-std::unique_ptr<Exporter> webdataset_exporter() { return std::make_unique<WebdatasetExporter>(); }
+ExportFormat webdataset_format() {
+  return {.word = "webdataset",
+          .title = "tar files with a .npz and a .json for each sample, and a dataset card",
+          .need = LabelNeed::kNone,
+          .options = {},
+          .files = {"SHARD.tar", "README.md"},
+          .make = make_exporter<WebdatasetExporter>};
+}
 
 }  // namespace eventgan

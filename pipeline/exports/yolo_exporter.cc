@@ -47,10 +47,6 @@ class YoloExporter : public Exporter {
                        keep_ignored_ ? "keep" : "drop", full_scale_, pose_text_);
   }
 
-  bool takes(const ExportSource& source) const override {
-    return source.has_boxes() || source.has_joints();
-  }
-
   void write_shard(const ExportWork& work, const ExportShard& shard, const ShardReader& reader,
                    ExportFolder::Step& step) const override {
     const ExportSource& source = work.input.source_of(shard);
@@ -178,8 +174,16 @@ class YoloExporter : public Exporter {
 
 }  // namespace
 
-std::unique_ptr<Exporter> yolo_exporter(const ExportInput& input, const ExportOptions& options) {
-  return std::make_unique<YoloExporter>(input, options);
+ExportFormat yolo_format() {
+  return {.word = "yolo",
+          .title = "YOLO's text files for boxes and poses, images, volumes as .npy",
+          .need = LabelNeed::kBoxesOrJoints,
+          .options = {"--classes", "--ignored", "--full-scale"},
+          .files = {"images/SPLIT/NAME.png", "images/SPLIT/NAME.npy", "labels/SPLIT/NAME.txt",
+                    "SPLIT.txt", "data.yaml", "pose[-N]/images/SPLIT/NAME.png",
+                    "pose[-N]/images/SPLIT/NAME.npy", "pose[-N]/labels/SPLIT/NAME.txt",
+                    "pose[-N]/SPLIT.txt", "pose[-N]/data.yaml"},
+          .make = make_exporter<YoloExporter>};
 }
 
 }  // namespace eventgan

@@ -63,9 +63,6 @@ class Exporter {
   /// Lines for the export's identity: the options that change its bytes.
   virtual std::string settings() const = 0;
 
-  /// Whether the format has a use for a source.
-  virtual bool takes(const ExportSource&) const { return true; }
-
   /// Throws UsageError if the samples do not go into the format; before a new export has its
   /// folder.
   virtual void check(const ExportInput&, const std::function<void()>& /*check_stop*/) const {}
@@ -87,14 +84,11 @@ class Exporter {
   virtual LeftOut whole_samples_left_out() const { return {}; }
 };
 
-std::unique_ptr<Exporter> yolo_exporter(const ExportInput& input, const ExportOptions& options);
-std::unique_ptr<Exporter> coco_exporter(const ExportInput& input, const ExportOptions& options);
-std::unique_ptr<Exporter> mpii_exporter(const ExportOptions& options);
-std::unique_ptr<Exporter> davis_exporter(const ExportOptions& options);
-std::unique_ptr<Exporter> webdataset_exporter();
-std::unique_ptr<Exporter> events_exporter(const ExportOptions& options);
-std::unique_ptr<Exporter> dsec_exporter(const ExportInput& input, const ExportOptions& options);
-std::unique_ptr<Exporter> rvt_exporter(const ExportInput& input, const ExportOptions& options);
+/// For ExportFormat::make.
+template <class Format>
+std::unique_ptr<Exporter> make_exporter(const ExportInput& input, const ExportOptions& options) {
+  return std::make_unique<Format>(input, options);
+}
 
 // What several of them share.
 

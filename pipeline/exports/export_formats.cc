@@ -1,0 +1,57 @@
+#include <algorithm>
+#include <array>
+
+#include "pipeline/exports/export_job.h"
+
+namespace eventgan {
+
+// The table of formats. Each row is in the file of its exporter.
+ExportFormat yolo_format();
+ExportFormat coco_format();
+ExportFormat mpii_format();
+ExportFormat davis_format();
+ExportFormat webdataset_format();
+ExportFormat events_format();
+ExportFormat dsec_format();
+ExportFormat rvt_format();
+
+const std::vector<ExportFormat>& export_formats() {
+  static const std::vector<ExportFormat> kFormats = {
+      yolo_format(),       coco_format(),   mpii_format(), davis_format(),
+      webdataset_format(), events_format(), dsec_format(), rvt_format()};
+  return kFormats;
+}
+
+namespace {
+
+bool fits(std::string_view name, std::string_view pattern) {
+  if (pattern.empty()) return name.empty();
+  if (pattern.front() == '[') {
+    const std::size_t end = pattern.find(']');
+    const std::string inner(pattern.substr(1, end - 1));
+    const std::string_view rest = pattern.substr(end + 1);
+    return fits(name, rest) || fits(name, inner + std::string(rest));
+  }
+  static constexpr std::array<std::string_view, 7> kAnyText{"SPLIT", "NAME",      "SET", "SHARD",
+                                                            "BINS",  "RECORDING", "N"};
+  const auto any = std::ranges::find_if(
+      kAnyText, [&](std::string_view word) { return pattern.starts_with(word); });
+  if (any == kAnyText.end()) {
+    return !name.empty() && name.front() == pattern.front() &&
+           fits(name.substr(1), pattern.substr(1));
+  }
+  const std::size_t most = std::min(name.find('/'), name.size());
+  for (std::size_t length = 1; length <= most; ++length) {
+    if (fits(name.substr(length), pattern.substr(any->size()))) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+bool writes(const ExportFormat& format, std::string_view name) {
+  return std::ranges::any_of(format.files,
+                             [&](std::string_view pattern) { return fits(name, pattern); });
+}
+
+}  // namespace eventgan
