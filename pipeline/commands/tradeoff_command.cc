@@ -127,8 +127,10 @@ int run(TradeoffArguments& arguments) {
   if (arguments.out && arguments.out->empty()) {  // a script's unset variable
     throw UsageError("--out: expected a folder, got nothing");
   }
-  options.out = arguments.out ? std::filesystem::path(*arguments.out)
-                              : manifest.directory / (manifest.name + "-tradeoff");
+  const std::filesystem::path out = arguments.out
+                                        ? std::filesystem::path(*arguments.out)
+                                        : manifest.directory / (manifest.name + "-tradeoff");
+  std::filesystem::create_directories(out);  // before minutes of measuring
   for (const std::string& real : arguments.real) {
     const bool is_folder = std::filesystem::is_directory(real);
     options.real.push_back(open_recording(
@@ -145,14 +147,14 @@ int run(TradeoffArguments& arguments) {
   };
   const TradeoffReport report = measure_tradeoff(manifest, options);
   const std::string json = to_json(report, arguments.demand);
-  write_file_atomically(options.out / "tradeoff.json", json);
-  write_file_atomically(options.out / "tradeoff.md", to_markdown(report, arguments.demand));
-  write_file_atomically(options.out / "tradeoff.svg", tradeoff_chart(report));
+  write_file_atomically(out / "tradeoff.json", json);
+  write_file_atomically(out / "tradeoff.md", to_markdown(report, arguments.demand));
+  write_file_atomically(out / "tradeoff.svg", tradeoff_chart(report));
   if (arguments.progress == ProgressStyle::kJson) {
     std::cout << json << std::flush;
   } else {
     std::cout << to_text(report, arguments.demand) << "\nAll measurements: tradeoff.md, "
-              << "tradeoff.json and tradeoff.svg in " << options.out.string() << std::endl;
+              << "tradeoff.json and tradeoff.svg in " << out.string() << std::endl;
   }
   return kComplete;
 }
@@ -207,8 +209,7 @@ void add_tradeoff_command(CLI::App& app, int& exit_code) {
       "Measure the speed and accuracy of configurations\nMeasures on pairs of a job how fast each "
       "combination of weights, precision, size, scope, method and stored type is and how much it "
       "loses against a reference, and recommends configurations with their manifest lines "
-      "(manifests/guides/tradeoff.md). Compares at most ten configurations by default. Run the "
-      "same command again to resume.");
+      "(manifests/guides/tradeoff.md). Compares at most ten configurations by default.");
   const auto arguments = std::make_shared<TradeoffArguments>();
   command->add_option("MANIFEST", arguments->manifest, "The manifest of the job")->required();
   add_axes(*command, *arguments);
@@ -239,9 +240,9 @@ void add_tradeoff_command(CLI::App& app, int& exit_code) {
       ->check(CLI::NonNegativeNumber)
       ->option_text("SPEED");
   command
-      ->add_option("--out", arguments->out,
-                   "Folder for the tables, the image and the measurements kept for the next run; "
-                   "default: NAME-tradeoff beside the manifest")
+      ->add_option(
+          "--out", arguments->out,
+          "Folder for the tables and the chart; default: NAME-tradeoff beside the manifest")
       ->option_text("FOLDER");
   command
       ->add_option("--threads", arguments->options.threads, "Number of threads; default: all cores")

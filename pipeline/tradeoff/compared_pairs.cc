@@ -87,8 +87,7 @@ TrialJob ComparedJob::as(const Computation& computation, StoredType dtype) const
 
 void ComparedJob::check_stop() const {
   if (stop_requested && stop_requested()) {
-    throw Stopped(
-        "stopped on request; the measurements are kept: run the same command again to resume");
+    throw Stopped("stopped on request");
   }
 }
 

@@ -5,20 +5,17 @@
 #include <algorithm>
 #include <map>
 #include <mutex>
-#include <span>
 #include <utility>
 
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "manifests/values/weights.h"
 #include "pipeline/conversion/plan_summary.h"
 #include "pipeline/generators/choose_engine.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/tradeoff/compared_pairs.h"
-#include "pipeline/tradeoff/kept_trials.h"
 #include "pipeline/tradeoff/measure_computation.h"
-#include "pipeline/tradeoff/real_scores.h"
-#include "stages/base/files/sha256.h"
 #include "stages/base/processor/processor.h"
 #include "stages/generator/shipped_weights.h"
 
@@ -61,44 +58,29 @@ class Comparison {
   TradeoffReport run();
 
  private:
-  /// What runs a computation, found out once; a reason if nothing can.
+  /// Whether a computation can be run, found out once.
   struct Able {
-    std::string description;  ///< of weights and engine, all that decides its volumes
     int base_channels = 0;
-    std::string reason;
+    std::string reason;  ///< why not
   };
 
   Able look_at(const Computation& computation) const;
   Computation choose_reference() const;
   void choose_trials();
 
-  /// Trials, by index, of one computation.
-  using Group = std::vector<std::size_t>;
-  const Computation& computation_of(const Group& group) const {
-    return report_.trials[group.front()].configuration.computation;
-  }
-  std::vector<StoredType> dtypes_of(const Group& group) const {
-    std::vector<StoredType> dtypes;
-    for (const std::size_t i : group) dtypes.push_back(report_.trials[i].configuration.dtype);
-    return dtypes;
-  }
-  /// Those that still lack something.
-  template <class Lacks>
-  std::vector<Group> groups(Lacks lacks) const;
-  /// What is not measured yet.
-  struct Work {
-    std::vector<Group> losses;
-    std::vector<std::vector<Group>> rounds;  ///< by round; some are empty
-    std::vector<std::vector<Group>> real;    ///< by recording
+  /// The trials of one computation, one for each stored type of the axes.
+  struct Group {
+    Computation computation;
+    std::size_t first = 0;  ///< in the report
   };
-  Work work_left() const;
+
   double pair_s(const Computation& computation) const;
   double scoring_s() const;
-  void announce(const Work& work);
+  void announce();
 
   void find_losses(const Group& group);
-  void run_round(std::size_t round, const std::vector<Group>& lacking);
   void find_real(const Group& group, const RealPart& part);
+  void run_round();
   void advance() {
     const std::lock_guard lock(telling_);
     if (progress_) progress_->advance(false, 0);
@@ -109,9 +91,9 @@ class Comparison {
   int threads_;
   ComparedJob job_;
   TradeoffReport report_;
+  std::vector<Group> groups_;           ///< those of a size together: its pairs are read once
   std::optional<ComparedPairs> pairs_;  ///< once the reference is known
   std::vector<RealPart> real_;
-  std::unique_ptr<KeptTrials> kept_;
   std::unique_ptr<Progress> progress_;
   std::mutex telling_;
 };
@@ -135,8 +117,7 @@ Comparison::Able Comparison::look_at(const Computation& computation) const {
     }
   }
   try {
-    const LoadedGenerator loaded = load_generator(job);
-    able.description = loaded.weights_hash + " " + loaded.generator->description();
+    load_generator(job);
   } catch (const UsageError& error) {
     able.reason = error.what();
   } catch (const InputError& error) {  // the engine refuses the weights
@@ -165,64 +146,27 @@ void Comparison::choose_trials() {
     throw UsageError("--reference: expected a configuration that can be run, got " +
                      name_of(report_.reference) + ": " + reference.reason);
   }
-  std::string common =
-      fmt::format("{}\n{}\n{} threads\n{} pairs\nagainst {} {}\n", processor_text(), kKeptVersion,
-                  threads_, options_.pairs, name_of(report_.reference), reference.description);
-  for (const auto& [field, value] : job_.planned.plan.fingerprint) {
-    common += field + "=" + value + "\n";
-  }
-  // The fingerprint has frames by name and size.
-  for (const SampleMessage& pair : pairs_->reference().pairs) {
-    common += sha256_hex(std::as_bytes(std::span(pair.prepared.input))) + "\n";
-  }
   for (const Computation& computation : computations(options_.axes)) {
     const Able able = look_at(computation);
     if (!able.reason.empty()) {
       report_.refused.push_back({computation, able.reason});
       continue;
     }
+    groups_.push_back({computation, report_.trials.size()});
     for (const StoredType dtype : options_.axes.dtypes) {
       Trial trial;
       trial.configuration = {computation, dtype};
       trial.lines = job_.as(computation, dtype).lines;
-      kept_->load(trial, sha256_hex(common + name_of(trial.configuration) + able.description));
       report_.trials.push_back(std::move(trial));
     }
   }
+  std::ranges::stable_sort(groups_, std::ranges::greater(),
+                           [](const Group& group) { return group.computation.size; });
   if (report_.trials.empty()) {
     throw UsageError(
         "expected a configuration that can be run, got none: " +
         (report_.refused.empty() ? "the axes are empty" : report_.refused.front().reason));
   }
-}
-
-template <class Lacks>
-std::vector<Comparison::Group> Comparison::groups(Lacks lacks) const {
-  std::vector<Group> all;
-  for (std::size_t i = 0; i < report_.trials.size(); ++i) {
-    if (!lacks(report_.trials[i])) continue;
-    if (all.empty() || computation_of(all.back()) != computation_of({i})) all.emplace_back();
-    all.back().push_back(i);
-  }
-  // Sizes together, so that the pairs of each are read once.
-  std::ranges::stable_sort(all, std::ranges::greater(),
-                           [&](const Group& group) { return computation_of(group).size; });
-  return all;
-}
-
-Comparison::Work Comparison::work_left() const {
-  Work work;
-  work.losses =
-      groups([](const Trial& trial) { return trial.losses.empty() && trial.quarantined == 0; });
-  for (int round = 0; round < options_.rounds; ++round) {
-    work.rounds.push_back(
-        groups([&](const Trial& trial) { return std::ssize(trial.rounds) <= round; }));
-  }
-  for (const RealPart& part : real_) {
-    work.real.push_back(
-        groups([&](const Trial& trial) { return !trial.real.contains(part.content); }));
-  }
-  return work;
 }
 
 /// Processor time of a pair with a computation, tried on one or two; 0 if none can be.
@@ -247,7 +191,7 @@ double Comparison::scoring_s() const {
 }
 
 /// Tells how much there is to do, and begins to show how it goes on.
-void Comparison::announce(const Work& work) {
+void Comparison::announce() {
   std::map<std::string, double> tried_s;
   const auto pair_of = [&](const Computation& computation) {
     const auto [tried, is_new] = tried_s.try_emplace(name_of(computation));
@@ -260,88 +204,63 @@ void Comparison::announce(const Work& work) {
     steps += pairs;
     processor_s += static_cast<double>(pairs + 1) * seconds;  // one warms up
   };
-  const double score_s = scoring_s();
-  for (const Group& group : work.losses) {
-    add(report_.pairs, pair_of(report_.reference) + pair_of(computation_of(group)) +
-                           static_cast<double>(group.size()) * score_s);
-  }
-  for (const std::vector<Group>& round : work.rounds) {
-    if (!round.empty()) add(report_.pairs, pair_of(report_.reference));
-    for (const Group& group : round) {
-      if (computation_of(group) != report_.reference)
-        add(report_.pairs, pair_of(computation_of(group)));
-    }
-  }
-  for (std::size_t i = 0; i < real_.size(); ++i) {
-    for (const Group& group : work.real[i]) {
-      add(std::ssize(real_[i].intervals),
-          pair_of(computation_of(group)) + static_cast<double>(group.size()) * score_s);
-    }
+  const double scores_s = static_cast<double>(options_.axes.dtypes.size()) * scoring_s();
+  const double reference_s = pair_of(report_.reference);
+  add(options_.rounds * report_.pairs, reference_s);
+  for (const Group& group : groups_) {
+    const double group_s = pair_of(group.computation);
+    add(report_.pairs, reference_s + group_s + scores_s);
+    for (const RealPart& part : real_) add(std::ssize(part.intervals), group_s + scores_s);
+    if (group.computation != report_.reference) add(options_.rounds * report_.pairs, group_s);
   }
   if (options_.tell) {
-    const auto counted = [](std::int64_t count, const char* noun) {
-      return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
-    };
-    options_.tell(fmt::format(
-        "{}, {}, {}: {}", counted(std::ssize(report_.trials), "configuration"),
-        counted(report_.pairs, "pair"), counted(options_.rounds, "round"),
-        steps == 0 ? "all measured before"
-                   : "about " + duration_text(std::max(processor_s / threads_, 1.0), "hms")));
+    options_.tell(
+        fmt::format("{}, {}, {}: about {}", count_text(std::ssize(report_.trials), "configuration"),
+                    count_text(report_.pairs, "pair"), count_text(options_.rounds, "round"),
+                    duration_text(std::max(processor_s / threads_, 1.0), "hms")));
   }
-  if (options_.make_progress && steps > 0) progress_ = options_.make_progress(steps);
+  if (options_.make_progress) progress_ = options_.make_progress(steps);
 }
 
 void Comparison::find_losses(const Group& group) {
   const std::vector<std::vector<PairLoss>> losses = measure_losses(
-      *pairs_, computation_of(group), dtypes_of(group), threads_, [&] { advance(); });
-  for (std::size_t k = 0; k < group.size(); ++k) {
-    Trial& trial = report_.trials[group[k]];
+      *pairs_, group.computation, options_.axes.dtypes, threads_, [&] { advance(); });
+  for (std::size_t k = 0; k < losses.size(); ++k) {
+    Trial& trial = report_.trials[group.first + k];
     trial.losses = losses[k];
     trial.quarantined = report_.pairs - std::ssize(losses[k]);
-    kept_->save(trial);
-  }
-}
-
-/// The reference first, with every stored type as the others have them: that costs a turn the same.
-void Comparison::run_round(std::size_t round, const std::vector<Group>& lacking) {
-  std::vector<StoredType> types = options_.axes.dtypes;
-  if (std::ranges::find(types, manifest_.output.dtype) == types.end()) {
-    types.push_back(manifest_.output.dtype);
-  }
-  const auto cost_of = [&](const std::vector<RoundCost>& costs, StoredType type) {
-    return costs.at(static_cast<std::size_t>(std::ranges::find(types, type) - types.begin()));
-  };
-  const auto turn_of = [&](const Computation& computation) {
-    return take_turn(*pairs_, computation, types, threads_, [&] { advance(); });
-  };
-  const std::vector<RoundCost> reference = turn_of(report_.reference);
-  for (const Group& group : lacking) {
-    const Computation& computation = computation_of(group);
-    const std::vector<RoundCost> costs =
-        computation == report_.reference ? reference : turn_of(computation);
-    for (const std::size_t i : group) {
-      Trial& trial = report_.trials[i];
-      trial.rounds.resize(round);
-      trial.rounds.push_back(cost_of(costs, trial.configuration.dtype));
-      trial.rounds.back().reference_s = cost_of(reference, manifest_.output.dtype).conversion_s;
-      kept_->save(trial);
-    }
   }
 }
 
 void Comparison::find_real(const Group& group, const RealPart& part) {
-  const Computation& computation = computation_of(group);
-  const std::vector<StoredType> dtypes = dtypes_of(group);
-  const JobManifest job = job_.as(computation, dtypes.front()).manifest;
+  const std::vector<StoredType>& dtypes = options_.axes.dtypes;
+  const JobManifest job = job_.as(group.computation, dtypes.front()).manifest;
   const std::vector<RealismScores> scores =
-      real_scores(part, job, computation.size, dtypes, threads_, [&] {
+      real_scores(part, job, group.computation.size, dtypes, threads_, [&] {
         job_.check_stop();
         advance();
       });
-  for (std::size_t k = 0; k < group.size(); ++k) {
-    Trial& trial = report_.trials[group[k]];
-    trial.real[part.content] = scores[k];
-    kept_->save(trial);
+  for (std::size_t k = 0; k < scores.size(); ++k) {
+    report_.trials[group.first + k].real[part.recording.name()] = scores[k];
+  }
+}
+
+/// The reference first, with every stored type as the others have them: that costs a turn the same.
+void Comparison::run_round() {
+  std::vector<StoredType> types = options_.axes.dtypes;
+  const auto own = std::ranges::find(types, manifest_.output.dtype) - types.begin();
+  if (own == std::ssize(types)) types.push_back(manifest_.output.dtype);
+  const auto turn_of = [&](const Computation& computation) {
+    return take_turn(*pairs_, computation, types, threads_, [&] { advance(); });
+  };
+  const std::vector<RoundCost> reference = turn_of(report_.reference);
+  for (const Group& group : groups_) {
+    const bool is_reference = group.computation == report_.reference;
+    const std::vector<RoundCost> costs = is_reference ? reference : turn_of(group.computation);
+    for (std::size_t k = 0; k < options_.axes.dtypes.size(); ++k) {
+      RoundCost& cost = report_.trials[group.first + k].rounds.emplace_back(costs.at(k));
+      cost.reference_s = reference.at(static_cast<std::size_t>(own)).conversion_s;
+    }
   }
 }
 
@@ -349,7 +268,6 @@ TradeoffReport Comparison::run() {
   if (job_.samples.empty()) {
     throw InputError("expected pairs to compare, got none, in " + manifest_.name);
   }
-  kept_ = std::make_unique<KeptTrials>(options_.out);
   report_.job = manifest_.name;
   report_.processor = processor_text();
   report_.threads = threads_;
@@ -369,25 +287,16 @@ TradeoffReport Comparison::run() {
   }
   choose_trials();
   for (const auto& recording : options_.real) {
-    real_.push_back(part_of(*recording, options_.pairs, manifest_.volume.bins, threads_));
+    real_.push_back(part_of(*recording, options_.pairs));
   }
 
-  const Work work = work_left();
-  announce(work);
-  for (const Group& group : work.losses) find_losses(group);
-  for (std::size_t i = 0; i < real_.size(); ++i) {
-    for (const Group& group : work.real[i]) find_real(group, real_[i]);
+  announce();
+  for (const Group& group : groups_) find_losses(group);
+  for (const RealPart& part : real_) {
+    for (const Group& group : groups_) find_real(group, part);
   }
-  for (std::size_t round = 0; round < work.rounds.size(); ++round) {
-    if (!work.rounds[round].empty()) run_round(round, work.rounds[round]);
-  }
+  for (int round = 0; round < options_.rounds; ++round) run_round();
   if (progress_) progress_->finish();
-  for (Trial& trial : report_.trials) {  // an earlier run may have had more
-    trial.rounds.resize(static_cast<std::size_t>(options_.rounds));
-    std::map<std::string, RealismScores> by_name;
-    for (const RealPart& part : real_) by_name[part.recording.name()] = trial.real.at(part.content);
-    trial.real = std::move(by_name);
-  }
   return std::move(report_);
 }
 

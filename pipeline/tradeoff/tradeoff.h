@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -25,10 +24,9 @@ struct TradeoffOptions {
   bool only_native = true;
   /// What the others are compared with; none: the widest weights of the axes, float32, size 1.
   std::optional<Computation> reference;
-  int pairs = 32;             ///< of the job, ≥ 1
-  int rounds = 5;             ///< of measuring cost, ≥ 1
-  int threads = 0;            ///< 0: all cores
-  std::filesystem::path out;  ///< folder for what is kept between runs; made if absent
+  int pairs = 32;                                ///< of the job, ≥ 1
+  int rounds = 5;                                ///< of measuring cost, ≥ 1
+  int threads = 0;                               ///< 0: all cores
   std::vector<std::unique_ptr<Recording>> real;  ///< to score the configurations by, too
   std::function<bool()> stop_requested;          ///< none: nobody asks
   /// Told before the first pair how many configurations there are and how long it will take. None:
@@ -55,8 +53,7 @@ struct Trial {
   std::vector<PairLoss> losses;    ///< of each pair that can be compared
   std::int64_t quarantined = 0;    ///< pairs whose volume, or the reference's, is not sound
   std::vector<RoundCost> rounds;
-  /// Means over its intervals, by recording; while it is measured, by the SHA-256 of what is scored
-  /// of the recording.
+  /// Means over its intervals, by recording.
   std::map<std::string, RealismScores> real;
 };
 
@@ -92,10 +89,6 @@ TradeoffAxes default_axes(const JobManifest& manifest);
 /// Cost: in each round every computation takes its turn once, after the reference's. Reading is
 /// the same for all configurations of a size and is measured apart, on pairs that follow each other
 /// in the plan, since neighbours share frames; one turn of a computation serves all stored types.
-///
-/// What is measured is kept in OUT/kept after each turn, a file a configuration, named by a hash of
-/// all it depends on (of the pairs and the recordings' intervals: their content), and not measured
-/// again. Work goes on where a run was stopped.
 ///
 /// Throws UsageError if no configuration or not the reference can be run, InputError if weights or
 /// inputs cannot be read or no pair can, Stopped on a request to stop.

@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/tradeoff/kept_trials.h"
 #include "tests/testing/temporary_folder.h"
 #include "tests/testing/text_file.h"
 
@@ -191,78 +190,6 @@ TEST(TradeoffChart, IsDrawnAlsoOfOneAndOfNothing) {
   EXPECT_THAT(tradeoff_chart(report), HasSubstr(" mark\""));
   report.trials.clear();
   EXPECT_THAT(tradeoff_chart(report), HasSubstr("nothing to show"));
-}
-
-TEST(KeptTrials, AreNotKeptThroughALink) {
-  const testing::TemporaryFolder folder;
-  const testing::TemporaryFolder elsewhere;
-  std::filesystem::create_directory_symlink(elsewhere.path(), folder / "kept");
-  EXPECT_THROW(KeptTrials(folder.path()), std::runtime_error);
-}
-
-TEST(KeptTrials, ComeBackUnderTheirKeyAlone) {
-  const testing::TemporaryFolder folder;
-  KeptTrials kept(folder.path());
-  Trial trial = trial_of("a", 2, std::numeric_limits<double>::infinity());
-  const std::vector<PairLoss> losses = std::exchange(trial.losses, {});
-  const std::vector<RoundCost> rounds = std::exchange(trial.rounds, {});
-  const std::string key(64, 'a');
-  kept.load(trial, key);
-  EXPECT_TRUE(trial.losses.empty());
-  trial.losses = losses;
-  trial.losses[0].time_correlation = std::numeric_limits<double>::quiet_NaN();
-  trial.rounds = rounds;
-  trial.quarantined = 3;
-  trial.real["r.hdf5"].f1_raw = 0.25;
-  kept.save(trial);
-
-  Trial again;
-  again.configuration = trial.configuration;
-  kept.load(again, std::string(24, 'a') + std::string(40, 'b'));  // the same name, another key
-  EXPECT_TRUE(again.losses.empty());
-  kept.load(again, key);
-  ASSERT_EQ(again.losses.size(), 1u);
-  EXPECT_EQ(again.losses[0].relative_l2, std::numeric_limits<double>::infinity());
-  EXPECT_THAT(again.losses[0].time_correlation, IsNan());
-  EXPECT_EQ(again.losses[0].lost_events, 1);
-  ASSERT_EQ(again.rounds.size(), 1u);
-  EXPECT_EQ(again.rounds[0].pairs_per_s, 2);
-  EXPECT_EQ(again.quarantined, 3);
-  EXPECT_EQ(again.real.at("r.hdf5").f1_raw, 0.25);
-}
-
-TEST(KeptTrials, WhatIsNotAsItWasWrittenIsMeasuredAgain) {
-  const testing::TemporaryFolder folder;
-  KeptTrials kept(folder.path());
-  const std::string key(64, 'a');
-  Trial trial;
-  kept.load(trial, key);
-  trial.losses = trial_of("a", 2, 0.25).losses;
-  trial.rounds = trial_of("a", 2, 0.25).rounds;
-  kept.save(trial);
-  const auto file = folder.path() / "kept" / (key.substr(0, 24) + ".json");
-  const std::string sound = testing::read_file(file);
-  const auto is_believed = [&](const std::string& text) {
-    testing::write_file(file, text);
-    Trial again;
-    kept.load(again, key);
-    EXPECT_EQ(again.losses.empty(), again.rounds.empty());
-    return !again.losses.empty();
-  };
-  EXPECT_TRUE(is_believed(sound));
-  for (const char* number : {"0.25", "100000000.0", "\"lost_events\":1", "\"quarantined\":0"}) {
-    std::string edited = sound;
-    ASSERT_NE(sound.find(number), std::string::npos) << number << sound;
-    edited[sound.find(number) + std::string(number).size() - 1] = '9';
-    EXPECT_FALSE(is_believed(edited)) << number;
-  }
-  std::string without = sound;
-  without.replace(without.find("\"sha256\""), 8, "\"sha257\"");
-  EXPECT_FALSE(is_believed(without));
-  EXPECT_FALSE(is_believed(sound.substr(0, sound.size() / 2)));
-  EXPECT_FALSE(is_believed(std::string(1'000'000, '[')));
-  EXPECT_FALSE(is_believed("[]"));
-  EXPECT_FALSE(is_believed(""));
 }
 
 }  // namespace
