@@ -9,9 +9,9 @@
 #include <string>
 #include <string_view>
 
+#include "pipeline/command_line/detail/usage.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/detail/usage.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/memory.h"

@@ -8,9 +8,9 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/generators/calibrate.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/planning/make_plan.h"

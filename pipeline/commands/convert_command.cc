@@ -9,10 +9,10 @@
 #include <memory>
 
 #include "manifests/values/job.h"
+#include "pipeline/command_line/given_job.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/given_job.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/convert.h"
 #include "pipeline/generators/load_generator.h"
 #include "pipeline/runtime/errors.h"
@@ -122,11 +122,7 @@ void add_convert_command(CLI::App& app, int& exit_code) {
                    "OUTPUT-trial-N beside the manifest's output folder, or into --output")
       ->check(CLI::Range(std::int64_t{1}, std::numeric_limits<std::int64_t>::max()))
       ->option_text("N");
-  command
-      ->add_option("--grace", arguments->grace_s,
-                   "Seconds to finish the current shard after a signal; default: 20")
-      ->check(CLI::Range(0.0, 1e9))
-      ->option_text("SECONDS");
+  add_grace_option(*command, arguments->grace_s);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

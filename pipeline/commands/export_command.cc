@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/detail/usage.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/detail/usage.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/exports/export_job.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
@@ -130,8 +130,7 @@ void add_export_command(CLI::App& app, int& exit_code) {
                   "lines of text, t x y p (default), or HDF5 as MVSEC has it"),
               kEventFiles);
   add("--seed", options.seed, "random seed; default: 0")->option_text("NUMBER");
-  command->add_option("--threads", options.threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
+  add_threads_option(*command, options.threads);
   command->add_flag("--overwrite", options.overwrite, "Replace an earlier export in FOLDER");
   add_progress_option(*command, arguments->progress);
   command->callback([command, arguments, &exit_code] { exit_code = run(*command, *arguments); });

@@ -1,13 +1,14 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
 #include "manifests/documents/job_manifest.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/dataset/finalize.h"
 #include "pipeline/runtime/errors.h"
 
@@ -15,7 +16,7 @@ namespace eventgan {
 namespace {
 
 struct FinalizeArguments {
-  std::string folder;
+  std::filesystem::path folder;
   std::string manifest;  ///< empty: the one in the plan
   bool partial = false;
   bool json = false;
@@ -49,7 +50,7 @@ void add_finalize_command(CLI::App& app, int& exit_code) {
       "all shards as one. Missing or damaged shards are listed and give exit code 1; more "
       "quarantined samples than the manifest allows give exit code 65.");
   const auto arguments = std::make_shared<FinalizeArguments>();
-  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  add_folder_argument(*command, arguments->folder);
   command->add_flag("--partial", arguments->partial,
                     "Complete the dataset even if shards are missing (dataset.json records it)");
   command
@@ -57,7 +58,7 @@ void add_finalize_command(CLI::App& app, int& exit_code) {
                    "Take the limits for quarantined samples from this manifest, not from the one "
                    "that was converted")
       ->option_text("FILE");
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_json_option(*command, arguments->json);
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -9,9 +9,10 @@
 
 #include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/recording_arguments.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/recording_arguments.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/realism/sensor_fit.h"
 #include "pipeline/realism/volume_method.h"
@@ -120,8 +121,7 @@ void add_fit_command(CLI::App& app, int& exit_code) {
   command->add_option("--name", arguments->name, "Name of the sensor; default: camera");
   command->add_option("--out", arguments->out,
                       "The document to write, *.json, in place of an older one; default: print it");
-  command->add_option("--threads", arguments->threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
+  add_threads_option(*command, arguments->threads);
   command->callback([arguments, &exit_code] { exit_code = run_fit(*arguments); });
 }
 

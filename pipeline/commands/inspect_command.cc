@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/dataset/shown_samples.h"
@@ -68,14 +69,11 @@ int run(const InspectArguments& arguments) {
 void add_inspect_command(CLI::App& app, int& exit_code) {
   auto* command = app.add_subcommand("inspect", "Describe a folder of shards, a shard or a sample");
   const auto arguments = std::make_shared<InspectArguments>();
-  command
-      ->add_option("OUT", arguments->where,
-                   "Output folder of convert, its dataset.h5, or one shard")
-      ->required();
+  add_shards_argument(*command, arguments->where);
   command
       ->add_option("--sample", arguments->sample, std::string("Only this sample, ") + kSampleRule)
       ->option_text("SAMPLE");
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_json_option(*command, arguments->json);
   command->callback([arguments, &exit_code] {
     exit_code = (means_folder(arguments->where) ? read_apart : read_guarded)(
         arguments->where, [&] { return run(*arguments); });

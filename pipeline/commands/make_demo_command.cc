@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "stages/synthetic/demo_dataset.h"

@@ -7,10 +7,10 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/given_job.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/given_job.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/plan_summary.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/generators/load_generator.h"
@@ -84,11 +84,8 @@ void add_plan_command(CLI::App& app, int& exit_code) {
                          "and time. Writes nothing, except with --freeze.");
   const auto arguments = std::make_shared<PlanArguments>();
   command->add_option(kGivenJob, arguments->manifest, kGivenJobText)->required();
-  command
-      ->add_option("--threads", arguments->threads,
-                   "Number of threads to estimate for; default: all cores")
-      ->check(CLI::Range(1, 4096));
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_threads_option(*command, arguments->threads);
+  add_json_option(*command, arguments->json);
   auto* freeze_flag =
       command->add_flag("--freeze", arguments->freeze,
                         "Freeze the plan in the output folder, as the first convert does, and "

@@ -5,8 +5,9 @@
 #include <string>
 
 #include "manifests/documents/detail/json_text.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/preview/preview.h"
@@ -44,10 +45,7 @@ void add_preview_command(CLI::App& app, int& exit_code) {
                                      "image of the average event times, with boxes and joints.");
   const auto arguments = std::make_shared<PreviewArguments>();
   PreviewOptions& options = arguments->options;
-  command
-      ->add_option("OUT", arguments->where,
-                   "Output folder of convert, its dataset.h5, or one shard")
-      ->required();
+  add_shards_argument(*command, arguments->where);
   command->add_option("--out", options.out, "Folder for the images")->required();
   auto* slots =
       command->add_option("--samples", options.slots, "For one shard: slots such as 0,3-5")
@@ -83,11 +81,7 @@ void add_preview_command(CLI::App& app, int& exit_code) {
                  "An MP4 of the sample's sequence, frames beside events; without --sample, of the "
                  "longest sequence")
       ->excludes(sheet, worst);
-  command
-      ->add_option("--frames", options.frames,
-                   "The manifest's folder, which frame paths are relative to; default: as recorded "
-                   "by convert")
-      ->option_text("DIR");
+  add_frames_option(*command, options.frames);
   command->callback([arguments, &exit_code] { exit_code = run_guarded(*arguments); });
 }
 

@@ -13,11 +13,11 @@
 
 #include "manifests/documents/sensor_document.h"
 #include "manifests/values/faults.h"
+#include "pipeline/command_line/detail/usage.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/recording_arguments.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/detail/usage.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/recording_arguments.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/realism/realism.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/recordings/recording.h"
@@ -137,9 +137,7 @@ void add_realism_command(CLI::App& app, int& exit_code) {
   add_gaps_option(*command, arguments->options.gaps);
   add_methods(*command, *arguments);
   command->add_option("--seed", arguments->options.seed, "Random seed; default: 0");
-  command
-      ->add_option("--threads", arguments->options.threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
+  add_threads_option(*command, arguments->options.threads);
   command->add_flag("--json", arguments->json, "Print JSON with the scores of each pair");
   command->add_option("--out", arguments->out, "Folder for an image of each pair");
   add_progress_option(*command, arguments->progress);

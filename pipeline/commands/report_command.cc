@@ -4,8 +4,9 @@
 #include <memory>
 #include <optional>
 
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/folder/shard_guard.h"
 #include "pipeline/generators/load_generator.h"
@@ -57,14 +58,10 @@ void add_report_command(CLI::App& app, int& exit_code) {
                          "Write an HTML report about an output folder\nOne self-contained page "
                          "with inputs, counts, distributions, faults and sample images.");
   const auto arguments = std::make_shared<ReportArguments>();
-  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  add_folder_argument(*command, arguments->folder);
   command->add_option("--out", arguments->out, "The page to write; default: DIR/report.html")
       ->option_text("FILE");
-  command
-      ->add_option("--frames", arguments->frames,
-                   "The manifest's folder, which frame paths are relative to; default: as recorded "
-                   "by convert")
-      ->option_text("DIR");
+  add_frames_option(*command, arguments->frames);
   command->callback([arguments, &exit_code] {
     exit_code = read_apart(arguments->folder, [&] { return run(*arguments); });
   });

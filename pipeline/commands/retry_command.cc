@@ -1,15 +1,16 @@
 #include <fmt/core.h>
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "manifests/values/job.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/conversion/retry.h"
 #include "pipeline/folder/output_folder.h"
 #include "pipeline/generators/load_generator.h"
@@ -21,7 +22,7 @@ namespace eventgan {
 namespace {
 
 struct RetryArguments {
-  std::string folder;
+  std::filesystem::path folder;
   std::optional<std::string> manifest;
   int threads = 0;
   double grace_s = RunOptions().grace_s;
@@ -75,18 +76,13 @@ void add_retry_command(CLI::App& app, int& exit_code) {
                          "Make quarantined samples again\nFor use after their inputs have been "
                          "fixed. All other bytes of the shards stay the same.");
   const auto arguments = std::make_shared<RetryArguments>();
-  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  add_folder_argument(*command, arguments->folder);
   command
       ->add_option("--manifest", arguments->manifest,
                    "The job's manifest, if its folder has moved; default: as recorded in DIR")
       ->option_text("FILE");
-  command->add_option("--threads", arguments->threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
-  command
-      ->add_option("--grace", arguments->grace_s,
-                   "Seconds to finish the current shard after a signal; default: 20")
-      ->check(CLI::Range(0.0, 1e9))
-      ->option_text("SECONDS");
+  add_threads_option(*command, arguments->threads);
+  add_grace_option(*command, arguments->grace_s);
   add_progress_option(*command, arguments->progress);
   add_profile_option(*command, arguments->profile);
   command->callback([arguments, &exit_code] {

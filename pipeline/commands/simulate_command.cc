@@ -3,8 +3,8 @@
 #include <memory>
 
 #include "manifests/documents/simulation_manifest.h"
+#include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/simulation/simulate.h"
 

@@ -7,6 +7,7 @@
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
 #include "pipeline/dataset/shown_samples.h"
 #include "pipeline/folder/folder_status.h"
@@ -53,7 +54,7 @@ void add_status_command(CLI::App& app, int& exit_code) {
       ->add_option("DIR", arguments->where,
                    "Output folder of convert, or the manifest that names it")
       ->required();
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_json_option(*command, arguments->json);
   command->callback([arguments, &exit_code] {
     const FolderStatus status = folder_status(output_folder_of(arguments->where));
     std::cout << (arguments->json ? status_json(status) : status_text(status)) << std::flush;

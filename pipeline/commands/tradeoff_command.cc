@@ -15,9 +15,9 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/text.h"
 #include "manifests/values/words.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/tradeoff/tradeoff.h"
@@ -244,9 +244,7 @@ void add_tradeoff_command(CLI::App& app, int& exit_code) {
           "--out", arguments->out,
           "Folder for the tables and the chart; default: NAME-tradeoff beside the manifest")
       ->option_text("FOLDER");
-  command
-      ->add_option("--threads", arguments->options.threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
+  add_threads_option(*command, arguments->options.threads);
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

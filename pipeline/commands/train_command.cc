@@ -3,9 +3,9 @@
 #include <memory>
 
 #include "manifests/documents/training_manifest.h"
+#include "pipeline/command_line/options.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
-#include "pipeline/commands/standard_streams.h"
 #include "pipeline/runtime/errors.h"
 #include "pipeline/runtime/stopping.h"
 #include "pipeline/training/run_training.h"

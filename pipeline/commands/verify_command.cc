@@ -1,11 +1,12 @@
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <optional>
 #include <string>
 
+#include "pipeline/command_line/options.h"
 #include "pipeline/commands/commands.h"
-#include "pipeline/commands/options.h"
 #include "pipeline/dataset/verify_folder.h"
 #include "pipeline/runtime/errors.h"
 
@@ -13,7 +14,7 @@ namespace eventgan {
 namespace {
 
 struct VerifyArguments {
-  std::string folder;
+  std::filesystem::path folder;
   bool deep = false;
   std::optional<std::string> manifest;
   bool json = false;
@@ -39,7 +40,7 @@ void add_verify_command(CLI::App& app, int& exit_code) {
       "Check every file of an output folder\nChecks hashes, structure, counts, checksums and "
       "values. Prints a line for each shard and for each fault; any fault gives exit code 1.");
   const auto arguments = std::make_shared<VerifyArguments>();
-  command->add_option("DIR", arguments->folder, "Output folder of convert")->required();
+  add_folder_argument(*command, arguments->folder);
   command->add_flag("--deep", arguments->deep,
                     "Also compare pairs and labels, column by column, with the plan and, where "
                     "available, the sources");
@@ -49,7 +50,7 @@ void add_verify_command(CLI::App& app, int& exit_code) {
           "With --deep: the job's manifest, if its folder has moved; default: as recorded in DIR")
       ->option_text("FILE")
       ->needs("--deep");
-  command->add_flag("--json", arguments->json, "Print JSON");
+  add_json_option(*command, arguments->json);
   add_progress_option(*command, arguments->progress);
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }

@@ -26,6 +26,7 @@ FLOORS = [
     ["pipeline/generators"],
     ["pipeline/simulation", "pipeline/training", "pipeline/realism", "pipeline/exports", "pipeline/report"],
     ["pipeline/tradeoff"],
+    ["pipeline/command_line"],
     ["pipeline/commands", "pipeline/python"],
     ["pipeline/main.cc", "pipeline/without_torch.cc", "pipeline/without_videos.cc"],
 ]

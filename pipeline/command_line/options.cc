@@ -1,4 +1,4 @@
-#include "pipeline/commands/options.h"
+#include "pipeline/command_line/options.h"
 
 #include <fmt/core.h>
 
@@ -11,8 +11,8 @@
 #include <system_error>
 
 #include "manifests/values/faults.h"
-#include "pipeline/commands/detail/usage.h"
-#include "pipeline/commands/standard_streams.h"
+#include "pipeline/command_line/detail/usage.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/planning/fingerprint.h"
 #include "pipeline/runtime/trace_watch.h"
 
@@ -26,6 +26,40 @@ const std::map<std::string, ProgressStyle> kProgressStyles = {{"auto", ProgressS
                                                               {"none", ProgressStyle::kNone}};
 
 }  // namespace
+
+void add_folder_argument(CLI::App& command, std::filesystem::path& folder) {
+  command.add_option("DIR", folder, "Output folder of convert")->required();
+}
+
+void add_shards_argument(CLI::App& command, std::filesystem::path& where) {
+  command.add_option("OUT", where, "Output folder of convert, its dataset.h5, or one shard")
+      ->required();
+}
+
+void add_frames_option(CLI::App& command, std::filesystem::path& folder) {
+  command
+      .add_option("--frames", folder,
+                  "The manifest's folder, which frame paths are relative to; default: as recorded "
+                  "by convert")
+      ->option_text("DIR");
+}
+
+void add_threads_option(CLI::App& command, int& threads) {
+  command.add_option("--threads", threads, "Number of threads; default: all cores")
+      ->check(CLI::Range(1, 4096));
+}
+
+void add_grace_option(CLI::App& command, double& grace_s) {
+  command
+      .add_option("--grace", grace_s,
+                  "Seconds to finish the current shard after a signal; default: 20")
+      ->check(CLI::Range(0.0, 1e9))
+      ->option_text("SECONDS");
+}
+
+void add_json_option(CLI::App& command, bool& json) {
+  command.add_flag("--json", json, "Print JSON");
+}
 
 void add_progress_option(CLI::App& command, ProgressStyle& style) {
   take_one_of(command.add_option("--progress", style,
@@ -58,8 +92,7 @@ void add_job_options(CLI::App& command, JobOptions& options, const std::string& 
                      const std::string& what_text, const std::string& overwrite_text) {
   command.add_option(what, options.manifest, what_text)->required();
   command.add_option("--output", options.output, "Output folder; default: the manifest's");
-  command.add_option("--threads", options.threads, "Number of threads; default: all cores")
-      ->check(CLI::Range(1, 4096));
+  add_threads_option(command, options.threads);
   command.add_flag("--overwrite", options.overwrite, overwrite_text);
   add_progress_option(command, options.progress);
 }

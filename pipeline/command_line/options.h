@@ -16,7 +16,28 @@ class App;
 
 namespace eventgan {
 
-/// Adds `--progress STYLE` to a command; `style` must outlive its parsing.
+// Options that several commands have, each declared once. What takes a value must outlive the
+// parsing.
+
+/// DIR, a folder that convert has written.
+void add_folder_argument(CLI::App& command, std::filesystem::path& folder);
+
+/// OUT, the same, or its dataset.h5, or a shard of it.
+void add_shards_argument(CLI::App& command, std::filesystem::path& where);
+
+/// --frames DIR, where paths of frames begin.
+void add_frames_option(CLI::App& command, std::filesystem::path& folder);
+
+/// --threads NUMBER; 0: all cores.
+void add_threads_option(CLI::App& command, int& threads);
+
+/// --grace SECONDS, of a run that makes shards.
+void add_grace_option(CLI::App& command, double& grace_s);
+
+/// --json
+void add_json_option(CLI::App& command, bool& json);
+
+/// --progress STYLE
 void add_progress_option(CLI::App& command, ProgressStyle& style);
 
 /// Progress on the standard error stream.
@@ -41,12 +62,12 @@ struct JobOptions {
   std::optional<std::filesystem::path> output_folder() const;
 };
 
-/// Adds the manifest under the name `what`, --output, --threads, --overwrite and --progress.
-/// `options` must outlive the parsing; the texts are the help of the manifest and --overwrite.
+/// Adds the manifest under the name `what`, --output, --threads, --overwrite and --progress; the
+/// texts are the help of the manifest and --overwrite.
 void add_job_options(CLI::App& command, JobOptions& options, const std::string& what,
                      const std::string& what_text, const std::string& overwrite_text);
 
-/// Adds `--profile FILE` to a command; `file` must outlive its parsing.
+/// --profile FILE
 void add_profile_option(CLI::App& command, std::optional<std::string>& file);
 
 /// What a command is traced as.

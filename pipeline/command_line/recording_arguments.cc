@@ -1,4 +1,4 @@
-#include "pipeline/commands/recording_arguments.h"
+#include "pipeline/command_line/recording_arguments.h"
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "manifests/documents/training_manifest.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/words.h"
-#include "pipeline/commands/standard_streams.h"
+#include "pipeline/command_line/standard_streams.h"
 
 namespace eventgan {
 namespace {

@@ -1,4 +1,4 @@
-#include "pipeline/commands/given_job.h"
+#include "pipeline/command_line/given_job.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
-#include "pipeline/commands/standard_streams.h"
+#include "pipeline/command_line/standard_streams.h"
 #include "pipeline/planning/draft_manifest.h"
 #include "stages/base/files/atomic_file.h"
 #include "stages/frames/find_source.h"

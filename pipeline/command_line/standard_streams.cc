@@ -1,4 +1,4 @@
-#include "pipeline/commands/standard_streams.h"
+#include "pipeline/command_line/standard_streams.h"
 
 #include <fcntl.h>
 #include <sys/ioctl.h>
