@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -43,8 +44,8 @@ namespace {
 
 // ---- Volumes
 
-/// Memory of the volumes that were let go, for the next ones: faulting in a new one costs as much
-/// as a part of the network, also for who holds a batch before he lets it go. Thread safe.
+/// Memory of freed volumes, kept for the next ones: the page faults of new memory cost as much as
+/// a part of the network, also for a caller that frees a whole batch at once. Thread safe.
 class SpareMemory {
  public:
   PageBuffer take(std::size_t size_bytes) {
@@ -133,7 +134,7 @@ void lay_into(std::span<const float> content, const PreparedPair& pair, std::spa
   }
 }
 
-/// What stands for a sample's id where images have none: their content.
+/// What stands for a sample's id, since arrays have none: the images' content.
 std::string content_name(const PreparedFrame& previous, const PreparedFrame& following) {
   Sha256 hash;
   for (const PreparedFrame* frame : {&previous, &following}) {
@@ -157,11 +158,23 @@ struct MadeVolume {
   VolumeLabels labels;
 };
 
+/// Throws UsageError for settings that are none, and Python's FileNotFoundError if there is no file
+/// of weights.
+JobManifest read_settings(const std::string& settings) {
+  JobManifest job = parse_pair_manifest(settings, {}, "eventgan.Generator");
+  const std::string& weights = job.generator.weights;
+  if (weights.starts_with('/') && !std::filesystem::exists(weights)) {
+    PyErr_SetObject(PyExc_FileNotFoundError,
+                    py::make_tuple(ENOENT, "expected a file of weights, got none", weights).ptr());
+    throw py::error_already_set();
+  }
+  return job;
+}
+
 class PairGenerator {
  public:
   explicit PairGenerator(const std::string& settings)
-      : job_(parse_pair_manifest(settings, {}, "eventgan.Generator")),
-        loaded_(load_generator(job_)) {}
+      : job_(read_settings(settings)), loaded_(load_generator(job_)) {}
 
   int bins() const { return generator().bins(); }
   std::string description() const { return generator().description(); }
@@ -274,7 +287,7 @@ class PairGenerator {
     const bool has_noise =
         add_pair_noise(job_.generator, key, std::numeric_limits<double>::quiet_NaN(),
                        {bins(), pair.content}, values);
-    // A fifth of the time of a network of width 8 in bfloat16: only for who wants them.
+    // A fifth of the time of a network of width 8 in bfloat16: only where they are wanted.
     bool is_sound = made.part.notes.sound;
     if (labels || job_.volume.normalize != Normalization::kNone) {
       const auto statistics =

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import json
 import operator
 import os
@@ -105,9 +104,6 @@ class Generator:
 
     def _set_up(self, settings: str) -> None:
         self._settings = settings
-        weights = json.loads(settings)["generator"].get("weights", "")
-        if os.path.isabs(weights) and not os.path.exists(weights):
-            raise FileNotFoundError(errno.ENOENT, "expected a file of weights, got none", weights)
         self._engine = _engine.Generator(settings)
 
     def __getstate__(self) -> str:
