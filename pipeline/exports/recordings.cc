@@ -19,7 +19,6 @@
 #include "manifests/values/job.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/files/sha256.h"
-#include "stages/exports/export_name.h"
 #include "stages/exports/sampled_events.h"
 
 namespace eventgan {

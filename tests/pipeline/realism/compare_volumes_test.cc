@@ -1,5 +1,3 @@
-#include "pipeline/realism/compare_volumes.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -10,6 +8,7 @@
 
 #include "manifests/values/faults.h"
 #include "pipeline/realism/real_interval.h"
+#include "pipeline/realism/realism.h"
 #include "stages/events/event_volume.h"
 #include "stages/events/volume_statistics.h"
 #include "tests/testing/fake_recording.h"

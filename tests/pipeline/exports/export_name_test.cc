@@ -1,6 +1,6 @@
-#include "stages/exports/export_name.h"
-
 #include <gtest/gtest.h>
+
+#include "pipeline/exports/detail/exporter.h"
 
 namespace eventgan {
 namespace {
