@@ -330,14 +330,11 @@ std::string describe_dataset(const DatasetParts& parts, const std::vector<Datase
 
 std::string describe_dataset(const DatasetParts& parts) { return text_of(description(parts)); }
 
-namespace {
-
-std::string counts_text(const DatasetCounts& counts) {
-  return fmt::format("{}, {} of them quarantined, {} boxes, {} persons", counts.samples,
-                     counts.quarantined(), counts.boxes, counts.persons);
+std::string contents_text(const DatasetCounts& counts) {
+  return fmt::format("{}, {} of them quarantined, {}, {} with joints",
+                     count_text(counts.samples, "sample"), counts.quarantined(),
+                     count_text(counts.boxes, "box"), count_text(counts.persons, "person"));
 }
-
-}  // namespace
 
 std::string dataset_text(const DatasetParts& parts) {
   constexpr std::size_t kListed = 20;
@@ -357,12 +354,12 @@ std::string dataset_text(const DatasetParts& parts) {
   const auto line = [&](std::string_view name, const std::string& value) {
     text += fmt::format("  {:14} {}\n", name, escape_controls(value));
   };
-  line("shards", fmt::format("{} of {} done", total.shards, parts.frozen.plan.shards.size()));
-  line("samples", counts_text(total));
+  line("shards", fmt::format("{} of {} done", total.shards, std::ssize(parts.frozen.plan.shards)));
+  line("contents", contents_text(total));
   for (const auto& [source, counts] : sources) {
     const SourceSpec& spec = parts.manifest.sources.at(static_cast<std::size_t>(source));
-    line("source", fmt::format("{} {}, split {}: samples {}", to_string(spec.dataset), spec.root,
-                               spec.split, counts_text(counts)));
+    line("source", fmt::format("{} {}, split {}: {}", to_string(spec.dataset), spec.root,
+                               spec.split, contents_text(counts)));
   }
   line("volumes",
        fmt::format("2 polarities x {} bins, {}{} pixels, {}, normalization {}", header.volume.bins,
@@ -377,8 +374,9 @@ std::string dataset_text(const DatasetParts& parts) {
   line("plan", parts.frozen.hash);
   for (std::size_t i = 0; i < std::min(parts.done.size(), kListed); ++i) {
     const CommitRecord& record = *parts.done[i].record;
-    line(i == 0 ? "done" : "", fmt::format("{}, samples {}, {} of them quarantined", record.shard,
-                                           record.samples, record.samples - record.valid));
+    line(i == 0 ? "done" : "",
+         fmt::format("{}, {}, {} of them quarantined", record.shard,
+                     count_text(record.samples, "sample"), record.samples - record.valid));
   }
   if (parts.done.size() > kListed) {
     line("", fmt::format("... and {} more (--json lists them)", parts.done.size() - kListed));

@@ -71,6 +71,9 @@ struct DatasetCounts {
   bool operator==(const DatasetCounts&) const = default;
 };
 
+/// "10 samples, 2 of them quarantined, 6 boxes, 1 person with joints".
+std::string contents_text(const DatasetCounts& counts);
+
 /// Adds what a shard holds.
 void add(const CommitRecord& record, DatasetCounts& counts);
 

@@ -8,6 +8,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/dataset/dataset_description.h"
 #include "pipeline/folder/shard_backup.h"
 #include "stages/base/files/atomic_file.h"
@@ -65,9 +66,8 @@ std::string to_text(const FinalizationReport& report) {
     text += fmt::format("... and {} more (--json lists them)\n", report.missing.size() - listed);
   }
   const DatasetCounts& counts = report.counts;
-  text += fmt::format("{} of {} shards: {} samples, {} of them quarantined, {} boxes, {} persons\n",
-                      counts.shards, report.shards_planned, counts.samples, counts.quarantined(),
-                      counts.boxes, counts.persons);
+  text += fmt::format("{} of {}: {}\n", counts.shards, count_text(report.shards_planned, "shard"),
+                      contents_text(counts));
   text += notes_text(report.notes);
   if (!report.written) {
     return text + (counts.shards == 0 ? "not finalized: no shard is done\n"

@@ -296,7 +296,7 @@ std::string card_text(const ExportWork& work, const std::vector<const ExportShar
     row("samples", count.samples);
     for (const auto& [name, boxes] : count.boxes) row("boxes of class " + markdown(name), boxes);
     if (count.boxes_to_ignore > 0) row("boxes to ignore", count.boxes_to_ignore);
-    if (count.persons > 0) row("persons", count.persons);
+    if (count.persons > 0) row("persons with joints", count.persons);
   }
   if (!input.missing().empty()) {
     text += fmt::format("\n**Not complete**: {} shards were missing.\n", input.missing().size());

@@ -174,7 +174,8 @@ std::string head(const Survey& survey, const PageContext& context) {
   const DatasetCounts& counts = survey.counts;
   html += "<div class=tiles>" + tile("samples", counts.samples, "samples") +
           tile("quarantined", counts.quarantined(), "of them quarantined") +
-          tile("boxes", counts.boxes, "boxes") + tile("persons", counts.persons, "persons") +
+          tile("boxes", counts.boxes, "boxes") +
+          tile("persons", counts.persons, "persons with joints") +
           tile("shards", counts.shards, "shards") +
           tile("size_bytes", counts.size_bytes, "on disk", bytes_text(counts.size_bytes)) +
           "</div>";
@@ -260,7 +261,9 @@ std::string counts_of(const std::map<std::string, DatasetCounts>& by_name,
     rows.push_back(text_cell(escaped(name)) + counts_cells(what + "." + name, counts));
   }
   return "<h3>By " + what + "</h3>" +
-         table({what, "#samples", "#quarantined", "#boxes", "#persons", "#shards", "#size"}, rows);
+         table({what, "#samples", "#quarantined", "#boxes", "#persons with joints", "#shards",
+                "#size"},
+               rows);
 }
 
 std::string counts(const Survey& survey) {
@@ -277,7 +280,7 @@ std::string counts(const Survey& survey) {
   }
   html += "<h3>By source</h3>" +
           table({"source", "#labelled frames", "#without paired frame", "#volumes without events",
-                 "#samples", "#quarantined", "#boxes", "#persons", "#shards", "#size"},
+                 "#samples", "#quarantined", "#boxes", "#persons with joints", "#shards", "#size"},
                 rows);
   if (survey.datasets.size() > 1) html += counts_of(survey.datasets, "dataset");
   if (survey.splits.size() > 1) html += counts_of(survey.splits, "split");

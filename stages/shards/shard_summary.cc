@@ -159,7 +159,7 @@ std::string describe_shard(const ShardReader& reader) {
   line("gaps", "{} (frames: samples)", counts_text(counts.gaps));
   line("boxes", "{}{}", counts.boxes,
        counts.boxes > 0 ? fmt::format(" ({})", counts_text(counts.classes)) : "");
-  line("persons", "{}", counts.persons);
+  line("persons", "{} with joints", counts.persons);
   if (!header.label_schema.joint_names.empty()) {
     line("joints", "{}", fmt::join(header.label_schema.joint_names, ", "));
   }

@@ -405,7 +405,7 @@ class Formats(Export):
             boxes = collections.Counter("boxes to ignore" if ignore else f"boxes of class {sample['classes'][i]}"
                                         for sample in of(split).values()
                                         for i, ignore in zip(sample["boxes"]["class_id"], sample["boxes"]["ignore"]))
-            boxes["persons"] = sum(len(sample["poses"]["joints"]) for sample in of(split).values())
+            boxes["persons with joints"] = sum(len(sample["poses"]["joints"]) for sample in of(split).values())
             self.assertEqual({row[1]: int(row[2]) for row in rows if row[0] == split and row[1] != "samples"},
                              {what.replace("_", "\\_"): count for what, count in boxes.items() if count})
         self.assertIn(["kitti\\_object", "val", str(len(of("val"))), "1"], rows)

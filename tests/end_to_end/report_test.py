@@ -158,7 +158,7 @@ class Report(program.InFolder):
         for where in (self.out, self.out / "dataset.h5"):
             self.assertEqual(json.loads(run("inspect", where, "--json")[0]), whole)
             told, _ = run("inspect", where)
-            self.assertIn("samples        11, 1 of them quarantined", told)
+            self.assertIn("contents       11 samples, 1 of them quarantined", told)
             self.assertIn(first, told)
             told, _ = run("inspect", where, "--sample", "000002")
             self.assertIn("id             000002", told)

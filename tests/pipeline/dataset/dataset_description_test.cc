@@ -212,10 +212,11 @@ TEST(DatasetText, TellsAPersonWhatThereIs) {
   // Two shards of the example: 5 samples, one in quarantine, 3 boxes, 3 persons each.
   const std::string text = dataset_text(read_dataset_parts(ConvertedFolder(2).path()));
   for (const char* part :
-       {"2 of 4 done", "samples        10, 2 of them quarantined, 6 boxes, 6 persons",
-        "split val: samples 5, 1 of them quarantined, 3 boxes, 3 persons", "8x6",
+       {"2 of 4 done",
+        "contents       10 samples, 2 of them quarantined, 6 boxes, 6 persons with joints",
+        "split val: 5 samples, 1 of them quarantined, 3 boxes, 3 persons with joints", "8x6",
         "2: 10 (frames: samples)", "Car: 4, DontCare: 2",
-        "demo-val-00000-of-00001.h5, samples 5, 1 of them quarantined"}) {
+        "demo-val-00000-of-00001.h5, 5 samples, 1 of them quarantined"}) {
     EXPECT_THAT(text, HasSubstr(part));
   }
 }
