@@ -3,6 +3,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "manifests/values/text.h"
+
 namespace eventgan {
 
 std::size_t stored_size(StoredType type) {
@@ -28,7 +30,7 @@ std::string limits_text(const ErrorSpec& errors) {
     return "no quarantined pair (errors.policy in the manifest is \"fail\")";
   }
   std::ostringstream text;
-  text << "at most " << errors.max_count << " quarantined pairs and a share of "
+  text << "at most " << count_text(errors.max_count, "quarantined pair") << " and a share of "
        << errors.max_fraction << " (errors in the manifest)";
   return text.str();
 }

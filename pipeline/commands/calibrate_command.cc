@@ -8,6 +8,7 @@
 
 #include "manifests/documents/job_manifest.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/commands/commands.h"
@@ -38,9 +39,8 @@ std::string error_line(const CalibrationOutcome& outcome) {
   if (sorted.empty()) return "int8 error: not measured, the job has no other pairs";
   std::ranges::sort(sorted);
   const double median = (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]) / 2;
-  return fmt::format(
-      "int8 error against float32, relative L2, on {} other pairs: median {:.3f}, worst {:.3f}",
-      sorted.size(), median, sorted.back());
+  return fmt::format("int8 error against float32, relative L2, on {}: median {:.3f}, worst {:.3f}",
+                     count_text(std::ssize(sorted), "other pair"), median, sorted.back());
 }
 
 CalibrationOutcome calibrate_job(const CalibrateArguments& arguments, const JobManifest& manifest,
@@ -75,9 +75,9 @@ int run(const CalibrateArguments& arguments) {
   for (const std::string& skipped : outcome.skipped) tell_warning("skipped " + skipped);
   const std::string bytes = serialize_weights(outcome.weights);
   write_file_atomically(file, bytes);
-  std::cout << file.string() << ": calibrated on " << outcome.weights.calibration->pairs
-            << " pairs, " << outcome.skipped.size() << " skipped, SHA-256 " << sha256_hex(bytes)
-            << "\n"
+  std::cout << file.string() << ": calibrated on "
+            << count_text(outcome.weights.calibration->pairs, "pair") << ", "
+            << outcome.skipped.size() << " skipped, SHA-256 " << sha256_hex(bytes) << "\n"
             << error_line(outcome) << "\nFor the manifest:\n  "
             << calibrated_generator_line(manifest, file) << std::endl;
   return kComplete;

@@ -9,6 +9,7 @@
 #include <memory>
 
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/command_line/given_job.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
@@ -44,8 +45,8 @@ namespace fs = std::filesystem;
 
 /// What a trial leaves to do, for a person.
 std::string trial_text(const JobOptions& job, const ConversionReport& report) {
-  return fmt::format("trial run: {} pairs of the job. For all pairs:  eventgan convert {}\n",
-                     report.plan_pairs, job.manifest);
+  return fmt::format("trial run: {} of the job. For all pairs:  eventgan convert {}\n",
+                     count_text(report.plan_pairs, "pair"), job.manifest);
 }
 
 int convert_and_report(const JobOptions& job, const GivenJob& given, ConversionOptions options) {

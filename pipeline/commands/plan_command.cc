@@ -7,6 +7,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "pipeline/command_line/given_job.h"
 #include "pipeline/command_line/options.h"
 #include "pipeline/command_line/standard_streams.h"
@@ -40,8 +41,9 @@ void print_frozen(const std::filesystem::path& folder, const FrozenPlan& frozen,
     std::cout << dump_json(json, JsonLayout::kIndented) << std::endl;
     return;
   }
-  std::cout << "Frozen in " << (folder / "plan.json").string() << ": " << frozen.plan.sample_count()
-            << " samples in " << frozen.plan.shards.size() << " shards" << std::endl;
+  std::cout << "Frozen in " << (folder / "plan.json").string() << ": "
+            << count_text(frozen.plan.sample_count(), "sample") << " in "
+            << count_text(std::ssize(frozen.plan.shards), "shard") << std::endl;
 }
 
 int freeze(const PlanArguments& arguments, const GivenJob& given, Plan plan) {

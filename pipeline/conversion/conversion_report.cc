@@ -24,9 +24,10 @@ std::string part_text(const ConversionReport& report) {
 }
 
 std::string shards_text(const ConversionReport& report) {
-  const std::string text = fmt::format("{} of {} pairs written, {} quarantined, in {} of {} shards",
-                                       report.written, report.planned, report.quarantined.size(),
-                                       report.shards_done, report.shards_planned);
+  const std::string text =
+      fmt::format("{} of {} written, {} quarantined, in {} of {}", report.written,
+                  count_text(report.planned, "pair"), report.quarantined.size(), report.shards_done,
+                  count_text(report.shards_planned, "shard"));
   std::vector<std::string> how;
   const auto add = [&](int count, const char* what) {
     if (count > 0) how.push_back(fmt::format("{} done {}", count, what));
@@ -58,9 +59,10 @@ std::string to_text(const ConversionReport& report) {
     }
   }
   if (report.unpaired > 0) {
-    text += fmt::format("\n{} labelled frames without a paired frame", report.unpaired_frames);
+    text += "\n" + count_text(report.unpaired_frames, "labelled frame") + " without a paired frame";
     if (report.unpaired_frames != report.unpaired) {
-      text += fmt::format(" for at least one of their gaps, {} pairs in total", report.unpaired);
+      text +=
+          " for at least one of their gaps, " + count_text(report.unpaired, "pair") + " in total";
     }
     text += " (listed in plan.json)";
   }

@@ -9,6 +9,7 @@
 #include "manifests/documents/plan.h"
 #include "manifests/values/faults.h"
 #include "manifests/values/job.h"
+#include "manifests/values/text.h"
 #include "pipeline/conversion/earlier_shards.h"
 #include "pipeline/conversion/shard_sink.h"
 #include "pipeline/folder/output_folder.h"
@@ -85,11 +86,11 @@ ConversionReport empty_report(const fs::path& folder, const Plan& plan, const Pl
 
 void say_part(const ConversionReport& report, const ConversionOptions& options) {
   if (report.shards_planned == report.plan_shards) return;
-  const std::string plan = " of the plan's " + std::to_string(report.plan_shards) + " shards";
+  const std::string plan = " of the plan's " + count_text(report.plan_shards, "shard");
   tell(options.note, report.shards_planned == 0
                          ? report.part + ": nothing to do, it has none" + plan
                          : report.part + ": " + std::to_string(report.shards_planned) + plan +
-                               ", " + std::to_string(report.planned) + " pairs");
+                               ", " + count_text(report.planned, "pair"));
 }
 
 /// Checks what earlier runs left, and reports it.

@@ -126,9 +126,10 @@ std::string unpaired_text(const SourceSpec& spec, const SourceSummary& summary,
   const std::vector<std::string>& ids = summary.unpaired_ids;
   if (ids.empty()) return text;
   const bool draws = spec.pairs.choose == PairChoice::kOne;
-  return text + fmt::format("  {:<15}  {} of {} labelled frames  ({})\n",
+  return text + fmt::format("  {:<15}  {} of {}  ({})\n",
                             draws ? "no pair at all" : "lacking a gap", ids.size(),
-                            summary.labelled_frames, escape_controls(some_of(ids, 5)));
+                            count_text(summary.labelled_frames, "labelled frame"),
+                            escape_controls(some_of(ids, 5)));
 }
 
 std::string source_text(const SourceSpec& spec, const SourceSummary& summary,
@@ -183,7 +184,8 @@ std::string plan_text(const JobManifest& manifest, const PlannedJob& job,
                         shards_of(plan, static_cast<int>(i)));
   }
   return text +
-         fmt::format("total: {} pairs in {} shards, ", plan.sample_count(), plan.shards.size()) +
+         fmt::format("total: {} in {}, ", count_text(plan.sample_count(), "pair"),
+                     count_text(std::ssize(plan.shards), "shard")) +
          estimate_text(estimate, threads, manifest.generator.device);
 }
 

@@ -286,10 +286,10 @@ std::string to_text(const RetryReport& report) {
   if (report.tried == 0 && report.quarantined == 0) {
     text += "nothing to retry: no sample of a committed shard is quarantined\n";
   } else {
-    text += fmt::format("{} of {} fixed, {} rewritten; {} of {} samples are still quarantined\n",
+    text += fmt::format("{} of {} fixed, {} rewritten; still quarantined: {} of {}\n",
                         report.mended, count_text(report.tried, "quarantined sample"),
                         count_text(report.shards_rewritten, "shard"), report.quarantined,
-                        report.planned);
+                        count_text(report.planned, "sample"));
   }
   const std::size_t listed = std::min(report.failed.size(), kListedSamples);
   for (std::size_t i = 0; i < listed; ++i) {

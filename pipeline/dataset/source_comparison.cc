@@ -19,6 +19,7 @@
 #include "manifests/values/faults.h"
 #include "manifests/values/pair_key.h"
 #include "manifests/values/placement.h"
+#include "manifests/values/text.h"
 #include "pipeline/planning/make_plan.h"
 #include "pipeline/runtime/errors.h"
 #include "stages/frames/dataset.h"
@@ -43,7 +44,7 @@ bool same(const Element& a, const Element& b) {
 
 std::string value_text(const std::string& text) { return '"' + text + '"'; }
 std::string value_text(const std::vector<char>& bytes) {
-  return fmt::format("{} bytes", bytes.size());
+  return count_text(std::ssize(bytes), "byte");
 }
 template <class Number>
 std::string value_text(Number number) {
@@ -224,12 +225,13 @@ std::vector<std::string> row_differences(const ShardHeader& header, const ShardT
   };
   const auto expect_rows = [&](const char* what, std::size_t count, std::size_t got) {
     if (count == got) return;
-    differences.push_back(fmt::format("expected {} {}, as in {}, got {}", count, what, place, got));
+    differences.push_back(fmt::format("expected {}, as in {}, got {}",
+                                      count_text(std::int64_t(count), what), place, got));
   };
   const std::size_t boxes = expected.labels.boxes.size();
   const std::size_t persons = expected.labels.persons.size();
-  expect_rows("boxes", boxes, rows_of(stored.boxes.offsets));
-  expect_rows("persons", persons, rows_of(stored.poses.offsets));
+  expect_rows("box", boxes, rows_of(stored.boxes.offsets));
+  expect_rows("person", persons, rows_of(stored.poses.offsets));
   if (!differences.empty()) return differences;
 
   std::vector<const void*> columns;  // of `wanted`; the walk below takes them in the same order

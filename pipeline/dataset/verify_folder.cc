@@ -278,10 +278,10 @@ std::string line_of(const ShardCheck& shard, bool deep) {
   if (shard.condition != ShardCondition::kDone) {
     return shard.name + ": " + to_string(shard.condition);
   }
-  std::string text =
-      fmt::format("{}: {}, {} hashed, {} samples read, {} quarantined", shard.name,
-                  shard.faults.empty() ? "sound" : fmt::format("{} faults", shard.faults.size()),
-                  bytes_text(shard.size_bytes), shard.samples, shard.quarantined);
+  std::string text = fmt::format(
+      "{}: {}, {} hashed, {} read, {} quarantined", shard.name,
+      shard.faults.empty() ? "sound" : count_text(std::ssize(shard.faults), "fault"),
+      bytes_text(shard.size_bytes), count_text(shard.samples, "sample"), shard.quarantined);
   if (deep) text += fmt::format(", labels of {} compared", shard.compared);
   return text;
 }
@@ -294,12 +294,14 @@ std::string to_text(const FolderCheck& check, bool deep) {
   for (const ShardCheck& shard : check.by_shard) text += line_of(shard, deep) + "\n";
   for (const std::string& fault : check.faults) text += escape_controls(fault) + "\n";
   if (deep)
-    text += fmt::format("labels of {} samples compared with their sources\n", check.compared);
+    text += "labels of " + count_text(check.compared, "sample") + " compared with their sources\n";
   if (!check.sound()) {
-    return text + fmt::format("{} faults in {} shards\n", check.faults.size(), check.shards());
+    return text + count_text(std::ssize(check.faults), "fault") + " in " +
+           count_text(check.shards(), "shard") + "\n";
   }
-  return text + fmt::format("sound: {} shards, {} samples, {} of them quarantined\n",
-                            check.shards(), check.samples, check.samples - check.valid);
+  return text + fmt::format("sound: {}, {}, {} of them quarantined\n",
+                            count_text(check.shards(), "shard"),
+                            count_text(check.samples, "sample"), check.samples - check.valid);
 }
 
 std::string to_json(const FolderCheck& check, const fs::path& folder) {

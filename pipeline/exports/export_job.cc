@@ -8,6 +8,7 @@
 
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/values/faults.h"
+#include "manifests/values/text.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/files/atomic_file.h"
@@ -155,15 +156,15 @@ ExportReport run_export(const std::filesystem::path& folder, const ExportOptions
 }
 
 std::string to_text(const ExportReport& report) {
-  std::string text =
-      fmt::format("{}: {} samples, {} quarantined samples left out (listed in export.json)\n",
-                  report.folder, report.samples, report.quarantined);
+  std::string text = fmt::format("{}: {}, {} left out (listed in export.json)\n", report.folder,
+                                 count_text(report.samples, "sample"),
+                                 count_text(report.quarantined, "quarantined sample"));
   for (const auto& [what, count] : report.left_out) {
     text += fmt::format("left out: {} {}\n", count, what);
   }
   if (!report.missing.empty()) {
-    text += fmt::format("PARTIAL: {} shards were missing when the folder was finalized\n",
-                        report.missing.size());
+    text += "PARTIAL: without " + count_text(std::ssize(report.missing), "shard") +
+            ", missing when the folder was finalized\n";
   }
   return text;
 }

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/text.h"
 #include "pipeline/exports/detail/exporter.h"
 #include "pipeline/runtime/threads.h"
 #include "stages/base/archives/numpy_arrays.h"
@@ -299,7 +300,8 @@ std::string card_text(const ExportWork& work, const std::vector<const ExportShar
     if (count.persons > 0) row("persons with joints", count.persons);
   }
   if (!input.missing().empty()) {
-    text += fmt::format("\n**Not complete**: {} shards were missing.\n", input.missing().size());
+    text +=
+        "\n**Not complete**: without " + count_text(std::ssize(input.missing()), "shard") + ".\n";
   }
   const VolumeShape& shape = header.volume;
   text += fmt::format(

@@ -330,14 +330,14 @@ PlannedSource plan_source(const JobManifest& manifest, int index, const Dataset&
   summary.notes = dataset.notes();
   if (const auto left_out = dataset.labelled_frames().size() - frames.size(); left_out > 0) {
     summary.notes.push_back(std::to_string(left_out) + " of " +
-                            std::to_string(dataset.labelled_frames().size()) +
-                            " labelled frames left out, as the manifest selects");
+                            count_text(std::ssize(dataset.labelled_frames()), "labelled frame") +
+                            " left out, as the manifest selects");
   }
   summary.notes.insert(summary.notes.end(), selection_notes.begin(), selection_notes.end());
   if (planned.pairs < std::min(spec.pairs.min_pairs, most)) {
-    throw InputError("expected at least " + std::to_string(spec.pairs.min_pairs) +
-                     " pairs (pairs.min_pairs), got " + std::to_string(planned.pairs) + " of " +
-                     std::to_string(summary.labelled_frames) + " labelled frames, in " + spec.root +
+    throw InputError("expected at least " + count_text(spec.pairs.min_pairs, "pair") +
+                     " (pairs.min_pairs), got " + std::to_string(planned.pairs) + " of " +
+                     count_text(summary.labelled_frames, "labelled frame") + ", in " + spec.root +
                      " ($.sources[" + std::to_string(index) + "])");
   }
   return planned;

@@ -135,9 +135,9 @@ std::string head(const RealismReport& report) {
     events += interval.event_count;
   }
   std::string text =
-      fmt::format("{}: {} pixels, {} of frames ({}), {} real events, {} bins\n", report.recording,
+      fmt::format("{}: {} pixels, {} of frames ({}), {}, {} bins\n", report.recording,
                   to_string(report.size), count_text(std::ssize(report.intervals), "pair"),
-                  counts_text(by_gap, "gap "), events, report.bins);
+                  counts_text(by_gap, "gap "), count_text(events, "real event"), report.bins);
   for (const MethodSummary& method : report.methods) {
     text += fmt::format("  {}: {}\n", method.name, method.settings);
   }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "manifests/values/sensor_input.h"
+#include "manifests/values/text.h"
 #include "pipeline/realism/sensor_fit.h"
 
 namespace eventgan {
@@ -28,10 +29,10 @@ std::string noise_text(const NoiseFit& fit) {
   return fmt::format(
       "noise of pixels that stay still: shot_hz {}, leak_hz {}, hot_pixels {:.3g} ({} of them)\n"
       "  {:.3g} positive and {:.3g} negative events per pixel and second, from {} pixels, {:.3g} s "
-      "each, of {} pairs\n",
+      "each, of {}\n",
       range_text(fit.noise.shot_hz), range_text(fit.noise.leak_hz), fit.noise.hot_pixels[0],
       fit.hot_pixels, fit.positive_hz, fit.negative_hz, fit.pixels,
-      fit.pixel_seconds / static_cast<double>(fit.pixels), fit.pairs);
+      fit.pixel_seconds / static_cast<double>(fit.pixels), count_text(fit.pairs, "pair"));
 }
 
 }  // namespace
@@ -64,9 +65,9 @@ std::string to_text(const SensorFit& fit) {
 }
 
 std::string origin_text(const SensorFit& fit, const std::string& weights) {
-  std::string text =
-      fmt::format("{} pairs of frames of mean grey level {:.3g} ({:.3g}..{:.3g})", fit.fitted_pairs,
-                  fit.grey_level, fit.grey_levels[0], fit.grey_levels[1]);
+  std::string text = fmt::format("{} of frames of mean grey level {:.3g} ({:.3g}..{:.3g})",
+                                 count_text(fit.fitted_pairs, "pair"), fit.grey_level,
+                                 fit.grey_levels[0], fit.grey_levels[1]);
   if (fit.network) {
     text += fmt::format("; threshold {} through {}", threshold_text(*fit.network), weights);
   }

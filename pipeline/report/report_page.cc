@@ -156,8 +156,8 @@ std::string head(const Survey& survey, const PageContext& context) {
       "{}</p></header>",
       escaped(parts.frozen.plan.name), escaped(survey.header.program_version),
       missing == 0 ? "All shards are done."
-                   : fmt::format("<strong class=bad>{} of {} shards are missing or "
-                                 "damaged</strong>: the numbers cover the rest.",
+                   : fmt::format("<strong class=bad>Missing or damaged: {} of {} "
+                                 "shards</strong>, the numbers cover the rest.",
                                  grouped(std::ssize(parts.missing)),
                                  grouped(std::ssize(parts.frozen.plan.shards))));
   if (!context.warning.empty()) {

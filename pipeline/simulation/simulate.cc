@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/text.h"
 #include "pipeline/runtime/memory.h"
 #include "pipeline/runtime/threads.h"
 #include "pipeline/simulation/clip_frames.h"
@@ -230,11 +231,11 @@ std::string to_text(const SimulationReport& report) {
   const RecordingSummary total = sum(report.made);
   if (report.made.size() > 1) text += table_line(total);
   return text +
-         fmt::format(
-             "{} recordings made, {} kept from earlier runs; {:.1f} s, {:.2f} s per frame\n{}\n",
-             report.made.size(), report.kept.size(), report.wall_seconds,
-             total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0,
-             report.folder);
+         fmt::format("{} made, {} kept from earlier runs; {:.1f} s, {:.2f} s per frame\n{}\n",
+                     count_text(std::ssize(report.made), "recording"), report.kept.size(),
+                     report.wall_seconds,
+                     total.frames > 0 ? report.wall_seconds / static_cast<double>(total.frames) : 0,
+                     report.folder);
 }
 
 std::string to_json(const SimulationReport& report) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "manifests/documents/detail/json_text.h"
+#include "manifests/values/text.h"
 #include "pipeline/realism/realism_report.h"
 
 namespace eventgan {
@@ -167,8 +168,10 @@ std::vector<Row> table_of(const Digest& digest) {
 std::string head(const TradeoffReport& report) {
   std::size_t rounds = 0;
   for (const Trial& trial : report.trials) rounds = std::max(rounds, trial.rounds.size());
-  return fmt::format("{}: {} pairs, {} rounds, {} threads\n{}\nreference: {}, its cost with {}\n",
-                     report.job, report.pairs, rounds, report.threads, report.processor,
+  return fmt::format("{}: {}, {}, {}\n{}\nreference: {}, its cost with {}\n", report.job,
+                     count_text(report.pairs, "pair"),
+                     count_text(static_cast<std::int64_t>(rounds), "round"),
+                     count_text(report.threads, "thread"), report.processor,
                      name_of(report.reference), to_string(report.reference_dtype));
 }
 
@@ -185,8 +188,8 @@ std::vector<std::string> left_out(const TradeoffReport& report) {
   for (const std::string& pair : report.skipped) lines.push_back("skipped pair: " + pair);
   for (const Trial& trial : report.trials) {
     if (trial.quarantined == 0) continue;
-    lines.push_back(fmt::format("{}: {} of {} pairs have no valid volume",
-                                name_of(trial.configuration), trial.quarantined, report.pairs));
+    lines.push_back(fmt::format("{}: no valid volume for {} of {}", name_of(trial.configuration),
+                                trial.quarantined, count_text(report.pairs, "pair")));
   }
   return lines;
 }

@@ -225,7 +225,7 @@ class Report(program.InFolder):
         _, err = run("report", self.out)
         self.assertIn("warning", err)
         source = (self.out / "report.html").read_text(encoding="utf-8")
-        self.assertIn("1 of 6 shards are missing or damaged", source)
+        self.assertIn("Missing or damaged: 1 of 6 shards", source)
         self.assertEqual(Page(source).numbers["samples"], self.counted()["samples"])
 
     def test_what_cannot_be_looked_at_is_told_in_one_error(self):

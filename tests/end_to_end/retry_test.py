@@ -184,7 +184,7 @@ class Retry(program.InFolder):
         faults, _ = run("verify", self.out, "--deep", expect=1)
         self.assertIn("cars/label_2/000004.txt", faults)
         self.assertIn("000004)", faults)
-        self.assertIn("1 faults", faults)
+        self.assertIn("1 fault", faults)
 
 
 class ChangedInputs(program.InFolder):

@@ -48,7 +48,7 @@ TEST_F(PlanSummary, TextTellsWhatWillBeMadeAndWhatIsMissing) {
       "  to quarantine    1  (a frame is missing inside the sequence, or a note says why)\n"
       "  note: 2 images without labels\n"
       "  shards           1\n"
-      "total: 3 pairs in 1 shards, about 4 MB and 1m30s with 2 threads (0.500 s per pair on one "
+      "total: 3 pairs in 1 shard, about 4 MB and 1m30s with 2 threads (0.500 s per pair on one "
       "thread, measured on 2 pairs)\n");
 }
 

@@ -125,8 +125,8 @@ TEST(RetryText, SaysWhatWasMendedAndWhatIsLeft) {
   EXPECT_EQ(to_text(example()),
             "/out/x.h5: expected size in bytes 5, got 4; eventgan convert makes it again\n"
             "7 shards not made yet: run eventgan convert\n"
-            "2 of 3 quarantined samples fixed, 1 shard rewritten; 5 of 1000 samples are still "
-            "quarantined\n"
+            "2 of 3 quarantined samples fixed, 1 shard rewritten; still quarantined: 5 of 1000 "
+            "samples\n"
             "quarantined: expected an image (000007)\n"
             "/out\n");
 }

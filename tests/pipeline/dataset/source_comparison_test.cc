@@ -84,7 +84,7 @@ TEST_F(RowDifferences, AnotherNumberOfLabelsIsTold) {
   expected_.labels.boxes.pop_back();
   expected_.annotation.persons.clear();
   expected_.labels.persons.clear();
-  EXPECT_THAT(found(expected_), ElementsAre("expected 1 boxes, as in labels/0.txt, got 2",
+  EXPECT_THAT(found(expected_), ElementsAre("expected 1 box, as in labels/0.txt, got 2",
                                             "expected 0 persons, as in labels/0.txt, got 2"));
 }
 
