@@ -140,14 +140,8 @@ std::optional<std::filesystem::path> find_coco(const FoundFrames& frames,
   return files.front();
 }
 
-std::unique_ptr<OwnLabels> open_coco_labels(const LabelSpec& spec,
-                                            const std::filesystem::path& base,
-                                            LabelledSource source) {
-  return std::make_unique<CocoLabels>(spec, base, std::move(source));
-}
-
 }  // namespace
 
-constinit const LabelReader kCocoReader{LabelFormat::kCoco, open_coco_labels, find_coco};
+constinit const LabelReader kCocoReader{LabelFormat::kCoco, open_labels<CocoLabels>, find_coco};
 
 }  // namespace eventgan

@@ -218,13 +218,8 @@ std::optional<std::filesystem::path> find_csv(const FoundFrames& frames,
   return found;
 }
 
-std::unique_ptr<OwnLabels> open_csv_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source) {
-  return std::make_unique<CsvLabels>(spec, base, std::move(source));
-}
-
 }  // namespace
 
-constinit const LabelReader kCsvReader{LabelFormat::kCsv, open_csv_labels, find_csv};
+constinit const LabelReader kCsvReader{LabelFormat::kCsv, open_labels<CsvLabels>, find_csv};
 
 }  // namespace eventgan

@@ -329,14 +329,9 @@ std::optional<std::filesystem::path> find_mot(const FoundFrames& frames,
   return std::nullopt;
 }
 
-std::unique_ptr<OwnLabels> open_mot_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source) {
-  return std::make_unique<MotLabels>(spec, base, std::move(source));
-}
-
 }  // namespace
 
-constinit const LabelReader kMotReader{LabelFormat::kMot, open_mot_labels, find_mot,
+constinit const LabelReader kMotReader{LabelFormat::kMot, open_labels<MotLabels>, find_mot,
                                        /*image_folder=*/"img1"};
 
 }  // namespace eventgan

@@ -9,6 +9,7 @@
 #include <string>
 #include <string_view>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "manifests/values/faults.h"
@@ -186,6 +187,13 @@ inline constexpr std::array kLabelReaders{&kMotReader, &kCocoReader, &kYoloReade
 static_assert(kLabelReaders.size() == kLabelFormats.size());
 
 const LabelReader& label_reader(LabelFormat format);
+
+/// LabelReader::open of a class of labels.
+template <class Labels>
+std::unique_ptr<OwnLabels> open_labels(const LabelSpec& spec, const std::filesystem::path& base,
+                                       LabelledSource source) {
+  return std::make_unique<Labels>(spec, base, std::move(source));
+}
 
 /// Opens the labels that `spec` tells of; its path starts at `base`, the manifest's folder. Throws
 /// InputError if a file of them is missing or broken as a whole.

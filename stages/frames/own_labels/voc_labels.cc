@@ -179,13 +179,8 @@ std::optional<std::filesystem::path> find_voc(const FoundFrames& frames,
   return labels.empty() ? std::nullopt : std::optional(std::move(labels));
 }
 
-std::unique_ptr<OwnLabels> open_voc_labels(const LabelSpec& spec, const std::filesystem::path& base,
-                                           LabelledSource source) {
-  return std::make_unique<VocLabels>(spec, base, std::move(source));
-}
-
 }  // namespace
 
-constinit const LabelReader kVocReader{LabelFormat::kVoc, open_voc_labels, find_voc};
+constinit const LabelReader kVocReader{LabelFormat::kVoc, open_labels<VocLabels>, find_voc};
 
 }  // namespace eventgan

@@ -70,14 +70,8 @@ std::optional<std::filesystem::path> find_yolo(const FoundFrames& frames,
   return std::nullopt;
 }
 
-std::unique_ptr<OwnLabels> open_yolo_labels(const LabelSpec& spec,
-                                            const std::filesystem::path& base,
-                                            LabelledSource source) {
-  return std::make_unique<YoloLabels>(spec, base, std::move(source));
-}
-
 }  // namespace
 
-constinit const LabelReader kYoloReader{LabelFormat::kYolo, open_yolo_labels, find_yolo};
+constinit const LabelReader kYoloReader{LabelFormat::kYolo, open_labels<YoloLabels>, find_yolo};
 
 }  // namespace eventgan
