@@ -1,4 +1,4 @@
-"""Event volumes made on the fly, of pairs of images: `eventgan.torch.FramePairs`."""
+"""Event volumes made on the fly from pairs of images: `eventgan.torch.FramePairs`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,8 @@ import numpy as np
 import torch
 from torch.utils.data import Dataset
 
+from .augmentation import EventAugmentation, Item, detection_item, moved, numbered
 from .detection_scores import DONT_CARE
-from .torch import EventAugmentation, Item, _detection_item, _moved, _numbered
-
-try:
-    import cv2
-except ImportError:
-    cv2 = None
-    import PIL.Image
-    import PIL.ImageOps
 
 if TYPE_CHECKING:
     from .generator import Generator
@@ -30,15 +23,15 @@ if TYPE_CHECKING:
 
 @dataclasses.dataclass(frozen=True)
 class FrameAugmentation:
-    """What may happen to a pair of images before there are events, which no change of a volume can bring about.
+    """Random changes of a pair of images before there are events, which no change of a volume can imitate.
 
     Parameters
     ----------
     reverse : float
         Probability that time runs backwards: the images are exchanged.
     gain, gamma : (float, float)
-        Ranges, drawn uniformly in the logarithm: a value v of an image, from 0 to 1, becomes gain x v^gamma, clipped to 0..1. Both images
-        of a pair have the same, as under another exposure; were they to differ, there would be events everywhere.
+        Ranges, drawn uniformly in the logarithm: a value v of an image, from 0 to 1, becomes gain x v^gamma, clipped to
+        0..1, as under another exposure. Both images of a pair get the same; a difference would make events everywhere.
     """
 
     reverse: float = 0.0
@@ -66,7 +59,7 @@ class Drawn(NamedTuple):
 
 
 class CacheInfo(NamedTuple):
-    """How often a volume was in the cache and was not, and the bytes of those that are."""
+    """How often a volume was found in the cache and how often not, and the bytes it holds."""
 
     hits: int
     misses: int
@@ -74,71 +67,81 @@ class CacheInfo(NamedTuple):
 
 
 class FramePairs(Dataset):
-    """Volumes made of pairs of images when they are asked for: no shard on the disk, and other volumes in each epoch.
+    """Volumes made from pairs of images when they are asked for: no shards on disk, and other volumes in each epoch.
 
-    What is drawn for an item is a function of (seed, epoch, index) alone: of no worker, no order and no batch. Call `set_epoch` before each epoch.
+    What is drawn for an item depends on (seed, epoch, index) alone, not on the worker, the order or the batch. Call
+    `set_epoch` before each epoch.
 
-    An item is that of `DetectionDataset` if the target has boxes, so `collate_yolo` and `collate_torchvision` take it, and also has
-    `label_position`: 1 if the target belongs to the image at the end of time, 0 to that at the start. With any other target it is (volume, target),
-    float32 [2B, H, W]: batches need volumes of one size, which a generator's `size` gives.
+    If the target has boxes, an item is one of `DetectionDataset`, so `collate_yolo` and `collate_torchvision` take it;
+    its `label_position` is 1 if the target belongs to the image at the end of time, 0 for the one at the start. With
+    any other target it is (volume, target), float32 [2B, H, W]: batches need volumes of one size, which a generator's
+    `size` gives.
 
     A target with boxes is a dictionary:
 
     boxes     [n, 4], left, top, right, bottom in pixels of the image, by edges: a whole image is 0, 0, W, H
-    labels    [n], whole numbers from 0, below 0 for boxes to be ignored; with `classes` names, DontCare to be ignored
-    ignore    [n] bool, may be left out
-    id        str, may be left out: it is the item's index then
+    labels    [n], whole numbers from 0, below 0 for ignored boxes; with `classes` names, DontCare for ignored boxes
+    ignore    [n] bool, optional
+    id        str, optional; by default the item's index
 
     Parameters
     ----------
     generator : Generator, or a sequence of them
-        Of several, one is drawn for each item: of sensors with other thresholds, of other weights, all with one number of bins.
+        Of several, one is drawn for each item: of sensors with other thresholds or of other weights, all with one
+        number of bins.
     source : sequence or callable
-        source[i], or source(i), is (previous, following, target), or with `gap` a clip: (frames, ..., target), as torchvision's datasets of videos
-        have it, whose sound is passed over. An image is a file's path, or an array or tensor, uint8 or floating-point numbers from 0 to 1:
-        [H, W], [H, W, 3], [H, W, 1], [3, H, W] or [1, H, W]. `frames` is a sequence of images, such as [T, H, W, 3] or [T, 3, H, W].
+        source[i], or source(i), is (previous, following, target), or with `gap` a clip: (frames, ..., target), as in
+        torchvision's datasets of videos, whose sound is ignored. An image is a file's path, or an array or tensor,
+        uint8 or floating-point numbers from 0 to 1: [H, W], [H, W, 3], [H, W, 1], [3, H, W] or [1, H, W]. `frames` is a
+        sequence of images, such as [T, H, W, 3] or [T, 3, H, W].
     gap : int or (int, int), optional
-        The source has clips, of which two frames that far apart are taken; of a range (first, last) it is drawn. None: the source has pairs.
+        The source has clips, from which two frames that far apart are taken; from a range (first, last) it is drawn.
+        None: the source has pairs.
     label_frame : int, default -1
-        The frame of a clip that the target belongs to; negative numbers count from its end. It is at the end of the pair, at least the largest
-        gap behind the clip's first frame.
+        The frame of a clip that the target belongs to; negative numbers count from its end. It is the end of the pair,
+        so at least the largest gap must lie between it and the clip's first frame.
     classes : sequence of str, or mapping of str to int, optional
-        As DetectionDataset's; labels are names then, and boxes of other classes are left out.
+        As of DetectionDataset; labels are names then, and boxes of other classes are left out.
     frame_augmentation : FrameAugmentation, optional
-        Reversed, a clip's pair is that of the target's frame and of one after it, so that the target stays at the end of time. A pair, and a clip
-        that does not go on so far, has its images exchanged: the target belongs to the start of time then. What is true of the whole
-        clip, such as its class, stays true, unless it is a direction ("opening a door"); boxes are where things were at that end.
+        A clip's reversed pair is the target's frame and one after it, so that the target stays at the end of time. A
+        pair, or a clip without such a frame, has its images exchanged: then the target belongs to the start of time.
+        Targets of a whole clip, such as its class, stay true unless they are a direction ("opening a door"); boxes are
+        where things were at that end.
     augmentation : EventAugmentation, optional
         Changes volume and boxes alike.
     seed : int, default 0
     cache_bytes : int, default 0
-        So many bytes of the volumes last used are kept, before `augmentation`. Another gap, gain, gamma, direction or generator is another volume:
-        what is drawn from a continuous range never comes again. Each worker has its own cache, which ends with it: between epochs it is of use
-        with persistent_workers=True, and an item must come to the same worker again.
+        How many bytes of the volumes last used are kept, before `augmentation`. Another gap, gain, gamma, direction or
+        generator is another volume: one drawn from a continuous range never comes again. Each worker has its own cache,
+        which ends with it: it is of use between epochs with persistent_workers=True, if an item comes to the same
+        worker again.
     length : int, optional
-        How many items there are, if `source` is a callable.
+        The number of items, if `source` is a callable.
 
     Raises
     ------
     ValueError
-        An image, a clip or a target is none; the index is named.
+        An image, a clip or a target is not valid; the message names the index.
     FileNotFoundError
         There is no such image.
 
     Examples
     --------
     >>> generator = eventgan.Generator("shipped:8", size=(256, 320), fit="letterbox")
-    >>> pairs = FramePairs(generator, [("0.png", "1.png", {"boxes": [[0, 0, 20, 40]], "labels": ["car"]})], classes=["car"])
+    >>> pairs = FramePairs(generator, [("0.png", "1.png", {"boxes": [[0, 0, 20, 40]], "labels": ["car"]})],
+    ...                    classes=["car"])
     >>> clips = FramePairs(generator, torchvision.datasets.UCF101("videos", "lists", frames_per_clip=7), gap=(1, 6))
     """
 
     def __init__(self, generator: Generator | Sequence[Generator], source: Sequence[Any] | Callable[[int], Any], *,
-                 gap: int | tuple[int, int] | None = None, label_frame: int = -1, classes: Sequence[str] | Mapping[str, int] | None = None,
-                 frame_augmentation: FrameAugmentation | None = None, augmentation: EventAugmentation | None = None, seed: int = 0,
-                 cache_bytes: int = 0, length: int | None = None) -> None:
+                 gap: int | tuple[int, int] | None = None, label_frame: int = -1,
+                 classes: Sequence[str] | Mapping[str, int] | None = None,
+                 frame_augmentation: FrameAugmentation | None = None, augmentation: EventAugmentation | None = None,
+                 seed: int = 0, cache_bytes: int = 0, length: int | None = None) -> None:
         self._generators = list(generator) if isinstance(generator, Sequence) else [generator]
         if len({each.bins for each in self._generators}) != 1:
-            raise ValueError(f"expected generators with one number of bins, got {[each.bins for each in self._generators]}")
+            raise ValueError("expected generators with one number of bins, got "
+                             f"{[each.bins for each in self._generators]}")
         self._source: Any = source
         if length is None and not hasattr(source, "__len__"):
             raise ValueError(f"expected a source with a length, or `length`, got {type(source).__name__} alone")
@@ -149,14 +152,14 @@ class FramePairs(Dataset):
         if not 0 <= seed < 2**64:
             raise ValueError(f"expected a seed from 0 to 2^64 - 1, got {seed}")
         self._label_frame, self._seed = label_frame, seed
-        self.classes = None if classes is None else _numbered(classes)
+        self.classes = None if classes is None else numbered(classes)
         self._frame_augmentation, self._augmentation = frame_augmentation or FrameAugmentation(), augmentation
         self._cache = _Cache(cache_bytes)
         self._epoch = torch.zeros((), dtype=torch.int64)
         self._share_epoch()
 
     def _share_epoch(self) -> None:
-        self._epoch.share_memory_()  # with persistent workers, which `set_epoch` would not reach otherwise
+        self._epoch.share_memory_()  # so that `set_epoch` reaches persistent workers
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
@@ -166,7 +169,7 @@ class FramePairs(Dataset):
         return self._length
 
     def set_epoch(self, epoch: int) -> None:
-        """What is drawn from now on is that of epoch `epoch` (>= 0), in workers that are running, too."""
+        """Draws for epoch `epoch` (>= 0) from now on, in running workers, too."""
         if epoch < 0:
             raise ValueError(f"expected an epoch of at least 0, got {epoch}")
         self._epoch.fill_(epoch)
@@ -178,11 +181,11 @@ class FramePairs(Dataset):
         gap, reverse, gain, gamma, generator = ((raw[:5] >> np.uint64(11)) * 2.0**-53).tolist()
         first, last = self._gaps or (1, 1)
         may = self._frame_augmentation
-        return Drawn(first + int(gap * (last - first + 1)), reverse < may.reverse, _between(may.gain, gain), _between(may.gamma, gamma),
-                     int(generator * len(self._generators)), int(raw[5] >> np.uint64(1)))
+        return Drawn(first + int(gap * (last - first + 1)), reverse < may.reverse, _between(may.gain, gain),
+                     _between(may.gamma, gamma), int(generator * len(self._generators)), int(raw[5] >> np.uint64(1)))
 
     def cache_info(self) -> CacheInfo:
-        """Of this process's cache, and since it began."""
+        """Of this process's cache, since it was made."""
         return self._cache.info()
 
     def __getitem__(self, index: int) -> Item | tuple[torch.Tensor, Any]:
@@ -192,8 +195,8 @@ class FramePairs(Dataset):
         volume = torch.from_numpy(made.volume)
         with _drawing_from(drawn.augmentation_seed):
             if made.boxes is None:
-                return _moved(volume, made.label_position, self._augmentation)[0], made.target
-            item = _detection_item(volume, *made.boxes, made.label_position, self._augmentation)
+                return moved(volume, made.label_position, self._augmentation)[0], made.target
+            item = detection_item(volume, *made.boxes, made.label_position, self._augmentation)
         return {**item, "id": str(made.target.get("id", index)), "index": index, "label_position": made.label_position}
 
     def _number(self, index: int) -> int:
@@ -211,7 +214,8 @@ class FramePairs(Dataset):
                 return _Made(generator(*images), target, None, label_position)
             boxes, labels, ignore = self._boxes(target)
             sample = generator.sample(*images, boxes=boxes, gap=drawn.gap)
-            return _Made(sample["volume"], target, (sample["boxes"]["xyxy"], sample["boxes"]["xyxy_unclipped"], labels, ignore), label_position)
+            return _Made(sample["volume"], target,
+                         (sample["boxes"]["xyxy"], sample["boxes"]["xyxy_unclipped"], labels, ignore), label_position)
         except FileNotFoundError as error:
             raise FileNotFoundError(f"{error}, in item {index}") from error
         except ValueError as error:
@@ -224,27 +228,32 @@ class FramePairs(Dataset):
                 raise ValueError(f"expected (previous, following, target), got {_what(item)} (`gap` is for clips)")
             previous, following, target = item
             return (following, previous, target, 0.0) if drawn.reversed else (previous, following, target, 1.0)
-        if not isinstance(item, (tuple, list)) or len(item) < 2 or not hasattr(item[0], "__len__") or isinstance(item[0], str):
+        is_clip = isinstance(item, (tuple, list)) and len(item) >= 2
+        if not is_clip or not hasattr(item[0], "__len__") or isinstance(item[0], str):
             raise ValueError(f"expected (frames, ..., target), got {_what(item)}")
         frames, target = item[0], item[-1]
         at = self._label_frame + (len(frames) if self._label_frame < 0 else 0)
         if not self._gaps[1] <= at < len(frames):
-            raise ValueError(f"expected a clip whose frame {self._label_frame} is at least {self._gaps[1]} behind the first, "
-                             f"got {len(frames)} frames")
+            raise ValueError(f"expected a clip whose frame {self._label_frame} is at least {self._gaps[1]} behind the "
+                             f"first, got {len(frames)} frames")
         before, after = at - drawn.gap, at + drawn.gap
         if not drawn.reversed:
             return frames[before], frames[at], target, 1.0
-        return (frames[after], frames[at], target, 1.0) if after < len(frames) else (frames[at], frames[before], target, 0.0)
+        if after < len(frames):
+            return frames[after], frames[at], target, 1.0
+        return frames[at], frames[before], target, 0.0
 
     def _boxes(self, target: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """[n, 4] float64, [n] int64 and [n] bool of those boxes that count: boxes, labels, ignore."""
+        """Boxes [n, 4], labels [n] and ignore [n] of the wanted classes."""
         boxes, labels = np.asarray(target["boxes"], float), np.asarray(target.get("labels", ()))
         if not boxes.size:
             boxes = boxes.reshape(0, 4)
         ignore = np.asarray(target.get("ignore", np.zeros(len(boxes), bool)), bool)
-        if boxes.shape != (*labels.shape, 4) or ignore.shape != labels.shape or labels.ndim != 1 or not np.isfinite(boxes).all():
+        shapes = boxes.shape, labels.shape, ignore.shape
+        if labels.ndim != 1 or shapes != ((len(labels), 4),
+                                          (len(labels),), (len(labels),)) or not np.isfinite(boxes).all():
             raise ValueError("expected boxes [n, 4] of finite numbers, labels [n] and ignore [n], "
-                             f"got {boxes.shape}, {labels.shape}, {ignore.shape}")
+                             f"got {', '.join(map(str, shapes))}")
         if self.classes is not None:
             names = labels.tolist()
             if not all(isinstance(name, str) for name in names):
@@ -262,12 +271,13 @@ class FramePairs(Dataset):
 class _Made(NamedTuple):
     volume: np.ndarray        # [2B, H, W]
     target: Any
-    boxes: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None  # [n, 4] in volume pixels, and before they were cut; labels; ignore
+    # [n, 4] in volume pixels, the same before clipping, labels, ignore
+    boxes: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None
     label_position: float
 
 
 class _Cache:
-    """What was last used, by the bytes of the volumes."""
+    """The volumes last used, up to a number of bytes."""
 
     def __init__(self, most_bytes: int) -> None:
         self._most = most_bytes
@@ -288,7 +298,7 @@ class _Cache:
         return CacheInfo(self._hits, self._misses, self._bytes)
 
     def get(self, key: Any, make: Callable[[], _Made]) -> _Made:
-        """What is kept under the key, or what `make` makes, with a volume of the caller's own."""
+        """What is kept for the key, else the result of `make`; its volume is a copy."""
         made = self._kept.get(key)
         if made is None:
             self._misses += 1
@@ -311,7 +321,7 @@ def _between(limits: tuple[float, float], share: float) -> float:
 
 @contextlib.contextmanager
 def _drawing_from(seed: int) -> Iterator[None]:
-    """PyTorch's random numbers begin with this seed, and go on afterwards as if nothing had been drawn."""
+    """Seeds PyTorch's random numbers, which afterwards go on as if nothing had been drawn."""
     with torch.random.fork_rng(devices=[]):
         torch.default_generator.manual_seed(seed)
         yield
@@ -325,7 +335,8 @@ def _image(image: Any) -> np.ndarray:
         image = np.asarray(image)
     except (TypeError, RuntimeError) as error:  # such as a tensor of a GPU
         raise ValueError(f"expected an image, got what NumPy does not take: {error}") from error
-    if image.dtype == object or image.ndim not in (2, 3) or image.ndim == 3 and not {image.shape[0], image.shape[2]} & {1, 3}:
+    has_channels = image.ndim == 3 and {image.shape[0], image.shape[2]} & {1, 3}
+    if image.dtype == object or image.ndim != 2 and not has_channels:
         raise ValueError(f"expected an image [H, W], [H, W, 3] or [3, H, W], or a file, got {_what(image)}")
     if image.ndim == 3 and image.shape[2] not in (1, 3):
         image = np.moveaxis(image, 0, 2)
@@ -336,28 +347,38 @@ def _read(path: str) -> np.ndarray:
     """The image of a file, upright, as `_image` has it."""
     if not os.path.isfile(path):
         raise FileNotFoundError(f"expected an image, got no such file, in {path}")
-    if cv2:
-        image = cv2.imread(path, cv2.IMREAD_ANYCOLOR)
-        if image is None:
-            raise ValueError(f"expected an image, got none, in {path}")
-        return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if image.ndim == 3 else image
+    try:
+        import cv2
+    except ImportError:
+        return _read_by_pillow(path)
+    image = cv2.imread(path, cv2.IMREAD_ANYCOLOR)
+    if image is None:
+        raise ValueError(f"expected an image, got none, in {path}")
+    return cv2.cvtColor(image, cv2.COLOR_BGR2RGB) if image.ndim == 3 else image
+
+
+def _read_by_pillow(path: str) -> np.ndarray:
+    import PIL.Image
+    import PIL.ImageOps
+
     try:
         with PIL.Image.open(path) as file:
             image = PIL.ImageOps.exif_transpose(file)
             if image.mode[0] in "IF":
                 raise ValueError(f"expected 8 bits a value, got {image.mode}, in {path}")
             return np.asarray(image.convert("L" if image.mode in ("1", "L", "LA") else "RGB"))
-    except (OSError, SyntaxError) as error:  # a PNG that is broken is a SyntaxError
+    except (OSError, SyntaxError) as error:  # a broken PNG raises SyntaxError
         raise ValueError(f"expected an image, got none ({error}), in {path}") from error
 
 
 def _exposed(image: np.ndarray, gain: float, gamma: float) -> np.ndarray:
-    """The image with values v, from 0 to 1, that have become gain x v^gamma."""
+    """The image with each value v, from 0 to 1, replaced by gain x v^gamma."""
     if gain == gamma == 1:
         return image
     if image.dtype == np.uint8:
         table = np.round(255 * np.minimum(gain * (np.arange(256) / 255) ** gamma, 1)).astype(np.uint8).tobytes()
-        return np.frombuffer(image.tobytes().translate(table), np.uint8).reshape(image.shape)  # three times as fast as table[image]
+        # 3x faster than table[image]
+        return np.frombuffer(image.tobytes().translate(table), np.uint8).reshape(image.shape)
     if image.dtype.kind != "f" or not ((image >= 0) & (image <= 1)).all():
         raise ValueError(f"expected an image of uint8 or of numbers from 0 to 1, got {_what(image)}")
     return np.minimum(gain * image**gamma, 1)

@@ -5,15 +5,14 @@ import json
 import os
 import pickle
 import subprocess
+import sys
 
 import numpy as np
 import pytest
-from conftest import SOURCE  # noqa: F401  (the path to the package)
 
 torch = pytest.importorskip("torch")
 from torch.utils.data import DataLoader, Subset  # noqa: E402
 
-from eventgan import frame_pairs  # noqa: E402
 from eventgan.torch import EventAugmentation, FrameAugmentation, FramePairs, collate_torchvision, collate_yolo  # noqa: E402
 
 
@@ -109,14 +108,13 @@ def test_images_with_channels_first_or_last(of):
 
 @pytest.mark.parametrize("reader", ["cv2", "PIL"])
 def test_files(tmp_path, monkeypatch, reader):
-    PIL = pytest.importorskip("PIL")
-    from PIL import Image, ImageOps  # noqa: F401
+    pytest.importorskip("PIL")
+    from PIL import Image
 
     if reader == "cv2":
         pytest.importorskip("cv2")
     else:
-        monkeypatch.setattr(frame_pairs, "cv2", None)
-        monkeypatch.setattr(frame_pairs, "PIL", PIL, raising=False)
+        monkeypatch.setitem(sys.modules, "cv2", None)
     colour = np.zeros((4, 5, 3), np.uint8)
     colour[1, 2] = 40, 20, 8  # red, green, blue: 40 + 10 + 2
     Image.fromarray(colour).save(tmp_path / "colour.png")
