@@ -3,14 +3,15 @@
     import eventgan
 
     generator = eventgan.Generator("shipped:8", precision="bfloat16")
-    volume = generator(previous, following)                 # float32 [2B, H, W], >= 0, of two images [H, W] or [H, W, 3]
-    events = eventgan.sample_events(volume, seed=0)         # structured array t, x, y, p
+    volume = generator(previous, following)               # float32 [2B, H, W], >= 0, of images [H, W] or [H, W, 3]
+    events = eventgan.sample_events(volume, seed=0)       # structured array t, x, y, p
 
-    for sample in eventgan.Shards("out", split="train"):    # what `eventgan convert` wrote: a folder, a shard, or a list of shards
+    for sample in eventgan.Shards("out", split="train"):  # a folder of `eventgan convert`, a shard, or a list of shards
         sample["volume"], sample["boxes"]["xyxy"], sample["persons"]["joints"]
 
-`eventgan.torch` has PyTorch's datasets, `eventgan.evaluate` scores what a network finds. Each name is loaded when it is first used: `Shards` needs
-h5py, `Generator` the compiled module, `show` matplotlib. manifests/guides/python.md shows all of it at work.
+`eventgan.torch` has PyTorch's datasets, `eventgan.evaluate` scores what a network finds. Each name is loaded when it is
+first used: `Shards` needs h5py, `Generator` the compiled module, `show` matplotlib. manifests/guides/python.md shows
+all of it at work.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ if TYPE_CHECKING:
 
 _MODULE_OF = {
     "Generator": "generator", "sample_events": "generator",
-    "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards", "read_description": "shards",
-    "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
+    "FIELDS": "shards", "InvalidSample": "shards", "Sample": "shards", "Shards": "shards", "open_shard": "shards",
+    "read_description": "shards", "ProgramError": "program", "convert": "program", "init": "program", "open": "program",
     "show": "plotting", "signed_channel": "representations",
 }
 _MODULES = ("evaluate", "reconstruction", "shards", "torch")

@@ -1,7 +1,7 @@
-"""Scores of boxes that were found, on arrays: PASCAL VOC's matching and average precision, COCO's, and KITTI's.
+"""Scores of detected boxes, on arrays: the matching and average precision of PASCAL VOC, of COCO and of KITTI.
 
-What is not defined (a recall where nothing is to be found, a precision where nothing was found) is NaN. An average precision is 0 if all is
-missed, NaN if there is nothing to find.
+What is not defined (a recall with nothing to find, a precision with nothing found) is NaN. An average precision is 0 if
+every box is missed, NaN if there is none to find.
 """
 
 from __future__ import annotations
@@ -15,129 +15,69 @@ import numpy as np
 from .shards import Shards
 
 DONT_CARE = "DontCare"
-BLOCK = 1_000_000  # pairs of boxes that are compared at once
+BLOCK = 1_000_000  # pairs of boxes compared at once
 COCO_IOUS = np.linspace(0.5, 0.95, 10)
 COCO_MOST = 100  # predictions of a class in a sample that COCO counts
-KITTI_CLASSES = {"Car": (0.7, "Van"), "Pedestrian": (0.5, "Person_sitting"), "Cyclist": (0.5, "")}  # least IoU, class that is ignored
+# least IoU, class that is ignored
+KITTI_CLASSES = {"Car": (0.7, "Van"), "Pedestrian": (0.5, "Person_sitting"), "Cyclist": (0.5, "")}
 KITTI_LEVELS = {"easy": 40, "moderate": 25, "hard": 25}  # least height in source pixels
 KITTI_POINTS = 41
 
 
 class Detections(NamedTuple):
-    """Boxes that were found: n rows, the highest score first, equal ones as they were given. Make it by `of`.
+    """Boxes that were found: n rows, the highest score first, equal scores in the order given. Made by `of`."""
 
-    Attributes
-    ----------
-    image : numpy.ndarray, int [n]
-        Which image.
-    label : numpy.ndarray, int [n]
-        Which class.
-    xyxy : numpy.ndarray, float [n, 4]
-        Left, top, right, bottom in pixels, by edges.
-    score : numpy.ndarray, float [n]
-    """
-
-    image: np.ndarray
-    label: np.ndarray
-    xyxy: np.ndarray
-    score: np.ndarray
+    image: np.ndarray  # int [n]: its number
+    label: np.ndarray  # int [n]: the number of the class
+    xyxy: np.ndarray   # float [n, 4]: left, top, right, bottom in pixels, by edges
+    score: np.ndarray  # float [n]
 
     @staticmethod
-    def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]], score: Iterable[float]) -> Detections:
-        """Detections of rows in any order.
-
-        Parameters
-        ----------
-        image, label : iterable of int, [n]
-        xyxy : iterable, [n, 4]
-            Left, top, right, bottom in pixels, by edges.
-        score : iterable of float, [n]
-
-        Returns
-        -------
-        Detections
-        """
+    def of(image: Iterable[int], label: Iterable[int], xyxy: Iterable[Iterable[float]],
+           score: Iterable[float]) -> Detections:
+        """Detections of rows in any order: image [n], label [n], xyxy [n, 4], score [n]."""
         score = np.asarray(score, float)
         order = np.argsort(-score, kind="stable")
-        return Detections(np.asarray(image, int)[order], np.asarray(label, int)[order], np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
+        return Detections(np.asarray(image, int)[order], np.asarray(label, int)[order],
+                          np.asarray(xyxy, float).reshape(-1, 4)[order], score[order])
 
     def rows(self, chosen: np.ndarray) -> Detections:
-        """Those `chosen`, bool [n] or rows that keep the order.
-
-        Parameters
-        ----------
-        chosen : numpy.ndarray
-
-        Returns
-        -------
-        Detections
-        """
+        """The `chosen` ones: bool [n], or rows in ascending order."""
         return Detections(*(column[chosen] for column in self))
 
 
 class GroundTruth(NamedTuple):
-    """Boxes that are there: m rows.
+    """Labelled boxes: m rows."""
 
-    Attributes
-    ----------
-    image : numpy.ndarray, int [m]
-    label : numpy.ndarray, int [m]
-        -1 for DontCare, which is of no class.
-    xyxy : numpy.ndarray, float [m, 4]
-        Left, top, right, bottom in pixels, by edges.
-    ignore : numpy.ndarray, bool [m]
-        What is found there, of this class (-1: of any), neither helps nor hurts.
-    difficulty : numpy.ndarray, int [m]
-        0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 not known or none of them.
-    """
-
-    image: np.ndarray
-    label: np.ndarray
-    xyxy: np.ndarray
-    ignore: np.ndarray
-    difficulty: np.ndarray
+    image: np.ndarray       # int [m]
+    label: np.ndarray       # int [m]; -1: DontCare, which stands for every class
+    xyxy: np.ndarray        # float [m, 4]: left, top, right, bottom in pixels, by edges
+    ignore: np.ndarray      # bool [m]: detections of this class (-1: any) in it are neither right nor wrong
+    difficulty: np.ndarray  # int [m]: 0 easy, 1 and 2 hard (KITTI's moderate and hard), -1 unknown or none of them
 
 
 class Overlaps(NamedTuple):
-    """Pairs of boxes of one image that overlap.
+    """Pairs of overlapping boxes of one image."""
 
-    Attributes
-    ----------
-    first, second : numpy.ndarray, int [k]
-        Rows of the first and of the second list.
-    iou, share : numpy.ndarray, float [k]
-        The intersection as a share of the union, and as one of the first box.
-    """
-
-    first: np.ndarray
-    second: np.ndarray
-    iou: np.ndarray
-    share: np.ndarray
+    first: np.ndarray   # int [k]: row of the first list
+    second: np.ndarray  # int [k]: row of the second list
+    iou: np.ndarray     # float [k]
+    share: np.ndarray   # float [k]: the intersection as a share of the first box
 
 
-def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray, iou: float = 0.0) -> Overlaps:
-    """All pairs of a box of the first list with one of the second whose IoU is at least `iou`, in order of the first and then the second.
+def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, other_xyxy: np.ndarray,
+                iou: float = 0.0) -> Overlaps:
+    """All pairs of a box [n, 4] and another one [m, 4] of the same image whose IoU is at least `iou`, by the first,
+    then the second.
 
-    Boxes are compared with those alone that lie beside them: of the same image, their left edges near enough.
-
-    Parameters
-    ----------
-    image : numpy.ndarray, int [n]
-    xyxy : numpy.ndarray, float [n, 4]
-    other_image : numpy.ndarray, int [m]
-    other_xyxy : numpy.ndarray, float [m, 4]
-    iou : float, default 0
-
-    Returns
-    -------
-    Overlaps
+    Only boxes that are close in x are compared.
     """
     lefts, widths = np.sort(other_xyxy[:, 0]), xyxy[:, 2] - xyxy[:, 0]
     widest = (other_xyxy[:, 2] - other_xyxy[:, 0]).max(initial=0)
-    reach = np.minimum(widths / iou, widest) if iou else widest  # none that is wider has that IoU
+    reach = np.minimum(widths / iou, widest) if iou else widest  # a wider box cannot have that IoU
 
     def place(images: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """int: by image, then by x: where it comes among the left edges."""
+        """Orders by image, then by where x comes among the left edges."""
         return images * (len(lefts) + 1) + np.searchsorted(lefts, x)
 
     places = place(other_image, other_xyxy[:, 0])
@@ -146,7 +86,8 @@ def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, ot
     counts = np.maximum(end - begin, 0)
     areas, other_areas = (np.prod(boxes[:, 2:] - boxes[:, :2], axis=1) for boxes in (xyxy, other_xyxy))
     parts = []
-    for rows in np.split(np.arange(len(image)), np.searchsorted(np.cumsum(counts), np.arange(BLOCK, counts.sum(), BLOCK))):
+    for rows in np.split(np.arange(len(image)),
+                         np.searchsorted(np.cumsum(counts), np.arange(BLOCK, counts.sum(), BLOCK))):
         of_row = counts[rows]
         i = np.repeat(rows, of_row)
         j = order[np.arange(len(i)) + np.repeat(begin[rows] - (np.cumsum(of_row) - of_row), of_row)]
@@ -161,17 +102,7 @@ def overlapping(image: np.ndarray, xyxy: np.ndarray, other_image: np.ndarray, ot
 
 
 def turns(group: np.ndarray) -> np.ndarray:
-    """How many rows before have the same group.
-
-    Parameters
-    ----------
-    group : numpy.ndarray, int [n]
-
-    Returns
-    -------
-    numpy.ndarray
-        int [n].
-    """
+    """int [n]: how many rows before each have the same group, [n]."""
     order = np.argsort(group, kind="stable")
     turn = np.empty(len(group), int)
     turn[order] = np.arange(len(group)) - np.searchsorted(group[order], group[order])
@@ -179,34 +110,15 @@ def turns(group: np.ndarray) -> np.ndarray:
 
 
 def rounds(turn: np.ndarray) -> list[np.ndarray]:
-    """Rows of equal turn, the lowest first; equal ones stay in order.
-
-    Parameters
-    ----------
-    turn : numpy.ndarray, int [k]
-
-    Returns
-    -------
-    list of numpy.ndarray
-        int, rows.
-    """
+    """The rows of each turn, lowest turn first; within a turn in order."""
     order = np.argsort(turn, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(turn[order])) + 1)
 
 
 def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
-    """What non-maximum suppression leaves: from the highest score on, a box that is left removes those of its class whose IoU with it is
-    above `iou`.
+    """bool [n]: what non-maximum suppression leaves.
 
-    Parameters
-    ----------
-    found : Detections
-    iou : float
-
-    Returns
-    -------
-    numpy.ndarray
-        bool [n].
+    From the highest score on, a box that is left removes those of its class whose IoU with it is above `iou`.
     """
     left = np.ones(len(found.score), bool)
     for rows in rounds(_group(found)):
@@ -214,7 +126,7 @@ def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
         sides, areas, is_left = high - low, np.prod(high - low, axis=1), np.ones(len(rows), bool)
         order = np.argsort(low[:, 0])
         widest = sides[:, 0].max(initial=0)
-        reach = np.minimum(sides[:, 0] / iou, widest) if iou else widest  # none that is wider has that IoU
+        reach = np.minimum(sides[:, 0] / iou, widest) if iou else widest  # a wider box cannot have that IoU
         begin, end = (np.searchsorted(low[order, 0], x) for x in (low[:, 0] - reach, high[:, 0]))
         for i in range(len(rows)):
             if is_left[i]:
@@ -227,22 +139,10 @@ def non_maximum_suppression(found: Detections, iou: float) -> np.ndarray:
 
 
 def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: np.ndarray, others: int) -> np.ndarray:
-    """Which of the `others` each of n rows gets in T trials.
+    """int [n, T]: which of the `others` each of n rows gets in T trials, -1 for none.
 
-    Rows choose in their `turn`, those of one image one after the other; each takes, of the pairs (first, second) in their order, the first that
-    is `allowed` and whose second is still free. Pairs are never of two images.
-
-    Parameters
-    ----------
-    first, second : numpy.ndarray, int [k]
-    allowed : numpy.ndarray, bool [k, T]
-    turn : numpy.ndarray, int [n]
-    others : int
-
-    Returns
-    -------
-    numpy.ndarray
-        int [n, T], -1 for none.
+    Rows choose in the order of `turn` [n], those of one image one after the other; each takes the first of the pairs
+    (`first`, `second`) [k] that is `allowed` [k, T] and whose second is still free. A pair is always of one image.
     """
     trials = allowed.shape[1]
     choice, free = np.full((len(turn), trials), -1), np.ones((others, trials), bool)
@@ -260,11 +160,11 @@ def assigned(first: np.ndarray, second: np.ndarray, allowed: np.ndarray, turn: n
 
 
 def match_as_voc(found: Detections, truth: GroundTruth, iou: float = 0.5) -> tuple[np.ndarray, np.ndarray]:
-    """Matches as PASCAL VOC's development kit does.
+    """Matches as the development kit of PASCAL VOC does.
 
-    A detection matches the true box of its class with which its IoU is greatest, if that is at least `iou` and no box of a higher score has
-    it; a second one on the same is wrong. What matches none and lies with a share of at least `iou` of its area in a box to be ignored, of
-    its class or of none, does not count.
+    A detection matches the true box of its class with the greatest IoU, if that is at least `iou` and no detection with
+    a higher score has matched it; a second one on the same box is wrong. A detection without a match does not count if
+    at least `iou` of its area lies in an ignored box of its class or of DontCare.
 
     Parameters
     ----------
@@ -290,10 +190,11 @@ def match_as_voc(found: Detections, truth: GroundTruth, iou: float = 0.5) -> tup
 
 
 def match_as_coco(found: Detections, truth: GroundTruth) -> tuple[np.ndarray, np.ndarray]:
-    """Matches at each of COCO's IoUs, as pycocotools' evaluateImg does.
+    """Matches at each of COCO's IoUs, as evaluateImg of pycocotools does.
 
-    From the highest score on, each takes the true box of its class with the greatest IoU of those that are free; boxes to be ignored are
-    crowds, of their class, or of all if they are of none. Beyond the 100 best of a class and sample none counts.
+    From the highest score on, each detection takes the true box of its class with the greatest IoU among those that are
+    free. Ignored boxes are crowds of their class; DontCare is a crowd of all classes. Of a class only the 100 best
+    detections in a sample count.
 
     Parameters
     ----------
@@ -327,7 +228,7 @@ def _same_class(found: Detections, truth: GroundTruth, pairs: Overlaps) -> np.nd
 
 
 def _ignored_share(found: Detections, truth: GroundTruth) -> np.ndarray:
-    """[n]: the greatest share of each found box that lies in one box to be ignored, of its class or of none."""
+    """[n]: the largest share of each found box that lies in a single ignored box, of its class or of DontCare."""
     share = np.zeros(len(found.score))
     ignored = np.flatnonzero(truth.ignore)
     pairs = overlapping(found.image, found.xyxy, truth.image[ignored], truth.xyxy[ignored])
@@ -338,38 +239,17 @@ def _ignored_share(found: Detections, truth: GroundTruth) -> np.ndarray:
 
 
 def curve(right: np.ndarray, truths: float) -> tuple[np.ndarray, np.ndarray]:
-    """Recall and precision after each found box.
-
-    Parameters
-    ----------
-    right : numpy.ndarray, bool [n]
-        Which found boxes are right, in the order of their scores.
-    truths : int
-        Boxes to be found.
-
-    Returns
-    -------
-    recall, precision : numpy.ndarray
-        float [n].
-    """
+    """Recall and precision [n] after each found box; `right` [n] is in the order of the scores,
+    `truths` counts the boxes to find."""
     hits = np.cumsum(right)
     return hits / max(truths, 1), hits / np.arange(1, len(hits) + 1)
 
 
 def average_precisions(right: np.ndarray, truths: float) -> dict[str, float]:
-    """The area under the curve in three ways, from the highest precision at each recall or above.
+    """The area under the precision-recall curve in three ways, each with the highest precision at that recall or above.
 
-    Parameters
-    ----------
-    right, truths
-        As of `curve`.
-
-    Returns
-    -------
-    dict
-        ap_voc : the whole area (PASCAL VOC from 2010 on)
-        ap_voc_11 : mean at the recalls 0, 0.1, ... 1 (PASCAL VOC 2007)
-        ap_coco_101 : mean at the recalls 0, 0.01, ... 1 (COCO)
+    ap_voc is the whole area (PASCAL VOC from 2010 on), ap_voc_11 the mean at the recalls 0, 0.1, ... 1 (PASCAL VOC
+    2007), ap_coco_101 that at 0, 0.01, ... 1 (COCO).
     """
     if not truths:
         return dict.fromkeys(("ap_voc", "ap_voc_11", "ap_coco_101"), math.nan)
@@ -387,8 +267,8 @@ def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str
                      sure: np.ndarray | None = None) -> dict[str, dict[str, float]]:
     """Scores of each class, and of "all".
 
-    "all" counts all classes together, and has the mean of the classes' average precisions, without those that have no box to find. Found
-    boxes of other classes are left out, and so are true ones, unless they are to be ignored.
+    "all" counts the boxes of all classes together and averages the average precisions of those classes that have a box
+    to find. Found boxes of other classes are left out, and so are true ones unless they are ignored.
 
     Parameters
     ----------
@@ -399,16 +279,18 @@ def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str
     iou : float, default 0.5
         Of VOC's matching.
     sure : numpy.ndarray, bool [n], optional
-        Which predictions precision, recall and F1 are of. None: all.
+        The predictions that precision, recall and F1 are computed from. None: all.
 
     Returns
     -------
     dict of dict
-        truths, easy, hard : how many boxes count, and how many of these have difficulty 0, and 1 or 2
-        found, right : how many of the predictions that are `sure` count, and how many of these are right (`match_as_voc`)
-        precision, recall, f1 : of all these predictions; recall_easy, recall_hard: shares of those true boxes
-        ap_voc, ap_voc_11, ap_coco_101 : of all predictions, sure or not: see `average_precisions`, all with VOC's matching at `iou`
-        ap_coco : of all, too, COCO's AP@[.5:.95]: 101 points and its own matching, mean of ten IoUs
+        truths, easy, hard : how many boxes count, how many of these have difficulty 0, and how many have 1 or 2
+        found, right : how many of the predictions that are `sure` count, and how many of these are right
+            (`match_as_voc`)
+        precision, recall, f1 : of these predictions; recall_easy, recall_hard: the recall of those true boxes
+        ap_voc, ap_voc_11, ap_coco_101 : of all predictions, sure or not: see `average_precisions`, all with VOC's
+            matching at `iou`
+        ap_coco : also of all: COCO's AP@[.5:.95], from 101 points and its own matching, the mean of ten IoUs
     """
     ours = np.isin(found.label, list(classes.values()))
     chosen, found = found.rows(ours if sure is None else ours & sure), found.rows(ours)
@@ -424,26 +306,32 @@ def detection_scores(found: Detections, truth: GroundTruth, classes: Mapping[str
         easy, hard = there & (truth.difficulty == 0), there & (truth.difficulty > 0)
         right = np.count_nonzero(right_one[mine] >= 0)
         truths, all_found = np.count_nonzero(there), np.count_nonzero(mine)
-        return {"truths": truths, "easy": np.count_nonzero(easy), "hard": np.count_nonzero(hard), "found": all_found, "right": right,
-                "precision": ratio(right, all_found), "recall_easy": ratio(met[easy].sum(), easy.sum()),
-                "recall_hard": ratio(met[hard].sum(), hard.sum()), "recall": ratio(right, truths), "f1": ratio(2 * right, truths + all_found)}
+        return {"truths": truths, "easy": np.count_nonzero(easy), "hard": np.count_nonzero(hard), "found": all_found,
+                "right": right, "precision": ratio(right, all_found), "recall_easy": ratio(met[easy].sum(), easy.sum()),
+                "recall_hard": ratio(met[hard].sum(), hard.sum()), "recall": ratio(right, truths),
+                "f1": ratio(2 * right, truths + all_found)}
 
     scores = {}
     for name, label in classes.items():
         own = sums([label])
         mine = found.label == label
-        coco = [average_precisions(coco_right[kept, i], own["truths"])["ap_coco_101"] for i, kept in enumerate((coco_counts & mine[:, None]).T)]
-        scores[name] = {**own, **average_precisions(voc_right[mine & voc_counts] >= 0, own["truths"]), "ap_coco": float(np.mean(coco))}
-    means = {key: mean([each[key] for each in scores.values()]) for key in ("ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco")}
+        coco = [average_precisions(coco_right[kept, i], own["truths"])["ap_coco_101"]
+                for i, kept in enumerate((coco_counts & mine[:, None]).T)]
+        scores[name] = {**own, **average_precisions(voc_right[mine & voc_counts] >= 0, own["truths"]),
+                        "ap_coco": float(np.mean(coco))}
+    means = {key: mean([each[key] for each in scores.values()])
+             for key in ("ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco")}
     return {**scores, "all": {**sums(list(classes.values())), **means}}
 
 
-def kitti_average_precision(found: Detections, truth: GroundTruth, classes: Mapping[str, int], name: str, level: str, height: np.ndarray) -> float:
-    """KITTI's average precision, of 40 recalls, of a class at a level, as its development kit (evaluate_object.cpp) counts it.
+def kitti_average_precision(found: Detections, truth: GroundTruth, classes: Mapping[str, int], name: str, level: str,
+                            height: np.ndarray) -> float:
+    """KITTI's average precision (40 recalls) of a class at a level, counted as in its development kit
+    (evaluate_object.cpp).
 
-    IoU is above 0.7 for cars and 0.5 for pedestrians and cyclists; boxes beyond the level, and vans and sitting persons, are ignored; found
-    boxes lower than the level's least height never count (of whatever class, they may take a true box); those that lie in DontCare do
-    not, either.
+    The least IoU is 0.7 for cars, 0.5 for pedestrians and cyclists. Boxes beyond the level, vans and sitting persons
+    are ignored. Found boxes lower than the level's least height never count, although one of any class may take a true
+    box; neither do those inside DontCare.
 
     Parameters
     ----------
@@ -476,7 +364,8 @@ def kitti_average_precision(found: Detections, truth: GroundTruth, classes: Mapp
     turn = turns(truth.image)
 
     # Each true box takes the highest score: these scores, at 41 recalls, are the thresholds.
-    choice = assigned(pairs.first, pairs.second, np.ones((len(pairs.first), 1), bool), turn, len(found.score))[counted, 0]
+    every = np.ones((len(pairs.first), 1), bool)
+    choice = assigned(pairs.first, pairs.second, every, turn, len(found.score))[counted, 0]
     choice = choice[choice >= 0]
     thresholds = _kitti_thresholds(found.score[choice[~small[choice]]], np.count_nonzero(counted))
 
@@ -510,19 +399,7 @@ def _kitti_thresholds(scores: np.ndarray, truths: int) -> np.ndarray:
 
 
 def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> GroundTruth:
-    """The boxes of all samples.
-
-    Parameters
-    ----------
-    shards : Shards
-    numbers : mapping of str to int
-        The label of each class, by name.
-
-    Returns
-    -------
-    GroundTruth
-        `image` is the sample's index, `label` the class's number.
-    """
+    """The boxes of all samples: `image` is the sample's index, `label` the number of its class in `numbers`."""
     numbers = {**numbers, DONT_CARE: -1}
     nothing = np.empty(0, int)
     parts = [(nothing, nothing, np.empty((0, 4)), nothing.astype(bool), nothing)]
@@ -530,35 +407,18 @@ def read_boxes(shards: Shards, numbers: Mapping[str, int]) -> GroundTruth:
         boxes = shards.sample(i, {"boxes"})["boxes"]
         labels = np.array([numbers[name] for name in shards.class_names(i)], int)[boxes["class_id"]]
         unknown = np.full(len(labels), -1)
-        parts.append((np.full(len(labels), i), labels, boxes["xyxy"], boxes["ignore"] != 0, boxes.get("difficulty", unknown)))
+        parts.append((np.full(len(labels), i), labels, boxes["xyxy"], boxes["ignore"] != 0,
+                      boxes.get("difficulty", unknown)))
     return GroundTruth(*map(np.concatenate, zip(*parts)))
 
 
 def ratio(part: float, whole: float) -> float:
-    """NaN if the whole is 0.
-
-    Parameters
-    ----------
-    part, whole : float
-
-    Returns
-    -------
-    float
-    """
+    """part / whole; NaN if the whole is 0."""
     return float(part / whole) if whole else math.nan
 
 
 def mean(values: Sequence[float]) -> float:
-    """Of what is not NaN; NaN if all is.
-
-    Parameters
-    ----------
-    values : sequence of float
-
-    Returns
-    -------
-    float
-    """
+    """The mean of those values that are not NaN; NaN if there are none."""
     known = np.asarray(values, float)
     known = known[~np.isnan(known)]
     return float(known.mean()) if len(known) else math.nan

@@ -1,4 +1,5 @@
-"""Images of volumes with what is there and what was found, as the EventGAN paper draws them, and of precision over recall. Needs OpenCV."""
+"""Drawings of volumes with true and found labels, as in the EventGAN paper, and of precision over recall.
+Needs OpenCV."""
 
 from __future__ import annotations
 
@@ -14,59 +15,32 @@ FAR = 1e6  # pixels: what lies farther out is drawn there
 
 
 def of_events(volume: np.ndarray) -> np.ndarray:
-    """Grey where events are, on white.
-
-    Parameters
-    ----------
-    volume : numpy.ndarray, float [2B, H, W]
-
-    Returns
-    -------
-    numpy.ndarray
-        uint8 [ZOOM H, ZOOM W, 3], blue, green, red.
-    """
+    """uint8 [ZOOM H, ZOOM W, 3] BGR: a volume [2B, H, W] as grey on white."""
     events = volume.sum(0)
     top = np.percentile(events[events > 0], 98) if (events > 0).any() else 1
     canvas = (255 - 175 * np.clip(events / top, 0, 1)).astype(np.uint8)
     return cv2.cvtColor(cv2.resize(canvas, None, fx=ZOOM, fy=ZOOM, interpolation=cv2.INTER_NEAREST), cv2.COLOR_GRAY2BGR)
 
 
-def draw_boxes(canvas: np.ndarray, boxes: Iterable[Sequence[float]] | np.ndarray, colour: tuple[int, int, int], texts: Iterable[str] = ()) -> None:
-    """Draws boxes onto `of_events`.
-
-    Parameters
-    ----------
-    canvas : numpy.ndarray, uint8 [ZOOM H, ZOOM W, 3]
-    boxes : iterable, [n, 4]
-        Left, top, right, bottom in volume pixels, by edges.
-    colour : (int, int, int)
-        Blue, green, red.
-    texts : iterable of str
-        What stands above each.
-    """
+def draw_boxes(canvas: np.ndarray, boxes: Iterable[Sequence[float]] | np.ndarray, colour: tuple[int, int, int],
+               texts: Iterable[str] = ()) -> None:
+    """Draws boxes [n, 4] (left, top, right, bottom in volume pixels, by edges) onto `of_events`,
+    each with its text above."""
     texts = iter(texts)
     for box in boxes:
         left, top, right, bottom = (round(ZOOM * float(edge)) for edge in np.clip(box, -FAR, FAR))
         cv2.rectangle(canvas, (left, top), (right - 1, bottom - 1), colour, 1)
-        cv2.putText(canvas, next(texts, ""), (left, max(top - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1, cv2.LINE_AA)
+        cv2.putText(canvas, next(texts, ""), (left, max(top - 3, 9)), cv2.FONT_HERSHEY_SIMPLEX, 0.35, colour, 1,
+                    cv2.LINE_AA)
 
 
-def draw_joints(canvas: np.ndarray, joints: np.ndarray, colour: tuple[int, int, int], true: np.ndarray | None = None) -> None:
-    """Draws joints onto `of_events`. What is NaN is left out.
-
-    Parameters
-    ----------
-    canvas : numpy.ndarray, uint8 [ZOOM H, ZOOM W, 3]
-    joints : numpy.ndarray, [J, 2]
-        x, y in volume pixels.
-    colour : (int, int, int)
-        Blue, green, red.
-    true : numpy.ndarray, [J, 2], optional
-        The true joints, to which lines lead.
-    """
+def draw_joints(canvas: np.ndarray, joints: np.ndarray, colour: tuple[int, int, int],
+                true: np.ndarray | None = None) -> None:
+    """Draws joints [J, 2] in volume pixels onto `of_events`, with lines to the `true` ones [J, 2]; NaN is left out."""
     for i, joint in enumerate(joints):
         ends = [joint] if true is None else [joint, true[i]]
-        ends = [tuple(int(x) for x in np.round(ZOOM * (np.clip(end, -FAR, FAR) + 0.5) - 0.5)) for end in ends if np.isfinite(end).all()]
+        ends = [tuple(int(x) for x in np.round(ZOOM * (np.clip(end, -FAR, FAR) + 0.5) - 0.5)) for end in ends
+                if np.isfinite(end).all()]
         if len(ends) == 2:
             cv2.line(canvas, *ends, colour, 1, cv2.LINE_AA)
         if np.isfinite(joint).all():
@@ -74,18 +48,7 @@ def draw_joints(canvas: np.ndarray, joints: np.ndarray, colour: tuple[int, int, 
 
 
 def of_precision(curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Precision over recall as lines in a square from 0 to 1.
-
-    Parameters
-    ----------
-    curves : mapping of str to (numpy.ndarray, numpy.ndarray)
-        By name recall and precision [n].
-
-    Returns
-    -------
-    numpy.ndarray
-        uint8 [440, 440, 3], blue, green, red.
-    """
+    """uint8 [440, 440, 3] BGR: precision over recall (each [n], by name) as lines in a square from 0 to 1."""
     canvas = np.full((440, 440, 3), 255, np.uint8)
     colours = [FOUND, TRUE, IGNORED, (200, 160, 0), (180, 0, 160), (0, 150, 230), BLACK]
 
@@ -108,20 +71,7 @@ def of_precision(curves: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> np.ndar
 
 
 def write(folder: str | pathlib.Path, name: str, canvas: np.ndarray) -> None:
-    """Writes an image as FOLDER/NAME.png.
-
-    Parameters
-    ----------
-    folder : str or path
-    name : str
-    canvas : numpy.ndarray, uint8 [H, W, 3]
-        Blue, green, red.
-
-    Raises
-    ------
-    OSError
-        It cannot be written.
-    """
+    """Writes a BGR image as FOLDER/NAME.png. Raises OSError if it cannot be written."""
     path = pathlib.Path(folder, name.replace("/", "_") + ".png")
     path.parent.mkdir(parents=True, exist_ok=True)
     if not cv2.imwrite(str(path), canvas):

@@ -1,19 +1,20 @@
-"""Scores of what a network finds in shards: boxes as PASCAL VOC, COCO and KITTI count them, joints as the EventGAN paper and MPII do.
+"""Scores a network's predictions on shards: boxes as PASCAL VOC, COCO and KITTI do, joints as the EventGAN paper and
+MPII do.
 
     python3 -m eventgan.evaluate detections found.json --truth out --split val
     python3 -m eventgan.evaluate poses found.json --truth out --split val --dataset mpii --images images
 
-The predictions are a list in JSON:
+The predictions are a JSON list of
 
-    detections   {"image_id": "000001", "category_id": "Car", "bbox": [left, top, width, height], "score": 0.9}, as COCO's results
+    detections   {"image_id": "000001", "category_id": "Car", "bbox": [left, top, width, height], "score": 0.9}
     poses        {"image_id": "000001", "person": 0, "joints": [[x, y], ...]}
 
-image_id is a sample's id, or its place in the split, from 1 on; category_id a class's name, or its place among the sources' classes without
-DontCare, from 1 on: the numbers of `eventgan export --to coco`. Boxes and joints are in volume pixels, boxes by edges, joints by centres
-(shard_format.md, Geometry). `person` is the row in the sample, to be left out where there is only one; joints come in the order of
-Shards.default_joints().
+the first as in COCO's results. image_id is a sample's id, or its place in the split from 1 on; category_id is a class's
+name, or its place among the sources' classes without DontCare from 1 on: the numbers of `eventgan export --to coco`.
+Boxes and joints are in volume pixels, boxes by edges, joints by pixel centres (shard_format.md, Geometry). `person` is
+the row in the sample and may be left out where there is only one; joints come in the order of Shards.default_joints().
 
-detection_scores.py and pose_scores.py say what each number is. One that is not defined is null in JSON and "-" in a table.
+detection_scores.py and pose_scores.py define the numbers. One that is not defined is null in JSON and "-" in a table.
 """
 
 from __future__ import annotations
@@ -30,35 +31,18 @@ from typing import Any
 
 import numpy as np
 
-from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, curve, detection_scores, kitti_average_precision, match_as_voc,
-                               non_maximum_suppression, read_boxes)
+from .detection_scores import (DONT_CARE, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, curve, detection_scores,
+                               kitti_average_precision, match_as_voc, non_maximum_suppression, read_boxes)
 from .pose_scores import Persons, pose_scores, read_persons
 from .shards import PathLike, Shards, open_shard
 
-IMAGES = 12  # samples that are drawn
-PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall", "recall": "combined recall", "ap_voc": "AP",
-                 "f1": "F1"}  # of the EventGAN paper's Table 1
+IMAGES = 12  # samples to draw
+PAPER_COLUMNS = {"precision": "precision", "recall_easy": "easy recall", "recall_hard": "hard recall",
+                 "recall": "combined recall", "ap_voc": "AP", "f1": "F1"}  # of the EventGAN paper's Table 1
 
 
 def read_predictions(path: PathLike, keys: Sequence[str]) -> list[dict[str, Any]]:
-    """A file's list of predictions.
-
-    Parameters
-    ----------
-    path : str or path
-        Of a JSON file.
-    keys : sequence of str
-        What every entry has.
-
-    Returns
-    -------
-    list of dict
-
-    Raises
-    ------
-    ValueError
-        It is no list of objects with these keys.
-    """
+    """A JSON file's list of predictions, each an object with these keys; anything else is a ValueError."""
     try:
         entries = json.loads(pathlib.Path(path).read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
@@ -89,31 +73,14 @@ def _is_whole(value: Any) -> bool:
 
 def _are_numbers(value: Any, shape: tuple[int, ...]) -> bool:
     if shape:
-        return isinstance(value, list) and len(value) == shape[0] and all(_are_numbers(each, shape[1:]) for each in value)
+        return (isinstance(value, list) and len(value) == shape[0]
+                and all(_are_numbers(each, shape[1:]) for each in value))
     return _is_whole(value) or isinstance(value, float)
 
 
 def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int, ...], path: PathLike) -> np.ndarray:
-    """The finite numbers that each entry has under a key.
-
-    Parameters
-    ----------
-    entries : sequence of dict
-    key : str
-    shape : tuple of int
-    path : str or path
-        Where they come from, for the error.
-
-    Returns
-    -------
-    numpy.ndarray
-        float [n, *shape].
-
-    Raises
-    ------
-    ValueError
-        An entry has others.
-    """
+    """float [n, *shape]: the finite numbers that each entry has under a key;
+    anything else is a ValueError that names `path`."""
     values = np.empty((len(entries), *shape))
     for number, entry in enumerate(entries):
         try:
@@ -122,12 +89,13 @@ def numbers_of(entries: Sequence[Mapping[str, Any]], key: str, shape: tuple[int,
             values[number] = np.inf
         if not np.isfinite(values[number]).all():
             wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "a finite number"
-            raise ValueError(f"expected {wanted} as {key}, got {_brief(entry[key])}, in {path} (entry {number}, sample {_name(entry)})")
+            raise ValueError(f"expected {wanted} as {key}, got {_brief(entry[key])}, in {path} (entry {number}, sample "
+                             f"{_name(entry)})")
     return values
 
 
 def _places(shards: Shards) -> list[tuple[str, int]]:
-    """Of each sample its shard and slot, which no other one has."""
+    """The shard and slot of each sample, which are unique."""
     return [(sample["shard"], sample["slot"]) for sample in (shards.sample(i, ()) for i in range(len(shards)))]
 
 
@@ -143,70 +111,58 @@ def _is_coco_s(original: bytes) -> bool:
 class Samples:
     """The samples that are scored, and what predictions call them.
 
-    Parameters
-    ----------
-    truth : str or path
-        Folder of shards, or one shard.
-    split, dataset : str, optional
-        Only samples of this split, of this kind of source.
-    ids : str, path or iterable of str, optional
-        Only these samples, as `Shards` takes them.
+    `truth` is a folder of shards, or one shard; `split`, `dataset` (the kind of source) and `ids` (see `Shards`) select
+    samples.
     """
 
-    def __init__(self, truth: PathLike, split: str | None, dataset: str | None, ids: PathLike | Iterable[str] | None) -> None:
+    def __init__(self, truth: PathLike, split: str | None, dataset: str | None,
+                 ids: PathLike | Iterable[str] | None) -> None:
         where = {"dataset": dataset} if dataset else None
         self.shards = Shards(truth, split=split, where=where, ids=ids)
         self._of_split, self.classes = Shards(truth, split=split), Shards(truth).known_classes()
         scored = {place: i for i, place in enumerate(_places(self.shards))}
-        exported = (any((self._of_split.class_names(i), self._of_split.joint_names(i))) for i in range(len(self._of_split)))
-        self._of_number = [scored.get(place, -1) for place, is_exported in zip(_places(self._of_split), exported) if is_exported]
+        exported = (any((self._of_split.class_names(i), self._of_split.joint_names(i)))
+                    for i in range(len(self._of_split)))
+        self._of_number = [scored.get(place, -1) for place, is_exported in zip(_places(self._of_split), exported)
+                           if is_exported]
         names = self.shards.column("sample_id").tolist()
-        self._of_name = {**dict.fromkeys(self._of_split.column("sample_id").tolist(), -1), **{name: i for i, name in enumerate(names)}}
+        self._of_name = {**dict.fromkeys(self._of_split.column("sample_id").tolist(), -1),
+                         **{name: i for i, name in enumerate(names)}}
         self._twice = {name for name, count in collections.Counter(names).items() if count > 1}
 
     def of(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """The samples of entries, by their `image_id`.
+        """int [n]: the index in `shards` of each entry's `image_id`, -1 for a sample of the split that is not scored.
 
-        Parameters
-        ----------
-        entries : sequence of dict
-        path : str or path
-            Where they come from, for the error.
-
-        Returns
-        -------
-        numpy.ndarray
-            int [n], the index in `shards`, -1 for one of the split that is not scored. A number is a place in the split, whatever is scored of it.
-
-        Raises
-        ------
-        ValueError
-            There is no such id, or two scored samples have it.
+        A number is a place in the split, whichever of its samples are scored. An id that does not exist, or that two
+        scored samples have, is a ValueError that names `path`.
         """
         found = np.empty(len(entries), int)
         for number, entry in enumerate(entries):
             name = entry["image_id"]
             if _is_whole(name) and 1 <= name <= len(self._of_number):
                 if len(self._splits) > 1:
-                    raise ValueError(f"expected --split with samples that are numbered, got shards of {', '.join(self._splits)}")
+                    raise ValueError("expected --split with samples that are numbered, got shards of "
+                                     f"{', '.join(self._splits)}")
                 self._refuse_coco_s_own("image_id", name, path, number)
                 found[number] = self._of_number[name - 1]
                 continue
             is_known = isinstance(name, str) and name in self._of_name
             if not is_known or name in self._twice:
-                raise ValueError(f"expected the image_id of {'one' if is_known else 'a'} sample of {len(self._of_number)}, got {_brief(name)}"
+                raise ValueError(f"expected the image_id of {'one' if is_known else 'a'} sample of "
+                                 f"{len(self._of_number)}, got {_brief(name)}"
                                  f"{', which two samples have' if is_known else ''}, in {path} (entry {number})")
             found[number] = self._of_name[name]
         return found
 
     def _refuse_coco_s_own(self, key: str, value: Any, path: PathLike, number: int) -> None:
         if self._has_coco_labels:
-            raise ValueError(f"expected names, since `export --to coco` keeps the numbers of labels that are COCO's own, got {value} as {key}, "
-                             f"in {path} (entry {number})")
+            raise ValueError("expected names, since `export --to coco` keeps the numbers of labels that are COCO's "
+                             f"own, got {value} as {key}, in {path} (entry {number})")
 
     @functools.cached_property
     def _has_coco_labels(self) -> bool:
-        first = {shard: i for i, (shard, _) in reversed(list(enumerate(_places(self._of_split))))}  # the samples of a shard are of one source
+        # all samples of a shard are from one source
+        first = {shard: i for i, (shard, _) in reversed(list(enumerate(_places(self._of_split))))}
         return any(_is_coco_s(self._of_split.sample(i, {"original"})["original"]) for i in first.values())
 
     @functools.cached_property
@@ -214,41 +170,27 @@ class Samples:
         return sorted({open_shard(path).attrs["split"] for path in self._of_split.paths})
 
     def labels(self, entries: Sequence[Mapping[str, Any]], path: PathLike) -> np.ndarray:
-        """The classes of entries, by their `category_id`.
-
-        Parameters
-        ----------
-        entries : sequence of dict
-        path : str or path
-            Where they come from, for the error.
-
-        Returns
-        -------
-        numpy.ndarray
-            int [n], the place in `classes`.
-
-        Raises
-        ------
-        ValueError
-            There is no such category.
-        """
+        """int [n]: the place in `classes` of each entry's `category_id`;
+        one that does not exist is a ValueError that names `path`."""
         numbered = [name for name in self.classes if name != DONT_CARE]
         labels: dict[Any, int] = {i + 1: self.classes.index(name) for i, name in enumerate(numbered)}
         labels |= {name: self.classes.index(name) for name in numbered}
         given = [entry["category_id"] for entry in entries]
-        unknown = [i for i, name in enumerate(given) if not (_is_whole(name) or isinstance(name, str)) or name not in labels]
+        unknown = [i for i, name in enumerate(given) if not (_is_whole(name) or isinstance(name, str))
+                   or name not in labels]
         if unknown:
-            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got {_brief(given[unknown[0]])}, in {path} "
-                             f"(entry {unknown[0]})")
+            raise ValueError(f"expected a category_id of {', '.join(numbered)}, or its number from 1 on, got "
+                             f"{_brief(given[unknown[0]])}, in {path} (entry {unknown[0]})")
         whole = [i for i, name in enumerate(given) if not isinstance(name, str)]
         if whole:
             self._refuse_coco_s_own("category_id", given[whole[0]], path, whole[0])
         return np.array([labels[name] for name in given], int)
 
 
-def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None, confidence: float = 0.2, nms: float = 0.2,
+def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequence[str] | None = None,
+                        confidence: float = 0.2, nms: float = 0.2,
                         iou: float = 0.5) -> tuple[dict[str, Any], Detections, GroundTruth]:
-    """What `detections` prints, with the boxes that it is of. Samples of sources without boxes are left out.
+    """What `detections` prints, with the boxes it was computed from. Samples of sources without boxes are left out.
 
     Parameters
     ----------
@@ -258,8 +200,8 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     classes : sequence of str, optional
         Those to score. None: all that have a box to find or a prediction.
     confidence, nms : float, default 0.2
-        Precision, recall and F1 are, as in the paper, of predictions of at least this score that non-maximum suppression at this IoU
-        leaves (1: none); the average precisions are of all predictions.
+        As in the paper, precision, recall and F1 are of predictions with at least this score that non-maximum
+        suppression at this IoU leaves (1: no suppression); the average precisions are of all predictions.
     iou : float, default 0.5
         The least at which a detection matches a box.
 
@@ -272,7 +214,7 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     Raises
     ------
     ValueError
-        No sample has boxes, or the predictions do not hold what they should.
+        No sample has boxes, or an entry of the predictions is not valid.
     """
     shards, numbers = samples.shards, {name: i for i, name in enumerate(samples.classes)}
     unknown = [name for name in classes or () if name not in numbers]
@@ -282,7 +224,8 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     boxes, scores = numbers_of(entries, "bbox", (4,), predictions), numbers_of(entries, "score", (), predictions)
     wrong = np.flatnonzero((boxes[:, 2:] < 0).any(1))
     if len(wrong):
-        raise ValueError(f"expected a bbox of left, top, width, height, got {boxes[wrong[0]].tolist()}, in {predictions} (entry {wrong[0]})")
+        raise ValueError(f"expected a bbox of left, top, width, height, got {boxes[wrong[0]].tolist()}, in "
+                         f"{predictions} (entry {wrong[0]})")
     labelled = np.array([bool(shards.class_names(i)) for i in range(len(shards))], bool)
     if not labelled.any():
         raise ValueError("expected samples of sources with boxes, got none")
@@ -294,9 +237,10 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
     if classes is None:
         there = np.concatenate([found.label, truth.label[~truth.ignore]])
         classes = [name for name, label in numbers.items() if name != DONT_CARE and (there == label).any()]
-    counts = {"samples": int(labelled.sum()), "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))),
-              "ignored": int(truth.ignore.sum()), "predictions": len(entries), "not_of_these_samples": len(entries) - len(found.score),
-              "after_suppression": int(sure.sum())}
+    counts = {"samples": int(labelled.sum()),
+              "samples_without_prediction": int(labelled.sum() - len(np.unique(found.image))),
+              "ignored": int(truth.ignore.sum()), "predictions": len(entries),
+              "not_of_these_samples": len(entries) - len(found.score), "after_suppression": int(sure.sum())}
     result = {"settings": {"confidence": confidence, "nms": nms, "iou": iou}, "counts": counts,
               "classes": detection_scores(found, truth, {name: numbers[name] for name in classes}, iou, sure)}
     kitti = _of_kitti(shards, found, truth, numbers, classes)
@@ -304,23 +248,26 @@ def evaluate_detections(predictions: PathLike, samples: Samples, classes: Sequen
 
 
 def _sure(found: Detections, confidence: float, nms: float) -> np.ndarray:
-    """bool [n]: what is left by the confidence, and then by non-maximum suppression."""
+    """bool [n]: the detections with at least this confidence that non-maximum suppression leaves."""
     sure = found.score >= confidence
     sure[sure] = non_maximum_suppression(found.rows(sure), nms)
     return sure
 
 
-def _of_kitti(shards: Shards, found: Detections, truth: GroundTruth, numbers: Mapping[str, int], classes: Sequence[str]) -> dict[str, dict[str, float]]:
+def _of_kitti(shards: Shards, found: Detections, truth: GroundTruth, numbers: Mapping[str, int],
+              classes: Sequence[str]) -> dict[str, dict[str, float]]:
     """KITTI's average precisions by class and level, of the samples of kitti_object."""
     ours = shards.column("dataset") == "kitti_object"
     found, truth = found.rows(ours[found.image]), GroundTruth(*(column[ours[truth.image]] for column in truth))
     height = (found.xyxy[:, 3] - found.xyxy[:, 1]) / shards.column("source_to_volume")[found.image, 1, 1]
     return {name: {level: kitti_average_precision(found, truth, numbers, name, level, height) for level in KITTI_LEVELS}
-            for name in classes if name in KITTI_CLASSES and (truth.difficulty[truth.label == numbers[name]] >= 0).any()}
+            for name in classes if name in KITTI_CLASSES
+            and (truth.difficulty[truth.label == numbers[name]] >= 0).any()}
 
 
-def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False) -> tuple[dict[str, Any], np.ndarray, Persons]:
-    """What `poses` prints, with the joints that it is of.
+def evaluate_poses(predictions: PathLike, samples: Samples,
+                   hidden: bool = False) -> tuple[dict[str, Any], np.ndarray, Persons]:
+    """What `poses` prints, with the joints it was computed from.
 
     Parameters
     ----------
@@ -336,19 +283,20 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
     found : numpy.ndarray
         float [P, J, 2] in volume pixels; NaN: not found.
     persons : Persons
-        Those that are there.
+        The labelled ones.
 
     Raises
     ------
     ValueError
-        No sample has joints, or the predictions do not hold what they should.
+        No sample has joints, or an entry of the predictions is not valid.
     """
     shards = samples.shards
     persons = read_persons(shards)
     if not persons.names:
         raise ValueError("expected samples of sources with joints, got none")
     entries = read_predictions(predictions, ("image_id", "joints"))
-    image, joints = samples.of(entries, predictions), numbers_of(entries, "joints", (len(persons.names), 2), predictions)
+    image, joints = samples.of(entries, predictions), numbers_of(entries, "joints", (len(persons.names), 2),
+                                                                 predictions)
     rows = {(index, row): i for i, (index, row) in enumerate(persons.place.tolist())}
     alone = np.bincount(persons.place[:, 0], minlength=len(shards)) == 1
     found = np.full(persons.joints.shape, np.nan)
@@ -359,38 +307,27 @@ def evaluate_poses(predictions: PathLike, samples: Samples, hidden: bool = False
         at = rows.get((index, person)) if _is_whole(person) else None
         if at is None or np.isfinite(found[at]).all():
             what = f"got {_brief(person)}" if at is None else f"got {person} twice"
-            raise ValueError(f"expected a person of the {np.count_nonzero(persons.place[:, 0] == index)} there are, {what}, in {predictions} (entry {number}, "
-                             f"sample {_name(entry)})")
+            raise ValueError(f"expected a person of the {np.count_nonzero(persons.place[:, 0] == index)} there are, "
+                             f"{what}, in {predictions} (entry {number}, sample {_name(entry)})")
         found[at] = joints[number]
     not_found = np.isnan(found).all((1, 2)) & persons.scored(hidden).any(1)
-    counts = {"persons": len(persons.place), "not_found": int(not_found.sum()), "predictions": len(entries), "not_of_these_samples": int((image < 0).sum()),
-              "hidden": int(persons.hidden.sum()), "not_annotated": int((~persons.annotated).sum()),
-              "without_head": int(np.isnan(persons.head).sum()), "without_head_box": int(np.isnan(persons.head_box).sum())}
-    return {"settings": {"hidden": hidden}, "counts": counts, "joints": pose_scores(found, persons, hidden)}, found, persons
+    counts = {"persons": len(persons.place), "not_found": int(not_found.sum()), "predictions": len(entries),
+              "not_of_these_samples": int((image < 0).sum()), "hidden": int(persons.hidden.sum()),
+              "not_annotated": int((~persons.annotated).sum()), "without_head": int(np.isnan(persons.head).sum()),
+              "without_head_box": int(np.isnan(persons.head_box).sum())}
+    return {"settings": {"hidden": hidden}, "counts": counts,
+            "joints": pose_scores(found, persons, hidden)}, found, persons
 
 
-def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str], digits: int = 3) -> str:
-    """A line of headings, then one for each row; NaN is "-".
-
-    Parameters
-    ----------
-    title : str
-        Above the rows' names.
-    rows : mapping of str to mapping
-        By the row's name its values, by column.
-    columns : mapping of str to str
-        The columns, and their headings.
-    digits : int, default 3
-
-    Returns
-    -------
-    str
-    """
+def table(title: str, rows: Mapping[str, Mapping[str, float | str]], columns: Mapping[str, str],
+          digits: int = 3) -> str:
+    """A line of headings (`title`, then those of `columns`), then one for each row; NaN is "-"."""
     cells = [[title, *columns.values()]]
     for name, row in rows.items():
         cells.append([name, *(_text(row[key], digits) for key in columns)])
     widths = [max(map(len, column)) for column in zip(*cells)]
-    return "\n".join("  ".join([line[0].ljust(widths[0]), *(text.rjust(width) for text, width in zip(line[1:], widths[1:]))]) for line in cells)
+    return "\n".join("  ".join([line[0].ljust(widths[0]),
+                                *(text.rjust(width) for text, width in zip(line[1:], widths[1:]))]) for line in cells)
 
 
 def _text(value: float | str, digits: int) -> str:
@@ -398,60 +335,41 @@ def _text(value: float | str, digits: int) -> str:
 
 
 def detection_tables(result: Mapping[str, Any]) -> str:
-    """The result of `evaluate_detections` as text.
-
-    Parameters
-    ----------
-    result : dict
-
-    Returns
-    -------
-    str
-    """
+    """The result of `evaluate_detections` as text."""
     counts, settings, classes = result["counts"], result["settings"], result["classes"]
-    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), {classes['all']['truths']} ground-truth boxes, "
-             f"{counts['ignored']} ignored; average precisions use all {counts['predictions']} predictions; precision, recall and F1 use "
-             f"{counts['after_suppression']}, after confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
+    first = (f"{counts['samples']} samples ({counts['samples_without_prediction']} without a prediction), "
+             f"{classes['all']['truths']} ground-truth boxes, {counts['ignored']} ignored; average precisions use all "
+             f"{counts['predictions']} predictions; precision, recall and F1 use {counts['after_suppression']}, after "
+             f"confidence {settings['confidence']:g} and non-maximum suppression at IoU {settings['nms']:g}")
     if counts["not_of_these_samples"]:
         first += f"; {counts['not_of_these_samples']} are of other samples"
     tables = [first, table("", classes, {"truths": "boxes", "easy": "easy", "hard": "hard", **PAPER_COLUMNS}),
-              table("average precision", classes, {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points",
-                                                   "ap_coco": "COCO, AP@[.5:.95]"})]
+              table("average precision", classes,
+                    {"ap_voc": "VOC, area", "ap_voc_11": "VOC, 11 points", "ap_coco_101": "COCO, 101 points",
+                     "ap_coco": "COCO, AP@[.5:.95]"})]
     if "kitti" in result:
         tables.append(table("KITTI, 40 recalls", result["kitti"], {level: level for level in KITTI_LEVELS}))
     return "\n\n".join(tables)
 
 
 def pose_tables(result: Mapping[str, Any]) -> str:
-    """The result of `evaluate_poses` as text.
-
-    Parameters
-    ----------
-    result : dict
-
-    Returns
-    -------
-    str
-    """
+    """The result of `evaluate_poses` as text."""
     counts = result["counts"]
-    hidden = f"{counts['hidden']} hidden ones also scored" if result["settings"]["hidden"] else f"{counts['hidden']} hidden"
-    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: {counts['not_annotated']} not annotated, {hidden}; "
-             f"PCKh leaves out {counts['without_head']} persons without annotated head or shoulders, MPII's {counts['without_head_box']} without "
-             "a head box")
-    return first + "\n\n" + table("", result["joints"], {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px",
-                                                          "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5", "pckh_mpii": "PCKh@0.5, MPII's"})
+    hidden = (f"{counts['hidden']} hidden ones also scored" if result["settings"]["hidden"]
+              else f"{counts['hidden']} hidden")
+    first = (f"{counts['persons']} persons, {counts['not_found']} of them not found; joints left out: "
+             f"{counts['not_annotated']} not annotated, {hidden}; PCKh leaves out {counts['without_head']} persons "
+             f"without annotated head or shoulders, MPII's {counts['without_head_box']} without a head box")
+    return first + "\n\n" + table("", result["joints"],
+                                  {"scored": "scored", "left_out": "left out", "mpjpe_volume": "MPJPE, volume px",
+                                   "mpjpe_source": "MPJPE, source px", "pckh": "PCKh@0.5",
+                                   "pckh_mpii": "PCKh@0.5, MPII's"})
 
 
-def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections, truth: GroundTruth) -> None:
-    """Writes images: precision over recall of all that was found, and some of the samples, evenly spread, with what is sure of it: found blue,
-    true green, to be ignored red. Needs OpenCV.
-
-    Parameters
-    ----------
-    folder : str
-    samples : Samples
-    result, found, truth
-        Of `evaluate_detections`.
+def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], found: Detections,
+                    truth: GroundTruth) -> None:
+    """Writes images of the result of `evaluate_detections`: precision over recall of all detections, and some of the
+    samples, evenly spread, with the sure detections in blue, true boxes in green, ignored ones in red. Needs OpenCV.
     """
     from . import drawing  # OpenCV, which nothing else here needs
 
@@ -459,7 +377,8 @@ def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], fo
     found = found.rows(np.isin(found.label, list(names)))
     settings = result["settings"]
     matched_truth, counts = match_as_voc(found, truth, settings["iou"])
-    curves = {name: curve(matched_truth[counts & (found.label == label)] >= 0, result["classes"][name]["truths"]) for label, name in names.items()}
+    curves = {name: curve(matched_truth[counts & (found.label == label)] >= 0, result["classes"][name]["truths"])
+              for label, name in names.items()}
     drawing.write(folder, "precision_recall", drawing.of_precision(curves))
     found = found.rows(_sure(found, settings["confidence"], settings["nms"]))
     true = ~truth.ignore & np.isin(truth.label, list(names))
@@ -468,19 +387,14 @@ def draw_detections(folder: str, samples: Samples, result: Mapping[str, Any], fo
         canvas = drawing.of_events(samples.shards.sample(i, {"volume"})["volume"])
         drawing.draw_boxes(canvas, truth.xyxy[there & truth.ignore], drawing.IGNORED)
         drawing.draw_boxes(canvas, truth.xyxy[there & true], drawing.TRUE)
-        drawing.draw_boxes(canvas, found.xyxy[ours], drawing.FOUND, [f"{names[found.label[n]]} {found.score[n]:.2f}" for n in ours])
+        drawing.draw_boxes(canvas, found.xyxy[ours], drawing.FOUND,
+                           [f"{names[found.label[n]]} {found.score[n]:.2f}" for n in ours])
         drawing.write(folder, samples.shards.column("sample_id")[i], canvas)
 
 
 def draw_poses(folder: str, samples: Samples, result: Mapping[str, Any], found: np.ndarray, persons: Persons) -> None:
-    """Writes images of some of the samples, evenly spread: joints found blue, true green, annotated and not scored red. Needs OpenCV.
-
-    Parameters
-    ----------
-    folder : str
-    samples : Samples
-    result, found, persons
-        Of `evaluate_poses`.
+    """Writes images of some of the samples, evenly spread, from the result of `evaluate_poses`: joints found in blue,
+    true ones in green, annotated but not scored ones in red. Needs OpenCV.
     """
     from . import drawing
 
@@ -506,34 +420,38 @@ def _without_nan(value: Any) -> Any:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        None: those of the process.
-    """
-    parser = argparse.ArgumentParser(prog="python3 -m eventgan.evaluate", description="Scores the predictions of a network against the labels of shards.")
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python3 -m eventgan.evaluate",
+                                     description="Scores the predictions of a network against the labels of shards.")
     parser.add_argument("what", choices=["detections", "poses"])
-    parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with image_id, person, joints")
+    parser.add_argument("predictions", help="JSON list of objects with image_id, category_id, bbox, score; or with "
+                        "image_id, person, joints")
     parser.add_argument("--truth", required=True, metavar="OUT", help="folder of shards, or one shard")
     parser.add_argument("--split", help="score only samples of this split")
     parser.add_argument("--dataset", help="score only samples of this kind of source, such as kitti_object")
     parser.add_argument("--ids", metavar="FILE", help="score only the samples listed in this file, one id per line")
     parser.add_argument("--classes", type=lambda text: text.split(","),
-                        help="detections: class names, separated by commas (default: all that have a box or a prediction)")
-    parser.add_argument("--confidence", type=float, default=0.2, help="detections: lowest score that counts for precision, recall and F1; average precisions use all predictions (default: %(default)s)")
-    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression for precision, recall and F1; 1 switches it off (default: %(default)s)")
-    parser.add_argument("--iou", type=float, default=0.5, help="detections: lowest IoU at which a detection matches a box (default: %(default)s)")
-    parser.add_argument("--hidden", action="store_true", help="poses: also score hidden joints that are annotated, as MPII's own evaluation does")
+                        help="detections: class names, separated by commas (default: all that have a box or a "
+                        "prediction)")
+    parser.add_argument("--confidence", type=float, default=0.2, help="detections: lowest score that counts for "
+                        "precision, recall and F1; average precisions use all predictions (default: %(default)s)")
+    parser.add_argument("--nms", type=float, default=0.2, help="detections: IoU of the non-maximum suppression for "
+                        "precision, recall and F1; 1 switches it off (default: %(default)s)")
+    parser.add_argument("--iou", type=float, default=0.5,
+                        help="detections: lowest IoU at which a detection matches a box (default: %(default)s)")
+    parser.add_argument("--hidden", action="store_true",
+                        help="poses: also score hidden joints that are annotated, as MPII's own evaluation does")
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    parser.add_argument("--images", metavar="DIR", help="folder for plots of precision and recall and for images of some samples with their predictions; needs OpenCV")
+    parser.add_argument("--images", metavar="DIR", help="folder for plots of precision and recall and for images of "
+                        "some samples with their predictions; needs OpenCV")
     args = parser.parse_args(arguments)
     try:
         samples = Samples(args.truth, args.split, args.dataset, args.ids)
         if args.what == "detections":
-            result, *boxes = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms, args.iou)
-            text, draw = detection_tables(result), functools.partial(draw_detections, args.images, samples, result, *boxes)
+            result, *boxes = evaluate_detections(args.predictions, samples, args.classes, args.confidence, args.nms,
+                                                 args.iou)
+            text, draw = detection_tables(result), functools.partial(draw_detections, args.images, samples, result,
+                                                                     *boxes)
         else:
             result, *joints = evaluate_poses(args.predictions, samples, args.hidden)
             text, draw = pose_tables(result), functools.partial(draw_poses, args.images, samples, result, *joints)

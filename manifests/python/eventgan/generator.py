@@ -1,4 +1,4 @@
-"""Volumes of two images, by the engine of the program `eventgan`: bit for bit those of its shards."""
+"""Volumes of two images, by the engine of the program `eventgan`: bit for bit those in its shards."""
 
 from __future__ import annotations
 
@@ -16,61 +16,66 @@ import numpy.typing as npt
 try:
     from . import _engine
 except ImportError as error:
-    raise ImportError(f"expected the compiled module eventgan._engine, got none ({error}): install the Debian package python3-eventgan, or run "
-                      "`pip install -v ./manifests/python` in a checkout, which builds it or says what is missing") from error
+    raise ImportError(f"expected the compiled module eventgan._engine, got none ({error}): install the Debian package "
+                      "python3-eventgan, or run `pip install -v ./manifests/python` in a checkout, which builds it or "
+                      "says what is missing") from error
 
 PathLike = Union[str, os.PathLike]
 _PLACES = {  # of settings in a manifest
     "image": ("fit", "preset", "grey", "blur"),
-    "generator": ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px", "tile_px", "sensor", "sample",
-                  "duration_s", "max_displacement_px"),
+    "generator": ("kind", "weights", "precision", "scope", "motion_threshold", "motion_margin_px", "label_margin_px",
+                  "tile_px", "sensor", "sample", "duration_s", "max_displacement_px"),
     "volume": ("bins", "normalize"),
 }
 
 
 class Generator:
-    """Makes the event volume of two images, as `eventgan convert` does with the same settings: bit for bit what is in its shards of float32.
+    """Makes the event volume of two images, as `eventgan convert` does with the same settings: bit for bit what is in
+    its shards of float32.
 
-    Images are uint8, or floating-point numbers from 0 to 1, which are rounded to the 256 levels of an image file; [H, W] grey or [H, W, 3] red,
-    green, blue (of OpenCV's, which are blue, green, red, pass `image[..., ::-1]`). NumPy arrays, and what NumPy takes for one: a PyTorch
-    tensor on the CPU, a PIL image.
+    Images are uint8, or floating-point numbers from 0 to 1, which are rounded to the 256 levels of an image file; [H,
+    W] grey or [H, W, 3] red, green, blue (for OpenCV's order, blue, green, red, pass `image[..., ::-1]`). NumPy arrays,
+    and what NumPy converts to one: a PyTorch tensor on the CPU, a PIL image.
 
-    An object may be used by several threads at once, goes to workers that are forked or spawned, and has no threads of its own: a
-    call computes on the thread that calls, without Python's lock.
+    Several threads may use one object at once, and it can go to forked or spawned workers. It has no threads of its
+    own: a call computes on the calling thread, without Python's lock.
 
     Parameters
     ----------
     weights : str or path, default "shipped"
-        A .safetensors file, "shipped", "shipped:WIDTH" or "shipped:sensor" (weights that come with the package), or "untrained:WIDTH".
+        A .safetensors file, "shipped", "shipped:WIDTH" or "shipped:sensor" (weights that come with the package), or
+        "untrained:WIDTH".
     kind : {"network", "esim", "difference"}
-        The EventGAN network, or a model of a sensor to compare it with, which needs no weights.
+        The EventGAN network, or a sensor model to compare it with, which needs no weights.
     precision : {"float32", "bfloat16", "int8"}
-        In which numbers the network is computed. int8 needs weights that are calibrated (`eventgan calibrate`).
+        The numbers that the network computes with. int8 needs calibrated weights (`eventgan calibrate`).
     size : (int, int), optional
         Height and width of the volumes. None: those of the images.
     fit : {"stretch", "letterbox", "crop"}
-        How an image of another shape comes to that size.
+        How an image of another shape is fitted to that size.
     preset : {"demo", "kitti", "mpii"}
-        Preprocessing as in the EventGAN authors' scripts: "demo" makes grey after resizing, "mpii" before, "kitti" too and
-        blurs (3x3). Or give both of the next two.
+        Preprocessing as in the EventGAN authors' scripts: "demo" converts to grey after resizing, "mpii" before it,
+        "kitti" also before it, and blurs (3x3). Or give both of the next two.
     grey : {"before_resize", "after_resize"}, optional
     blur : int, optional
         Side of the Gaussian kernel in pixels, odd; 0: none.
     scope : {"whole", "motion", "labels", "labels_only"}
-        Which part of a volume is computed; the rest is zeros. "labels" and "labels_only" need labels, which only `sample` takes.
+        Which part of a volume is computed; the rest is zeros. "labels" and "labels_only" need labels, which only
+        `sample` takes.
     normalize : {"none", "eta98"}
         Whether a volume is divided by its 98th percentile and clipped.
     seed : int, default 0
-        Of the models' random numbers, of what sensor={"threshold": [0.1, 0.6], "noise": {...}} draws for each pair, and of untrained weights.
+        Of the sensor models' random numbers, of what sensor={"threshold": [0.1, 0.6], "noise": {...}} draws for each
+        pair, and of untrained weights.
     **settings
-        Other keys of `generator` and `volume` of a manifest: motion_threshold, motion_margin_px, label_margin_px, tile_px,
-        sensor (a dictionary, or a camera: the path of its document or a name that ships), sample, duration_s, max_displacement_px, bins.
-        manifest.schema.json has their meanings and ranges.
+        Other keys of `generator` and `volume` in a manifest: motion_threshold, motion_margin_px, label_margin_px,
+        tile_px, sensor (a dictionary, or a camera: the path of its document or the name of one that ships), sample,
+        duration_s, max_displacement_px, bins. manifest.schema.json has their meanings and ranges.
 
     Raises
     ------
     ValueError
-        A setting is none, or the processor or the weights cannot do it; every fault is named.
+        A setting is not valid, or the processor or the weights do not support it; the message names every fault.
     FileNotFoundError
         There is no such file of weights.
 
@@ -83,10 +88,11 @@ class Generator:
     """
 
     def __init__(self, weights: PathLike | None = None, *, kind: str | None = None, precision: str | None = None,
-                 size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None, grey: str | None = None,
-                 blur: int | None = None, scope: str | None = None, normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
-        given = dict(kind=kind, weights=_weights(weights), precision=precision, fit=fit, preset=preset, grey=grey, blur=blur, scope=scope,
-                     normalize=normalize, **settings)
+                 size: tuple[int, int] | None = None, fit: str | None = None, preset: str | None = None,
+                 grey: str | None = None, blur: int | None = None, scope: str | None = None,
+                 normalize: str | None = None, seed: int = 0, **settings: Any) -> None:
+        given = dict(kind=kind, weights=_weights(weights), precision=precision, fit=fit, preset=preset, grey=grey,
+                     blur=blur, scope=scope, normalize=normalize, **settings)
         known = [key for keys in _PLACES.values() for key in keys]
         unknown = [key for key in given if key not in known]
         if unknown:
@@ -122,7 +128,7 @@ class Generator:
 
     @property
     def description(self) -> str:
-        """Engine, precision and the libraries that change bytes, as in a plan's fingerprint."""
+        """Engine, precision and the libraries that affect the bytes, as in a plan's fingerprint."""
         return self._engine.description
 
     @property
@@ -132,7 +138,7 @@ class Generator:
 
     @property
     def training_gaps(self) -> tuple[int, int] | None:
-        """The first and the last gap, in frames, that the network has seen in training; None: not known."""
+        """The smallest and the largest gap, in frames, that the network was trained on; None: unknown."""
         return self._engine.training_gaps
 
     def __call__(self, previous: npt.ArrayLike, following: npt.ArrayLike) -> np.ndarray:
@@ -146,7 +152,8 @@ class Generator:
         Returns
         -------
         numpy.ndarray
-            float32 [2B, H, W], >= 0: B bins of positive polarity in time order, then B of negative polarity. Dimensionless.
+            float32 [2B, H, W], >= 0: B bins of positive polarity in time order, then B of negative polarity.
+            Dimensionless.
 
         Raises
         ------
@@ -156,8 +163,10 @@ class Generator:
         return self._engine.call(_array(previous, "previous"), _array(following, "following"))
 
     def many(self, previous: npt.ArrayLike, following: npt.ArrayLike, threads: int = 1) -> np.ndarray:
-        """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], on as many threads, which end with the call."""
-        return self._engine.many(_array(previous, "previous"), _array(following, "following"), _whole(threads, "threads"))
+        """Volumes of N pairs: images [N, H, W] or [N, H, W, 3] -> float32 [N, 2B, H, W], by this many threads,
+        which end with the call."""
+        return self._engine.many(_array(previous, "previous"), _array(following, "following"),
+                                 _whole(threads, "threads"))
 
     def sample(self, previous: npt.ArrayLike, following: npt.ArrayLike, *, boxes: npt.ArrayLike | None = None,
                joints: npt.ArrayLike | None = None, gap: int = 1) -> dict[str, Any]:
@@ -172,33 +181,34 @@ class Generator:
         joints : array_like, [P, J, 2], optional
             x, y in pixels of the image, whose centres are whole numbers; NaN: not annotated.
         gap : int, default 1
-            How many frames the images are apart; only for the flag that says that the network has not seen such a gap.
+            The gap between the images in frames; only for the flag that the network was not trained on such a gap.
 
         Returns
         -------
         dict
             volume : float32 [2B, H, W]
-            statistics : dict, as in `Shards`: nonzero_fraction, max, sum_positive, sum_negative, flags, eta98; where scope computes a part,
-                generated_fraction and tiles
-            threshold : float, what was drawn for the pair, if sensor={"threshold": ...} was given
+            statistics : dict, as in `Shards`: nonzero_fraction, max, sum_positive, sum_negative, flags, eta98; if the
+                scope is a part, generated_fraction and tiles
+            threshold : float, drawn for the pair, if sensor={"threshold": ...} was given
             source_to_volume : float64 [2, 3], the map of points (pixel centres are whole numbers)
             boxes : dict with xyxy, clipped to the volume, and xyxy_unclipped, if boxes were given; row for row
             joints : float64 [P, J, 2] in volume pixels, if joints were given
         """
-        return self._engine.sample(_array(previous, "previous"), _array(following, "following"), _numbers(boxes, "boxes"),
-                                   _numbers(joints, "joints"), _whole(gap, "gap"))
+        return self._engine.sample(_array(previous, "previous"), _array(following, "following"),
+                                   _numbers(boxes, "boxes"), _numbers(joints, "joints"), _whole(gap, "gap"))
 
     def prepare(self, image: npt.ArrayLike) -> np.ndarray:
-        """uint8 [H, W]: what the network sees of an image, grey, resized, blurred, in the place that it has in the volume."""
+        """uint8 [H, W]: an image as the network sees it: grey, resized, blurred, at its place in the volume."""
         return self._engine.prepare(_array(image, "image"))
 
     def source_to_volume(self, height: int, width: int) -> np.ndarray:
-        """float64 [2, 3]: where points of an image of that size come to lie in the volume."""
+        """float64 [2, 3]: the map of points of an image of that size to those of the volume."""
         return self._engine.source_to_volume(_whole(height, "height"), _whole(width, "width"))
 
 
-def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int = 0, counts: str = "poisson") -> np.ndarray:
-    """Events of which the volume could have been made, as `eventgan export --to events` draws them.
+def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int = 0,
+                  counts: str = "poisson") -> np.ndarray:
+    """Events that could have made the volume, as `eventgan export --to events` draws them.
 
     Parameters
     ----------
@@ -212,15 +222,17 @@ def sample_events(volume: npt.ArrayLike, *, duration_s: float = 1.0, seed: int =
     Returns
     -------
     numpy.ndarray
-        Structured, in time order: t (float64, seconds from 0 to duration_s), x and y (int32, pixels), p (int8, 1 positive, 0 negative).
+        Structured, in time order: t (float64, seconds from 0 to duration_s), x and y (int32, pixels), p (int8, 1
+        positive, 0 negative).
     """
     if counts not in ("poisson", "rounded"):
         raise ValueError(f"expected counts to be of poisson, rounded, got {counts!r}")
-    return _engine.sample_events(_numbers(volume, "volume", np.float32), float(duration_s), _whole(seed, "seed", least=0), counts == "rounded")
+    return _engine.sample_events(_numbers(volume, "volume", np.float32), float(duration_s),
+                                 _whole(seed, "seed", least=0), counts == "rounded")
 
 
 def _weights(given: PathLike | None) -> str | None:
-    """A name as it is; a file by its whole path, so that a worker that is spawned elsewhere finds it, too."""
+    """A name unchanged; a file by its absolute path, so that a worker spawned in another folder finds it."""
     if given is None or isinstance(given, str) and re.fullmatch("(shipped|untrained)(:.*)?", given):
         return given
     if not isinstance(given, (str, os.PathLike)):

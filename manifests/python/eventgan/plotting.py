@@ -1,4 +1,4 @@
-"""Volumes and their labels in matplotlib's axes, in the colours of `eventgan preview`."""
+"""Volumes and their labels drawn with matplotlib, in the colours of `eventgan preview`."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ import numpy.typing as npt
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# red, green, blue, as stages/events/images/time_panel.cc and preview_image.cc have them
+# red, green, blue, as in stages/events/images/time_panel.cc and preview_image.cc
 EARLY_TO_LATE = np.array([[40, 60, 255], [0, 220, 230], [40, 220, 60], [255, 220, 0], [255, 30, 30]], np.float32)
-CLASSES = [(60, 220, 80), (30, 160, 255), (255, 170, 60), (255, 80, 60), (220, 90, 255), (240, 230, 80), (60, 220, 230), (160, 130, 190)]
+CLASSES = [(60, 220, 80), (30, 160, 255), (255, 170, 60), (255, 80, 60), (220, 90, 255), (240, 230, 80), (60, 220, 230),
+           (160, 130, 190)]
 IGNORED, JOINT = (235, 235, 235), (120, 230, 80)
 SCREEN = 10.0  # inches: the longer side of a figure that is made for a volume
 
 
 def time_image(volume: npt.ArrayLike) -> np.ndarray:
-    """The image of a volume's mean event times, coloured as `eventgan preview` does.
+    """The image of a volume's mean event times, coloured as by `eventgan preview`.
 
-    Colour is the mean time of both polarities, early blue to late red; brightness says how many events there are: 1 - exp(-m) of full brightness
-    where the pixel's values sum to m. Black is no event, white what is not finite.
+    The colour is the mean time of both polarities, from early (blue) to late (red); the brightness is 1 - exp(-m) of
+    full brightness for a pixel whose values sum to m. No event is black, a value that is not finite white.
 
     Parameters
     ----------
@@ -36,7 +37,7 @@ def time_image(volume: npt.ArrayLike) -> np.ndarray:
     Raises
     ------
     ValueError
-        The volume has another number of dimensions, or channels that are not two polarities.
+        The volume has another number of dimensions, or an odd number of channels.
     """
     volume = np.asarray(volume, np.float32)
     if volume.ndim != 3 or not volume.shape[0] or volume.shape[0] % 2:
@@ -47,7 +48,8 @@ def time_image(volume: npt.ArrayLike) -> np.ndarray:
     with np.errstate(invalid="ignore", over="ignore"):
         mass = polarities.sum(1)
         total = mass.sum(0)
-        time = (np.einsum("b,pbyx->pyx", times, polarities) / (mass + np.float32(1e-5)) * mass).sum(0) / np.where(total > 0, total, 1)
+        means = np.einsum("b,pbyx->pyx", times, polarities) / (mass + np.float32(1e-5))
+        time = (means * mass).sum(0) / np.where(total > 0, total, 1)
         at = np.clip((np.nan_to_num(time) - 0.1) / 0.9, 0, 1) * (len(EARLY_TO_LATE) - 1)
         below = np.minimum(at.astype(int), len(EARLY_TO_LATE) - 2)
         share = (at - below)[..., None]
@@ -57,21 +59,21 @@ def time_image(volume: npt.ArrayLike) -> np.ndarray:
     return image.astype(np.uint8)
 
 
-def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None = None, joints: npt.ArrayLike | None = None,
-         ax: Axes | None = None) -> Axes:
+def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None = None,
+         joints: npt.ArrayLike | None = None, ax: Axes | None = None) -> Axes:
     """Draws a volume with its labels, in the colours of `eventgan preview` (see `time_image`). Needs matplotlib.
 
     Parameters
     ----------
     volume : array_like, float [2B, H, W], or dict
-        A volume; or a sample of `Shards` or of `Generator.sample`, whose own labels are drawn: a colour for each class, dashes around what is
-        to be ignored, hidden joints hollow.
+        A volume; or a sample of `Shards` or of `Generator.sample`, which is drawn with its labels: a colour for each
+        class, ignored boxes dashed, hidden joints hollow.
     boxes : array_like, [n, 4], optional
-        Left, top, right, bottom in volume pixels, by edges: the whole volume is 0, 0, W, H. Instead of a sample's.
+        Instead of a sample's: left, top, right, bottom in volume pixels, by edges; the whole volume is 0, 0, W, H.
     joints : array_like, [J, 2] or [P, J, 2], optional
-        x, y in volume pixels, whose centres are whole numbers; NaN: not annotated. Instead of a sample's.
+        Instead of a sample's: x, y in volume pixels, whose centres are whole numbers; NaN: not annotated.
     ax : matplotlib.axes.Axes, optional
-        Where to draw. None: a new figure, as large as a page.
+        Where to draw. None: a new figure of page size.
 
     Returns
     -------
@@ -97,12 +99,12 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
     ax.imshow(image, interpolation="nearest")
     ax.set_axis_off()
     for (left, top, right, bottom), colour, ignore in _boxes_of(sample, boxes):
-        # Pixel centres are whole numbers: the edge x, the left one of pixel x, is half a pixel left of it.
+        # Pixel centres are whole numbers: the left edge of pixel x is half a pixel left of it.
         place = {"xy": (left - 0.5, top - 0.5), "width": right - left, "height": bottom - top, "fill": False}
         if ignore:
             ax.add_patch(matplotlib.patches.Rectangle(**place, edgecolor="black", linewidth=1))
-        ax.add_patch(matplotlib.patches.Rectangle(**place, edgecolor=np.divide(colour, 255), linewidth=1 if ignore else 2,
-                                                  linestyle="--" if ignore else "-"))
+        ax.add_patch(matplotlib.patches.Rectangle(**place, edgecolor=np.divide(colour, 255),
+                                                  linewidth=1 if ignore else 2, linestyle="--" if ignore else "-"))
     points, hidden = _joints_of(sample, joints)
     ax.scatter(*points[~hidden].T, s=40, zorder=3, linewidths=1, facecolors=[np.divide(JOINT, 255)], edgecolors="black")
     ax.scatter(*points[hidden].T, s=40, zorder=3, linewidths=1, facecolors="none", edgecolors=[np.divide(JOINT, 255)])
@@ -111,8 +113,9 @@ def show(volume: npt.ArrayLike | Mapping[str, Any], boxes: npt.ArrayLike | None 
     return ax
 
 
-def _boxes_of(sample: Mapping[str, Any], boxes: npt.ArrayLike | None) -> Iterator[tuple[np.ndarray, tuple[int, int, int], bool]]:
-    """Box [4], colour, and whether it is to be ignored; those first, so that they never cover an object."""
+def _boxes_of(sample: Mapping[str, Any],
+              boxes: npt.ArrayLike | None) -> Iterator[tuple[np.ndarray, tuple[int, int, int], bool]]:
+    """Box [4], colour, and whether it is ignored; ignored ones first, so that they never cover an object."""
     rows = sample.get("boxes", {}) if boxes is None else {}
     xyxy = np.asarray(rows.get("xyxy", []) if boxes is None else boxes, float)
     if xyxy.size and (xyxy.ndim != 2 or xyxy.shape[1] != 4):

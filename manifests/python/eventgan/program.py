@@ -1,10 +1,10 @@
-"""The program `eventgan` from Python: a manifest drafted, a manifest converted, an output folder opened.
+"""The program `eventgan` from Python: drafts a manifest, converts it, opens an output folder.
 
-The program is the one that the environment variable EVENTGAN_PROGRAM names, else the one beside the package (PREFIX/bin/eventgan of
-PREFIX/lib/python3/dist-packages, or the build tree's), else the first on the PATH.
+The program is the one named by the environment variable EVENTGAN_PROGRAM, else the one beside the package
+(PREFIX/bin/eventgan for PREFIX/lib/python3/dist-packages, or the build tree's), else the first on the PATH.
 
-One rule for what goes wrong: where the program ends with another exit code than 0, its message is raised as ProgramError, with the exit code.
-Where there is no program, it is a FileNotFoundError.
+If the program fails, its message is raised as ProgramError with the exit code; if there is no program,
+FileNotFoundError is raised.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ Event = dict[str, Any]
 
 
 class ProgramError(RuntimeError):
-    """The program's own message, after it ended with another exit code than 0.
+    """The program's message, after it ended with a non-zero exit code.
 
     Attributes
     ----------
     exit_code : int
-        1 failed, 64 bad manifest, or a folder of another job, 65 too many quarantined samples, 66 input missing, 75 stopped: run it again;
-        below 0: ended by that signal.
+        1 failed, 64 bad manifest, or a folder of another job, 65 too many quarantined samples, 66 input missing, 75
+        stopped: run it again; below 0: ended by that signal.
     """
 
     def __init__(self, message: str, exit_code: int) -> None:
@@ -45,20 +45,21 @@ class ProgramError(RuntimeError):
 
 
 def init(*paths: PathLike, out: PathLike = "manifest.json") -> pathlib.Path:
-    """Writes one manifest for these datasets, as `eventgan init` does. Its comments tell what was found.
+    """Writes one manifest for these datasets, as `eventgan init` does. Its comments say what was found.
 
     Parameters
     ----------
     *paths : str or path
-        Folders, videos and recordings, each a source of the manifest. Of several, the first may be the kind of dataset that the others are:
-        "kitti_object", "kitti_tracking", "kitti_raw", "mpii", "human36m", "mpii_list", "recording" or "frames".
+        Folders, videos and recordings, each a source of the manifest. The first of several may be the kind of dataset
+        that the others are: "kitti_object", "kitti_tracking", "kitti_raw", "mpii", "human36m", "mpii_list", "recording"
+        or "frames".
     out : str or path
         The manifest to write, a new file.
 
     Returns
     -------
     pathlib.Path
-        The manifest, for `convert`, or to be changed first.
+        The manifest, to be edited, or passed to `convert`.
 
     Raises
     ------
@@ -75,22 +76,23 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
             progress: Literal[False] | Callable[[Event], object] | None = None) -> Shards:
     """Makes the shards of a manifest and completes the dataset, as `eventgan convert` and then `eventgan finalize` do.
 
-    What is made already stays: called again, it does what is left to do. KeyboardInterrupt (Ctrl-C, a notebook's stop button) stops the
-    program in order: the shard in work is finished or dropped, then the exception goes on. A second one drops it at once.
+    A second call keeps what is finished and makes the rest. KeyboardInterrupt (Ctrl-C, a notebook's stop button) stops
+    the program cleanly: it finishes or drops the current shard, then the exception is raised. A second interrupt drops
+    the shard at once.
 
     Parameters
     ----------
     manifest : str, path or dict
-        A manifest; a folder, video or recording, of which the job is what `init` proposes; or a dictionary with what a manifest holds, whose
-        relative paths start at the current folder (there the program reads it from a temporary file).
+        A manifest; a folder, video or recording, converted as `init` proposes; or a dictionary with a manifest's keys,
+        whose relative paths start at the current folder (there the program reads it from a temporary file).
     output : str or path, optional
         Output folder. None: the manifest's.
     threads : int, optional
-        How many threads the program has. None: all cores.
+        How many threads the program uses. None: all cores.
     progress : None, False or callable
-        None: a bar, where tqdm is installed. False: none. A callable gets every event of the program as a dictionary:
-        {"event": "progress", "done": 3, "total": 41, "seconds_left": 1.9, ...}, {"event": "warning" or "note", "text": ...}, and the report at
-        the end of either command. Without one, warnings are Python's.
+        None: a bar, if tqdm is installed. False: none. A callable gets every event of the program as a dictionary:
+        {"event": "progress", "done": 3, "total": 41, "seconds_left": 1.9, ...}, {"event": "warning" or "note", "text":
+        ...}, and the report at the end of either command. Without one, warnings are Python's.
 
     Returns
     -------
@@ -100,7 +102,8 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     Raises
     ------
     ProgramError
-        The manifest is not one, an input is missing, more samples are quarantined than `errors` allows, or whatever the program says.
+        The manifest is not valid, an input is missing, more samples are quarantined than `errors` allows, or any other
+        failure of the program.
     FileNotFoundError
         There is no program.
     """
@@ -109,19 +112,20 @@ def convert(manifest: PathLike | Mapping[str, Any], output: PathLike | None = No
     shown = _Shown(bars=progress is None)
     on_event: Callable[[Event], object] = progress or shown
     with contextlib.closing(shown), _manifest_file(manifest) as file:
-        # All shards, whatever the variables of a cluster say: what is returned is the whole folder.
+        # All shards, even in a cluster's job: the whole folder is returned.
         report = _follow(on_event, "convert", "--progress", "json", "--shards", "all", *given, "--", file)
         _follow(on_event, "finalize", "--progress", "json", "--", report["folder"])
     return Shards(report["folder"])
 
 
 def open(folder: PathLike, **options: Any) -> Shards:
-    """The samples of an output folder: `Shards`, but where the folder is not whole, the error says how far the program is with it.
+    """The samples of an output folder as `Shards`; if the folder is incomplete, the error also says how far the
+    conversion is.
 
     Parameters
     ----------
     folder : str or path
-        What `eventgan convert` writes to.
+        The output folder of `eventgan convert`.
     **options
         Those of `Shards`: split, ids, where, partial...
 
@@ -132,7 +136,7 @@ def open(folder: PathLike, **options: Any) -> Shards:
     Raises
     ------
     ValueError
-        The folder is not whole, or `Shards` refuses the options.
+        The folder is incomplete, or `Shards` refuses the options.
     """
     try:
         return Shards(folder, **options)
@@ -144,7 +148,8 @@ def open(folder: PathLike, **options: Any) -> Shards:
         if status["complete"]:
             raise
         shards = status["shards"]
-        raise ValueError(f"{error}: {shards['done']} of {shards['planned']} shards are done, {shards['running']} in work; `eventgan convert`, or "
+        raise ValueError(f"{error}: {shards['done']} of {shards['planned']} shards are done, {shards['running']} in "
+                         "work; `eventgan convert`, or "
                          "eventgan.convert, of the same manifest makes the others") from error
 
 
@@ -156,28 +161,31 @@ def find_program() -> str:
             raise FileNotFoundError(f"expected the program eventgan, got none, in {named} (EVENTGAN_PROGRAM)")
         return named
     package = os.path.dirname(__file__)
-    # Of PREFIX/lib/python3/dist-packages/eventgan, and of build/release/python/eventgan, which may be a link: its own folders count.
+    # From PREFIX/lib/python3/dist-packages/eventgan, and from build/release/python/eventgan.
     for name in ("../../../../bin/eventgan", "../../eventgan", "eventgan"):
         found = shutil.which(os.path.normpath(os.path.join(package, name)) if "/" in name else name)
         if found:
             return found
-    raise FileNotFoundError("expected the program eventgan, got none beside the package, on the PATH, or in EVENTGAN_PROGRAM (install the Debian "
-                            "package eventgan, or build it)")
+    raise FileNotFoundError("expected the program eventgan, got none beside the package, on the PATH, or in "
+                            "EVENTGAN_PROGRAM (install the Debian package eventgan, or build it)")
 
 
 def _output(*arguments: PathLike) -> str:
-    """What the program writes to its standard output."""
-    done = subprocess.run([find_program(), *arguments], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", errors="replace")
+    """The program's standard output."""
+    done = subprocess.run([find_program(), *arguments], stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8",
+                          errors="replace")
     if done.returncode:
-        raise ProgramError(done.stderr.strip().removeprefix("error: ") or _ended(arguments[0], done.returncode), done.returncode)
+        raise ProgramError(done.stderr.strip().removeprefix("error: ") or _ended(arguments[0], done.returncode),
+                           done.returncode)
     return done.stdout
 
 
 def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
-    """Runs a command with --progress json; gives `on_event` each event as it comes. The report that it ends with."""
-    # In a session of its own: a terminal or a notebook interrupts all of ours at once, and a second interrupt would drop the shard in work.
-    process = subprocess.Popen([find_program(), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                               encoding="utf-8", errors="replace", start_new_session=True)
+    """Runs a command with --progress json, calls `on_event` with each event, and returns the report at its end."""
+    # In a session of its own: a terminal or a notebook interrupts the whole session, and a second interrupt would drop
+    # the current shard.
+    process = subprocess.Popen([find_program(), *arguments], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                               stderr=subprocess.STDOUT, encoding="utf-8", errors="replace", start_new_session=True)
     assert process.stdout
     event: Event = {}
     told: list[str] = []
@@ -193,7 +201,8 @@ def _follow(on_event: Callable[[Event], object], *arguments: PathLike) -> Event:
             _stop(process)
             raise
     if process.returncode:
-        raise ProgramError("\n".join(told) or f"{_ended(arguments[0], process.returncode)}: {json.dumps(event)[:1000]}", process.returncode)
+        raise ProgramError("\n".join(told) or f"{_ended(arguments[0], process.returncode)}: {json.dumps(event)[:1000]}",
+                           process.returncode)
     return event
 
 
@@ -203,17 +212,17 @@ def _event_of(line: str) -> Event:
     except ValueError:
         event = None
     if not isinstance(event, dict):
-        return {"event": "note", "text": line}  # a library may write what it likes
+        return {"event": "note", "text": line}  # such as a library's own output
     return {"event": "report", **event}
 
 
 def _stop(process: subprocess.Popen[str]) -> None:
-    """Interrupts the program and waits for its end; interrupted itself, once more."""
+    """Interrupts the program and waits until it ends; a further interrupt is passed on."""
     assert process.stdout
     while True:
         try:
             process.send_signal(signal.SIGINT)
-            process.stdout.read()  # a full pipe would hold it up
+            process.stdout.read()  # a full pipe would block it
             process.wait()
             return
         except KeyboardInterrupt:
@@ -226,7 +235,7 @@ def _ended(command: PathLike, exit_code: int) -> str:
 
 @contextlib.contextmanager
 def _manifest_file(manifest: PathLike | Mapping[str, Any]) -> Iterator[PathLike]:
-    """The manifest's path; that of a temporary file for a dictionary."""
+    """The manifest's path; for a dictionary that of a temporary file."""
     if not isinstance(manifest, Mapping):
         yield manifest
         return
@@ -240,7 +249,7 @@ def _manifest_file(manifest: PathLike | Mapping[str, Any]) -> Iterator[PathLike]
 
 
 class _Shown:
-    """Shows the program's warnings as Python's, and its progress as tqdm's bars if these are wanted and there."""
+    """Shows the program's warnings as Python's, and its progress as tqdm's bars if wanted and installed."""
 
     def __init__(self, bars: bool) -> None:
         self._tqdm: Callable[..., Any] | None = None
@@ -262,7 +271,8 @@ class _Shown:
         if not self._bar or phase != self._phase:
             self.close()
             unit = next((key[:-len("_per_s")] for key in event if key.endswith("_per_s") and key != "mb_per_s"), "")
-            self._bar, self._phase = self._tqdm(total=event["total"], desc=phase, unit=" " + unit, leave=not phase), phase
+            self._bar, self._phase = self._tqdm(total=event["total"], desc=phase, unit=" " + unit,
+                                                leave=not phase), phase
         self._bar.total = event["total"]
         self._bar.update(event["done"] - self._bar.n)
 

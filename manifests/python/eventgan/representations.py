@@ -7,17 +7,18 @@ import numpy.typing as npt
 
 
 def signed_channel(events: npt.ArrayLike) -> np.ndarray:
-    """One channel, whatever the events come from: at each pixel the positive events minus the negative ones, divided by the 99th percentile of their
-    magnitude over all pixels (by its maximum where that is 0), clipped to -1..1.
+    """One channel, wherever the events come from: the positive minus the negative events of each pixel, divided by the
+    99th percentile of their magnitude over all pixels (by its maximum if that is 0), clipped to -1..1.
 
-    Neither the camera's threshold nor the window's length nor the number of bins matters to it, so it suits to train on one source and to test on
-    another; when within the window an event happened is lost. For `Shards.changed`: ``shards.changed(lambda sample: signed_channel(sample["volume"]))``.
+    It does not depend on the camera's threshold, the window's length or the number of bins, so it suits training on one
+    source and testing on another; when an event happened within the window is lost. For `Shards.changed`:
+    ``shards.changed(lambda sample: signed_channel(sample["volume"]))``.
 
     Parameters
     ----------
     events : array_like
-        [2B, H, W], a volume: channels 0..B-1 are the positive polarity. Or [H, W], an image in which somebody has drawn positive minus
-        negative events in grey: its most frequent value is taken for no events.
+        [2B, H, W], a volume: channels 0..B-1 are the positive polarity. Or [H, W], a grey image that shows positive
+        minus negative events: its most frequent value is taken for no events.
 
     Returns
     -------

@@ -22,7 +22,7 @@ FEATURES = frozenset(("tiles", "times", "origin", "motion", "threshold", "projec
 PLAN = "plan.json"
 DESCRIPTION, DESCRIPTION_FORMAT, DESCRIPTION_VERSION = "dataset.json", "eventgan-dataset", "1.0"
 VIEW = "dataset.h5"
-SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # nothing that leads elsewhere
+SHARD_NAME = re.compile(r"\w[\w.-]*-\w[\w.-]*-\d{5,}-of-\d{5,}\.h5", re.ASCII)  # no path to another folder
 FIELDS = ("volume", "pair", "statistics", "boxes", "persons", "original")
 
 PathLike = Union[str, os.PathLike]
@@ -30,53 +30,55 @@ Sample = dict[str, Any]
 
 
 class InvalidSample(ValueError):
-    """A sample that eventgan put into quarantine was asked for."""
+    """A quarantined sample was read with invalid="raise"."""
 
 
 class Shards(Sequence):
     """The samples of one or more shards, in the order of the shards and their slots.
 
-    shards[i] is a sample (see `sample`), shards[i:j] or shards[[i, j, ...]] a Shards of those alone.
+    shards[i] is a sample (see `sample`); shards[i:j] or shards[[i, j, ...]] is a Shards of those alone.
 
-    The labels of a shard are read once, when they are first needed, and kept. Files are opened again in every process:
-    an object can go to workers that are forked or spawned. Slices share the files of what they were cut from: one thread at
-    a time for all of them.
+    The labels of a shard are read when they are first needed, and kept. Files are opened again in every process, so an
+    object can go to forked or spawned workers. Slices share the files of what they were cut from: only one thread at a
+    time may use any of them.
 
     Parameters
     ----------
     paths : str, path or iterable of them
-        A folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed, the
-        shards that its dataset.json lists, in the order of the plan. Of any other folder all shards that are done, so those with a commit
-        record, by name.
+        A folder, its dataset.h5, one shard, or a list of shards. Of a folder that `eventgan finalize` has completed:
+        the shards that its dataset.json lists, in the order of the plan. Of any other folder: all finished shards,
+        those with a commit record, by name.
     split : str, optional
         Only the shards of this split ("train"...).
     ids : str, path or iterable of str, optional
-        Only samples with these ids: a list, or a text file with one a line. Their order stays that of the shards. The id of
-        a frame ("000001") stands for all its samples ("000001@before1"...).
+        Only samples with these ids: a list, or a text file with one per line. They stay in the order of the shards. The
+        id of a frame ("000001") stands for all its samples ("000001@before1"...).
     where : dict, optional
-        Only samples whose value is one of those given, by column: {"gap": 1, "class": ["Car", "Van"]}. `class` means
-        a box of that class that is not to be ignored, `gap` is gap_frames; any other key is a column of /pairs:
-        sequence, subject, action, camera, dataset... (see `column`). Values that exist, but in no sample together, give an empty sequence.
+        Only samples whose value is one of those given, by column: {"gap": 1, "class": ["Car", "Van"]}. `class` means a
+        box of that class that is not ignored, `gap` is gap_frames; any other key is a column of /pairs: sequence,
+        subject, action, camera, dataset... (see `column`). Values that exist, but not together in a sample, give an
+        empty sequence.
     invalid : {"skip", "raise", "keep"}
-        What to do about quarantined samples. "skip": they are not part of the sequence. "raise": they are, and
-        reading one raises InvalidSample. "keep": they come with a volume of zeros and `valid` False. Those that `ids` names are
-        skipped with a warning.
+        What to do about quarantined samples. "skip": they are left out. "raise": they are in the sequence, and reading
+        one raises InvalidSample. "keep": they have a volume of zeros and `valid` False. Skipping one that `ids` names
+        gives a warning.
     fields : iterable of str
-        What a sample holds; of FIELDS. What is not asked for is not read.
+        What a sample holds; of FIELDS. Other fields are not read.
     decode : bool, default True
-        False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be
-        decoded elsewhere: value = stored number x scale.
+        False leaves a volume as it is stored (uint8, float16 or float32) with its `scale` beside it, to be decoded
+        elsewhere: value = stored number x scale.
     open_files : int, default 128
         How many shards stay open at a time (about half a megabyte each).
     partial : bool, default False
-        True takes what is done of a folder that is not whole.
+        True takes the finished shards of an incomplete folder.
 
     Raises
     ------
     ValueError
-        There is no shard at all; one that dataset.json describes is gone, another one by now, or has a name that is no shard's. Without
-        `partial`: dataset.json or plan.json misses a shard, one has no commit record, or a commit record has no shard. A split, an id or a
-        value that no sample (of the split) has: nothing is silently missing; so with a class that has a name but no box that counts.
+        There is no shard at all; one that dataset.json describes is missing, has been replaced, or does not have the
+        name of a shard. Without `partial`: dataset.json or plan.json lists a shard that is missing, one has no commit
+        record, or a commit record has no shard. A split, an id or a value that no sample (of the split) has, so that
+        nothing is missing in silence; also a class that has a name but no box that counts.
     """
 
     def __init__(self, paths: PathLike | Iterable[PathLike], *, split: str | None = None,
@@ -96,7 +98,8 @@ class Shards(Sequence):
         if split is not None:
             splits = [self._split(shard) for shard in shards]
             if split not in splits:
-                raise ValueError(f"expected a split of {', '.join(sorted(set(splits)))}, got {split!r}, in {self._described_as}")
+                raise ValueError(f"expected a split of {', '.join(sorted(set(splits)))}, got {split!r}, in "
+                                 f"{self._described_as}")
             shards = [shard for shard, of_it in zip(shards, splits) if of_it == split]
             self._described_as += f", split {split}"
         self.paths = [shard.path for shard in shards]
@@ -109,7 +112,7 @@ class Shards(Sequence):
         if ids is not None:
             chosen.append(self._with_ids(ids, sound))
         self._keep(np.logical_and.reduce([sound, *chosen]))
-        if chosen:  # sources that were not asked for have no say in what classes and columns there are
+        if chosen:  # classes and columns are those of the sources that were asked for
             used, self._shard = np.unique(self._shard, return_inverse=True)
             self.paths = [self.paths[number] for number in used] or self.paths
 
@@ -134,17 +137,17 @@ class Shards(Sequence):
         self._files.close()
 
     def changed(self, volume_of: Callable[[Sample], np.ndarray]) -> Shards:
-        """The same samples with other volumes. A camera's three times as bright:
+        """The same samples with other volumes, for example a camera's three times as bright:
 
             Shards("camera").changed(lambda sample: np.minimum(3 * sample["volume"], 1))
 
-        Statistics stay those of the stored volumes, quarantined samples stay as they are.
+        Statistics remain those of the stored volumes, and quarantined samples are not changed.
 
         Parameters
         ----------
         volume_of : callable
-            Makes a volume, float32 [2B, H, W], of a sample, which has the decoded `volume` and `pair`. To go to workers that are spawned, it must
-            be a function of a module.
+            Makes a volume, float32 [2B, H, W], of a sample, which has the decoded `volume` and `pair`. For spawned
+            workers it must be a function of a module.
 
         Returns
         -------
@@ -155,17 +158,7 @@ class Shards(Sequence):
         return changed
 
     def labels(self, index: int) -> Sample:
-        """Sample `index` without its volume, which is not touched.
-
-        Parameters
-        ----------
-        index : int
-
-        Returns
-        -------
-        dict
-            As of `sample`.
-        """
+        """Sample `index` without its volume, which is not read."""
         return self.sample(index, self._fields - {"volume"})
 
     def sample(self, index: int, fields: Iterable[str] | None = None) -> Sample:
@@ -181,9 +174,9 @@ class Shards(Sequence):
         -------
         dict
             volume : float32 [2B, H, W], >= 0 (decode=False: as stored, and `scale`, float32)
-            pair : everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4], if there
-            statistics : everything of /events/statistics, eta98, and `tiles` [R, C] where only some were generated; flags as
-                int64, since PyTorch has no uint32
+            pair : everything of /pairs: texts, numbers, `source_to_volume` [2, 3]; KITTI's `projection` [3, 4]
+            statistics : everything of /events/statistics, eta98, and `tiles` [R, C] if the scope is a part;
+                flags as int64, since PyTorch has no uint32
             boxes : arrays with a row for each box: xyxy [n, 4] in volume pixels, class_id, ignore...
             persons : arrays with a row for each person: joints [n, J, 2] in volume pixels, visible, center...
             original : bytes, the annotation as the dataset holds it
@@ -228,7 +221,7 @@ class Shards(Sequence):
         return {**sample, "valid": valid, "shard": str(path), "slot": slot}
 
     def column(self, name: str) -> np.ndarray:
-        """A column of /pairs of every sample, read without volumes or boxes.
+        """A column of /pairs for every sample, read without volumes or boxes.
 
         Parameters
         ----------
@@ -238,7 +231,7 @@ class Shards(Sequence):
         Returns
         -------
         numpy.ndarray
-            [len(self), ...]. Samples of shards that do not have the column, since none of theirs has such a thing, get "", NaN or -1.
+            [len(self), ...]. For samples of shards without that column: "", NaN or -1.
 
         Raises
         ------
@@ -249,36 +242,29 @@ class Shards(Sequence):
         having = next((file for file in map(self._files.__getitem__, self.paths) if file.has(name)), None)
         if having is None:
             known = sorted({column for path in self.paths for column in self._files[path].file["pairs"]})
-            raise ValueError(f"expected a column of {', '.join(known)}, got {name[len('pairs/'):]!r}, in {self._described_as}")
+            raise ValueError(f"expected a column of {', '.join(known)}, got {name[len('pairs/'):]!r}, in "
+                             f"{self._described_as}")
         like = having.column(name)
         nothing = {"O": "", "f": np.nan}.get(like.dtype.kind, -1)
 
         def of_shard(file: _OpenShard) -> np.ndarray:
-            return file.column(name) if file.has(name) else np.full((len(file.column("valid")), *like.shape[1:]), nothing, like.dtype)
+            return file.column(name) if file.has(name) else np.full((len(file.column("valid")), *like.shape[1:]),
+                                                                    nothing, like.dtype)
 
         return self._gathered(of_shard)
 
     @property
     def persons(self) -> np.ndarray:
-        """int64 [persons, 2]: of every person the sample's index here and its row there. Volumes are not touched."""
+        """int64 [persons, 2]: of every person the sample's index here and its row there. Reads no volumes."""
         counts = self._gathered(lambda file: np.diff(file.column("labels/poses/offsets")))
         first = np.cumsum(counts) - counts
         samples = np.repeat(np.arange(len(self)), counts)
-        return np.stack([samples, np.arange(len(samples)) - first[samples]], axis=1) if len(samples) else np.empty((0, 2), int)
+        return (np.stack([samples, np.arange(len(samples)) - first[samples]], axis=1) if len(samples)
+                else np.empty((0, 2), int))
 
     def annotated(self, joints: Iterable[str]) -> np.ndarray:
-        """Whether any of these joints is annotated, of every row of `persons`.
-
-        Parameters
-        ----------
-        joints : iterable of str
-            Names, as of `joint_places`.
-
-        Returns
-        -------
-        numpy.ndarray
-            bool [persons].
-        """
+        """bool [persons]: for every row of `persons`, whether any of these joints (named as for `joint_places`)
+        is annotated."""
         joints, persons = list(joints), self.persons
         if not len(persons):
             return np.empty(0, bool)
@@ -290,17 +276,10 @@ class Shards(Sequence):
         return self._gathered(of_shard, self._shard[persons[:, 0]], rows)
 
     def image_area(self) -> np.ndarray:
-        """What the samples' images cover, all together. What is outside is the border that a letterbox adds and never holds events.
+        """float64 [4]: left, top, right, bottom of the samples' images all together, in volume pixels, by edges.
 
-        Returns
-        -------
-        numpy.ndarray
-            float64 [4]: left, top, right, bottom in volume pixels (edges).
-
-        Raises
-        ------
-        ValueError
-            No sample has images.
+        Outside lies the border that a letterbox adds, which never holds events. Samples without images are a
+        ValueError.
         """
         maps, sizes = self.column("source_to_volume").reshape(-1, 2, 3), self.column("source_size").reshape(-1, 2)
         if np.isnan(maps).all():
@@ -309,7 +288,8 @@ class Shards(Sequence):
         low = maps[:, :, 2] - scale / 2 + 0.5
         volumes = self._gathered(lambda file: np.tile(file.size[::-1], (len(file.column("valid")), 1)))
         high = np.minimum(low + scale * sizes[:, ::-1], volumes)
-        if self._have("motion"):  # stills are larger by the borders that they have lost, which a letterbox shows none of
+        # stills have lost their borders, so the image in a letterbox is smaller than the source
+        if self._have("motion"):
             boxed = self._gathered(lambda file: np.full(len(file.column("valid")), file.fit() == "letterbox"))
             boxed &= np.isfinite(self.column("motion")).all(1) & (sizes > 0).all(1)
             whole, into = sizes[boxed][:, ::-1], volumes[boxed]
@@ -319,19 +299,14 @@ class Shards(Sequence):
         return np.concatenate([np.nanmin(np.maximum(low, 0), axis=0), np.nanmax(high, axis=0)])
 
     def groups(self, by: str = "sequence") -> np.ndarray:
-        """What each sample must not be parted from.
+        """str [len(self)]: the group of each sample, which a division into training and validation must not split.
 
         Parameters
         ----------
         by : str, default "sequence"
-            "sequence": Human3.6M's take (subject and action, whatever the camera), else the drive, else the sequence, else the labelled
-            frame, as far as each sample's is known. "sample_id": the labelled frame. Any other column: its value, or as "sequence" for
-            samples without.
-
-        Returns
-        -------
-        numpy.ndarray
-            str [len(self)].
+            "sequence": for Human3.6M subject and action, whatever the camera; else the drive, else the sequence, else
+            the labelled frame, whichever of these the sample has. "sample_id": the labelled frame. Any other column:
+            its value, or as "sequence" for samples without.
         """
         frames = np.array([_frame_of(name) for name in self.column("sample_id")], object)
         if by == "sample_id":
@@ -352,11 +327,11 @@ class Shards(Sequence):
         Parameters
         ----------
         fraction : float
-            About which share of the samples the first part has, between 0 and 1.
+            About the share of the samples that the first part gets, between 0 and 1.
         by : str, default "sequence"
             As of `groups`.
         seed : int, default 0
-            Which groups are in the first part is a function of it and their names.
+            Which groups the first part gets depends on it and on their names.
 
         Returns
         -------
@@ -365,13 +340,14 @@ class Shards(Sequence):
         Raises
         ------
         ValueError
-            There are not two groups, or the fraction is none.
+            There are fewer than two groups, or the fraction is not between 0 and 1.
         """
         if not 0 < fraction < 1:
             raise ValueError(f"expected a fraction between 0 and 1, got {fraction}")
         names, group, counts = np.unique(self.groups(by), return_inverse=True, return_counts=True)
         if len(names) < 2:
-            raise ValueError(f"expected at least two values of {by} to divide by, got {len(names)}, in {self._described_as}")
+            raise ValueError(f"expected at least two values of {by} to divide by, got {len(names)}, in "
+                             f"{self._described_as}")
         order = np.random.default_rng(seed).permutation(len(names))
         ends = np.cumsum(counts[order])[:-1]
         cut = 1 + int(np.abs(ends - fraction * len(self)).argmin())
@@ -379,22 +355,12 @@ class Shards(Sequence):
         return self[np.flatnonzero(first)], self[np.flatnonzero(~first)]
 
     def known_classes(self) -> list[str]:
-        """The names that the shards have for classes, in their order, whether or not a sample here has such a box.
-
-        Returns
-        -------
-        list of str
-        """
-        return list(dict.fromkeys(name for path in self.paths for name in self._files[path].names("labels/boxes/class_id", "class_names")))
+        """The names of classes in the shards, in their order, whether or not a sample here has such a box."""
+        return list(dict.fromkeys(name for path in self.paths
+                                  for name in self._files[path].names("labels/boxes/class_id", "class_names")))
 
     def class_counts(self) -> dict[str, int]:
-        """How many boxes that are not to be ignored the samples have of each class.
-
-        Returns
-        -------
-        dict
-            By name, in the order the shards name them.
-        """
+        """The number of boxes of each class that are not ignored, by name, in the order of the shards."""
         counts: dict[str, int] = {}
         for number in np.unique(self._shard):
             file, slots = self._files[self.paths[number]], self._slot[self._shard == number]
@@ -407,64 +373,28 @@ class Shards(Sequence):
         return counts
 
     def default_joints(self) -> list[str]:
-        """The joints of the first source that has any: the 17 in common use where it names them (`joint_aliases`), else all.
-
-        Returns
-        -------
-        list of str
-        """
+        """The joints of the first source that has any: the 17 in common use if it names them (`joint_aliases`),
+        else all."""
         files = (self._files[self.paths[number]] for number in np.unique(self._shard))
-        sets = ([name for name in file.names("labels/poses", "joint_aliases") if name] or file.names("labels/poses", "joint_names") for file in files)
+        sets = ([name for name in file.names("labels/poses", "joint_aliases") if name]
+                or file.names("labels/poses", "joint_names") for file in files)
         return next(filter(None, sets), [])
 
     def class_names(self, index: int) -> list[str]:
-        """What the class ids of a sample mean, the same for a whole source.
-
-        Parameters
-        ----------
-        index : int
-
-        Returns
-        -------
-        list of str
-        """
+        """The classes that a sample's class ids stand for, the same for a whole source."""
         return self._files[self._place(index)[0]].names("labels/boxes/class_id", "class_names")
 
     def joint_names(self, index: int) -> list[str]:
-        """What the joints of a sample are, the same for a whole source.
-
-        Parameters
-        ----------
-        index : int
-
-        Returns
-        -------
-        list of str
-        """
+        """The joints of a sample, the same for a whole source."""
         return self._files[self._place(index)[0]].names("labels/poses", "joint_names")
 
     def joint_places(self, index: int, names: Iterable[str]) -> list[int]:
-        """Where these joints are among those of a sample.
-
-        Parameters
-        ----------
-        index : int
-        names : iterable of str
-            The source's own, or those of the 17 joints in common use (`joint_aliases`).
-
-        Returns
-        -------
-        list of int
-
-        Raises
-        ------
-        ValueError
-            A name is neither.
-        """
+        """The places of these joints (the source's names, or those of `joint_aliases`) among a sample's;
+        others are a ValueError."""
         return self._files[self._place(index)[0]].joint_places(names)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: a table of what the samples are, counted without touching a volume."""
+        """A table for notebooks, counted without reading a volume."""
         counts: dict[str, collections.Counter] = collections.defaultdict(collections.Counter)
         for number in np.unique(self._shard):
             here, file = self[np.flatnonzero(self._shard == number)], self._files[self.paths[number]]
@@ -477,7 +407,8 @@ class Shards(Sequence):
         for what, found in counts.items():
             rows[what] = ", ".join(f"{value}: {count:,}" for value, count in sorted(found.items()) if count) or "none"
         rows["quarantined"] = f"{self._quarantined:,} in these shards"
-        cells = "".join(f'<tr><th style="text-align:left">{what}</th><td style="text-align:left">{html.escape(text)}</td></tr>'
+        cells = "".join(f'<tr><th style="text-align:left">{what}</th><td '
+                        f'style="text-align:left">{html.escape(text)}</td></tr>'
                         for what, text in rows.items())
         return f"<table><caption>{html.escape(self._described_as)}</caption>{cells}</table>"
 
@@ -501,7 +432,8 @@ class Shards(Sequence):
 
     def _gathered(self, of_shard: Callable[[_OpenShard], np.ndarray], shard: np.ndarray | None = None,
                   rows: np.ndarray | None = None) -> np.ndarray:
-        """[n, ...]: what `of_shard` gives of a shard, [its rows, ...], for rows [n] of shards [n]; None: for the samples here."""
+        """[n, ...]: from `of_shard`'s array of a shard, [its slots, ...], rows [n] of shards [n]; None:
+        those of the samples here."""
         if shard is None or rows is None:
             shard, rows = self._shard, self._slot
         if not len(shard):
@@ -519,15 +451,16 @@ class Shards(Sequence):
         source = "ids"
         if isinstance(ids, (str, os.PathLike)):
             source = str(ids)
-            ids = [line.strip() for line in pathlib.Path(ids).read_text(encoding="utf-8-sig").splitlines() if line.strip()]
+            ids = [line.strip() for line in pathlib.Path(ids).read_text(encoding="utf-8-sig").splitlines()
+                   if line.strip()]
         wanted = dict.fromkeys(ids)
         names = [(name, _frame_of(name)) for name in self.column("sample_id")]
         self._require_known(wanted, {name for pair in names for name in pair}, "sample ids", source)
         chosen = np.array([name in wanted or frame in wanted for name, frame in names], bool)
         skipped = [names[i][0] for i in np.flatnonzero(chosen & ~sound)]
         if skipped:
-            warnings.warn(f"{len(skipped)} samples named by {source} are quarantined and skipped ({_first(skipped)}), in {self._described_as}",
-                          stacklevel=3)
+            warnings.warn(f"{len(skipped)} samples named by {source} are quarantined and skipped ({_first(skipped)}), "
+                          f"in {self._described_as}", stacklevel=3)
         return chosen
 
     def _with_values(self, key: str, values: Any) -> np.ndarray:
@@ -550,22 +483,22 @@ class Shards(Sequence):
         unknown = [value for value in values if value not in known]
         if unknown:
             there = _first(map(repr, sorted(known)), 20) or "none"
-            raise ValueError(f"expected {what} of {self._described_as} ({there}), got {len(unknown)} that it does not have "
-                             f"({_first(map(repr, unknown))}), in {source}")
+            raise ValueError(f"expected {what} of {self._described_as} ({there}), got {len(unknown)} that it does not "
+                             f"have ({_first(map(repr, unknown))}), in {source}")
 
 
 class _Kept:
-    """What was read of a shard and stays when its file is closed."""
+    """What was read from a shard and stays when its file is closed."""
 
     def __init__(self) -> None:
         self.columns: dict[str, np.ndarray] = {}
         self.groups: dict[str, list[tuple[str, np.ndarray]]] = {}
         self.names: dict[tuple[str, str], list[str]] = {}
-        self.paths: set[str] = set()  # of everything in the file
+        self.paths: set[str] = set()  # of all objects in the file
 
 
 class _OpenShard:
-    """A shard's file and those of its columns that were read."""
+    """A shard's open file, and the columns read from it."""
 
     def __init__(self, path: pathlib.Path, kept: _Kept) -> None:
         self.file = open_shard(path)
@@ -619,8 +552,9 @@ class _OpenShard:
         unknown = [name for name in names if name not in places]
         if unknown:
             also = [alias for alias in aliases if alias and alias not in known]
-            raise ValueError(f"expected joints of {', '.join(known)}{' or ' if also else ''}{', '.join(also)}, got {', '.join(unknown)}, "
-                             f"in {self.file.filename} (where={{'dataset': ...}}, or --dataset, leaves out sources with other joints)")
+            raise ValueError(f"expected joints of {', '.join(known)}{' or ' if also else ''}{', '.join(also)}, got "
+                             f"{', '.join(unknown)}, in {self.file.filename} (where={{'dataset': ...}}, or --dataset, "
+                             "leaves out sources with other joints)")
         return [places[name] for name in names]
 
     def _group(self, group: str) -> list[tuple[str, np.ndarray]]:
@@ -631,7 +565,8 @@ class _OpenShard:
 
 
 class _Files:
-    """The shards that are open in this process, the one used longest ago closed first, and the columns of all that were."""
+    """The shards open in this process, of which the least recently used is closed first,
+    and the columns read from all of them."""
 
     _open: collections.OrderedDict[pathlib.Path, _OpenShard]
     _process: int
@@ -685,7 +620,7 @@ def open_shard(path: PathLike) -> h5py.File:
     ValueError
         It is none, or of another major version.
     """
-    file = h5py.File(path, "r", rdcc_nbytes=0)  # a volume is a chunk of its own: nothing to keep
+    file = h5py.File(path, "r", rdcc_nbytes=0)  # each volume is one chunk: a cache is of no use
     try:
         _check_version(file.attrs, "format_version", FORMAT, FORMAT_VERSION, path)
     except ValueError:
@@ -724,7 +659,7 @@ def _known_fields(fields: Iterable[str]) -> frozenset[str]:
 
 
 def _frame_of(sample_id: str) -> str:
-    """The labelled frame's id: of "000005@before1", one of all pairs of a frame, 000005."""
+    """The id of the labelled frame: 000005 for "000005@before1"."""
     return re.sub(r"@(before|after|around)\d+$", "", sample_id)
 
 
@@ -748,7 +683,7 @@ def _reason(path: pathlib.Path, slot: int) -> str:
 
 class _Shard(NamedTuple):
     path: pathlib.Path
-    split: str | None = None  # None: look into the file
+    split: str | None = None  # None: the file says it
     valid: np.ndarray | None = None  # bool, of each slot
 
 
@@ -780,7 +715,8 @@ def _listed_shards(paths: PathLike | list[PathLike], partial: bool) -> list[_Sha
 def _expected_shards(folder: pathlib.Path) -> set[str]:
     """The names of shards that are there, or planned, or have a commit record."""
     names = {path.name for path in folder.glob("*.h5")} - {VIEW}
-    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json") if path.with_suffix(".h5").name not in names and _is_commit_record(path))
+    names.update(path.with_suffix(".h5").name for path in folder.glob("*.json")
+                 if path.with_suffix(".h5").name not in names and _is_commit_record(path))
     if (folder / PLAN).exists():
         names.update(shard["name"] for shard in json.loads((folder / PLAN).read_text(encoding="utf-8"))["shards"])
     return names
@@ -788,15 +724,16 @@ def _expected_shards(folder: pathlib.Path) -> set[str]:
 
 def _is_commit_record(path: pathlib.Path) -> bool:
     try:
-        return path.name != PLAN and json.loads(path.read_text(encoding="utf-8")).get("shard") == path.with_suffix(".h5").name
+        record = {} if path.name == PLAN else json.loads(path.read_text(encoding="utf-8"))
+        return record.get("shard") == path.with_suffix(".h5").name
     except (OSError, ValueError, AttributeError):
         return False
 
 
 def _require_whole(done: Sequence[str], missing: Sequence[str], folder: pathlib.Path) -> None:
     if missing:
-        raise ValueError(f"expected {len(done) + len(missing)} finished shards, got {len(missing)} unfinished ({_first(missing)}), in {folder} "
-                         "(partial=True uses the others)")
+        raise ValueError(f"expected {len(done) + len(missing)} finished shards, got {len(missing)} unfinished "
+                         f"({_first(missing)}), in {folder} (partial=True uses the others)")
 
 
 def read_description(folder: PathLike) -> dict[str, Any]:
@@ -828,7 +765,8 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
     shards, valid = [], {}
     for entry in description["shards"]:
         if not SHARD_NAME.fullmatch(str(entry["name"])):
-            raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in {folder / DESCRIPTION}")
+            raise ValueError(f"expected the name of a shard beside it, got {entry['name']!r}, in "
+                             f"{folder / DESCRIPTION}")
         path = folder / entry["name"]
         if not _is_same(path, entry):
             raise ValueError(f"expected the shard that {DESCRIPTION} describes, got another or none, in {path} "
@@ -841,7 +779,7 @@ def _described_shards(folder: pathlib.Path, partial: bool) -> list[_Shard]:
 
 
 def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
-    """Whether the shard is the one that was described: by its size, and by its commit record if that came along."""
+    """Whether the shard is the one that was described: by its size, and by its commit record if there is one."""
     try:
         if path.stat().st_size != entry["size_bytes"]:
             return False
@@ -856,7 +794,7 @@ def _is_same(path: pathlib.Path, entry: Mapping[str, Any]) -> bool:
 
 
 def _is_done(path: pathlib.Path) -> bool:
-    """Whether the commit record beside the file is a shard's and the file has its size: that is what done means."""
+    """Whether the shard is finished: the commit record beside it names it and has its size."""
     try:
         record = json.loads(_record(path).read_text(encoding="utf-8"))
     except (OSError, ValueError):
