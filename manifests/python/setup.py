@@ -1,8 +1,9 @@
 """Builds the compiled module eventgan._engine with CMake; pyproject.toml has the rest.
 
-For Debian's Python and pybind11 it is that of the checkout's build/release, which is made if it is not there; others get a build folder of their
-own. The environment variable EVENTGAN_BUILD names a folder that CMake has set up elsewhere. Without it the package is installed even where
-the module cannot be built, and what is missing is a warning, which `pip install -v` shows.
+For Debian's Python and pybind11 it is that of the checkout's build/release, which is made if it is not there; others
+get a build folder of their own. The environment variable EVENTGAN_BUILD names a folder that CMake has set up elsewhere.
+Without it the package is installed even where the module cannot be built, and what is missing is a warning, which `pip
+install -v` shows.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 
 CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
-MISSING = """eventgan is installed without its compiled module: Shards and all that reads them work, eventgan.Generator does not.
+MISSING = """eventgan is installed without its compiled module: Shards and their readers work, eventgan.Generator not.
 {reason}
-For the module, install from a checkout of eventgan, on Debian 12 or 13, after `docker/bootstrap.sh packages build`; or the package
-python3-eventgan that `docker/bootstrap.sh package` makes."""
+For the module, install from a checkout of eventgan, on Debian 12 or 13, after `docker/bootstrap.sh packages build`; or
+the package python3-eventgan that `docker/bootstrap.sh package` makes."""
 
 
 def run(*command: str | os.PathLike) -> None:
@@ -31,12 +32,14 @@ def run(*command: str | os.PathLike) -> None:
     except FileNotFoundError:
         raise RuntimeError(f"expected the program {command[0]}, got none") from None
     except subprocess.CalledProcessError as error:
-        raise RuntimeError(f"expected {' '.join(map(str, command))} to succeed, got exit code {error.returncode}: see above") from None
+        raise RuntimeError(f"expected {' '.join(map(str, command))} to succeed, got exit code "
+                           f"{error.returncode}: see above") from None
 
 
 def made_module() -> pathlib.Path:
     """The module's file in a build folder, made if need be."""
-    python = os.path.realpath(sys.executable)  # not the virtual environment's, which may be gone when the folder is used again
+    # not the virtual environment's, which may be gone when the folder is used again
+    python = os.path.realpath(sys.executable)
     if "EVENTGAN_BUILD" in os.environ:
         build = pathlib.Path(os.environ["EVENTGAN_BUILD"]).resolve()
     else:
@@ -44,7 +47,8 @@ def made_module() -> pathlib.Path:
             raise RuntimeError(f"expected the sources of the program, got none in {CHECKOUT}")
         options = [f"-DPython_EXECUTABLE={python}", "-DEVENTGAN_TESTS=OFF"]
         found = find_spec("pybind11")
-        if found and not found.origin.startswith("/usr/lib/python3/"):  # not Debian's, which CMake finds: that of Debian 12 knows no NumPy 2
+        # not Debian's, which CMake finds: that of Debian 12 knows no NumPy 2
+        if found and not found.origin.startswith("/usr/lib/python3/"):
             import pybind11
             options.append(f"-Dpybind11_DIR={pybind11.get_cmake_dir()}")
         own = python == os.path.realpath("/usr/bin/python3") and len(options) == 2
@@ -76,5 +80,6 @@ class BuildEngine(build_ext):
 needed = ["numpy"] if find_spec("h5py") else ["numpy", "h5py>=3"]
 # Beside the sources, a build would leave files that the next one installs, too.
 with tempfile.TemporaryDirectory() as folder:
-    setup(install_requires=needed, ext_modules=[Extension("eventgan._engine", sources=[], optional=True)], cmdclass={"build_ext": BuildEngine},
+    setup(install_requires=needed, ext_modules=[Extension("eventgan._engine", sources=[], optional=True)],
+          cmdclass={"build_ext": BuildEngine},
           options={"build": {"build_base": folder}, "egg_info": {"egg_base": folder}})

@@ -1,6 +1,8 @@
-"""Events with boxes of persons, for `experiment.py real`: photographs and clips turned into events in several ways, and recordings of real cameras.
+"""Events with boxes of persons, for `experiment.py real`: photographs and clips turned into events in several ways, and
+recordings of real cameras.
 
-All of them become items of `DetectionDataset`, which are kept in OUT/items. `args` is experiment.py's: frames, real, peers, out.
+All of them become items of `DetectionDataset`, which are kept in OUT/items. `args` is experiment.py's: frames, real,
+peers, out.
 """
 
 from __future__ import annotations
@@ -38,14 +40,18 @@ Item = dict[str, Any]  # of DetectionDataset, its volume in half precision
 
 @dataclasses.dataclass(frozen=True)
 class Source:
-    """A way to make events of the photographs. The generator's part of a manifest, or what is made of the pairs that were converted for another."""
+    """A way to make events of the photographs. The generator's part of a manifest,
+    or what is made of the pairs that were converted for another."""
 
     generator: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-    of_pair: Callable[[argparse.Namespace, Mapping[str, Any]], np.ndarray] | None = None  # a signed channel, of a sample of EventGAN 16's
+    # a signed channel, of a sample of EventGAN 16's
+    of_pair: Callable[[argparse.Namespace, Mapping[str, Any]], np.ndarray] | None = None
     normalize: str = "none"
     motion_px: float = MOTION_PX
     size: tuple[int, int] = SIZE
-    finer: int = 1  # the sensor has so many times the size's lines and columns; events are averaged down, as a camera's are before a detector
+    # the sensor has so many times the size's lines and columns; events are averaged down, as a camera's are before a
+    # detector
+    finer: int = 1
 
 
 def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
@@ -54,7 +60,8 @@ def grey(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
 
 
 def gradient(_: argparse.Namespace, sample: Mapping[str, Any]) -> np.ndarray:
-    """The slope of the labelled frame's log intensity along a direction drawn for it: what a small shift would bring about, without any generator."""
+    """The slope of the labelled frame's log intensity along a direction drawn for it:
+    what a small shift would bring about, without any generator."""
     angle = np.random.default_rng(zlib.crc32(sample["pair"]["sample_id"].encode())).uniform(0, 2 * np.pi)
 
     def slope(_: np.ndarray, image: np.ndarray) -> np.ndarray:
@@ -81,21 +88,26 @@ def _where_shown(sample: Mapping[str, Any], channel_of: Callable[[np.ndarray, np
 def _shown(shape: Sequence[int], size: tuple[int, int]) -> tuple[slice, slice]:
     """The lines and columns of a letterbox of the size H, W in which an image of a shape H, W lies."""
     sides = np.round(np.multiply(shape[:2], min(np.divide(size, shape[:2])))).astype(int)
-    lines, columns = (slice((whole - side) // 2, (whole - side) // 2 + side) for whole, side in zip(size, sides.tolist()))
+    lines, columns = (slice((whole - side) // 2, (whole - side) // 2 + side)
+                      for whole, side in zip(size, sides.tolist()))
     return lines, columns
 
 
 def pair_of(sample: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Both frames of a sample where they lie in the volume, uint8 [H, W]: of a still the first one is moved as its shard says."""
+    """Both frames of a sample where they lie in the volume, uint8 [H, W]:
+    of a still the first one is moved as its shard says."""
     image, pair = training.labelled_image(sample), sample["pair"]
     x, y, angle, scale = pair.get("motion", [math.nan] * 4)
     if math.isnan(scale):  # two frames of a clip
         previous = cv2.imread(pair["prev_path"], cv2.IMREAD_GRAYSCALE)
     else:
-        cos, sin, middle = scale * np.cos(np.deg2rad(angle)), scale * np.sin(np.deg2rad(angle)), (np.array(image.shape[::-1]) - 1) / 2
+        cos, sin, middle = (scale * np.cos(np.deg2rad(angle)), scale * np.sin(np.deg2rad(angle)),
+                            (np.array(image.shape[::-1]) - 1) / 2)
         linear = np.array([[cos, -sin], [sin, cos]])
-        affine = np.column_stack([linear, middle - linear @ middle + [x, y]])  # from a point of the previous frame to that of the next one
-        previous = cv2.warpAffine(image, affine, image.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE)
+        # from a point of the previous frame to that of the next one
+        affine = np.column_stack([linear, middle - linear @ middle + [x, y]])
+        previous = cv2.warpAffine(image, affine, image.shape[::-1], flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+                                  borderMode=cv2.BORDER_REPLICATE)
     first, second = (training.placed(sample, each).round().astype(np.uint8) for each in (previous, image))
     return first, second
 
@@ -144,15 +156,20 @@ def manifest_of(args: argparse.Namespace, name: str, source: Source) -> dict[str
         if not path.exists():
             _write_boxes(args.frames / folder, path, EVERY if folder in CLIPS else 1)
         pairs = {"gaps": [1, 2, 3], "side": "before", "choose": "one"} if folder in CLIPS else {
-            "from": "stills", "motion": {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
-        sources.append({"dataset": "frames", "root": str(args.frames / folder / "images"), "labels": {"format": "csv", "path": str(path)}, "pairs": pairs})
+            "from": "stills",
+            "motion": {"translation_px": [0, source.motion_px], "rotation_deg": 2, "scale": 0.03, "frames": 1}}
+        sources.append({"dataset": "frames", "root": str(args.frames / folder / "images"),
+                        "labels": {"format": "csv", "path": str(path)}, "pairs": pairs})
     generator = dict(source.generator)
     if generator.get("sensor") == "fitted":
         threshold = fitted_threshold(args)
         generator["sensor"] = {"positive_threshold": threshold, "negative_threshold": threshold}
-    return {"format": "eventgan-manifest", "version": 1, "name": "persons", "seed": 7, "sources": sources, "generator": generator,
-            "image": {"height": source.size[0] * source.finer, "width": source.size[1] * source.finer, "fit": "letterbox", "preset": "mpii"},
-            "volume": {"normalize": source.normalize}, "output": {"directory": name, "dtype": "float16", "samples_per_shard": 64}}
+    return {"format": "eventgan-manifest", "version": 1, "name": "persons", "seed": 7, "sources": sources,
+            "generator": generator,
+            "image": {"height": source.size[0] * source.finer, "width": source.size[1] * source.finer,
+                      "fit": "letterbox", "preset": "mpii"},
+            "volume": {"normalize": source.normalize},
+            "output": {"directory": name, "dtype": "float16", "samples_per_shard": 64}}
 
 
 def _write_boxes(folder: pathlib.Path, path: pathlib.Path, every: int) -> None:
@@ -178,12 +195,13 @@ def shards_of(args: argparse.Namespace, name: str) -> Shards:
 
 
 def fitted_threshold(args: argparse.Namespace) -> float:
-    """The contrast threshold with which log differences of the photographs have events at as many pixels as the windows of the first camera that has
-    events, not drawings of them; their labels are not looked at."""
+    """The contrast threshold with which log differences of the photographs have events at as many pixels as the windows
+    of the first camera that has events, not drawings of them; their labels are not looked at."""
     path = args.out / "threshold.json"
     if not path.exists():
         folder = next(folder for folder in recordings_in(args.real) if any(folder.glob("*.npz")))
-        wanted = np.mean([(window["volume"] > 0).any(0).float().mean().item() for window in test_items(args, folder, SIZE, signed=False)])
+        wanted = np.mean([(window["volume"] > 0).any(0).float().mean().item()
+                          for window in test_items(args, folder, SIZE, signed=False)])
         samples = shards_of(args, "EventGAN 16")
         pairs = [pair_of(samples[i]) for i in range(0, len(samples), 12)]
         low, high = 0.02, 2.0
@@ -192,7 +210,8 @@ def fitted_threshold(args: argparse.Namespace) -> float:
             model = Generator(kind="difference", sensor={"positive_threshold": middle, "negative_threshold": middle})
             share = np.mean([(model(previous, following) > 0).any(0).mean() for previous, following in pairs])
             low, high = (middle, high) if share > wanted else (low, middle)
-        path.write_text(json.dumps({"threshold": middle, "active_pixels": share, "of_camera": wanted}) + "\n", encoding="utf-8")
+        path.write_text(json.dumps({"threshold": middle, "active_pixels": share, "of_camera": wanted}) + "\n",
+                        encoding="utf-8")
     return json.loads(path.read_text(encoding="utf-8"))["threshold"]
 
 
@@ -232,20 +251,25 @@ def _halved(item: Item) -> Item:
 
 
 def recordings_in(folder: pathlib.Path) -> list[pathlib.Path]:
-    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt) or of drawn events (images/ and labels/)."""
-    found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir() and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
-                                                                                        (each / "images").is_dir() and (each / "labels").is_dir())]
+    """The folders of recordings with boxes: of windows (NAME.npz and NAME.txt)
+    or of drawn events (images/ and labels/)."""
+    found = [each for each in (folder, *sorted(folder.iterdir())) if each.is_dir()
+             and (any(each.glob("*.npz")) and any(each.glob("*.txt")) or
+                  (each / "images").is_dir() and (each / "labels").is_dir())]
     if not found:
-        raise SystemExit(f"expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/, labels/), got none, in {folder}")
+        raise SystemExit("expected folders with windows (NAME.npz, NAME.txt) or drawn events (images/, labels/), got "
+                         f"none, in {folder}")
     return found
 
 
-def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], signed: bool = True) -> list[Item]:
-    """The windows of a recording with boxes, brought to the size: signed channels, or volumes divided by their 98th percentiles and clipped at 1; [] if it
-    has drawings of events alone and volumes are asked for."""
+def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int],
+               signed: bool = True) -> list[Item]:
+    """The windows of a recording with boxes, brought to the size: signed channels, or volumes divided by their 98th
+    percentiles and clipped at 1; [] if it has drawings of events alone and volumes are asked for."""
     def make() -> list[Item]:
         if (folder / "images").is_dir():
-            return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size) for path in sorted((folder / "images").iterdir())] if signed else []
+            return [_drawn(path, folder / "labels" / f"{path.stem}.txt", size)
+                    for path in sorted((folder / "images").iterdir())] if signed else []
         windows = DetectionDataset(windows_of(args, folder, DAVIS346, "none"), CLASSES)
         return [_smaller(windows[i], size, signed_channel if signed else _normalized) for i in range(len(windows))]
 
@@ -253,21 +277,23 @@ def test_items(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
 
 
 def _drawn(path: pathlib.Path, labels: pathlib.Path, size: tuple[int, int]) -> Item:
-    """Of an image in which somebody has drawn positive minus negative events in grey, stretched to 0..255 by its own range."""
+    """Of an image in which somebody has drawn positive minus negative events in grey,
+    stretched to 0..255 by its own range."""
     image = cv2.imread(str(path), cv2.IMREAD_GRAYSCALE)
     if image is None:
         raise ValueError(f"expected an image, got none, in {path}")
     # What is no event is known before the image is made smaller, when values are still whole.
     events = torch.from_numpy(image.astype(np.float32) - np.bincount(image.ravel()).argmax())
     boxes = torch.from_numpy(_boxes(labels, image.shape)).float()
-    item = {"volume": events[None], "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64), "ignore": torch.zeros(len(boxes), dtype=torch.bool),
-            "id": path.stem}
+    item = {"volume": events[None], "boxes": boxes, "labels": torch.zeros(len(boxes), dtype=torch.int64),
+            "ignore": torch.zeros(len(boxes), dtype=torch.bool), "id": path.stem}
     return _smaller(item, size, lambda signed: signed_channel(np.concatenate([signed.clip(0), (-signed).clip(0)])))
 
 
 def _smaller(item: Item, size: tuple[int, int], finish: Callable[[np.ndarray], np.ndarray]) -> Item:
-    """The item in a letterbox of the size, each pixel the mean of those that it covers, and then finished: pixels taken singly, or events put into the
-    pixel in which they fall, would make a pattern of lines where the sides' quotient is no whole number."""
+    """The item in a letterbox of the size, each pixel the mean of those that it covers, and then finished: pixels taken
+    singly, or events put into the pixel in which they fall, would make a pattern of lines where the sides' quotient is
+    no whole number."""
     events = item["volume"].numpy()
     lines, columns = shown = _shown(events.shape[1:], size)
     height, width = lines.stop - lines.start, columns.stop - columns.start
@@ -282,12 +308,14 @@ def _normalized(volume: np.ndarray) -> np.ndarray:
     return np.minimum(volume / (np.percentile(volume[volume > 0], 98) if volume.any() else 1), 1)
 
 
-def windows_folder(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], normalize: str) -> pathlib.Path:
+def windows_folder(args: argparse.Namespace, folder: pathlib.Path,
+                   size: tuple[int, int], normalize: str) -> pathlib.Path:
     return args.out / "shards" / f"{key_of(folder)}-{size[0]}x{size[1]}-{normalize}"
 
 
 def windows_of(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, int], normalize: str) -> Shards:
-    """Files of a window each, NAME.npz with t_us, x, y and p of a DAVIS346, with their boxes, as the program converts them."""
+    """Files of a window each, NAME.npz with t_us, x, y and p of a DAVIS346, with their boxes,
+    as the program converts them."""
     out = windows_folder(args, folder, size, normalize)
     labels = args.out / "labels" / key_of(folder)
     labels.mkdir(parents=True, exist_ok=True)
@@ -295,11 +323,14 @@ def windows_of(args: argparse.Namespace, folder: pathlib.Path, size: tuple[int, 
         end = f"{np.load(path)['t_us'][-1] * 1e-6:.6f}"  # a sample is at the time of its label, the window's end
         boxes = _boxes(path.with_suffix(".txt"), DAVIS346)
         lines = [f"{end},{','.join(f'{edge:.3f}' for edge in box)},{CLASSES[0]}" for box in boxes] or [end]
-        (labels / f"{path.stem}.csv").write_text("\n".join(["time_s,left,top,right,bottom,class", *lines, ""]), encoding="utf-8")
-    source = {"dataset": "recording", "root": str(folder), "annotations": str(labels), "sensor": dict(zip(("height", "width"), DAVIS346)),
+        (labels / f"{path.stem}.csv").write_text("\n".join(["time_s,left,top,right,bottom,class", *lines, ""]),
+                                                 encoding="utf-8")
+    source = {"dataset": "recording", "root": str(folder), "annotations": str(labels),
+              "sensor": dict(zip(("height", "width"), DAVIS346)),
               "columns": {"t": "t_us"}, "window_s": 0.05, "split": "test"}
-    return convert({"format": "eventgan-manifest", "version": 1, "name": "windows", "sources": [source], "generator": {"kind": "events"},
-                    "image": {"height": size[0], "width": size[1], "fit": "letterbox"}, "volume": {"normalize": normalize},
+    return convert({"format": "eventgan-manifest", "version": 1, "name": "windows", "sources": [source],
+                    "generator": {"kind": "events"}, "image": {"height": size[0], "width": size[1], "fit": "letterbox"},
+                    "volume": {"normalize": normalize},
                     "output": {"directory": str(out), "dtype": "float32"}}, out, progress=False)
 
 

@@ -5,8 +5,8 @@
     method = recordings.METHODS["difference, fitted"](frames, real.sum((1, 2, 3)), peers)
     volume = method(frames[0], frames[1])                                                         # [18, H, W]
 
-Volumes of the camera, of the models, of v2e and of the network that knows its sensor are counts of events; those of the other networks are about
-[0, 1] and no counts.
+Volumes of the camera, of the models, of v2e and of the network that knows its sensor are counts of events; those of the
+other networks are about [0, 1] and no counts.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import torch
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan import Generator, Shards  # noqa: E402
+from eventgan import Generator, Shards
 
 PathLike = Union[str, os.PathLike]
 Method = Callable[[np.ndarray, np.ndarray], np.ndarray]  # previous, following: uint8 [H, W] -> float32 [2B, H, W]
@@ -78,8 +78,8 @@ def frames_of(path: PathLike) -> tuple[np.ndarray, np.ndarray]:
 def real_volumes(program: PathLike, path: PathLike, folder: PathLike) -> np.ndarray:
     """Volumes of the camera's events, of each interval between two frames, by `eventgan convert`.
 
-    They are counts ("normalize": "none"): a count is what a sensor model makes, too, and its sum is how many events there were. Whoever needs
-    shares of the 98th percentile divides by it.
+    They are counts ("normalize": "none"): a count is what a sensor model makes, too, and its sum is how many events
+    there were. Whoever needs shares of the 98th percentile divides by it.
 
     Parameters
     ----------
@@ -105,9 +105,11 @@ def real_volumes(program: PathLike, path: PathLike, folder: PathLike) -> np.ndar
     path, folder = pathlib.Path(path).resolve(), pathlib.Path(folder).resolve()
     if not (folder / "dataset.json").exists():
         folder.parent.mkdir(parents=True, exist_ok=True)
-        manifest = {"format": "eventgan-manifest", "version": 1, "name": path.stem, "image": {}, "generator": {"kind": "events"},
+        manifest = {"format": "eventgan-manifest", "version": 1, "name": path.stem, "image": {},
+                    "generator": {"kind": "events"},
                     "sources": [{"dataset": "recording", "root": str(path), "split": "test"}],
-                    "volume": {"bins": BINS, "normalize": "none"}, "output": {"directory": folder.name, "dtype": "float32"}}
+                    "volume": {"bins": BINS, "normalize": "none"},
+                    "output": {"directory": folder.name, "dtype": "float32"}}
         file = folder.with_name(f"{folder.name}.json")
         file.write_text(json.dumps(manifest, indent=1), encoding="utf-8")
         for command in (["convert", file], ["finalize", folder]):
@@ -116,20 +118,23 @@ def real_volumes(program: PathLike, path: PathLike, folder: PathLike) -> np.ndar
         volumes = np.stack([shards.sample(i, {"volume"})["volume"] for i in range(len(shards))])
     expected = len(frames_of(path)[0]) - 1
     if len(volumes) != expected:
-        raise ValueError(f"expected volumes of {expected} intervals, got {len(volumes)}, in {folder} (its dataset.json has the reasons)")
+        raise ValueError(f"expected volumes of {expected} intervals, got {len(volumes)}, in {folder} (its dataset.json "
+                         "has the reasons)")
     return volumes
 
 
 class V2e:
     """The emulator of v2e (Hu et al. 2021) without its noise, as a function of two frames.
 
-    Thresholds differ from pixel to pixel by 15 %, the same at each call, as in one camera. In place of frames interpolated by SuperSloMo it is given
-    the pair in eight steps, blended from both: else the events would have only as many times as the pixel with most events has events.
+    Thresholds differ from pixel to pixel by 15 %, the same at each call, as in one camera. In place of frames
+    interpolated by SuperSloMo it is given the pair in eight steps, blended from both: else the events would have only
+    as many times as the pixel with most events has events.
 
     Parameters
     ----------
     peers : str or path
-        A folder with `v2e`, a checkout of SensorsINI/v2e. Its folder `stubs`, if there is one, stands in for packages that are not installed.
+        A folder with `v2e`, a checkout of SensorsINI/v2e. Its folder `stubs`, if there is one, stands in for packages
+        that are not installed.
     threshold : float
         Contrast threshold of both polarities.
     bins : int
@@ -160,18 +165,21 @@ class V2e:
         height, width = previous.shape
         with torch.random.fork_rng(devices=[]):  # a training's random numbers stay its own
             torch.manual_seed(0)
-            emulator = EventEmulator(pos_thres=self.threshold, neg_thres=self.threshold, sigma_thres=SPREAD_SHARE * self.threshold, leak_rate_hz=0,
+            emulator = EventEmulator(pos_thres=self.threshold, neg_thres=self.threshold,
+                                     sigma_thres=SPREAD_SHARE * self.threshold, leak_rate_hz=0,
                                      device="cpu", output_height=height, output_width=width)
             atexit.unregister(emulator.cleanup)  # it would keep every emulator in memory
             parts = [np.zeros((0, 4), np.float32)]
             for share in np.linspace(0, 1, self._steps + 1, dtype=np.float32):
-                made = emulator.generate_events((1 - share) * previous + share * following, float(share))  # without noise the time's unit is all one
+                # without noise the time's unit is all one
+                made = emulator.generate_events((1 - share) * previous + share * following, float(share))
                 parts += [] if made is None else [made]
         return volume_of(np.concatenate(parts), (height, width), self._bins)
 
 
 def volume_of(events: np.ndarray, size: tuple[int, int], bins: int = BINS) -> np.ndarray:
-    """The volume of events, each shared between the two bins nearest to it in time, of which the first event has 0 and the last one `bins` - 1.
+    """The volume of events, each shared between the two bins nearest to it in time, of which the first event has 0 and
+    the last one `bins` - 1.
 
     Parameters
     ----------
@@ -196,8 +204,10 @@ def volume_of(events: np.ndarray, size: tuple[int, int], bins: int = BINS) -> np
     return np.bincount(cells, weights, 2 * bins * size[0] * size[1]).astype(np.float32).reshape(2 * bins, *size)
 
 
-def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: np.ndarray, within: tuple[float, float] = THRESHOLDS) -> float:
-    """The threshold with which a model makes as many events as the camera, as a simulator's user would set it and `eventgan realism` does.
+def fitted(model: Callable[[float], Method], frames: np.ndarray, event_counts: np.ndarray,
+           within: tuple[float, float] = THRESHOLDS) -> float:
+    """The threshold with which a model makes as many events as the camera, as a simulator's user would set it and
+    `eventgan realism` does.
 
     Parameters
     ----------
@@ -244,20 +254,21 @@ def esim(threshold: float) -> Method:
 
 
 def _sensor(threshold: float) -> dict[str, float]:
-    return {"positive_threshold": threshold, "negative_threshold": threshold, "threshold_spread": SPREAD_SHARE * threshold,
-            "log_epsilon": LOG_EPSILON}
+    return {"positive_threshold": threshold, "negative_threshold": threshold,
+            "threshold_spread": SPREAD_SHARE * threshold, "log_epsilon": LOG_EPSILON}
 
 
 def _fitted_v2e(frames: np.ndarray, event_counts: np.ndarray, peers: PathLike) -> V2e:
     return V2e(peers, fitted(lambda threshold: V2e(peers, threshold, steps=1), frames, event_counts))
 
 
-# By name a function of the recording's frames, of how many events its camera had in each interval, [F - 1], and of the folder with v2e.
-# It returns the method; only those that are fitted look at the recording.
+# By name a function of the recording's frames, of how many events its camera had in each interval, [F - 1], and of the
+# folder with v2e. It returns the method; only those that are fitted look at the recording.
 METHODS: dict[str, Callable[[np.ndarray, np.ndarray, PathLike], Method]] = {
     "EventGAN 16": lambda frames, event_counts, peers: Generator("shipped:16", bins=BINS),
     "EventGAN 8": lambda frames, event_counts, peers: Generator("shipped:8", bins=BINS),
-    "EventGAN sensor, fitted": lambda frames, event_counts, peers: told(fitted(told, frames, event_counts, LEARNT_THRESHOLDS)),
+    "EventGAN sensor, fitted": lambda frames, event_counts, peers: told(fitted(told, frames, event_counts,
+                                                                               LEARNT_THRESHOLDS)),
     "difference": lambda frames, event_counts, peers: difference(THRESHOLD),
     "difference, fitted": lambda frames, event_counts, peers: difference(fitted(difference, frames, event_counts)),
     "esim": lambda frames, event_counts, peers: esim(fitted(esim, frames, event_counts)),

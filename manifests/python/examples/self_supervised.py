@@ -1,17 +1,20 @@
 #!/usr/bin/python3
-"""Networks for optical flow and for images, learnt without labels on generated events of some recordings, tested on the real events of others.
+"""Networks for optical flow and for images, learnt without labels on generated events of some recordings, tested on the
+real events of others.
 
-    self_supervised.py --program build/release/eventgan --recordings ../shared/data/recordings ../shared/data/davis/slider_depth_mvsec_layout.hdf5 \\
+    self_supervised.py --program build/release/eventgan --recordings ../shared/data/recordings
+    ../shared/data/davis/slider_depth_mvsec_layout.hdf5 \\
         --peers ../shared/peers --out flows
 
-The networks and their losses are those that `eventgan train` has besides the generator (EventGAN, section 3.3). The flow network learns from events
-how each pixel moves: the previous frame, moved by the flow, should look like the next one. The reconstruction network learns the next frame from the
-previous one and the events' sum. Each way of making events has its row; a row's networks see its events alone, of the same crops in the same order as
-every other row's, and the row "real" those of the camera: the bound.
+The networks and their losses are those that `eventgan train` has besides the generator (EventGAN, section 3.3). The
+flow network learns from events how each pixel moves: the previous frame, moved by the flow, should look like the next
+one. The reconstruction network learns the next frame from the previous one and the events' sum. Each way of making
+events has its row; a row's networks see its events alone, of the same crops in the same order as every other row's, and
+the row "real" those of the camera: the bound.
 
-Recordings are of MVSEC's layout, and of one camera and scene if their names begin with the same word (up to _). Every second such group is one
-half: the networks that learn on one half are tested on the other, so every recording is tested by networks that have not seen it. The same command
-resumes: what networks of a row and a seed scored is kept.
+Recordings are of MVSEC's layout, and of one camera and scene if their names begin with the same word (up to _). Every
+second such group is one half: the networks that learn on one half are tested on the other, so every recording is tested
+by networks that have not seen it. The same command resumes: what networks of a row and a seed scored is kept.
 """
 
 from __future__ import annotations
@@ -35,7 +38,7 @@ from torch import nn
 from torch.nn import functional
 
 matplotlib.use("Agg")
-from matplotlib import pyplot  # noqa: E402
+from matplotlib import pyplot
 
 LEVELS, RESIDUAL_BLOCKS, WIDTH = 4, 2, 8
 SMOOTHNESS = 0.5  # of `eventgan train`
@@ -50,10 +53,12 @@ ROWS = [*recordings.METHODS, REAL]
 DRAWN = ["EventGAN 16", "difference, fitted", REAL]
 
 
-# The networks ------------------------------------------------------------------------------------------------------------------------------------
+# The networks
+# ----------------------------------------------------------------------------------------------------------------------
 
 
-def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: bool = True, activation: nn.Module | None = None) -> nn.Sequential:
+def layer(inputs: int, outputs: int, kernel: int = 3, stride: int = 1, norm: bool = True,
+          activation: nn.Module | None = None) -> nn.Sequential:
     parts: dict[str, nn.Module] = {"conv2d": nn.Conv2d(inputs, outputs, kernel, stride, kernel // 2, bias=not norm)}
     if norm:
         parts["norm_layer"] = nn.BatchNorm2d(outputs, momentum=0.01)
@@ -88,14 +93,17 @@ class UNet(nn.Module):
         self.encoders = nn.ModuleList(layer(above, below, stride=2) for above, below in zip(widths, widths[1:]))
         self.resblocks = nn.Sequential(*(ResidualBlock(widths[-1]) for _ in range(RESIDUAL_BLOCKS)))
         # Each but the lowest takes the prediction of the level below, too.
-        self.decoders = nn.ModuleList(layer(3 * each + (outputs if i else 0), each) for i, each in enumerate(widths[-2::-1]))
-        self.pred_layers = nn.ModuleList(layer(each, outputs, 1, norm=False, activation=nn.Tanh()) for each in widths[-2::-1])
+        self.decoders = nn.ModuleList(layer(3 * each + (outputs if i else 0), each)
+                                      for i, each in enumerate(widths[-2::-1]))
+        self.pred_layers = nn.ModuleList(layer(each, outputs, 1, norm=False, activation=nn.Tanh())
+                                         for each in widths[-2::-1])
         for parameter in self.parameters():
             if parameter.dim() == 4:
                 nn.init.kaiming_normal_(parameter, a=10)  # as published
 
     def forward(self, x: torch.Tensor) -> list[torch.Tensor]:
-        """float32 [B, inputs, H, W] -> four predictions in -1..1, [B, outputs, h, w], coarse to fine, the last one of H x W."""
+        """float32 [B, inputs, H, W] -> four predictions in -1..1, [B, outputs, h, w], coarse to fine,
+        the last one of H x W."""
         x, skips, predictions = self.head(x), [], []
         for encoder in self.encoders:
             skips.append(x)
@@ -108,7 +116,8 @@ class UNet(nn.Module):
         return predictions
 
 
-# Their losses, with the published oddities, of which stages/training/losses.cc tells -------------------------------------------------------------
+# Their losses, with the published oddities, of which stages/training/losses.cc tells
+# -------------------------------------------------------------
 
 
 def charbonnier(error: torch.Tensor) -> torch.Tensor:
@@ -117,15 +126,16 @@ def charbonnier(error: torch.Tensor) -> torch.Tensor:
 
 def flow_losses(previous: torch.Tensor, following: torch.Tensor, flows: Sequence[torch.Tensor],
                 mask: torch.Tensor) -> tuple[torch.Tensor, torch.Tensor]:
-    """How much the previous frame, moved by the flow, differs from the next one where there are events; and how rough the flow is.
+    """How much the previous frame, moved by the flow, differs from the next one where there are events; and how rough
+    the flow is.
 
     Parameters
     ----------
     previous, following : torch.Tensor
         Float [B, 1, H, W], in -1..1.
     flows : sequence of torch.Tensor
-        [B, 2, h, w], coarse to fine: x as a share of the width, y of the height. What is at (x, y) in the next frame is looked up in the previous one
-        at (x + u, y + v).
+        [B, 2, h, w], coarse to fine: x as a share of the width, y of the height. What is at (x, y) in the next frame is
+        looked up in the previous one at (x + u, y + v).
     mask : torch.Tensor
         [B, 1, H, W], >= 0: how much a pixel counts.
 
@@ -141,15 +151,17 @@ def flow_losses(previous: torch.Tensor, following: torch.Tensor, flows: Sequence
         places = torch.stack([x, y], 2) + functional.interpolate(flow, (height, width)).permute(0, 2, 3, 1)
         weights = mask * (places.detach().abs() < 1).all(3)[:, None]
         error = charbonnier(functional.grid_sample(previous, 2 * places - 1, align_corners=False) - following)
-        photometric = photometric + 2.0**scale * ((error * weights).sum((1, 2, 3)) / weights.sum((1, 2, 3)).clamp_min(1e-30)).mean()
+        photometric = photometric + 2.0**scale * ((error * weights).sum((1, 2, 3))
+                                                  / weights.sum((1, 2, 3)).clamp_min(1e-30)).mean()
         for side in (2, 3):
-            smoothness = smoothness + 2.0**scale / 2 * charbonnier(torch.diff(flow, dim=side, prepend=flow.narrow(side, 0, 1))).mean()
+            smoothness = smoothness + 2.0**scale / 2 * charbonnier(torch.diff(flow, dim=side,
+                                                                              prepend=flow.narrow(side, 0, 1))).mean()
     return photometric, smoothness
 
 
 def ssim(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
-    """Structural similarity (Wang et al. 2004) at each pixel of two float tensors [B, 1, H, W] in -1..1: the same shape. Gaussian window of 11x11,
-    zeros beyond the edge, constants for images in 0..1."""
+    """Structural similarity (Wang et al. 2004) at each pixel of two float tensors [B, 1, H, W] in -1..1: the same
+    shape. Gaussian window of 11x11, zeros beyond the edge, constants for images in 0..1."""
 
     weights = torch.exp(-torch.arange(-5.0, 6) ** 2 / (2 * 1.5**2))
     weights = weights / weights.sum()
@@ -158,7 +170,8 @@ def ssim(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
         """Images as channels of their own, which is twenty times as fast as one channel of each."""
         count = len(image)
         across = functional.conv2d(image.transpose(0, 1), weights.expand(count, 1, 1, 11), padding=(0, 5), groups=count)
-        return functional.conv2d(across, weights[:, None].expand(count, 1, 11, 1), padding=(5, 0), groups=count).transpose(0, 1)
+        return functional.conv2d(across, weights[:, None].expand(count, 1, 11, 1),
+                                 padding=(5, 0), groups=count).transpose(0, 1)
 
     mean1, mean2, product = blur(first), blur(second), blur(first * second)
     squares = mean1**2 + mean2**2
@@ -167,8 +180,8 @@ def ssim(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
 
 
 def reconstruction_loss(images: Sequence[torch.Tensor], target: torch.Tensor) -> torch.Tensor:
-    """L1 - SSIM of predictions [B, 1, h, w], coarse to fine, to the target, float [B, 1, H, W] in -1..1: a scalar, the sum over scales, each with
-    half the weight of the next finer one."""
+    """L1 - SSIM of predictions [B, 1, h, w], coarse to fine, to the target, float [B, 1, H, W] in -1..1: a scalar, the
+    sum over scales, each with half the weight of the next finer one."""
     loss = torch.zeros(())
     for scale, image in enumerate(images, 1 - len(images)):
         image = functional.interpolate(image, target.shape[2:])
@@ -176,9 +189,11 @@ def reconstruction_loss(images: Sequence[torch.Tensor], target: torch.Tensor) ->
     return loss
 
 
-# The experiment ----------------------------------------------------------------------------------------------------------------------------------
+# The experiment
+# ----------------------------------------------------------------------------------------------------------------------
 
-Pair = tuple[np.ndarray, np.ndarray, np.ndarray]  # previous and following frame, uint8 [H, W], and volume, float16 [2B, H, W]
+# previous and following frame, uint8 [H, W], and volume, float16 [2B, H, W]
+Pair = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
 def reduced(images: np.ndarray, factor: int) -> np.ndarray:
@@ -191,9 +206,10 @@ def reduced(images: np.ndarray, factor: int) -> np.ndarray:
 def normalized(volume: np.ndarray) -> np.ndarray:
     """Divided by its 98th percentile (of what is not 0) and clipped: "normalize": "eta98".
 
-    The network's volumes have no other scale, since it learned from such, and a camera's or a model's counts depend on its threshold and on the
-    interval. This takes the unit away, each volume on its own, so nothing of the tested camera needs to be known. Where events are, how many at each
-    pixel relative to others, and when, stays the method's own: that is what is tested.
+    The network's volumes have no other scale, since it learned from such, and a camera's or a model's counts depend on
+    its threshold and on the interval. This takes the unit away, each volume on its own, so nothing of the tested camera
+    needs to be known. Where events are, how many at each pixel relative to others, and when, stays the method's own:
+    that is what is tested.
     """
     values = volume[volume > 0]
     return np.minimum(volume / np.percentile(values, 98), 1) if len(values) else volume
@@ -211,8 +227,8 @@ def kept(args: argparse.Namespace, row: str, path: pathlib.Path, compute: Callab
 
 
 def read_pairs(args: argparse.Namespace, row: str, path: pathlib.Path) -> list[Pair]:
-    """Neighbouring frames of a recording, reduced if they are large, with the row's events; without the pairs whose frames do not fit the camera's
-    events, as where their clocks disagree."""
+    """Neighbouring frames of a recording, reduced if they are large, with the row's events; without the pairs whose
+    frames do not fit the camera's events, as where their clocks disagree."""
     frames, _ = recordings.frames_of(path)
     factor = -(-max(frames.shape[1:]) // LONGEST)
 
@@ -221,15 +237,18 @@ def read_pairs(args: argparse.Namespace, row: str, path: pathlib.Path) -> list[P
 
     def of_camera() -> dict[str, np.ndarray]:
         real = recordings.real_volumes(args.program, path, args.out / "shards" / path.stem)
-        polarities = (positive.sum(0) - negative.sum(0) for positive, negative in (np.split(volume, 2) for volume in real))
+        polarities = (positive.sum(0) - negative.sum(0)
+                      for positive, negative in (np.split(volume, 2) for volume in real))
         changes = np.diff(np.log1p(frames.astype(np.float32)), axis=0)
         pairs = ((cv2.GaussianBlur(image, (0, 0), 1).ravel() for image in pair) for pair in zip(polarities, changes))
-        return {"volumes": small(real), "event_counts": real.sum((1, 2, 3)), "correlations": np.array([np.corrcoef(*pair)[0, 1] for pair in pairs])}
+        return {"volumes": small(real), "event_counts": real.sum((1, 2, 3)),
+                "correlations": np.array([np.corrcoef(*pair)[0, 1] for pair in pairs])}
 
     camera = kept(args, REAL, path, of_camera)
 
     def of_method() -> dict[str, np.ndarray]:
-        return {"volumes": small(map(recordings.METHODS[row](frames, camera["event_counts"], args.peers), frames, frames[1:]))}
+        return {"volumes": small(map(recordings.METHODS[row](frames, camera["event_counts"], args.peers),
+                                     frames, frames[1:]))}
 
     volumes = (camera if row == REAL else kept(args, row, path, of_method))["volumes"]
     grey = (reduced(frames, factor) / factor**2).round().astype(np.uint8)
@@ -243,7 +262,8 @@ def tensors(pairs: Sequence[Pair]) -> tuple[torch.Tensor, ...]:
 
 
 def batches(pairs: Sequence[Pair], seed: int) -> Iterator[tuple[torch.Tensor, ...]]:
-    """Crops without end, flipped and of changed brightness. Which ones does not depend on the events, so every row learns from the same."""
+    """Crops without end, flipped and of changed brightness. Which ones does not depend on the events,
+    so every row learns from the same."""
     random = np.random.default_rng(seed)
 
     def crop() -> Pair:
@@ -252,7 +272,8 @@ def batches(pairs: Sequence[Pair], seed: int) -> Iterator[tuple[torch.Tensor, ..
         views = [(..., slice(y, y + SIDE), slice(x, x + SIDE)) for y, x in corners]
         view = max(views, key=lambda view: cv2.norm(previous[view], following[view], cv2.NORM_L1))
         flip = (..., *(slice(None, None, int(step)) for step in random.choice([-1, 1], 2)))
-        table = (255 * np.clip(random.uniform(*GAIN) * np.linspace(0, 1, 256) ** random.uniform(*GAMMA), 0, 1)).astype(np.uint8)
+        table = (255 * np.clip(random.uniform(*GAIN) * np.linspace(0, 1, 256) ** random.uniform(*GAMMA), 0, 1)).astype(
+            np.uint8)
         return table[previous[view][flip]], table[following[view][flip]], volume[view][flip]
 
     while True:
@@ -272,7 +293,8 @@ def learn(what: str, pairs: Sequence[Pair], seed: int, steps: int) -> UNet:
     torch.manual_seed(seed)
     network, predictions_of = (UNet(2 * recordings.BINS, 2), flow_of) if what == "flow" else (UNet(2, 1), images_of)
     for prediction in network.pred_layers if what == "flow" else ():
-        nn.init.zeros_(prediction.conv2d.weight)  # as published, flows begin at random, a dozen pixels long: hundreds of steps go by to forget them
+        # as published, flows begin at random, a dozen pixels long: hundreds of steps go by to forget them
+        nn.init.zeros_(prediction.conv2d.weight)
         nn.init.zeros_(prediction.conv2d.bias)
     optimizer = torch.optim.Adam(network.parameters())
     schedule = torch.optim.lr_scheduler.OneCycleLR(optimizer, RATE, total_steps=steps)
@@ -299,8 +321,8 @@ def learn(what: str, pairs: Sequence[Pair], seed: int, steps: int) -> UNet:
 
 
 def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
-    """The previous frame [1, 1, H, W], moved by a flow [1, 2, H, W] in pixels; beyond the edge its outermost pixels. Zero flow moves nothing, unlike
-    in the loss."""
+    """The previous frame [1, 1, H, W], moved by a flow [1, 2, H, W] in pixels; beyond the edge its outermost pixels.
+    Zero flow moves nothing, unlike in the loss."""
     height, width = flow.shape[2:]
     y, x = torch.meshgrid(torch.arange(height), torch.arange(width), indexing="ij")
     places = (torch.stack([x, y], 2) + flow.permute(0, 2, 3, 1)) / torch.tensor([width - 1, height - 1])
@@ -309,14 +331,16 @@ def moved(previous: torch.Tensor, flow: torch.Tensor) -> torch.Tensor:
 
 @torch.no_grad()
 def predict(networks: dict[str, UNet], pair: Pair) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Of a whole frame the flow in pixels [1, 2, H, W], the previous frame moved by it, and the reconstruction of the next one [1, 1, H, W]."""
+    """Of a whole frame the flow in pixels [1, 2, H, W], the previous frame moved by it,
+    and the reconstruction of the next one [1, 1, H, W]."""
     previous, _, volume = tensors([pair])
     flow = SIDE * flow_of(networks["flow"], previous, volume)[-1]  # learnt as shares of the crops' sides
     return flow, moved(previous, flow), images_of(networks["reconstruction"], previous, volume)[-1]
 
 
 def scores_of(pair: Pair, image: torch.Tensor, reconstruction: torch.Tensor) -> dict[str, float]:
-    """How far a moved frame is from the next one, in grey levels, at pixels with events; and SSIM of a reconstruction with it."""
+    """How far a moved frame is from the next one, in grey levels, at pixels with events;
+    and SSIM of a reconstruction with it."""
     _, following, volume = tensors([pair])
     there = volume.sum(1, keepdim=True) > 0
     similarity = ssim(reconstruction, following)
@@ -332,13 +356,17 @@ def mean_scores(pairs: Sequence[Pair], images: Callable[[Pair], tuple[torch.Tens
 def read_args() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--program", default="eventgan", help="the eventgan program")
-    parser.add_argument("--recordings", required=True, nargs="+", type=pathlib.Path, help="recordings in MVSEC's layout, or folders of such")
-    parser.add_argument("--peers", type=pathlib.Path, help="folder with v2e, a checkout of SensorsINI/v2e; without it its rows are left out")
-    parser.add_argument("--out", required=True, type=pathlib.Path, help="folder for volumes, networks, results.json, table.md and images; run the "
+    parser.add_argument("--recordings", required=True, nargs="+", type=pathlib.Path,
+                        help="recordings in MVSEC's layout, or folders of such")
+    parser.add_argument("--peers", type=pathlib.Path,
+                        help="folder with v2e, a checkout of SensorsINI/v2e; without it its rows are left out")
+    parser.add_argument("--out", required=True, type=pathlib.Path,
+                        help="folder for volumes, networks, results.json, table.md and images; run the "
                         "same command again to resume")
     parser.add_argument("--seeds", type=int, default=3)
     parser.add_argument("--steps", type=int, default=400, help="batches that each network learns from")
-    parser.add_argument("--with", nargs="+", choices=ROWS, dest="rows", metavar="ROW", help=f"only these rows, of: {'; '.join(ROWS)}")
+    parser.add_argument("--with", nargs="+", choices=ROWS, dest="rows", metavar="ROW",
+                        help=f"only these rows, of: {'; '.join(ROWS)}")
     args = parser.parse_args()
     args.rows = args.rows or [row for row in ROWS if args.peers or not row.startswith("v2e")]
     args.out = args.out.resolve()
@@ -347,7 +375,8 @@ def read_args() -> argparse.Namespace:
 
 def halves_of(paths: Iterable[pathlib.Path]) -> tuple[list[pathlib.Path], list[pathlib.Path]]:
     """The recordings in two parts that share no group of names."""
-    files = sorted((file for path in paths for file in (path.glob("*.hdf5") if path.is_dir() else [path])), key=lambda file: file.stem)
+    files = sorted((file for path in paths for file in (path.glob("*.hdf5") if path.is_dir() else [path])),
+                   key=lambda file: file.stem)
     groups = sorted({file.stem.split("_")[0] for file in files})
     if len(groups) < 2:
         raise SystemExit(f"expected recordings of at least 2 groups, got {len(groups)}, in {' '.join(map(str, paths))}")
@@ -362,8 +391,9 @@ def write(file: pathlib.Path, content: str) -> None:
 
 
 def table_of(scores: dict[str, dict[str, list[dict[str, float]]]], reference: dict[str, dict[str, float]]) -> str:
-    """Markdown. `scores`: by row and recording those of each seed; `reference`: by recording those of the previous frame as it is, neither moved nor
-    changed. ±: standard deviation over the seeds. In means each recording counts the same."""
+    """Markdown. `scores`: by row and recording those of each seed; `reference`: by recording those of the previous
+    frame as it is, neither moved nor changed. ±: standard deviation over the seeds. In means each recording counts the
+    same."""
 
     def spread(values: np.ndarray, digits: int) -> str:
         return f"{values.mean():.{digits}f}" + (f" ± {values.std():.{digits}f}" if len(values) > 1 else "")
@@ -371,19 +401,24 @@ def table_of(scores: dict[str, dict[str, list[dict[str, float]]]], reference: di
     lines = []
     for title, name, digits, mean in (("error of the moved frame, grey levels", "error", 1, "mean ÷ that without flow"),
                                       ("SSIM of the reconstruction", "ssim", 3, "mean"),
-                                      ("SSIM of the reconstruction at pixels with events", "ssim_at_events", 3, "mean")):
+                                      ("SSIM of the reconstruction at pixels with events",
+                                       "ssim_at_events", 3, "mean")):
         plain = np.array([each[name] for each in reference.values()])
         scale = plain if name == "error" else np.ones_like(plain)
-        cells = [[title, *reference, mean], ["previous frame as it is", *(f"{value:.{digits}f}" for value in plain), f"{(plain / scale).mean():.3f}"]]
+        cells = [[title, *reference, mean], ["previous frame as it is", *(f"{value:.{digits}f}" for value in plain),
+                                             f"{(plain / scale).mean():.3f}"]]
         for row, by_recording in scores.items():
-            values = np.array([[each[name] for each in by_recording[recording]] for recording in reference])  # [recording, seed]
-            cells.append([row, *(spread(each, digits) for each in values), spread((values / scale[:, None]).mean(0), 3)])
+            # [recording, seed]
+            values = np.array([[each[name] for each in by_recording[recording]] for recording in reference])
+            cells.append([row, *(spread(each, digits) for each in values),
+                          spread((values / scale[:, None]).mean(0), 3)])
         lines += [training.markdown(cells), ""]
     return "\n".join(lines)
 
 
 def in_colour(flow: np.ndarray, longest: float) -> np.ndarray:
-    """[2, H, W] -> uint8 [H, W, 3], red, green, blue: hue is the direction, saturation the length as a share of `longest`, so no flow is white."""
+    """[2, H, W] -> uint8 [H, W, 3], red, green, blue: hue is the direction,
+    saturation the length as a share of `longest`, so no flow is white."""
     x, y = flow
     hue = np.degrees(np.arctan2(y, x)) % 360 / 2
     saturation = 255 * np.minimum(np.hypot(x, y) / longest, 1)
@@ -391,22 +426,27 @@ def in_colour(flow: np.ndarray, longest: float) -> np.ndarray:
 
 
 def draw(file: pathlib.Path, pair: Pair, networks: dict[str, dict[str, UNet]]) -> None:
-    """A line for each row's networks: the pair's events and frames, the flow, the frame moved by it and the reconstruction."""
+    """A line for each row's networks: the pair's events and frames, the flow,
+    the frame moved by it and the reconstruction."""
     previous, following, volume = pair
     positive, negative = np.split(volume.astype(np.float32), 2)
     signed = positive.sum(0) - negative.sum(0)
     limit = np.percentile(np.abs(signed), 99.5)
-    grey, polarity = {"cmap": "gray", "vmin": 0, "vmax": int(following.max())}, {"cmap": "bwr_r", "vmin": -limit, "vmax": limit}
+    grey, polarity = {"cmap": "gray", "vmin": 0,
+                      "vmax": int(following.max())}, {"cmap": "bwr_r", "vmin": -limit, "vmax": limit}
     predicted = {row: predict(of_row, pair) for row, of_row in networks.items()}
     there = volume.any(0)
     longest = max(float(np.percentile(flow.norm(dim=1)[0].numpy()[there], 98)) for flow, _, _ in predicted.values())
     height = 3 * previous.shape[0] / previous.shape[1] + 0.6
-    figure, axes = pyplot.subplots(len(networks), 6, figsize=(18, height * len(networks)), squeeze=False, constrained_layout=True)
+    figure, axes = pyplot.subplots(len(networks), 6, figsize=(18, height * len(networks)), squeeze=False,
+                                   constrained_layout=True)
     for line, (row, (flow, *images)) in zip(axes, predicted.items()):
         scores = scores_of(pair, *images)
-        panels = [("real events", signed, polarity), ("previous frame", previous, grey), ("next frame", following, grey),
+        panels = [("real events", signed, polarity), ("previous frame", previous, grey),
+                  ("next frame", following, grey),
                   (f"flow learnt on {row}\nfull colour: {longest:.1f} px", in_colour(flow[0].numpy(), longest), {}),
-                  (f"previous frame moved by it\nerror {scores['error']:.1f} grey levels", 127.5 * (images[0][0, 0] + 1), grey),
+                  (f"previous frame moved by it\nerror {scores['error']:.1f} grey levels",
+                   127.5 * (images[0][0, 0] + 1), grey),
                   (f"reconstruction\nSSIM {scores['ssim']:.3f}", 127.5 * (images[1][0, 0] + 1), grey)]
         for ax, (title, image, colours) in zip(line, panels):
             ax.imshow(image, **colours)
@@ -433,9 +473,11 @@ def main() -> None:
     settings = {"steps": args.steps, "recordings": [[path.stem for path in half] for half in halves]}
     results = json.loads(file.read_text(encoding="utf-8")) if file.exists() else {"settings": settings, "runs": {}}
     if results["settings"] != settings:
-        raise SystemExit(f"expected the settings {results['settings']}, as when this run started, got {settings}, in {file}")
+        raise SystemExit(f"expected the settings {results['settings']}, as when this run started, got {settings}, "
+                         f"in {file}")
     runs, tests = results["runs"], {path.stem: read_pairs(args, REAL, path) for half in halves for path in half}
-    results["reference"] = {name: mean_scores(pairs, lambda pair: (tensors([pair])[0],) * 2) for name, pairs in tests.items()}
+    results["reference"] = {name: mean_scores(pairs, lambda pair: (tensors([pair])[0],) * 2)
+                            for name, pairs in tests.items()}
 
     def weights(row: str, half: int) -> pathlib.Path:
         return args.out / "networks" / f"{row} {half}.pt".replace(",", "").replace(" ", "-")
@@ -445,14 +487,18 @@ def main() -> None:
         networks = {what: learn(what, pairs, seed, args.steps) for what in ("flow", "reconstruction")}
         if seed == 0:  # for the images
             torch.save({what: network.state_dict() for what, network in networks.items()}, weights(row, half))
-        return {path.stem: mean_scores(tests[path.stem], lambda pair: predict(networks, pair)[1:]) for path in halves[1 - half]}
+        return {path.stem: mean_scores(tests[path.stem], lambda pair: predict(networks, pair)[1:])
+                for path in halves[1 - half]}
 
-    for seed, row, half in itertools.product(range(args.seeds), args.rows, (0, 1)):  # all rows of a seed first: they can be compared early
+    # all rows of a seed first: they can be compared early
+    for seed, row, half in itertools.product(range(args.seeds), args.rows, (0, 1)):
         run = f"{row} {half} {seed}"
         if run not in runs:
             runs[run] = learn_and_test(row, half, seed)
             write(file, json.dumps(results, indent=1) + "\n")
-            print(run, {name: {key: round(value, 3) for key, value in scores.items()} for name, scores in runs[run].items()}, flush=True)
+            print(run,
+                  {name: {key: round(value, 3) for key, value in scores.items()} for name, scores in runs[run].items()},
+                  flush=True)
     scores = {row: {path.stem: [runs[f"{row} {half} {seed}"][path.stem] for seed in range(args.seeds)]
                     for half in (0, 1) for path in halves[1 - half]} for row in args.rows}
     table = table_of(scores, results["reference"])

@@ -3,9 +3,10 @@
 
     train_detector.py --data out --classes person --out persons --steps 300
 
-It sees one channel, positive minus negative events (`eventgan.signed_channel`), unless --channels says that it sees the volume. In a map of an eighth
-of the image's size it finds how likely the middle of an object is at each place, and how far the object's edges are from there, as TTFNet does (Liu et
-al. 2020, "Training-Time-Friendly Network for Real-Time Object Detection").
+It sees one channel, positive minus negative events (`eventgan.signed_channel`), unless --channels says that it sees the
+volume. In a map of an eighth of the image's size it finds how likely the middle of an object is at each place, and how
+far the object's edges are from there, as TTFNet does (Liu et al. 2020, "Training-Time-Friendly Network for Real-Time
+Object Detection").
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ STRIDE = 8  # input pixels per cell of the map
 Norm = Callable[[int], nn.Module]  # channels -> layer
 SPREAD = 0.54 / 6  # standard deviation of a box's Gaussian, as a share of its sides: TTFNet's
 # What the events of another scene or camera may look like: measured on real cameras, manifests/guides/real_cameras.md.
-AUGMENTATION = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15, threshold=(0.0, 0.3), lost=(0.0, 0.4), isolated=(0.005, 0.03))
+AUGMENTATION = EventAugmentation(invert=0.5, scale=(0.7, 2.0), shift=0.15, threshold=(0.0, 0.3), lost=(0.0, 0.4),
+                                 isolated=(0.005, 0.03))
 
 
 def convolution(inputs: int, outputs: int, stride: int = 1, norm: Norm = nn.BatchNorm2d) -> nn.Sequential:
@@ -38,13 +40,15 @@ def convolution(inputs: int, outputs: int, stride: int = 1, norm: Norm = nn.Batc
 
 
 class Detector(nn.Module):
-    """Of events [N, C, H, W], sides multiples of 32: logits of the classes [N, K, H/8, W/8], and the distances of the left, top, right and bottom edge from
-    each cell's middle, in input pixels, [N, 4, H/8, W/8]. A U-Net down to 1/32 of the size; 0.5 million numbers."""
+    """Of events [N, C, H, W], sides multiples of 32: logits of the classes [N, K, H/8, W/8], and the distances of the
+    left, top, right and bottom edge from each cell's middle, in input pixels, [N, 4, H/8, W/8]. A U-Net down to 1/32 of
+    the size; 0.5 million numbers."""
 
     def __init__(self, channels: int, classes: int, norm: Norm = nn.BatchNorm2d) -> None:
         super().__init__()
         layer = functools.partial(convolution, norm=norm)
-        self.eighth = nn.Sequential(layer(channels, 16, 2), layer(16, 32, 2), layer(32, 32), layer(32, 64, 2), layer(64, 64))
+        self.eighth = nn.Sequential(layer(channels, 16, 2), layer(16, 32, 2), layer(32, 32), layer(32, 64, 2),
+                                    layer(64, 64))
         self.sixteenth = nn.Sequential(layer(64, 96, 2), layer(96, 96))
         self.thirtysecond = nn.Sequential(layer(96, 96, 2), layer(96, 96))
         self.to_sixteenth, self.to_eighth = layer(96 + 96, 32), layer(64 + 32, 64)
@@ -67,9 +71,11 @@ def middles(height: int, width: int, device: torch.device | None = None) -> torc
     return STRIDE * (torch.stack([x, y], -1) + 0.5)
 
 
-def target_of(item: dict[str, Any], classes: int, height: int, width: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
-    """Of an item of DetectionDataset, for a map of that size: the height of the Gaussians [K, H, W], 1 in the cell of a box's middle, -1 where a box is to be
-    ignored; the box [4, H, W] that a cell is to give, the smallest where several overlap; and how much that counts [H, W]."""
+def target_of(item: dict[str, Any], classes: int,
+              height: int, width: int) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:
+    """Of an item of DetectionDataset, for a map of that size: the height of the Gaussians [K, H, W], 1 in the cell of a
+    box's middle, -1 where a box is to be ignored; the box [4, H, W] that a cell is to give, the smallest where several
+    overlap; and how much that counts [H, W]."""
     heat, boxes, weight = torch.zeros(classes, height, width), torch.zeros(4, height, width), torch.zeros(height, width)
     at = middles(height, width)
     ignored = item["boxes"][item["ignore"]]
@@ -103,8 +109,10 @@ def giou(first: torch.Tensor, second: torch.Tensor) -> torch.Tensor:
     return overlap / union - (hull - union) / hull
 
 
-def detection_loss(logits: torch.Tensor, edges: torch.Tensor, heat: torch.Tensor, boxes: torch.Tensor, weight: torch.Tensor) -> torch.Tensor:
-    """The focal loss of CornerNet (Law and Deng 2018) of the classes, and 5 (1 - GIoU) of the boxes, as TTFNet has them."""
+def detection_loss(logits: torch.Tensor, edges: torch.Tensor, heat: torch.Tensor, boxes: torch.Tensor,
+                   weight: torch.Tensor) -> torch.Tensor:
+    """The focal loss of CornerNet (Law and Deng 2018) of the classes, and 5 (1 - GIoU) of the boxes,
+    as TTFNet has them."""
     score = logits.sigmoid()
     found = (1 - score) ** 2 * F.logsigmoid(logits) * (heat == 1)
     nothing = (1 - heat.clamp(min=0)) ** 4 * score**2 * F.logsigmoid(-logits) * ((heat < 1) & (heat >= 0))
@@ -114,7 +122,8 @@ def detection_loss(logits: torch.Tensor, edges: torch.Tensor, heat: torch.Tensor
     return focal + 5 * (weight[there] * (1 - giou(given, true))).sum() / weight.sum().clamp(min=1e-6)
 
 
-def detect(model: Detector, volumes: torch.Tensor, most: int = 50) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
+def detect(model: Detector,
+           volumes: torch.Tensor, most: int = 50) -> Iterator[tuple[torch.Tensor, torch.Tensor, torch.Tensor]]:
     """Of each volume [N, C, H, W]: boxes [n, 4], labels [n], scores [n]. The model must be in evaluation mode."""
     with torch.no_grad():
         logits, edges = (each.cpu() for each in model(volumes.to(next(model.parameters()).device)))
@@ -127,7 +136,8 @@ def detect(model: Detector, volumes: torch.Tensor, most: int = 50) -> Iterator[t
         boxes = torch.minimum(box.flatten(1)[:, cells].T.clamp(min=0), limits)
         kept = (values > 0.001) & (boxes[:, 2:] > boxes[:, :2]).all(1)
         boxes, labels, values = boxes[kept], labels[kept], values[kept]
-        sole = non_maximum_suppression(Detections(np.zeros(len(values), int), labels.numpy(), boxes.numpy(), values.numpy()), 0.5)
+        sole = non_maximum_suppression(Detections(np.zeros(len(values), int), labels.numpy(),
+                                                  boxes.numpy(), values.numpy()), 0.5)
         yield boxes[sole], labels[sole], values[sole]
 
 
@@ -145,9 +155,11 @@ class InMemory(Dataset):
         return (item["volume"], *target_of(item, self._classes, *(side // STRIDE for side in item["volume"].shape[1:])))
 
 
-def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Sequence[str], augmentation: EventAugmentation | None,
+def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Sequence[str],
+          augmentation: EventAugmentation | None,
           check: Sequence[dict[str, Any]], norm: Norm = nn.BatchNorm2d) -> Detector:
-    """The detector trained on the items, by the options of `training`, in evaluation mode; `check`: items whose AP is reported."""
+    """The detector trained on the items, by the options of `training`, in evaluation mode; `check`:
+    items whose AP is reported."""
     data = InMemory(items, len(classes), augmentation)
     model = Detector(len(data.items[0]["volume"]), len(classes), norm)
     training.load_fitting(model, args.pretrained)
@@ -165,7 +177,8 @@ def train(args: argparse.Namespace, items: Iterable[dict[str, Any]], classes: Se
     return model
 
 
-def search(model: Detector, items: Sequence[dict[str, Any]], batch: int) -> Iterator[tuple[dict, tuple[torch.Tensor, ...]]]:
+def search(model: Detector,
+           items: Sequence[dict[str, Any]], batch: int) -> Iterator[tuple[dict, tuple[torch.Tensor, ...]]]:
     """Each item with the boxes, labels and scores that are found in it."""
     for first in range(0, len(items), batch):
         some = [items[i] for i in range(first, min(first + batch, len(items)))]
@@ -178,10 +191,13 @@ def signed(sample: Mapping[str, Any]) -> np.ndarray:
 
 def main() -> None:
     parser = training.options(__doc__.splitlines()[0], batch=16, lr=2e-3)
-    parser.add_argument("--classes", default="Car", help="class names, separated by commas; the first one's AP is the result")
+    parser.add_argument("--classes", default="Car",
+                        help="class names, separated by commas; the first one's AP is the result")
     parser.add_argument("--channels", choices=["signed", "volume"], default="signed", help="what the network sees")
-    parser.add_argument("--scale", type=float, default=1.0, help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
-    parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where the processor has AVX512-BF16 or AMX")
+    parser.add_argument("--scale", type=float, default=1.0,
+                        help="input pixels per volume pixel; objects of less than 16 pixels need more than 1")
+    parser.add_argument("--bfloat16", action="store_true", help="compute convolutions in bfloat16, twice as fast where "
+                        "the processor has AVX512-BF16 or AMX")
     args = training.begin(parser)
     train_shards, validation_shards = training.divided(args, training.with_boxes)
     test_shards = training.tested(args, train_shards, validation_shards, training.with_boxes)
@@ -190,7 +206,8 @@ def main() -> None:
     view, classes = fitted(area, size), args.classes.split(",")
 
     def items_of(shards: Shards) -> list[dict[str, Any]]:
-        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, classes, size, view=view)
+        dataset = DetectionDataset(shards.changed(signed) if args.channels == "signed" else shards, classes, size,
+                                   view=view)
         return [dataset[i] for i in range(len(dataset))]
 
     try:
@@ -206,7 +223,8 @@ def main() -> None:
         return validation[i]["id"], training.draw_item(validation[i], boxes[sure], texts)
 
     found = search(model, test, args.batch)
-    training.write_predictions(args, (entry for item, boxes in found for entry in training.box_predictions(item, boxes, classes, view)))
+    training.write_predictions(args, (entry for item, boxes in found
+                                      for entry in training.box_predictions(item, boxes, classes, view)))
     training.write_images(args, len(validation), image_of)
 
 

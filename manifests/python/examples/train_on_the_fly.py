@@ -3,10 +3,11 @@
 
     train_on_the_fly.py --data road --classes car --out cars --workers 2
 
-A folder has images/ and boxes.csv: a header, then a row for each box: image, class, left, top, right, bottom; a row with an image alone is an image
-without objects. Where frames.csv (image, width, height, sequence, index) says that images follow each other, a pair is two frames of a sequence; any
-other image is paired with itself, moved a little. The last fifth of each table is for validation. The images are no recording's: what is found in
-a camera's events is another question (manifests/guides/scores.md).
+A folder has images/ and boxes.csv: a header, then a row for each box: image, class, left, top, right, bottom; a row
+with an image alone is an image without objects. Where frames.csv (image, width, height, sequence, index) says that
+images follow each other, a pair is two frames of a sequence; any other image is paired with itself, moved a little. The
+last fifth of each table is for validation. The images are no recording's: what is found in a camera's events is another
+question (manifests/guides/scores.md).
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ STEP_PX, STEP_DEG, STEP_SCALE = (1.0, 4.0), 0.7, 0.01  # of a still, from one of
 
 
 class Moved:
-    """A still as the last frame of a clip before which the camera has moved, turned and zoomed: frames[t] is an image, blue and red exchanged."""
+    """A still as the last frame of a clip before which the camera has moved, turned and zoomed: frames[t] is an image,
+    blue and red exchanged."""
 
     def __init__(self, path: str, seed: int) -> None:
         random = np.random.default_rng([seed, zlib.crc32(path.encode())])
@@ -47,7 +49,8 @@ class Moved:
         if image is None:
             raise ValueError(f"expected an image, got none, in {self._path}")
         height, width = image.shape[:2]
-        affine = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), steps * self._deg, 1 + steps * self._scale)
+        affine = cv2.getRotationMatrix2D(((width - 1) / 2, (height - 1) / 2), steps * self._deg,
+                                         1 + steps * self._scale)
         affine[:, 2] += steps * self._px * np.array([np.cos(self._direction), np.sin(self._direction)])
         return cv2.warpAffine(image, affine, (width, height), borderMode=cv2.BORDER_REFLECT)[..., ::-1]
 
@@ -79,20 +82,27 @@ def labelled_clips(folder: pathlib.Path, seed: int) -> list[tuple[Any, dict[str,
             rows[row[0]] += [row[1:6]] if row[1] else []
     before, clips = sequences(folder), []
     for image, boxes in rows.items():
-        target = {"boxes": [[float(edge) for edge in box[1:]] for box in boxes], "labels": [box[0] for box in boxes], "id": f"{folder.name}/{image}"}
+        target = {"boxes": [[float(edge) for edge in box[1:]] for box in boxes], "labels": [box[0] for box in boxes],
+                  "id": f"{folder.name}/{image}"}
         names = before.get(image)
-        clips.append(([str(folder / "images" / name) for name in names] if names else Moved(str(folder / "images" / image), seed), target))
+        clips.append(([str(folder / "images" / name) for name in names] if names
+                      else Moved(str(folder / "images" / image), seed), target))
     return clips
 
 
 def main() -> None:
-    parser = training.options_of_any(__doc__.splitlines()[0], "folder with images/ and boxes.csv, or one of such folders", batch=4, lr=2e-4)
-    parser.add_argument("--weights", default="shipped:8", help="of the generator: shipped:WIDTH, or a .safetensors file")
+    parser = training.options_of_any(__doc__.splitlines()[0],
+                                     "folder with images/ and boxes.csv, or one of such folders", batch=4, lr=2e-4)
+    parser.add_argument("--weights", default="shipped:8",
+                        help="of the generator: shipped:WIDTH, or a .safetensors file")
     parser.add_argument("--precision", default="float32", help="of the generator: float32, bfloat16 or int8")
-    parser.add_argument("--size", type=int, nargs=2, default=[256, 320], metavar=("HEIGHT", "WIDTH"), help="of the volumes, multiples of 32")
-    parser.add_argument("--classes", help="class names, separated by commas (default: all, the most frequent first); the first one's "
-                        "AP is the result")
-    parser.add_argument("--regions", type=int, default=64, help="region proposals per volume that the heads are trained on; more cost more time")
+    parser.add_argument("--size", type=int, nargs=2, default=[256, 320], metavar=("HEIGHT", "WIDTH"),
+                        help="of the volumes, multiples of 32")
+    parser.add_argument(
+        "--classes", help="class names, separated by commas (default: all, the most frequent first); the first one's "
+        "AP is the result")
+    parser.add_argument("--regions", type=int, default=64,
+                        help="region proposals per volume that the heads are trained on; more cost more time")
     args = training.begin(parser)
     data = pathlib.Path(args.data)
     folders = [path.parent for path in (*data.glob("boxes.csv"), *sorted(data.glob("*/boxes.csv")))]
@@ -105,7 +115,8 @@ def main() -> None:
     classes = args.classes.split(",") if args.classes else [name for name, _ in counts.most_common()]
     unknown = [name for name in classes if not counts[name]]
     if unknown or not classes or not parts[1]:
-        raise SystemExit(f"expected images with boxes of {args.classes or 'some class'}, got {len(parts[0])} for training and {len(parts[1])} for "
+        raise SystemExit(f"expected images with boxes of {args.classes or 'some class'}, got {len(parts[0])} for "
+                         f"training and {len(parts[1])} for "
                          f"validation, with {', '.join(counts) or 'no boxes'}, in {args.data}")
     print(f"{len(parts[0])} images for training, {len(parts[1])} for validation, of {len(folders)} folders")
     try:

@@ -23,8 +23,10 @@ def read_args() -> argparse.Namespace:
     parser.add_argument("--size", type=int, default=128, help="height and width of the input, a multiple of 32")
     parser.add_argument("--layers", type=int, default=18, help="layers of the ResNet: 18, 34, 50, 101 or 152")
     parser.add_argument("--filters", type=int, default=128, help="filters of each of the three deconvolutions")
-    parser.add_argument("--rotation", type=float, default=15.0, help="standard deviation of the crops' angles in degrees; Simple Baselines uses 30")
-    parser.add_argument("--sigma", type=float, default=1.5, help="standard deviation of the heatmap peaks, in heatmap pixels")
+    parser.add_argument("--rotation", type=float, default=15.0,
+                        help="standard deviation of the crops' angles in degrees; Simple Baselines uses 30")
+    parser.add_argument("--sigma", type=float, default=1.5,
+                        help="standard deviation of the heatmap peaks, in heatmap pixels")
     parser.add_argument("--last-layer", action="store_true", help="train only the last layer, with --pretrained")
     return training.begin(parser)
 
@@ -34,10 +36,12 @@ def with_persons(shards: Shards) -> np.ndarray:
 
 
 def deconvolution(layer: torch.nn.ConvTranspose2d, x: torch.Tensor) -> torch.Tensor:
-    """What the layer (kernel 4, stride 2, padding 1) makes of x [n, C, H, W], as a convolution to 4 C' channels that are then laid out in
-    squares: its output at 2i is of inputs i - 1 and i with kernel rows 3 and 1, that at 2i + 1 of i and i + 1 with rows 2 and 0."""
+    """What the layer (kernel 4, stride 2, padding 1) makes of x [n, C, H, W], as a convolution to 4 C' channels that
+    are then laid out in squares: its output at 2i is of inputs i - 1 and i with kernel rows 3 and 1, that at 2i + 1 of
+    i and i + 1 with rows 2 and 0."""
     taps = torch.tensor([[3, 1, 4], [4, 2, 0]])  # 4: the zeros beyond the kernel
-    kernel = torch.nn.functional.pad(layer.weight, (0, 1, 0, 1))[:, :, taps][..., taps]  # in, out, y of the square, y, x of the square, x
+    # in, out, y of the square, y, x of the square, x
+    kernel = torch.nn.functional.pad(layer.weight, (0, 1, 0, 1))[:, :, taps][..., taps]
     kernel = kernel.permute(1, 2, 4, 0, 3, 5).flatten(0, 2)
     return torch.nn.functional.pixel_shuffle(torch.nn.functional.conv2d(x, kernel, padding=1), 2)
 
@@ -54,27 +58,32 @@ def main() -> None:
     size = (args.size, args.size)
     searched = training.tested(args, train_shards, validation_shards, with_persons)
     try:
-        train_set = PoseDataset(train_shards, size, sigma=args.sigma, augmentation=PoseAugmentation(rotation=args.rotation))
+        train_set = PoseDataset(train_shards, size, sigma=args.sigma,
+                                augmentation=PoseAugmentation(rotation=args.rotation))
         validation_set = PoseDataset(validation_shards, size, train_set.joint_names, sigma=args.sigma)
         test = PoseDataset(searched, size, train_set.joint_names, sigma=args.sigma)
         persons = read_persons(validation_shards)
     except ValueError as error:
         raise SystemExit(str(error))
-    persons = persons.rows(validation_shards.annotated(train_set.joint_names) & np.isfinite(persons.head_box))  # PCKh is measured by the heads' boxes
+    # PCKh is measured by the heads' boxes
+    persons = persons.rows(validation_shards.annotated(train_set.joint_names) & np.isfinite(persons.head_box))
     validation_set.persons = persons.place
     if not len(validation_set) or persons.names != train_set.joint_names:
-        raise SystemExit(f"expected validation persons with head boxes and the trained joints, got {len(validation_set)} with {len(persons.names)} joints, in "
+        raise SystemExit("expected validation persons with head boxes and the trained joints, got "
+                         f"{len(validation_set)} with {len(persons.names)} joints, in "
                          f"{args.data} (--dataset {args.dataset})")
     print(f"{len(train_set)} persons for training, {len(validation_set)} for validation")
 
-    config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = len(train_set.joint_names), list(size), args.layers
+    config.MODEL.NUM_JOINTS, config.MODEL.IMAGE_SIZE, config.MODEL.EXTRA.NUM_LAYERS = (len(train_set.joint_names),
+                                                                                       list(size), args.layers)
     config.MODEL.EXTRA.NUM_DECONV_FILTERS = [args.filters] * 3
     model = get_pose_net(config, is_train=False)
     model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
     for layer in model.deconv_layers if args.device == "cpu" else ():
-        if isinstance(layer, torch.nn.ConvTranspose2d):  # PyTorch 1.13 leaves it to the system's BLAS there, several times slower
+        # PyTorch 1.13 leaves it to the system's BLAS there, several times slower
+        if isinstance(layer, torch.nn.ConvTranspose2d):
             layer.forward = functools.partial(deconvolution, layer)
     criterion = JointsMSELoss(use_target_weight=True)
 
@@ -107,7 +116,8 @@ def main() -> None:
         canvas = drawing.of_events(validation_shards[int(meta["index"])]["volume"])
         found = find(events[None], {name: meta[name][None] for name in ("center", "scale")})[0]
         drawing.draw_joints(canvas, persons.joints[i][persons.annotated[i]], drawing.TRUE)
-        drawing.draw_joints(canvas, found, drawing.FOUND, np.where(persons.annotated[i][:, None], persons.joints[i], np.nan))
+        drawing.draw_joints(canvas, found, drawing.FOUND,
+                            np.where(persons.annotated[i][:, None], persons.joints[i], np.nan))
         return f"{meta['image']}_{meta['person']}", canvas
 
     names = searched.column("sample_id")[test.persons[:, 0]]

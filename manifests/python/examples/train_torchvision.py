@@ -15,16 +15,19 @@ import torch
 import torchvision
 import training
 from eventgan import drawing
-from eventgan.torch import DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision, exchange_first_convolution, fitted
+from eventgan.torch import (DetectionDataset, EventAugmentation, KeypointDataset, collate_torchvision,
+                            exchange_first_convolution, fitted)
 from torch.utils.data import Dataset
 
 
 def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=4, lr=2e-4)
     parser.add_argument("--task", choices=["detection", "keypoints"], default="detection")
-    parser.add_argument("--classes", help="detection: class names, separated by commas (default: all); the first one's AP is the result")
+    parser.add_argument("--classes", help="detection: class names, separated by commas (default: all); the first one's "
+                        "AP is the result")
     parser.add_argument("--scale", type=float, default=1.5, help="input pixels per volume pixel")
-    parser.add_argument("--regions", type=int, default=64, help="region proposals per volume that the heads are trained on; more cost more time")
+    parser.add_argument("--regions", type=int, default=64,
+                        help="region proposals per volume that the heads are trained on; more cost more time")
     return training.begin(parser)
 
 
@@ -36,8 +39,8 @@ def usable(task: str):
 
 
 def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
-    """[k] bool, of each annotated joint of an item's persons, whether the best person found on it, [n, 4 + 2J] with boxes, has it within a
-    fifth of the longer side of the person's box."""
+    """[k] bool, of each annotated joint of an item's persons, whether the best person found on it, [n, 4 + 2J] with
+    boxes, has it within a fifth of the longer side of the person's box."""
     near = []
     for box, joints in zip(item["boxes"][~item["ignore"]], item["keypoints"][~item["ignore"]]):
         known = joints[:, 2] > 0
@@ -50,9 +53,11 @@ def near_joints(found: torch.Tensor, item: dict) -> np.ndarray:
 
 
 def network(classes: int, joints: int, size: tuple[int, int], regions: int) -> torch.nn.Module:
-    """The detector, of persons' joints if there are any, for inputs of 18 channels that are of this size already and are not normalised. A volume
-    holds tens of objects, not hundreds as an image of COCO: fewer regions are looked at."""
-    settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size), "image_mean": [0.0] * 18,
+    """The detector, of persons' joints if there are any, for inputs of 18 channels that are of this size already and
+    are not normalised. A volume holds tens of objects, not hundreds as an image of COCO: fewer regions are looked
+    at."""
+    settings = {"weights": None, "weights_backbone": None, "min_size": min(size), "max_size": max(size),
+                "image_mean": [0.0] * 18,
                 "image_std": [1.0] * 18, "box_batch_size_per_image": regions, "rpn_post_nms_top_n_train": 4 * regions,
                 "rpn_post_nms_top_n_test": 2 * regions, "box_detections_per_img": regions // 2}
     if joints:
@@ -72,9 +77,11 @@ def main() -> None:
             train_set = KeypointDataset(train_shards, augmentation=augmentation, **place)
             validation_set = KeypointDataset(validation_shards, train_set.joint_names, **place)
         else:
-            train_set = DetectionDataset(train_shards, args.classes.split(",") if args.classes else None, augmentation=augmentation, **place)
+            train_set = DetectionDataset(train_shards, args.classes.split(",") if args.classes else None,
+                                         augmentation=augmentation, **place)
             validation_set = DetectionDataset(validation_shards, train_set.classes, **place)
-            test = DetectionDataset(training.tested(args, train_shards, validation_shards, usable(args.task)), train_set.classes, **place)
+            test = DetectionDataset(training.tested(args, train_shards, validation_shards, usable(args.task)),
+                                    train_set.classes, **place)
     except ValueError as error:
         raise SystemExit(str(error))
     predict = train(args, train_set, validation_set, (height, width))
@@ -84,9 +91,11 @@ def main() -> None:
                                           for entry in training.box_predictions(item, found, classes, place["view"])))
 
 
-def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset, size: tuple[int, int]) -> Callable[[Dataset], Iterator]:
-    """Trains on items of DetectionDataset, of KeypointDataset or of FramePairs, all of one size, and draws some validation items. Returns what gives
-    each item of a dataset, without its volume, with the boxes, labels and scores that the network finds in it."""
+def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,
+          size: tuple[int, int]) -> Callable[[Dataset], Iterator]:
+    """Trains on items of DetectionDataset, of KeypointDataset or of FramePairs, all of one size, and draws some
+    validation items. Returns what gives each item of a dataset, without its volume, with the boxes, labels and scores
+    that the network finds in it."""
     joints, classes = len(getattr(train_set, "joint_names", ())), list(train_set.classes)
     print(f"input {size[1]}x{size[0]}, classes " + ", ".join(classes))
     model = network(len(classes), joints, size, args.regions)
@@ -96,11 +105,13 @@ def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,
 
     def loss_of(batch: tuple, _: float) -> torch.Tensor:
         images, targets = batch
-        targets = [{name: value.to(args.device) for name, value in target.items() if name != "id"} for target in targets]
+        targets = [{name: value.to(args.device) for name, value in target.items() if name != "id"}
+                   for target in targets]
         return sum(model([image.to(args.device) for image in images], targets).values())
 
     def detect(volumes: list[torch.Tensor]) -> list[dict[str, torch.Tensor]]:
-        return [{name: value.cpu() for name, value in found.items()} for found in model([volume.to(args.device) for volume in volumes])]
+        return [{name: value.cpu() for name, value in found.items()}
+                for found in model([volume.to(args.device) for volume in volumes])]
 
     def search(dataset: Dataset) -> Iterator[tuple[dict, dict[str, torch.Tensor]]]:
         """Each item, without its volume, with what is found in it."""
@@ -115,7 +126,8 @@ def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,
         values = training.average_precisions(((item, boxes(found)) for item, found in pairs), classes)
         if not joints:
             return values
-        near = [near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item) for item, found in pairs]
+        near = [near_joints(torch.cat([found["boxes"], found["keypoints"][:, :, :2].flatten(1)], 1), item)
+                for item, found in pairs]
         return {**values, "PCK@0.2": float(np.mean(np.concatenate(near)))}
 
     optimizer = torch.optim.AdamW(model.parameters(), lr=args.lr, weight_decay=1e-4)
@@ -126,7 +138,8 @@ def train(args: argparse.Namespace, train_set: Dataset, validation_set: Dataset,
         item = validation_set[i]
         found = detect([item["volume"]])[0]
         sure = found["scores"] > 0.5
-        texts = [f"{classes[label - 1]} {score:.2f}" for label, score in zip(found["labels"][sure], found["scores"][sure])]
+        texts = [f"{classes[label - 1]} {score:.2f}"
+                 for label, score in zip(found["labels"][sure], found["scores"][sure])]
         canvas = training.draw_item(item, found["boxes"][sure], texts)
         for source, kept, colour in ((item, ~item["ignore"], drawing.TRUE), (found, sure, drawing.FOUND)):
             for points in source["keypoints"][kept].numpy() if "keypoints" in source else ():

@@ -16,15 +16,18 @@ import numpy as np
 import torch
 import training
 from eventgan import Shards
-from eventgan.torch import DetectionDataset, EventAugmentation, collate_yolo, exchange_first_convolution, fitted, move_boxes
+from eventgan.torch import (DetectionDataset, EventAugmentation, collate_yolo, exchange_first_convolution, fitted,
+                            move_boxes)
 
 
 def read_args() -> argparse.Namespace:
     parser = training.options(__doc__.splitlines()[0], batch=8, lr=1e-3)
     parser.add_argument("--trainer", required=True, help="folder of ultralytics/yolov3")
     parser.add_argument("--cfg", default="yolov3-tiny.cfg", help="name of a file in the trainer's cfg/, or a path")
-    parser.add_argument("--classes", default="Car", help="class names, separated by commas; the first one's AP is the result")
-    parser.add_argument("--scale", type=float, default=2.0, help="input pixels per volume pixel; small objects need more than 1")
+    parser.add_argument("--classes", default="Car",
+                        help="class names, separated by commas; the first one's AP is the result")
+    parser.add_argument("--scale", type=float, default=2.0,
+                        help="input pixels per volume pixel; small objects need more than 1")
     return training.begin(parser)
 
 
@@ -33,7 +36,8 @@ def collate(items: list) -> tuple:
 
 
 def anchors_of(shards: Shards, classes: list[str], view: np.ndarray, count: int) -> np.ndarray:
-    """[count, 2] widths and heights in input pixels: means of the training boxes, by k-means of their logarithms, smallest first."""
+    """[count, 2] widths and heights in input pixels: means of the training boxes, by k-means of their logarithms,
+    smallest first."""
     boxes = [np.empty((0, 4))]
     for i in range(len(shards)):
         rows, names = shards.labels(i)["boxes"], np.array(shards.class_names(i))
@@ -52,7 +56,8 @@ def adapted(cfg: str, classes: int, anchors: np.ndarray) -> str:
     for pattern, text in ((r"(?m)^channels *=.*", "channels=18"), (r"(?m)^classes *=.*", f"classes={classes}"),
                           (r"(?m)^anchors *=.*", f"anchors = {pairs}"),
                           (r"filters *= *\d+(\s+activation *= *linear\s+\[yolo\])", rf"filters={3 * (classes + 5)}\1"),
-                          (r"(?m)^mask *= *1,2,3$", "mask = 0,1,2")):  # yolov3-tiny's own leaves its smallest anchor out
+                          # yolov3-tiny's own leaves its smallest anchor out
+                          (r"(?m)^mask *= *1,2,3$", "mask = 0,1,2")):
         cfg = re.sub(pattern, text, cfg)
     return cfg
 
@@ -73,7 +78,8 @@ def main() -> None:
     try:
         train_set = DetectionDataset(train_shards, classes, (height, width), augmentation, view=view)
         validation_set = DetectionDataset(validation_shards, classes, (height, width), view=view)
-        test = DetectionDataset(training.tested(args, train_shards, validation_shards, training.with_boxes), classes, (height, width), view=view)
+        test = DetectionDataset(training.tested(args, train_shards, validation_shards, training.with_boxes), classes,
+                                (height, width), view=view)
     except ValueError as error:
         raise SystemExit(str(error))
 
@@ -84,13 +90,16 @@ def main() -> None:
     anchors = anchors_of(train_shards, classes, view, int(re.search(r"(?m)^num *= *(\d+)", cfg)[1]))
     own = pathlib.Path(args.out, "model.cfg")
     own.write_text(adapted(cfg, len(classes), anchors))
-    with torch.no_grad():  # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
+    # its first biases are set in place, which fails where gradients are kept: then boxes are everywhere
+    with torch.no_grad():
         model = Darknet(str(own), (height, width))
     model = exchange_first_convolution(model, 18)
     training.load_fitting(model, args.pretrained)
     model = model.to(args.device).to(memory_format=torch.channels_last)
-    model.eval()(torch.zeros(1, 18, height, width, device=args.device))  # it makes its grids only if it does not begin with training
-    model.nc, model.hyp = len(classes), {**hyp, "cls": hyp["cls"] * len(classes) / 80, "obj": hyp["obj"] * max(height, width) / 320}
+    # it makes its grids only if it does not begin with training
+    model.eval()(torch.zeros(1, 18, height, width, device=args.device))
+    model.nc, model.hyp = len(classes), {**hyp, "cls": hyp["cls"] * len(classes) / 80,
+                                         "obj": hyp["obj"] * max(height, width) / 320}
 
     def loss_of(batch: tuple, progress: float) -> torch.Tensor:
         model.gr = min(progress / 0.05, 1.0)  # at first every true box counts as an object, then as far as it is found
@@ -116,16 +125,20 @@ def main() -> None:
     groups = {True: [], False: []}
     for name, weight in model.named_parameters():
         groups["Conv2d.weight" in name].append(weight)
-    optimizer = torch.optim.AdamW([{"params": groups[True], "weight_decay": 0.01}, {"params": groups[False], "weight_decay": 0}], lr=args.lr)
+    optimizer = torch.optim.AdamW([{"params": groups[True], "weight_decay": 0.01},
+                                   {"params": groups[False], "weight_decay": 0}], lr=args.lr)
     print(f"input {width}x{height}, anchors " + ", ".join(f"{w:.0f}x{h:.0f}" for w, h in anchors))
-    training.fit(args, model, optimizer, training.batches(args, train_set, collate, shuffle=True), loss_of, measure, f"AP50 {classes[0]}")
+    training.fit(args, model, optimizer, training.batches(args, train_set, collate, shuffle=True), loss_of, measure,
+                 f"AP50 {classes[0]}")
 
     def image_of(i: int) -> tuple[str, np.ndarray]:
         item = validation_set[i]
         found = detect(item["volume"][None], 0.3)[0]
-        return item["id"], training.draw_item(item, found[:, :4], [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
+        return item["id"], training.draw_item(item, found[:, :4],
+                                              [f"{classes[int(c)]} {score:.2f}" for score, c in found[:, 4:]])
 
-    training.write_predictions(args, (entry for item, found in search(test) for entry in training.box_predictions(item, found, classes, view)))
+    training.write_predictions(args, (entry for item, found in search(test)
+                                      for entry in training.box_predictions(item, found, classes, view)))
     training.write_images(args, len(validation_set), image_of)
 
 

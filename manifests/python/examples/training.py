@@ -1,4 +1,5 @@
-"""What the examples share: options, which samples are for training and which for validation, the loop with its checkpoint, images."""
+"""What the examples share: options, which samples are for training and which for validation,
+the loop with its checkpoint, images."""
 
 from __future__ import annotations
 
@@ -24,44 +25,53 @@ from torch.utils.data import DataLoader, Dataset
 
 sys.path.append(str(pathlib.Path(__file__).resolve().parents[1]))  # the package, if it is not installed
 
-from eventgan import Sample, Shards, drawing, read_description  # noqa: E402
-from eventgan.detection_scores import Detections, GroundTruth, detection_scores  # noqa: E402
-from eventgan.torch import inverse, move_boxes  # noqa: E402
+from eventgan import Sample, Shards, drawing, read_description
+from eventgan.detection_scores import Detections, GroundTruth, detection_scores
+from eventgan.torch import inverse, move_boxes
 
 VALIDATION_SPLITS = ("validation", "valid", "val", "test")
 GROUPS = ("subject", "sequence", "sample_id")  # what Shards.divide keeps together, the most first
-MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every", "test", "as_bright",
-              "without_noise"}  # when a run goes on
+MAY_CHANGE = {"out", "data", "trainer", "epochs", "steps", "minutes", "device", "threads", "workers", "images", "every",
+              "test", "as_bright", "without_noise"}  # when a run goes on
 
 
 def options(description: str, **defaults: Any) -> argparse.ArgumentParser:
     """The options of all examples that train on shards."""
     parser = options_of_any(description, "output folder completed by eventgan finalize", **defaults)
     parser.add_argument("--dataset", help="use only samples of this kind of source, such as kitti_object")
-    parser.add_argument("--test", help="folder of shards whose labelled samples (of its validation split, if it has one) are predicted at the "
-                        "end, into predictions.json; default: the validation samples")
-    parser.add_argument("--as-bright", action="store_true", help="scale the volumes of predictions.json by one factor to the mean of the training "
-                        "samples, and clip them at 1: a camera's are often fainter than generated ones, which have fewer zeros")
-    parser.add_argument("--without-noise", action="store_true", help="drop isolated events from the volumes of predictions.json: pixels with events that "
+    parser.add_argument("--test", help="folder of shards whose labelled samples (of its validation split, if it has "
+                        "one) are predicted at the end, into predictions.json; default: the validation samples")
+    parser.add_argument("--as-bright", action="store_true",
+                        help="scale the volumes of predictions.json by one factor to the mean of the training samples, "
+                        "and clip them at 1: a camera's are often fainter than generated ones, which have fewer zeros")
+    parser.add_argument("--without-noise", action="store_true",
+                        help="drop isolated events from the volumes of predictions.json: pixels with events that "
                         "have fewer than two such neighbours")
-    parser.add_argument("--frames", action="store_true", help="train on the labelled frames instead of events, grey in the first channel; "
+    parser.add_argument("--frames", action="store_true",
+                        help="train on the labelled frames instead of events, grey in the first channel; "
                         "their paths come from the shards (next_path)")
-    parser.add_argument("--overfit", action="store_true", help="validate on the training samples, to see whether the network can fit them")
+    parser.add_argument("--overfit", action="store_true",
+                        help="validate on the training samples, to see whether the network can fit them")
     return parser
 
 
 def options_of_any(description: str, data: str, **defaults: Any) -> argparse.ArgumentParser:
-    """The options that all examples have, of which --data is `data`. The first limit that is reached ends the training."""
+    """The options that all examples have, of which --data is `data`. The first limit that is reached ends the
+    training."""
     parser = argparse.ArgumentParser(description=description)
     parser.add_argument("--data", required=True, help=data)
-    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the same command again to resume")
+    parser.add_argument("--out", required=True, help="folder for checkpoint, weights, metrics.json and images; run the "
+                        "same command again to resume")
     parser.add_argument("--epochs", type=int, help="stop after this many epochs")
     parser.add_argument("--steps", type=int, help="stop after this many batches")
-    parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation (default: 30 if there is no other limit)")
+    parser.add_argument("--minutes", type=float, help="stop after this much training time, without validation "
+                        "(default: 30 if there is no other limit)")
     parser.add_argument("--every", type=int, default=1, help="validate every so many epochs, and at the end")
     parser.add_argument("--batch", type=int)
-    parser.add_argument("--lr", type=float, help="peak learning rate: it rises during the first 5 %% and decays to 1 %% along a cosine")
-    parser.add_argument("--pretrained", help=".pt file of initial weights; layers that do not fit are initialised at random")
+    parser.add_argument("--lr", type=float,
+                        help="peak learning rate: it rises during the first 5 %% and decays to 1 %% along a cosine")
+    parser.add_argument("--pretrained",
+                        help=".pt file of initial weights; layers that do not fit are initialised at random")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--device", default="cpu", help="cpu or cuda")
     parser.add_argument("--threads", type=int, help="number of threads (default: all cores)")
@@ -94,8 +104,8 @@ def has_bfloat16() -> bool:
 
 
 def use_trainer(folder: str, *modules: str) -> pathlib.Path:
-    """Puts the trainer's folder of modules first on the path, and stand-ins that keep nothing in place of the TensorBoards that its
-    modules ask for, if they are not installed."""
+    """Puts the trainer's folder of modules first on the path, and stand-ins that keep nothing in place of the
+    TensorBoards that its modules ask for, if they are not installed."""
     path = pathlib.Path(folder).resolve()
     for module in modules:
         if not (path / module).exists():
@@ -132,26 +142,30 @@ def with_boxes(shards: Shards) -> list[int]:
 
 
 def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]]) -> tuple[Shards, Shards]:
-    """The training samples and the validation samples, of which `usable` gives the positions of those with labels: by the folder's
-    splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at least no labelled frame."""
+    """The training samples and the validation samples, of which `usable` gives the positions of those with labels: by
+    the folder's splits if it has both, else four fifths and one fifth that share no subject, drive, sequence, or at
+    least no labelled frame."""
     where = {"dataset": args.dataset} if args.dataset else None
     try:
         description = read_description(args.data)
         validation = validation_split(description)
         if validation and "train" in description["counts"]["by_split"] and not args.overfit:
-            parts, how = [Shards(args.data, split=split, where=where, partial=True) for split in ("train", validation)], f"of split {validation}"
+            parts, how = [Shards(args.data, split=split, where=where, partial=True)
+                          for split in ("train", validation)], f"of split {validation}"
             parts = [part[list(usable(part))] for part in parts]
         else:
             shards = Shards(args.data, where=where, partial=True)
             shards = shards[list(usable(shards))]
             by = next((by for by in GROUPS if _divides(shards, by)), "sample_id")
-            parts, how = ([shards, shards], "the same") if args.overfit or not len(shards) else (shards.divide(0.8, by, args.seed), f"of another {by}")
+            parts, how = (([shards, shards], "the same") if args.overfit or not len(shards)
+                          else (shards.divide(0.8, by, args.seed), f"of another {by}"))
     except FileNotFoundError as error:
         sys.exit(f"expected a folder completed by eventgan finalize, got no {error.filename}")
     except ValueError as error:
         sys.exit(str(error))
     if not len(parts[0]) or not len(parts[1]):
-        sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in {args.data} (--dataset {args.dataset}; it has "
+        sys.exit(f"expected labelled samples for training and validation, got {len(parts[0])} and {len(parts[1])}, in "
+                 f"{args.data} (--dataset {args.dataset}; it has "
                  f"samples of {', '.join(description['counts']['by_dataset'])})")
     if description.get("missing"):
         print(f"{len(description['missing'])} shards are missing in {args.data} (finalize --partial)")
@@ -162,14 +176,16 @@ def divided(args: argparse.Namespace, usable: Callable[[Shards], Iterable[int]])
     return train_shards, validation_shards
 
 
-def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Shards, usable: Callable[[Shards], Iterable[int]]) -> Shards:
+def tested(args: argparse.Namespace, train_shards: Shards, validation_shards: Shards,
+           usable: Callable[[Shards], Iterable[int]]) -> Shards:
     """The samples that predictions.json is of, changed as the options say."""
     shards = _to_test(args, validation_shards, usable)
     if args.without_noise:
         shards = shards.changed(without_noise)
     if args.as_bright:
         factor = _mean(train_shards) / _mean(shards)
-        print(f"the volumes of {args.test or args.data} are scaled by {factor:.2f}, to the brightness of those of {args.data}")
+        print(f"the volumes of {args.test or args.data} are scaled by {factor:.2f}, to the brightness of those of "
+              f"{args.data}")
         shards = shards.changed(functools.partial(_brighter, factor=factor))
     return shards
 
@@ -203,15 +219,16 @@ def without_noise(sample: Sample) -> np.ndarray:
 
 
 def place_of(sample: Sample) -> tuple[int, int, int, int]:
-    """Where the whole image lies in the volume, in whole pixels: left, top, width, height. Of a still its borders, which are cut, lie
-    outside the volume, or outside what a letterbox shows."""
+    """Where the whole image lies in the volume, in whole pixels: left, top, width, height. Of a still its borders,
+    which are cut, lie outside the volume, or outside what a letterbox shows."""
     (scale_x, _, x), (_, scale_y, y) = sample["pair"]["source_to_volume"]
     height, width = sample["pair"]["source_size"]
     return round(x - scale_x / 2 + 0.5), round(y - scale_y / 2 + 0.5), round(width * scale_x), round(height * scale_y)
 
 
 def placed(sample: Sample, image: np.ndarray) -> np.ndarray:
-    """[H, W] float32: an image of the size of the sample's source, grey, where it lies in the volume, and 0 around it."""
+    """[H, W] float32: an image of the size of the sample's source, grey, where it lies in the volume,
+    and 0 around it."""
     result = np.zeros(sample["volume"].shape[1:], np.float32)
     left, top, width, height = place_of(sample)
     whole = cv2.resize(image, (width, height), interpolation=cv2.INTER_AREA)
@@ -225,7 +242,8 @@ def labelled_image(sample: Sample) -> np.ndarray:
     pair = sample["pair"]
     image = cv2.imread(pair["next_path"], cv2.IMREAD_GRAYSCALE) if pair["label_position"] == 1 else None
     if image is None:
-        raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} (sample {pair['sample_id']})")
+        raise ValueError(f"expected an image, of a pair with the label at its end, got none, in {pair['next_path']} "
+                         f"(sample {pair['sample_id']})")
     return image
 
 
@@ -238,13 +256,16 @@ def labelled_frame(sample: Sample) -> np.ndarray:
 
 def _divides(shards: Shards, by: str) -> bool:
     try:
-        return len(set(shards.groups(by).tolist())) > 1 and (by != "subject" or len({*shards.column(by).tolist()} - {""}) > 1)
+        return len(set(shards.groups(by).tolist())) > 1 and (by != "subject"
+                                                             or len({*shards.column(by).tolist()} - {""}) > 1)
     except ValueError:  # no shard has it
         return False
 
 
-def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None, shuffle: bool = False) -> DataLoader:
-    return DataLoader(dataset, args.batch, shuffle=shuffle, num_workers=args.workers, collate_fn=collate, persistent_workers=args.workers > 0)
+def batches(args: argparse.Namespace, dataset: Dataset, collate: Callable | None = None,
+            shuffle: bool = False) -> DataLoader:
+    return DataLoader(dataset, args.batch, shuffle=shuffle, num_workers=args.workers, collate_fn=collate,
+                      persistent_workers=args.workers > 0)
 
 
 def load_fitting(model: nn.Module, path: str | None) -> None:
@@ -266,24 +287,27 @@ def load_fitting(model: nn.Module, path: str | None) -> None:
 
 def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optimizer, loader: DataLoader,
         loss_of: Callable[[Any, float], torch.Tensor], check: Callable[[], dict[str, float]], metric: str) -> None:
-    """Trains up to the limits, from the checkpoint if there is one. loss_of(batch, progress): the loss, progress 0..1 of the way to
-    the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step and after each epoch (each --every). Minutes are
-    those of the steps, here and in metrics.json."""
+    """Trains up to the limits, from the checkpoint if there is one. loss_of(batch, progress): the loss, progress 0..1
+    of the way to the nearest limit. check(): the numbers to report, `metric` among them; asked before the first step
+    and after each epoch (each --every). Minutes are those of the steps, here and in metrics.json."""
     out = pathlib.Path(args.out)
     settings = {name: value for name, value in vars(args).items() if name not in MAY_CHANGE}
     state: dict[str, Any] = {"settings": settings, "epoch": 0, "step": 0, "seconds": 0.0, "history": []}
     if (out / "checkpoint.pt").exists():
-        state = torch.load(out / "checkpoint.pt", map_location=args.device)  # its own: a pickle, not to be had from others
+        # its own: a pickle, not to be had from others
+        state = torch.load(out / "checkpoint.pt", map_location=args.device)
         for name, value in settings.items():
             if state["settings"].get(name) != value:
-                sys.exit(f"expected --{name} {state['settings'].get(name)}, as when this run started, got {value}, in {out / 'checkpoint.pt'}")
+                sys.exit(f"expected --{name} {state['settings'].get(name)}, as when this run started, got {value}, in "
+                         f"{out / 'checkpoint.pt'}")
         model.load_state_dict(state["model"])
         optimizer.load_state_dict(state["optimizer"])
         print(f"resuming after epoch {state['epoch']}")
     for group in optimizer.param_groups:
         group.setdefault("initial_lr", group["lr"])
     began = time.monotonic()
-    steps = min(math.inf if args.steps is None else args.steps, math.inf if args.epochs is None else args.epochs * len(loader))
+    steps = min(math.inf if args.steps is None else args.steps,
+                math.inf if args.epochs is None else args.epochs * len(loader))
 
     def progress() -> float:
         minutes = (state["seconds"] + time.monotonic() - began) / 60
@@ -293,10 +317,14 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
         model.eval()
         with torch.no_grad():
             found = check()
-        row = {"epoch": state["epoch"], "step": state["step"], "minutes": round(state["seconds"] / 60, 2), "loss": loss, **found}
-        state["history"].append({name: None if value is None or math.isnan(value) else value for name, value in row.items()})
-        numbers = " ".join(f"{name} {value:.4g}" for name, value in state["history"][-1].items() if value is not None and name not in ("epoch", "step"))
-        print(f"epoch {row['epoch']:3} step {row['step']:5} {numbers}" + ("" if row["step"] else "  (untrained)"), flush=True)
+        row = {"epoch": state["epoch"], "step": state["step"], "minutes": round(state["seconds"] / 60, 2), "loss": loss,
+               **found}
+        state["history"].append({name: None if value is None or math.isnan(value) else value
+                                 for name, value in row.items()})
+        numbers = " ".join(f"{name} {value:.4g}" for name, value in state["history"][-1].items() if value is not None
+                           and name not in ("epoch", "step"))
+        print(f"epoch {row['epoch']:3} step {row['step']:5} {numbers}" + ("" if row["step"] else "  (untrained)"),
+              flush=True)
 
     if not state["history"]:
         report(None)
@@ -305,14 +333,16 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
     done = progress() >= 1
     while not done:
         state["epoch"] += 1
-        torch.manual_seed(args.seed * 1_000_003 + state["epoch"])  # what an epoch draws does not depend on where a run went on
+        # what an epoch draws does not depend on where a run went on
+        torch.manual_seed(args.seed * 1_000_003 + state["epoch"])
         set_epoch(state["epoch"])
         model.train()
         losses = []
         for batch in loader:
             at = progress()
             for group in optimizer.param_groups:
-                group["lr"] = group["initial_lr"] * min(at / 0.05 + 0.01, 1) * (0.505 + 0.495 * math.cos(math.pi * min(at, 1)))
+                group["lr"] = group["initial_lr"] * min(at / 0.05 + 0.01,
+                                                        1) * (0.505 + 0.495 * math.cos(math.pi * min(at, 1)))
             loss = loss_of(batch, at)
             if not torch.isfinite(loss):
                 sys.exit(f"expected a finite loss, got {loss.item()}, at step {state['step']} (try a smaller --lr)")
@@ -329,15 +359,18 @@ def fit(args: argparse.Namespace, model: nn.Module, optimizer: torch.optim.Optim
             continue
         state["seconds"] += time.monotonic() - began
         report(float(np.mean(losses)))
-        _replace(out / "checkpoint.pt", lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()}, path))
+        _replace(out / "checkpoint.pt",
+                 lambda path: torch.save({**state, "model": model.state_dict(), "optimizer": optimizer.state_dict()},
+                                         path))
         began = time.monotonic()
     model.eval()
     untrained, last = state["history"][0][metric], state["history"][-1][metric]
-    summary = {"metric": metric, "untrained": untrained, metric: last, "minutes": round(state["seconds"] / 60, 2), **state["settings"],
-               "history": state["history"]}
+    summary = {"metric": metric, "untrained": untrained, metric: last, "minutes": round(state["seconds"] / 60, 2),
+               **state["settings"], "history": state["history"]}
     _replace(out / "weights.pt", lambda path: torch.save(model.state_dict(), path))
     _replace(out / "metrics.json", lambda path: path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8"))
-    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, metrics.json, images/, predictions.json")
+    print(f"{metric} {last} after {summary['minutes']} minutes, untrained {untrained}; {out}: weights.pt, "
+          "metrics.json, images/, predictions.json")
 
 
 def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
@@ -346,8 +379,10 @@ def _replace(path: pathlib.Path, write: Callable[[pathlib.Path], Any]) -> None:
     os.replace(new, path)
 
 
-def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Tensor, torch.Tensor]]], classes: Sequence[str]) -> dict[str, float]:
-    """AP@0.5 of each class, as PASCAL VOC has it, of items of DetectionDataset, each with what was found in it: boxes [n, 4], labels [n], scores [n]."""
+def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Tensor, torch.Tensor]]],
+                       classes: Sequence[str]) -> dict[str, float]:
+    """AP@0.5 of each class, as PASCAL VOC has it, of items of DetectionDataset, each with what was found in it:
+    boxes [n, 4], labels [n], scores [n]."""
     found, truth = [], []
     for image, (item, columns) in enumerate(pairs):
         boxes, labels, scores = (column.numpy() for column in columns)
@@ -359,8 +394,10 @@ def average_precisions(pairs: Iterable[tuple[dict, tuple[torch.Tensor, torch.Ten
     return {f"AP50 {name}": scores[name]["ap_voc"] for name in classes}
 
 
-def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.Tensor], classes: Sequence[str], view: np.ndarray) -> list[dict]:
-    """What was found in an item of DetectionDataset, as in `average_precisions`, for predictions.json; `view` is the dataset's."""
+def box_predictions(item: dict, found: tuple[torch.Tensor, torch.Tensor, torch.Tensor], classes: Sequence[str],
+                    view: np.ndarray) -> list[dict]:
+    """What was found in an item of DetectionDataset, as in `average_precisions`, for predictions.json;
+    `view` is the dataset's."""
     boxes, labels, scores = (column.numpy() for column in found)
     boxes = move_boxes(boxes, inverse(view))
     boxes[:, 2:] -= boxes[:, :2]
