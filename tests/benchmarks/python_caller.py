@@ -20,8 +20,8 @@ import time
 for name in ("OMP_NUM_THREADS", "OMP_WAIT_POLICY"):  # as users have it, whatever the Contender says
     os.environ.pop(name, None)
 
-import numpy as np  # noqa: E402
-from eventgan import Generator  # noqa: E402
+import numpy as np
+from eventgan import Generator
 
 WARM_UP_CALLS = 3
 BATCH = 4

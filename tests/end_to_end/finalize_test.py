@@ -22,7 +22,7 @@ from program import run
 from small_job import small_job
 
 sys.path.insert(0, str(program.PACKAGE))
-import eventgan  # noqa: E402
+import eventgan
 
 SHARDS = 8  # 3 of cars, 3 of the same cars as "val", 2 of people
 CARS, PEOPLE = "kitti_object-24x32", "mpii_list-24x32"

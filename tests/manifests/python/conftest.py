@@ -12,7 +12,7 @@ SOURCE = pathlib.Path(__file__).resolve().parents[3]
 PACKAGE = pathlib.Path(os.environ.get("PYTHONPATH", str(SOURCE / "manifests" / "python")).split(os.pathsep)[0])
 sys.path[:0] = [str(PACKAGE), str(SOURCE / "tests" / "stages" / "shards")]
 
-from example_shards import NAME, ExampleShards  # noqa: E402
+from example_shards import NAME, ExampleShards
 
 SECOND = "demo-train-00001-of-00002.h5"
 
@@ -47,6 +47,7 @@ def data(tmp_path_factory):
     manifest = (demo / "manifest.json").read_text()
     assert '"width": 346, "height": 260' in manifest
     (demo / "manifest.json").write_text(manifest.replace('"width": 346, "height": 260', '"width": 176, "height": 132'))
-    subprocess.run([program, "convert", demo / "manifest.json", "--output", demo / "out", "--progress", "none"], check=True, capture_output=True)
+    subprocess.run([program, "convert", demo / "manifest.json", "--output", demo / "out", "--progress", "none"],
+                   check=True, capture_output=True)
     subprocess.run([program, "finalize", demo / "out"], check=True, capture_output=True)
     return demo / "out"

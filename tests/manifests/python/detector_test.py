@@ -1,4 +1,5 @@
-"""manifests/python/examples/train_detector.py: targets, loss and boxes that belong together, and a few steps on the demo."""
+"""manifests/python/examples/train_detector.py: targets, loss and boxes that belong together,
+and a few steps on the demo."""
 
 import json
 import pathlib
@@ -14,7 +15,7 @@ pytest.importorskip("cv2")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 
-import train_detector as detector  # noqa: E402
+import train_detector as detector
 
 
 def item(boxes, labels=None, ignore=None, height=96, width=128):
@@ -43,19 +44,22 @@ def perfect(given, classes=1):
 
 
 def test_targets_of_a_box():
-    """Its middle, (44, 36), is in the cell from 40 to 48, 32 to 40, whose own middle it is: there the Gaussian has 1, and around it what its deviations say,
-    0.09 of the sides, at least a quarter of a cell."""
+    """Its middle, (44, 36), is in the cell from 40 to 48, 32 to 40, whose own middle it is: there the Gaussian has 1,
+    and around it what its deviations say, 0.09 of the sides, at least a quarter of a cell."""
     heat, boxes, weight = detector.target_of(item([[4, 16, 84, 56]]), 1, 12, 16)
     assert heat.shape == (1, 12, 16) and heat[0, 4, 5] == 1 and (heat == 1).sum() == 1
-    assert heat[0, 4, 6] == pytest.approx(np.exp(-0.5 * (8 / 7.2) ** 2)) and heat[0, 5, 5] == pytest.approx(np.exp(-0.5 * (8 / 3.6) ** 2))
+    assert (heat[0, 4, 6] == pytest.approx(np.exp(-0.5 * (8 / 7.2) ** 2))
+            and heat[0, 5, 5] == pytest.approx(np.exp(-0.5 * (8 / 3.6) ** 2)))
     assert boxes[:, 4, 5].tolist() == [4, 16, 84, 56] and (weight > 0).sum() == (heat > 0.1).sum()
     assert weight.sum() == pytest.approx(np.log(80 * 40), rel=1e-5)  # a large box counts a little more than a small one
 
 
 def test_targets_of_several_boxes():
-    """The smaller one in the middle of the larger one has its cell; a box to be ignored is neither found nor missed; one at the edge stays inside."""
-    heat, boxes, _ = detector.target_of(item([[36, 28, 52, 44], [4, 0, 84, 72], [100, 60, 128, 96], [120, 88, 136, 104]], [0, 1, 0, 0],
-                                             [False, False, True, False]), 2, 12, 16)
+    """The smaller one in the middle of the larger one has its cell; a box to be ignored is neither found nor missed;
+    one at the edge stays inside."""
+    heat, boxes, _ = detector.target_of(
+        item([[36, 28, 52, 44], [4, 0, 84, 72], [100, 60, 128, 96], [120, 88, 136, 104]], [0, 1, 0, 0],
+             [False, False, True, False]), 2, 12, 16)
     assert heat[0, 4, 5] == heat[1, 4, 5] == 1 and boxes[:, 4, 5].tolist() == [36, 28, 52, 44]
     assert (heat[:, 8:11, 13:15] == -1).all()
     assert heat[0, 11, 15] == 1
@@ -99,8 +103,8 @@ def test_overlapping_boxes_are_one():
 
 @pytest.mark.parametrize("channels", ["signed", "volume"])
 def test_a_few_steps(channels, data, tmp_path):
-    line = [sys.executable, EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset", "kitti_object", "--threads", "1",
-            "--channels", channels, "--batch", "4", "--images", "2", "--every", "2"]
+    line = [sys.executable, EXAMPLES / "train_detector.py", "--data", data, "--out", tmp_path / "out", "--dataset",
+            "kitti_object", "--threads", "1", "--channels", channels, "--batch", "4", "--images", "2", "--every", "2"]
     for steps, epochs in ((4, "2"), (8, "4")):  # and on
         done = subprocess.run([*line, "--epochs", epochs], capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -109,9 +113,11 @@ def test_a_few_steps(channels, data, tmp_path):
     assert [row["epoch"] for row in history] == [0, 2, 4] and history[-1]["loss"] < history[1]["loss"]
     assert len([*pathlib.Path(tmp_path, "out", "images").iterdir()]) == 2
     entries = json.loads((tmp_path / "out" / "predictions.json").read_text())
-    more = [*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained", tmp_path / "out" / "weights.pt"]
+    more = [*line[:-2], "--every", "9", "--epochs", "1", "--out", tmp_path / "more", "--pretrained",
+            tmp_path / "out" / "weights.pt"]
     done = subprocess.run(more, capture_output=True, text=True)
     assert done.returncode == 0 and "of the model's" in done.stdout, done.stdout + done.stderr
     assert all(entry["category_id"] == "Car" and len(entry["bbox"]) == 4 for entry in entries)
-    done = subprocess.run([*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats"], capture_output=True, text=True)
+    done = subprocess.run([*line, "--classes", "Cat", "--epochs", "1", "--out", tmp_path / "cats"], capture_output=True,
+                          text=True)
     assert done.returncode == 1 and "got Cat" in done.stderr and "Traceback" not in done.stderr

@@ -1,4 +1,5 @@
-"""eventgan.evaluate: scores worked out by hand, against plain loops of the published rules, and against the trainers' own."""
+"""eventgan.evaluate: scores worked out by hand, against plain loops of the published rules,
+and against the trainers' own."""
 
 import inspect
 import json
@@ -15,8 +16,9 @@ import pytest
 from conftest import NAME, PACKAGE, SECOND, SOURCE
 
 from eventgan import Shards
-from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth, average_precisions, detection_scores,
-                                              kitti_average_precision, match_as_coco, match_as_voc, non_maximum_suppression)
+from eventgan.detection_scores import (COCO_IOUS, KITTI_CLASSES, KITTI_LEVELS, Detections, GroundTruth,
+                                       average_precisions, detection_scores, kitti_average_precision, match_as_coco,
+                                       match_as_voc, non_maximum_suppression)
 from eventgan.evaluate import Samples, evaluate_detections, evaluate_poses
 from eventgan.pose_scores import Persons, head_lengths, pose_scores
 
@@ -28,7 +30,8 @@ CLASSES = {"Car": CAR, "Van": VAN}
 def truth_of(*rows):
     """Rows of image, label, left, top, right, bottom, ignore, difficulty."""
     rows = np.array(rows, float).reshape(-1, 8)
-    return GroundTruth(rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:6], rows[:, 6] != 0, rows[:, 7].astype(int))
+    return GroundTruth(rows[:, 0].astype(int), rows[:, 1].astype(int), rows[:, 2:6], rows[:, 6] != 0,
+                       rows[:, 7].astype(int))
 
 
 def found_of(*rows):
@@ -38,8 +41,8 @@ def found_of(*rows):
 
 
 def test_scores_worked_out_by_hand():
-    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 20, 0, 30, 10, 0, 1], [1, CAR, 0, 0, 10, 10, 0, 2], [1, VAN, 50, 0, 60, 10, 0, -1],
-                     [1, DONT_CARE, 80, 0, 100, 20, 1, -1])
+    truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 20, 0, 30, 10, 0, 1], [1, CAR, 0, 0, 10, 10, 0, 2],
+                     [1, VAN, 50, 0, 60, 10, 0, -1], [1, DONT_CARE, 80, 0, 100, 20, 1, -1])
     found = found_of([0, CAR, 0, 0, 10, 10, 0.9],  # right
                      [0, CAR, 0, 0, 10, 9, 0.8],  # the same car again: wrong
                      [0, CAR, 20, 0, 30, 5, 0.7],  # IoU 0.5: right
@@ -73,7 +76,8 @@ def test_recalls_that_a_point_meets_belong_to_it():
 
 def test_a_second_one_is_wrong_for_voc_and_takes_another_box_for_coco():
     truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0], [0, CAR, 4, 0, 14, 10, 0, 0])
-    found = found_of([0, CAR, 0, 0, 10, 10, 0.9], [0, CAR, 1, 0, 11, 10, 0.8])  # IoU 9/11 with the first, 7/13 with the second
+    # IoU 9/11 with the first, 7/13 with the second
+    found = found_of([0, CAR, 0, 0, 10, 10, 0.9], [0, CAR, 1, 0, 11, 10, 0.8])
     assert match_as_voc(found, truth)[0].tolist() == [0, -1]
     assert match_as_coco(found, truth)[0][:, 0].tolist() == [True, True]
 
@@ -83,14 +87,16 @@ def test_equal_scores_stay_in_the_order_of_the_list():
     right, wrong = [0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 20, 0, 30, 10, 0.5]
     assert detection_scores(found_of(right, wrong), truth, CLASSES)["Car"]["ap_voc"] == 1
     assert detection_scores(found_of(wrong, right), truth, CLASSES)["Car"]["ap_voc"] == 0.5
-    assert non_maximum_suppression(found_of([0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 0, 0, 10, 9, 0.5]), 0.2).tolist() == [True, False]
+    assert non_maximum_suppression(found_of([0, CAR, 0, 0, 10, 10, 0.5], [0, CAR, 0, 0, 10, 9, 0.5]),
+                                   0.2).tolist() == [True, False]
 
 
 @pytest.mark.parametrize(("truth", "found", "precision", "recall", "ap", "f1"), [
     ([], [], math.nan, math.nan, math.nan, math.nan),
     ([], [[0, CAR, 0, 0, 10, 10, 0.5]], 0, math.nan, math.nan, 0),
     ([[0, CAR, 0, 0, 10, 10, 0, 0]], [], math.nan, 0, 0, 0),
-    ([[0, CAR, 0, 0, 10, 10, 1, 0]], [[0, CAR, 0, 0, 10, 10, 0.5]], math.nan, math.nan, math.nan, math.nan),  # all to be ignored
+    # all to be ignored
+    ([[0, CAR, 0, 0, 10, 10, 1, 0]], [[0, CAR, 0, 0, 10, 10, 0.5]], math.nan, math.nan, math.nan, math.nan),
     ([[0, CAR, 5, 5, 5, 5, 0, 0]], [[0, CAR, 5, 5, 5, 5, 0.5]], 0, 0, 0, 0),  # without an area nothing overlaps
 ])
 def test_edges(truth, found, precision, recall, ap, f1):
@@ -135,7 +141,8 @@ def rows_of(boxes, image):
 
 
 def ignored_by_loops(found, truth, n, least):
-    return any(truth.ignore[m] and truth.label[m] in (found.label[n], DONT_CARE) and iou_of(found.xyxy[n], truth.xyxy[m], share=True) >= least
+    return any(truth.ignore[m] and truth.label[m] in (found.label[n], DONT_CARE)
+               and iou_of(found.xyxy[n], truth.xyxy[m], share=True) >= least
                for m in rows_of(truth, found.image[n]))
 
 
@@ -162,7 +169,8 @@ def test_coco_s_matching_is_that_of_its_loop(seed):
     for t, least in enumerate(COCO_IOUS):
         taken = set()
         for n in range(len(found.score)):
-            free = [m for m in rows_of(truth, found.image[n]) if truth.label[m] == found.label[n] and not truth.ignore[m] and m not in taken]
+            free = [m for m in rows_of(truth, found.image[n]) if truth.label[m] == found.label[n]
+                    and not truth.ignore[m] and m not in taken]
             best = max(free, key=lambda m: iou_of(found.xyxy[n], truth.xyxy[m]), default=None)
             hit = best is not None and iou_of(found.xyxy[n], truth.xyxy[best]) >= least
             taken |= {best} if hit else set()
@@ -170,13 +178,14 @@ def test_coco_s_matching_is_that_of_its_loop(seed):
 
 
 def pycocotools(found, annotations, label, images):
-    """COCOeval's AP@[.5:.95] of a class, all areas, 100 detections, as its evaluateImg and accumulate have it, in plain loops; annotations are dictionaries
-    of image_id, category_id, bbox and iscrowd."""
+    """COCOeval's AP@[.5:.95] of a class, all areas, 100 detections, as its evaluateImg and accumulate have it, in plain
+    loops; annotations are dictionaries of image_id, category_id, bbox and iscrowd."""
     precision = []
     for least in np.linspace(0.5, 0.95, 10):
         scores, right, ignored, truths = [], [], [], 0
         for image in range(images):
-            there = sorted((each for each in annotations if each["image_id"] == image and each["category_id"] == label), key=lambda each: each["iscrowd"])
+            there = sorted((each for each in annotations if each["image_id"] == image and each["category_id"] == label),
+                           key=lambda each: each["iscrowd"])
             truths += sum(not each["iscrowd"] for each in there)
             rows = [n for n in rows_of(found, image) if found.label[n] == label]
             matched = {}
@@ -216,9 +225,11 @@ def pycocotools(found, annotations, label, images):
 def test_coco_s_average_precision_is_pycocotools_of_our_own_export(seed):
     found, truth = scene(seed, images=12, each=12)
     annotations = []
-    for image, label, (left, top, right, bottom), ignore in zip(truth.image, truth.label, truth.xyxy.tolist(), truth.ignore.tolist()):
+    for image, label, (left, top, right, bottom), ignore in zip(truth.image, truth.label, truth.xyxy.tolist(),
+                                                                truth.ignore.tolist()):
         for category in CLASSES.values() if label == DONT_CARE else [label]:  # exports.md: one of every class
-            annotations.append({"image_id": image, "category_id": category, "bbox": [left, top, right - left, bottom - top], "iscrowd": int(ignore)})
+            annotations.append({"image_id": image, "category_id": category,
+                                "bbox": [left, top, right - left, bottom - top], "iscrowd": int(ignore)})
     scores = detection_scores(found, truth, CLASSES)
     for name, label in CLASSES.items():
         assert scores[name]["ap_coco"] == pytest.approx(pycocotools(found, annotations, label, 12), abs=1e-12)
@@ -244,12 +255,14 @@ def test_average_precisions_are_of_all_predictions_and_the_others_of_those_that_
     assert car["ap_voc"] == pytest.approx(1 / 2 + 2 / 3 / 2)
     assert car["ap_coco"] == pytest.approx((51 + 50 * 2 / 3) / 101)
     sure = detection_scores(found.rows(found.score >= 0.2), truth, CLASSES)["Car"]
-    assert {key for key in sure if sure[key] != pytest.approx(car[key], nan_ok=True)} == {"ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco"}
+    assert {key for key in sure
+            if sure[key] != pytest.approx(car[key], nan_ok=True)} == {"ap_voc", "ap_voc_11", "ap_coco_101", "ap_coco"}
 
 
 def test_coco_counts_a_hundred_of_a_class_and_sample():
     truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 0])
-    found = found_of(*([0, CAR, 20 * i, 20, 20 * i + 9, 30, 0.9] for i in range(100)), [0, CAR, 0, 0, 10, 10, 0.1], [0, VAN, 0, 0, 10, 10, 0.1])
+    found = found_of(*([0, CAR, 20 * i, 20, 20 * i + 9, 30, 0.9] for i in range(100)), [0, CAR, 0, 0, 10, 10, 0.1],
+                     [0, VAN, 0, 0, 10, 10, 0.1])
     right, counted = match_as_coco(found, truth)
     assert not right.any() and counted.sum(0).tolist() == [101] * 10
 
@@ -258,8 +271,10 @@ def test_coco_counts_a_hundred_of_a_class_and_sample():
 def test_suppression_is_torchvision_s(iou):
     torch, ops = pytest.importorskip("torch"), pytest.importorskip("torchvision.ops")
     found, _ = scene(1)
-    kept = ops.batched_nms(torch.from_numpy(found.xyxy), torch.from_numpy(found.score), torch.from_numpy(2 * found.image + found.label), iou)
-    assert np.flatnonzero(non_maximum_suppression(found, iou)).tolist() == kept.tolist()  # both from the highest score on
+    kept = ops.batched_nms(torch.from_numpy(found.xyxy), torch.from_numpy(found.score),
+                           torch.from_numpy(2 * found.image + found.label), iou)
+    # both from the highest score on
+    assert np.flatnonzero(non_maximum_suppression(found, iou)).tolist() == kept.tolist()
     assert 0 < len(kept) < len(found.score) or iou == 1
 
 
@@ -273,15 +288,18 @@ def kitti_by_loops(found, truth, classes, name, level, height):
             kind[m] = 0 if 0 <= truth.difficulty[m] <= rank and not truth.ignore[m] else 1
         elif truth.label[m] == classes.get(neighbour):
             kind[m] = 1
-    small = {n: height[n] < KITTI_LEVELS[level] for n in range(len(found.score)) if height[n] < KITTI_LEVELS[level] or found.label[n] == classes[name]}
+    small = {n: height[n] < KITTI_LEVELS[level] for n in range(len(found.score)) if height[n] < KITTI_LEVELS[level]
+             or found.label[n] == classes[name]}
     images = range(max([*truth.image, *found.image], default=-1) + 1)
 
     def best_score(m, free):
-        return max((n for n in free if iou_of(found.xyxy[n], truth.xyxy[m]) > least), key=lambda n: found.score[n], default=None)
+        return max((n for n in free if iou_of(found.xyxy[n], truth.xyxy[m]) > least), key=lambda n: found.score[n],
+                   default=None)
 
     def best_fit(m, free):
         fits = [n for n in free if iou_of(found.xyxy[n], truth.xyxy[m]) > least]
-        return max((n for n in fits if not small[n]), key=lambda n: iou_of(found.xyxy[n], truth.xyxy[m]), default=fits[0] if fits else None)
+        return max((n for n in fits if not small[n]), key=lambda n: iou_of(found.xyxy[n], truth.xyxy[m]),
+                   default=fits[0] if fits else None)
 
     def right_and_wrong(choose, threshold):
         scores, wrong = [], 0
@@ -293,7 +311,8 @@ def kitti_by_loops(found, truth, classes, name, level, height):
                     free.remove(n)
                     scores += [found.score[n]] if kind[m] == 0 and not small[n] else []
             stuff = [m for m in rows_of(truth, image) if truth.label[m] == DONT_CARE]
-            wrong += sum(not small[n] and all(iou_of(found.xyxy[n], truth.xyxy[m], share=True) <= least for m in stuff) for n in free)
+            wrong += sum(not small[n] and all(iou_of(found.xyxy[n], truth.xyxy[m], share=True) <= least for m in stuff)
+                         for n in free)
         return scores, wrong
 
     truths = sum(each == 0 for each in kind.values())
@@ -327,13 +346,15 @@ def test_kitti_without_a_box_of_the_level():
     truth = truth_of([0, CAR, 0, 0, 10, 10, 0, 2])
     found = found_of([0, CAR, 0, 0, 10, 10, 0.5])
     assert math.isnan(kitti_average_precision(found, truth, CLASSES, "Car", "easy", np.array([50.0])))
-    assert kitti_average_precision(found, truth, CLASSES, "Car", "hard", np.array([50.0])) == 0  # one box: recall 0 alone has a threshold
+    # one box: recall 0 alone has a threshold
+    assert kitti_average_precision(found, truth, CLASSES, "Car", "hard", np.array([50.0])) == 0
     assert kitti_average_precision(found_of(), truth, CLASSES, "Car", "hard", np.empty(0)) == 0
 
 
 @pytest.fixture
 def trainer(monkeypatch):
-    """Puts the folder of a trainer's modules first on the path. Both trainers have a `utils`: what others have loaded of them is forgotten."""
+    """Puts the folder of a trainer's modules first on the path. Both trainers have a `utils`:
+    what others have loaded of them is forgotten."""
 
     def use(path, *modules):
         if not (TRAINERS / path).is_dir():
@@ -359,24 +380,27 @@ def test_average_precision_is_yolov3_s(trainer, monkeypatch, seed):
     found, truth = scene(seed)
     scores = detection_scores(found, truth, CLASSES)
     matched_truth, counts = match_as_voc(found, truth)
-    precision, recall, ap, f1, classes = utils.ap_per_class(matched_truth[counts, None] >= 0, found.score[counts] + 0.2, found.label[counts],
-                                                            truth.label[~truth.ignore])  # it looks at precision and recall at score 0.1
+    precision, recall, ap, f1, classes = utils.ap_per_class(matched_truth[counts, None] >= 0, found.score[counts] + 0.2,
+                                                            found.label[counts],
+                                                            # it looks at precision and recall at score 0.1
+                                                            truth.label[~truth.ignore])
     assert classes.tolist() == [CAR, VAN]
-    for key, values in (("ap_voc", ap[:, 0]), ("precision", precision[:, 0]), ("recall", recall[:, 0]), ("f1", f1[:, 0])):
+    for key, values in (("ap_voc", ap[:, 0]), ("precision", precision[:, 0]), ("recall", recall[:, 0]),
+                        ("f1", f1[:, 0])):
         np.testing.assert_allclose([scores[name][key] for name in CLASSES], values, rtol=0, atol=1e-6)
 
 
-MPII = ["r_ankle", "r_knee", "r_hip", "l_hip", "l_knee", "l_ankle", "pelvis", "thorax", "upper_neck", "head_top", "r_wrist", "r_elbow", "r_shoulder",
-        "l_shoulder", "l_elbow", "l_wrist"]
+MPII = ["r_ankle", "r_knee", "r_hip", "l_hip", "l_knee", "l_ankle", "pelvis", "thorax", "upper_neck", "head_top",
+        "r_wrist", "r_elbow", "r_shoulder", "l_shoulder", "l_elbow", "l_wrist"]
 
 
 def persons_at_random(rng, count):
     joints = rng.uniform(0, 200, (count, 16, 2))
     annotated = rng.random((count, 16)) < 0.9
     box = np.sort(rng.uniform(0, 120, (count, 2, 2)), axis=1)
-    persons = Persons(MPII, np.stack([np.arange(count), np.zeros(count, int)], 1), joints, joints, annotated, annotated & (rng.random((count, 16)) < 0.2),
-                      head_lengths(MPII, joints, annotated), np.linalg.norm(box[:, 1] - box[:, 0], axis=-1),
-                      np.tile(np.eye(2, 3), (count, 1, 1)))
+    persons = Persons(MPII, np.stack([np.arange(count), np.zeros(count, int)], 1), joints, joints, annotated,
+                      annotated & (rng.random((count, 16)) < 0.2), head_lengths(MPII, joints, annotated),
+                      np.linalg.norm(box[:, 1] - box[:, 0], axis=-1), np.tile(np.eye(2, 3), (count, 1, 1)))
     return persons, box, joints + rng.normal(0, 12, joints.shape)
 
 
@@ -388,14 +412,17 @@ def test_pckh_is_pose_resnet_s(trainer, tmp_path, hidden):
     from scipy.io import savemat
 
     persons, box, found = persons_at_random(np.random.default_rng(3), 50)
-    short = ["rank", "rkne", "rhip", "lhip", "lkne", "lank", "pelv", "thor", "neck", "head", "rwri", "relb", "rsho", "lsho", "lelb", "lwri"]
+    short = ["rank", "rkne", "rhip", "lhip", "lkne", "lank", "pelv", "thor", "neck", "head", "rwri", "relb", "rsho",
+             "lsho", "lelb", "lwri"]
     (tmp_path / "annot").mkdir()
-    savemat(tmp_path / "annot" / "gt_valid.mat", {"dataset_joints": np.array([short], object), "jnt_missing": (~persons.scored(hidden)).T.astype(float),
-                                                  "pos_gt_src": persons.joints.transpose(1, 2, 0) + 1, "headboxes_src": box.transpose(1, 2, 0) + 1})
+    savemat(tmp_path / "annot" / "gt_valid.mat",
+            {"dataset_joints": np.array([short], object), "jnt_missing": (~persons.scored(hidden)).T.astype(float),
+             "pos_gt_src": persons.joints.transpose(1, 2, 0) + 1, "headboxes_src": box.transpose(1, 2, 0) + 1})
     config.DATASET.ROOT, config.DATASET.TEST_SET = str(tmp_path), "valid"
     theirs, mean = MPIIDataset.evaluate(None, config, found, "")
     ours = {name: row["pckh_mpii"] for name, row in pose_scores(found, persons, hidden).items()}
-    for name, joint in (("Shoulder", "shoulder"), ("Elbow", "elbow"), ("Wrist", "wrist"), ("Hip", "hip"), ("Knee", "knee"), ("Ankle", "ankle")):
+    for name, joint in (("Shoulder", "shoulder"), ("Elbow", "elbow"), ("Wrist", "wrist"), ("Hip", "hip"),
+                        ("Knee", "knee"), ("Ankle", "ankle")):
         assert 100 * (ours["l_" + joint] + ours["r_" + joint]) / 2 == pytest.approx(theirs[name], abs=1e-6)
     assert 100 * ours["head_top"] == pytest.approx(theirs["Head"], abs=1e-6)
     assert 100 * ours["all"] == pytest.approx(mean, abs=1e-6)
@@ -404,14 +431,15 @@ def test_pckh_is_pose_resnet_s(trainer, tmp_path, hidden):
 
 def test_poses_worked_out_by_hand():
     names = ["head", "left shoulder", "right shoulder", "hand"]
-    joints = np.array([[[0, 0], [-5, 20], [5, 20], [9, 9]], [[0, 0], [-5, 20], [5, 20], [9, 9]], [[-1, -1], [-5, 20], [5, 20], [9, 9]]], float)
+    joints = np.array([[[0, 0], [-5, 20], [5, 20], [9, 9]], [[0, 0], [-5, 20], [5, 20], [9, 9]],
+                       [[-1, -1], [-5, 20], [5, 20], [9, 9]]], float)
     annotated = ~(joints == -1).all(-1)
     hidden = np.zeros((3, 4), bool)
     hidden[1, 3] = True
     head = head_lengths(names, joints, annotated)
     np.testing.assert_array_equal(head, [20, 20, np.nan])  # within 6 px is near
-    persons = Persons(names, np.array([[0, 0], [0, 1], [1, 0]]), joints / 2, joints, annotated, hidden, head, np.array([np.nan, np.nan, 100.0]),
-                      np.tile(np.eye(2, 3) / 2, (3, 1, 1)))
+    persons = Persons(names, np.array([[0, 0], [0, 1], [1, 0]]), joints / 2, joints, annotated, hidden, head,
+                      np.array([np.nan, np.nan, 100.0]), np.tile(np.eye(2, 3) / 2, (3, 1, 1)))
     found = joints.copy()
     found[0, 3] += [6, 0]  # 6: near
     found[0, 0] += [3, 6]
@@ -421,7 +449,8 @@ def test_poses_worked_out_by_hand():
     hand, every = scores["hand"], scores["all"]
     assert (hand["scored"], hand["left_out"], hand["pckh"], hand["pckh_mpii"]) == (2, 1, 1, 1)
     assert (hand["mpjpe_source"], hand["mpjpe_volume"]) == (18, 9)
-    assert scores["head"]["pckh"] == 0 and math.isnan(scores["head"]["pckh_mpii"])  # of the third person it is not annotated
+    # of the third person it is not annotated
+    assert scores["head"]["pckh"] == 0 and math.isnan(scores["head"]["pckh_mpii"])
     assert (every["scored"], every["left_out"]) == (10, 2)
     assert every["pckh"] == 3 / 7 and every["pckh_mpii"] == 1  # the first person's 4, the second's 3; the third's 3
     assert every["mpjpe_source"] == pytest.approx((6 + math.sqrt(45) + 30) / 7)
@@ -429,16 +458,19 @@ def test_poses_worked_out_by_hand():
 
 
 def test_poses_without_a_head_or_a_person():
-    nobody = Persons(["nose"], np.empty((0, 2), int), *np.empty((2, 0, 1, 2)), *np.empty((2, 0, 1), bool), *np.empty((2, 0)), np.empty((0, 2, 3)))
+    nobody = Persons(["nose"], np.empty((0, 2), int), *np.empty((2, 0, 1, 2)), *np.empty((2, 0, 1), bool),
+                     *np.empty((2, 0)), np.empty((0, 2, 3)))
     row = pose_scores(np.empty((0, 1, 2)), nobody)["all"]
-    assert row["scored"] == 0 and all(math.isnan(row[key]) for key in ("mpjpe_volume", "mpjpe_source", "pckh", "pckh_mpii"))
+    assert row["scored"] == 0 and all(math.isnan(row[key])
+                                      for key in ("mpjpe_volume", "mpjpe_source", "pckh", "pckh_mpii"))
     assert np.isnan(head_lengths(["nose"], np.zeros((2, 1, 2)), np.ones((2, 1), bool))).all()
 
 
 def test_a_hundred_thousand_predictions_take_seconds():
     rng = np.random.default_rng(0)
     image, label, xyxy = boxes_at_random(rng, 10_000, 10)
-    truth = GroundTruth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool), rng.integers(-1, 3, 50_000))
+    truth = GroundTruth(*(column[::2] for column in (image, label, xyxy)), np.zeros(50_000, bool),
+                        rng.integers(-1, 3, 50_000))
     start = time.process_time()
     found = Detections.of(image, label, xyxy + rng.normal(0, 2, xyxy.shape), rng.random(100_000))
     found = found.rows(non_maximum_suppression(found, 0.5))
@@ -453,21 +485,24 @@ def test_a_hundred_thousand_boxes_in_twelve_images():
     rng = np.random.default_rng(0)
     image, at = np.arange(100_000) % 12, np.arange(100_000) // 12 % 100
     corner = np.stack([at % 10, at // 10], 1) * 50.0
-    found = Detections.of(image, np.zeros(len(image)), np.hstack([corner, corner + 40]) + rng.uniform(-1, 1, (len(image), 4)), rng.random(len(image)))
+    found = Detections.of(image, np.zeros(len(image)), np.hstack([corner, corner + 40])
+                          + rng.uniform(-1, 1, (len(image), 4)), rng.random(len(image)))
     place = np.arange(100)
     corner = np.stack([place % 10, place // 10], 1) * 50.0
-    truth = GroundTruth(np.repeat(np.arange(12), 100), np.zeros(1200, int), np.tile(np.hstack([corner, corner + 40]), (12, 1)), np.zeros(1200, bool), np.zeros(1200, int))
+    truth = GroundTruth(np.repeat(np.arange(12), 100), np.zeros(1200, int),
+                        np.tile(np.hstack([corner, corner + 40]), (12, 1)), np.zeros(1200, bool), np.zeros(1200, int))
     sure = non_maximum_suppression(found, 0.2)
     assert sure.sum() == 1200
     car = detection_scores(found, truth, CLASSES, sure=sure)["Car"]
     assert (car["right"], car["precision"], car["recall"]) == (1200, 1, 1)
     assert 0.5 < car["ap_voc"] < 0.9  # of all 100,000
     assert detection_scores(found.rows(sure), truth, CLASSES)["Car"]["ap_voc"] == pytest.approx(1)
-    assert kitti_average_precision(found.rows(sure), truth, CLASSES, "Car", "easy", np.full(1200, 40.0)) == pytest.approx(1)
+    assert kitti_average_precision(found.rows(sure), truth, CLASSES, "Car", "easy",
+                                   np.full(1200, 40.0)) == pytest.approx(1)
 
 
-# The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1, 4.25, 4.5 and a DontCare, and two
-# persons; the last one.
+# The example shard has samples 000000, 000001, 000003, 000004 and in quarantine 000002. The first has a car at 1, 1,
+# 4.25, 4.5 and a DontCare, and two persons; the last one.
 
 
 def write(path, entries):
@@ -480,14 +515,16 @@ def box(image_id, category, bbox, score=0.9):
 
 
 def test_detections_of_a_folder(folder, tmp_path):
-    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000001", "Car", [0, 0, 3, 3], 0.5),
-                                            box("000003", "Car", [0, 0, 3, 3], 0.1)])
+    found = write(tmp_path / "found.json",
+                  [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000001", "Car", [0, 0, 3, 3], 0.5),
+                   box("000003", "Car", [0, 0, 3, 3], 0.1)])
     result, _, truth = evaluate_detections(found, Samples(folder, None, None, None))
     car = result["classes"]["Car"]
-    assert result["counts"] == {"samples": 4, "samples_without_prediction": 1, "ignored": int(truth.ignore.sum()), "predictions": 3, "not_of_these_samples": 0,
-                                "after_suppression": 2}
+    assert result["counts"] == {"samples": 4, "samples_without_prediction": 1, "ignored": int(truth.ignore.sum()),
+                                "predictions": 3, "not_of_these_samples": 0, "after_suppression": 2}
     assert (car["truths"], car["found"], car["right"]) == (2, 2, 1)
-    numbered = write(tmp_path / "numbered.json", [box(1, 1, [1, 1, 3.25, 3.5]), box(2, 1, [0, 0, 3, 3], 0.5), box(3, 1, [0, 0, 3, 3], 0.1)])
+    numbered = write(tmp_path / "numbered.json",
+                     [box(1, 1, [1, 1, 3.25, 3.5]), box(2, 1, [0, 0, 3, 3], 0.5), box(3, 1, [0, 0, 3, 3], 0.1)])
     assert json.dumps(evaluate_detections(numbered, Samples(folder, "train", None, None))[0]) == json.dumps(result)
     (tmp_path / "ids.txt").write_text("000000\n000003\n")
     part, _, _ = evaluate_detections(found, Samples(folder, None, None, tmp_path / "ids.txt"))
@@ -498,13 +535,15 @@ def test_numbers_are_refused_where_an_export_keeps_those_of_coco_s_labels(folder
     module = sys.modules[Samples.__module__]
     entry = {"image": {"id": 3, "file_name": "a.png"}, "annotations": [{"id": 8, "category_id": 4}]}
     assert module._is_coco_s(json.dumps(entry).encode())
-    for other in (b"Car 0 0 1.5 1 2 3 4", b"", b"[]", b"3", b'{"image": "a.png", "annotations": []}', b'{"image": {"id": 1}}', b"\xff"):
+    for other in (b"Car 0 0 1.5 1 2 3 4", b"", b"[]", b"3", b'{"image": "a.png", "annotations": []}',
+                  b'{"image": {"id": 1}}', b"\xff"):
         assert not module._is_coco_s(other)
     monkeypatch.setattr(module, "_is_coco_s", lambda original: True)
     samples, edges = Samples(folder, "train", None, None), [1, 1, 3, 3]
     evaluate_detections(write(tmp_path / "names.json", [box("000000", "Car", edges)]), samples)
     for wrong, key in ((box(1, "Car", edges), "image_id"), (box("000000", 1, edges), "category_id")):
-        with pytest.raises(ValueError, match=f"keeps the numbers of labels that are COCO's own, got 1 as {key}, in .*entry 0"):
+        with pytest.raises(ValueError,
+                           match=f"keeps the numbers of labels that are COCO's own, got 1 as {key}, in .*entry 0"):
             evaluate_detections(write(tmp_path / "numbers.json", [wrong]), samples)
 
 
@@ -519,25 +558,31 @@ def test_a_number_is_the_place_in_the_split_whatever_is_scored_of_it(two_shards,
         result, _, _ = evaluate_detections(write(tmp_path / "found.json", [box(other, 1, right)]), samples)
         assert result["counts"]["not_of_these_samples"] == 1 and result["classes"]["Car"]["recall"] == 0
         result, found, _ = evaluate_detections(write(tmp_path / "found.json", [box(own, 1, right)]), samples)
-        assert result["counts"]["not_of_these_samples"] == 0 and result["classes"]["Car"]["recall"] == 1 / 2 and found.image.tolist() == [0]
-        joints = samples.shards.labels(0)["persons"]["joints"][1, samples.shards.joint_places(0, samples.shards.default_joints())].tolist()
+        assert (result["counts"]["not_of_these_samples"] == 0 and result["classes"]["Car"]["recall"] == 1 / 2
+                and found.image.tolist() == [0])
+        joints = samples.shards.labels(0)["persons"]["joints"][
+            1, samples.shards.joint_places(0, samples.shards.default_joints())].tolist()
         for number, there in ((own, 1), (other, 0)):
             entry = {"image_id": number, "person": 1, "joints": joints}
-            assert np.isfinite(evaluate_poses(write(tmp_path / "poses.json", [entry]), samples)[1]).all((1, 2)).sum() == there
+            assert (np.isfinite(evaluate_poses(write(tmp_path / "poses.json", [entry]), samples)[1]).all((1, 2)).sum()
+                    == there)
     (tmp_path / "ids.txt").write_text("000003\n")
     samples = Samples(two_shards, "train", "frames", tmp_path / "ids.txt")
     assert samples.of([box(n, 1, right) for n in range(1, 9)], "").tolist() == [-1] * 6 + [0, -1]
 
 
 def test_average_precision_has_no_least_score_and_no_suppression(folder, tmp_path):
-    found = write(tmp_path / "found.json", [box("000003", "Car", [0, 0, 3, 3], 0.06), box("000000", "Car", [1, 1, 3.25, 3.5], 0.05),
-                                            box("000000", "Car", [1, 1, 3.25, 3.4], 0.04)])
+    found = write(tmp_path / "found.json",
+                  [box("000003", "Car", [0, 0, 3, 3], 0.06), box("000000", "Car", [1, 1, 3.25, 3.5], 0.05),
+                   box("000000", "Car", [1, 1, 3.25, 3.4], 0.04)])
     result, boxes, _ = evaluate_detections(found, Samples(folder, None, None, None))
     car = result["classes"]["Car"]
-    assert (len(boxes.score), result["counts"]["after_suppression"], car["found"], car["recall"]) == (3, 0, 0, 0) and math.isnan(car["precision"])
+    assert (len(boxes.score), result["counts"]["after_suppression"],
+            car["found"], car["recall"]) == (3, 0, 0, 0) and math.isnan(car["precision"])
     assert car["ap_voc"] == 1 / 2 / 2 and car["ap_coco"] > 0  # one of two cars, after a wrong one
     everything, _, _ = evaluate_detections(found, Samples(folder, None, None, None), confidence=0, nms=1)
-    assert {key: everything["classes"]["Car"][key] for key in car if key.startswith("ap_")} == {key: car[key] for key in car if key.startswith("ap_")}
+    assert {key: everything["classes"]["Car"][key] for key in car
+            if key.startswith("ap_")} == {key: car[key] for key in car if key.startswith("ap_")}
     assert everything["counts"]["after_suppression"] == 3
 
 
@@ -556,7 +601,8 @@ def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
 
 
 @pytest.mark.parametrize(("entry", "error"), [
-    (box("000002", "Car", [0, 0, 1, 1]), r'expected the image_id of a sample of 4, got "000002", in .*json \(entry 1\)'),
+    (box("000002", "Car", [0, 0, 1, 1]),
+     r'expected the image_id of a sample of 4, got "000002", in .*json \(entry 1\)'),
     (box(5, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 5"),
     (box(0, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got 0"),
     (box(True, "Car", [0, 0, 1, 1]), "expected the image_id of a sample of 4, got true"),
@@ -570,7 +616,8 @@ def test_difficulty_gives_the_recalls_and_kitti_s_levels(folder, tmp_path):
     (box("000001", "Bus", [0, 0, 1, 1]), 'expected a category_id of Car, or its number from 1 on, got "Bus"'),
     (box("000001", 2, [0, 0, 1, 1]), "expected a category_id of Car, or its number from 1 on, got 2"),
     (box("000001", "DontCare", [0, 0, 1, 1]), 'got "DontCare"'),
-    (box("000001", "Car", [0, 0, math.nan, 1]), r"expected 4 finite numbers as bbox, got .*NaN.* \(entry 1, sample 000001\)"),
+    (box("000001", "Car", [0, 0, math.nan, 1]),
+     r"expected 4 finite numbers as bbox, got .*NaN.* \(entry 1, sample 000001\)"),
     (box("000001", "Car", [0, 0, 1]), "expected 4 finite numbers as bbox"),
     (box("000001", "Car", [0, 0, -1, 1]), "expected a bbox of left, top, width, height, got"),
     (box("000001", "Car", [0, 0, 1, 1], math.nan), "expected a finite number as score, got NaN"),
@@ -584,12 +631,14 @@ def test_wrong_predictions_are_refused(folder, tmp_path, entry, error):
 
 
 def test_what_is_no_list_and_ids_that_two_have_are_refused(two_shards, tmp_path):
-    for text, error in (("{}", "expected a list, got dict"), ("[", "expected JSON, got"), (100_000 * "[", "expected JSON, got .*recursion")):
+    for text, error in (("{}", "expected a list, got dict"), ("[", "expected JSON, got"),
+                        (100_000 * "[", "expected JSON, got .*recursion")):
         (tmp_path / "found.json").write_text(text)
         with pytest.raises(ValueError, match=error):
             evaluate_detections(tmp_path / "found.json", Samples(two_shards, None, None, None))
     found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3, 3])])
-    with pytest.raises(ValueError, match='expected the image_id of one sample of 8, got "000000", which two samples have'):
+    with pytest.raises(ValueError,
+                       match='expected the image_id of one sample of 8, got "000000", which two samples have'):
         evaluate_detections(found, Samples(two_shards, None, None, None))
     with pytest.raises(ValueError, match="expected classes of Car, DontCare, got Bus"):
         evaluate_detections(found, Samples(two_shards, None, None, None), ["Bus"])
@@ -600,7 +649,8 @@ def test_poses_of_a_folder(folder, tmp_path):
     places = samples.shards.joint_places(0, samples.shards.default_joints())
     first, alone = (samples.shards.labels(i)["persons"]["joints"][:, places] for i in (0, 3))  # two persons, one
     joints = first + [3.0, 4.0]
-    entries = [{"image_id": "000000", "person": 1, "joints": joints[1].tolist()}, {"image_id": "000004", "joints": alone[0].tolist()}]
+    entries = [{"image_id": "000000", "person": 1, "joints": joints[1].tolist()},
+               {"image_id": "000004", "joints": alone[0].tolist()}]
     result, found, persons = evaluate_poses(write(tmp_path / "found.json", entries), samples, hidden=True)
     assert result["counts"]["persons"] == 3 and result["counts"]["not_found"] == 1 and np.isnan(found[0]).all()
     of_it = persons.scored(True)[1:]
@@ -609,37 +659,48 @@ def test_poses_of_a_folder(folder, tmp_path):
     linear = samples.shards.labels(0)["pair"]["source_to_volume"]
     moved = math.hypot(3 / linear[0, 0], 4 / linear[1, 1])
     assert result["joints"]["all"]["mpjpe_source"] == pytest.approx(moved * of_it[0].sum() / of_it.sum())
-    for wrong, error in (({}, "expected a person of the 2 there are, got null"), ({"person": 2}, "expected a person of the 2 there are, got 2"),
+    for wrong, error in (({}, "expected a person of the 2 there are, got null"),
+                         ({"person": 2}, "expected a person of the 2 there are, got 2"),
                          ({"person": True}, "expected a person of the 2 there are, got true"),
-                         ({"person": 0, "joints": [[0, 0], [0, True]]}, "expected 2 x 2 finite numbers as joints, got .*true"),
-                         ({"person": 1}, "got 1 twice"), ({"person": 0, "joints": [[0, 0]]}, "expected 2 x 2 finite numbers as joints")):
+                         ({"person": 0, "joints": [[0, 0], [0, True]]},
+                          "expected 2 x 2 finite numbers as joints, got .*true"),
+                         ({"person": 1}, "got 1 twice"),
+                         ({"person": 0, "joints": [[0, 0]]}, "expected 2 x 2 finite numbers as joints")):
         with pytest.raises(ValueError, match=error):
-            evaluate_poses(write(tmp_path / "wrong.json", [*entries, {"image_id": "000000", "joints": joints[0].tolist(), **wrong}]), samples)
+            evaluate_poses(write(tmp_path / "wrong.json",
+                                 [*entries, {"image_id": "000000", "joints": joints[0].tolist(), **wrong}]), samples)
 
 
 def evaluate(*arguments, expect=0):
-    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", *map(str, arguments)], capture_output=True, text=True,
-                          env={**os.environ, "PYTHONPATH": str(PACKAGE)})
+    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", *map(str, arguments)], capture_output=True,
+                          text=True, env={**os.environ, "PYTHONPATH": str(PACKAGE)})
     assert done.returncode == expect, done.stdout + done.stderr
     return done.stdout + done.stderr
 
 
 def test_the_command_prints_tables_json_and_images(folder, tmp_path):
-    found = write(tmp_path / "found.json", [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
+    found = write(tmp_path / "found.json",
+                  [box("000000", "Car", [1, 1, 3.25, 3.5]), box("000000", "Car", [-1e30, 0, 2e30, 1], 0.1)])
     said = evaluate("detections", found, "--truth", folder)
     assert "4 samples (3 without a prediction), 2 ground-truth boxes" in said
-    assert "average precisions use all 2 predictions; precision, recall and F1 use 1, after confidence 0.2 and non-maximum" in said
+    assert ("average precisions use all 2 predictions; precision, recall and F1 use 1, after confidence 0.2 and "
+            "non-maximum" in said)
     heading, car = said.split("\n\n")[1].splitlines()[:2]
-    assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500", "0.500", "0.667"] and heading.split()[-1] == "F1"
-    assert json.loads(evaluate("detections", found, "--truth", folder, "--json"))["classes"]["Car"]["recall_easy"] is None
+    assert car.split()[1:] == ["2", "0", "1", "1.000", "-", "1.000", "0.500",
+                               "0.500", "0.667"] and heading.split()[-1] == "F1"
+    assert json.loads(evaluate("detections", found, "--truth",
+                               folder, "--json"))["classes"]["Car"]["recall_easy"] is None
     poses = write(tmp_path / "poses.json", [])
-    assert "3 persons, 1 of them not found" in evaluate("poses", poses, "--truth", folder)  # of the others all joints are hidden
+    # of the others all joints are hidden
+    assert "3 persons, 1 of them not found" in evaluate("poses", poses, "--truth", folder)
     assert "nowhere" in evaluate("detections", poses, "--truth", tmp_path / "nowhere", expect=1)
-    for more, error in ((("--split", "val"), "expected a split of train, got 'val'"), (("--dataset", "mpii"), "('kitti_object'), got 1 that it does not"),
+    for more, error in ((("--split", "val"), "expected a split of train, got 'val'"),
+                        (("--dataset", "mpii"), "('kitti_object'), got 1 that it does not"),
                         (("--classes", "Bus"), "expected classes of Car, DontCare, got Bus")):
         assert error in evaluate("detections", poses, "--truth", folder, *more, expect=1)
     for depth in (900, 100_000):  # as Python's reader of JSON gives it back, and as it does not
-        (tmp_path / "deep.json").write_text('[{"image_id": ' + depth * "[" + depth * "]" + ', "category_id": 1, "bbox": [0, 0, 1, 1], "score": 1}]')
+        (tmp_path / "deep.json").write_text('[{"image_id": ' + depth * "[" + depth * "]"
+                                            + ', "category_id": 1, "bbox": [0, 0, 1, 1], "score": 1}]')
         said = evaluate("detections", tmp_path / "deep.json", "--truth", folder, expect=1)
         assert said.startswith("error: expected ") and "Traceback" not in said
     pytest.importorskip("cv2")

@@ -50,7 +50,8 @@ def need_trainer(name, *modules):
 
 
 def evaluate(what, out, data, *more):
-    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", what, out / "predictions.json", "--truth", data, "--json", *more],
+    done = subprocess.run([sys.executable, "-m", "eventgan.evaluate", what, out / "predictions.json", "--truth", data,
+                           "--json", *more],
                           capture_output=True, text=True, env={**ONE_THREAD, "PYTHONPATH": str(PACKAGE)})
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
@@ -71,7 +72,8 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
     assert "resuming after epoch 1" in train("train_torchvision", data, tmp_path / "parts", "--steps", "3", *options)
     assert_trained(tmp_path / "parts", [0, 1, 3], images=2)
     assert {"AP50 Car", "AP50 Van"} <= history(tmp_path / "parts")[0].keys()
-    (tmp_path / "ids.txt").write_text("\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
+    (tmp_path / "ids.txt").write_text(
+        "\n".join({entry["image_id"] for entry in json.loads((tmp_path / "parts" / "predictions.json").read_text())}))
     scores = evaluate("detections", tmp_path / "parts", data, "--ids", tmp_path / "ids.txt", "--classes", "Car")
     assert scores["classes"]["Car"]["ap_voc"] == pytest.approx(history(tmp_path / "parts")[-1]["AP50 Car"], abs=1e-4)
     said = train("train_torchvision", data, tmp_path / "parts", "--steps", "4", *options, "--lr", "0.5", expect=1)
@@ -79,18 +81,20 @@ def test_faster_rcnn_learns_and_goes_on(data, tmp_path):
 
 
 def test_keypoint_rcnn_learns(data, tmp_path):
-    train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "2", "--batch", "1", "--scale", "0.5",
-          "--regions", "8", "--every", "9")
+    train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "mpii", "--steps", "2",
+          "--batch", "1", "--scale", "0.5", "--regions", "8", "--every", "9")
     assert_trained(tmp_path / "out", [0, 2], images=1)
     assert {"AP50 person", "PCK@0.2"} <= history(tmp_path / "out")[0].keys()
 
 
 def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
-    trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")  # nothing beside it
+    # nothing beside it
+    trainer = shutil.copytree(need_trainer("pose_resnet", "easydict", "yaml"), tmp_path / "trainer")
     options = ["--trainer", trainer, "--batch", "3", "--size", "64", "--filters", "16", "--epochs", "3"]
     train("train_pose", data, tmp_path / "whole", *options)
     assert_trained(tmp_path / "whole", [0, 2, 4, 6], images=1)
-    with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options), stdout=subprocess.DEVNULL, env=ONE_THREAD) as process:
+    with subprocess.Popen(line("train_pose", data, tmp_path / "killed", *options),
+                          stdout=subprocess.DEVNULL, env=ONE_THREAD) as process:
         while not (tmp_path / "killed" / "checkpoint.pt").exists() and process.poll() is None:
             time.sleep(0.01)
         process.kill()
@@ -100,7 +104,8 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
     scores = evaluate("poses", tmp_path / "whole", data, "--ids", tmp_path / "ids.txt", "--hidden")
     assert scores["joints"]["all"]["pckh_mpii"] == history(tmp_path / "whole")[-1]["PCKh@0.5"]
     weights = torch.load(tmp_path / "whole" / "weights.pt")
-    train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt", "--last-layer")
+    train("train_pose", data, tmp_path / "tuned", *options, "--pretrained", tmp_path / "whole" / "weights.pt",
+          "--last-layer")
     tuned = torch.load(tmp_path / "tuned" / "weights.pt")
     assert {name.split(".")[0] for name in weights if not torch.equal(weights[name], tuned[name])} == {"final_layer"}
     whole, killed = ([{**row, "minutes": 0} for row in history(tmp_path / out)] for out in ("whole", "killed"))
@@ -109,13 +114,14 @@ def test_pose_resnet_killed_and_begun_again_learns_the_same(data, tmp_path):
 
 def test_yolov3_learns(data, tmp_path):
     trainer = shutil.copytree(need_trainer("yolov3", "matplotlib", "tqdm"), tmp_path / "trainer")  # nothing beside it
-    train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2", "--batch", "2", "--scale", "1",
-          "--every", "9", "--classes", "Car,Van", "--test", data)
+    train("train_yolov3", data, tmp_path / "out", "--trainer", trainer, "--dataset", "kitti_object", "--steps", "2",
+          "--batch", "2", "--scale", "1", "--every", "9", "--classes", "Car,Van", "--test", data)
     scores = evaluate("detections", tmp_path / "out", data, "--dataset", "kitti_object")
     assert scores["counts"]["samples"] == 12 and scores["counts"]["not_of_these_samples"] == 0
     assert_trained(tmp_path / "out", [0, 2], images=2)
     assert "channels=18" in (tmp_path / "out" / "model.cfg").read_text()
-    said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes", "Bus", expect=1)
+    said = train("train_yolov3", data, tmp_path / "bus", "--trainer", trainer, "--dataset", "kitti_object", "--classes",
+                 "Bus", expect=1)
     assert "got Bus" in said and str(data) in said
 
 
@@ -134,7 +140,8 @@ def test_faster_rcnn_learns_on_the_fly(tmp_path):
         frames.append(f"{number}.png,100,60,{'drive' if number < 7 else ''},{2 * number}")
     (tmp_path / "road" / "boxes.csv").write_text("\n".join(boxes))
     (tmp_path / "road" / "frames.csv").write_text("\n".join(frames))
-    options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--images", "1", "--workers", "1", "--epochs", "1"]
+    options = ["--weights", "untrained:4", "--size", "64", "96", "--batch", "4", "--regions", "8", "--images", "1",
+               "--workers", "1", "--epochs", "1"]
     said = train("train_on_the_fly", tmp_path, tmp_path / "out", *options)
     assert "8 images for training, 2 for validation, of 1 folders" in said and "input 96x64, classes car" in said
     assert_trained(tmp_path / "out", [0, 2], images=1)
@@ -152,21 +159,27 @@ def test_pairs_on_the_fly_are_of_a_sequence_or_moved(tmp_path, monkeypatch):
     image = np.zeros((40, 60), np.uint8)
     image[20:22, 30:33] = 255
     assert cv2.imwrite(str(tmp_path / "images" / "still.png"), image)
-    (tmp_path / "boxes.csv").write_text("image,class,left,top,right,bottom,track,note\n" + "".join(f"{n}.png,car,1,2,3,4,1,\n{n}.png,dog,5,6,7.5,8,,\n"
-                                                                                           for n in (19, 21, 31, "still")) + "none.png,,,,,,,\n")
-    (tmp_path / "frames.csv").write_text("image,width,height,sequence,index\n" + "".join(f"{n}.png,60,40,drive,{n}\n" for n in (13, 15, 17, 19, 21, 27, 29, 31))
+    (tmp_path / "boxes.csv").write_text("image,class,left,top,right,bottom,track,note\n"
+                                        + "".join(f"{n}.png,car,1,2,3,4,1,\n{n}.png,dog,5,6,7.5,8,,\n"
+                                                  for n in (19, 21, 31, "still"))
+                                        + "none.png,,,,,,,\n")
+    (tmp_path / "frames.csv").write_text("image,width,height,sequence,index\n" + "".join(
+        f"{n}.png,60,40,drive,{n}\n" for n in (13, 15, 17, 19, 21, 27, 29, 31))
                                          + "still.png,60,40,,train\n")
     clips = train_on_the_fly.labelled_clips(tmp_path, seed=1)
-    assert [clip if isinstance(clip, train_on_the_fly.Moved) else [pathlib.Path(path).stem for path in clip] for clip, _ in clips[:2]] == [
+    assert [clip if isinstance(clip, train_on_the_fly.Moved) else [pathlib.Path(path).stem for path in clip]
+            for clip, _ in clips[:2]] == [
         ["13", "15", "17", "19"], ["15", "17", "19", "21"]]
     assert all(isinstance(clip, train_on_the_fly.Moved) for clip, _ in clips[2:])  # 25.png is missing before 31.png
-    assert clips[0][1] == {"boxes": [[1, 2, 3, 4], [5, 6, 7.5, 8]], "labels": ["car", "dog"], "id": f"{tmp_path.name}/19.png"}
+    assert clips[0][1] == {"boxes": [[1, 2, 3, 4], [5, 6, 7.5, 8]], "labels": ["car", "dog"],
+                           "id": f"{tmp_path.name}/19.png"}
     assert clips[4][1]["boxes"] == clips[4][1]["labels"] == []
     still = clips[3][0]
     assert still[3] == str(tmp_path / "images" / "still.png") and len(still) == 4
 
     def middle(image):
-        return np.array([np.average(np.arange(length), weights=image[..., 0].sum(axis, dtype=float)) for axis, length in ((0, 60), (1, 40))])
+        return np.array([np.average(np.arange(length), weights=image[..., 0].sum(axis, dtype=float))
+                         for axis, length in ((0, 60), (1, 40))])
 
     moved = [np.linalg.norm(middle(still[t]) - [31, 20.5]) for t in (2, 1, 0)]
     # 1 to 4 px a step, and at most 1.6 px from the centre (29.5, 19.5) turned and zoomed: 0.03 px a step
@@ -176,14 +189,17 @@ def test_pairs_on_the_fly_are_of_a_sequence_or_moved(tmp_path, monkeypatch):
 
 
 DETECTORS = [*(row for name in ("EventGAN", "log difference", "ESIM") for row in (name, f"{name}, as bright")), "Frame"]
-POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs", "camera"]
+POSES = ["EventGAN", "EventGAN, without noise", "EventGAN, last layer 1 epoch", "EventGAN, last layer 5 epochs",
+         "camera"]
 
 
 @pytest.mark.parametrize(("what", "trainer", "score", "names"), [
-    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", DETECTORS), ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", POSES)])
+    ("detection", ("yolov3", "matplotlib", "tqdm"), "ap_voc", DETECTORS),
+    ("pose", ("pose_resnet", "easydict", "yaml"), "pckh", POSES)])
 def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     trainer = need_trainer(*trainer)
-    line = [sys.executable, EXAMPLES / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
+    line = [sys.executable, EXAMPLES / "experiment.py", what, "--program", PROGRAM, "--trainer", trainer, "--out",
+            tmp_path / "out", "--small"]
     first, again = (subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD) for _ in range(2))
     assert first.returncode == 0, first.stdout + first.stderr
     assert first.stdout.count("examples/train_") == len(names) and "examples/train_" not in again.stdout  # done before
@@ -197,38 +213,46 @@ def test_the_experiments_in_small(tmp_path, what, trainer, score, names):
     if what == "detection":
         train_shards = Shards(tmp_path / "out" / "scenes" / "ESIM", split="train")
         factor = np.mean([s["volume"].mean() for s in train_shards]) / np.mean([s["volume"].mean() for s in events])
-        assert f"{camera / 'events'} are scaled by {factor:.2f}, to the brightness of those of {tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout
+        assert (f"{camera / 'events'} are scaled by {factor:.2f}, to the brightness of those of "
+                f"{tmp_path / 'out' / 'scenes' / 'ESIM'}\n" in first.stdout)
         for i in range(len(labelled)):
             seen, drawn = events.labels(i), labelled.labels(i)
             assert seen["pair"]["sample_id"].startswith(drawn["pair"]["sample_id"] + "/")
-            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)  # the camera's image is whole pixels high
+            # the camera's image is whole pixels high
+            np.testing.assert_allclose(seen["boxes"]["xyxy"], drawn["boxes"]["xyxy"], atol=0.51)
             np.testing.assert_array_equal(seen["boxes"]["ignore"], drawn["boxes"]["ignore"])
             np.testing.assert_array_equal(seen["boxes"]["difficulty"] > 0, drawn["boxes"]["difficulty"] > 0)
     else:
-        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"] for sample in map(labelled.labels, range(len(labelled)))}
+        joints = {sample["pair"]["sample_id"]: sample["persons"]["joints"]
+                  for sample in map(labelled.labels, range(len(labelled)))}
         assert len(events) == len(labelled)
         for sample in map(events.labels, range(len(events))):
-            np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]], atol=0.51)
+            np.testing.assert_allclose(sample["persons"]["joints"], joints[sample["pair"]["sample_id"].split("/")[0]],
+                                       atol=0.51)
 
 
 def test_the_trade_in_small(tmp_path):
     trainer = need_trainer("yolov3", "matplotlib", "tqdm")
-    line = [sys.executable, EXAMPLES / "experiment.py", "trade", "--program", PROGRAM, "--trainer", trainer, "--out", tmp_path / "out", "--small"]
+    line = [sys.executable, EXAMPLES / "experiment.py", "trade", "--program", PROGRAM, "--trainer", trainer, "--out",
+            tmp_path / "out", "--small"]
     done = subprocess.run(line, capture_output=True, text=True, env=ONE_THREAD)
     assert done.returncode == 0, done.stdout + done.stderr
     errors = {name: row["error"] for name, row in json.loads((tmp_path / "out" / "trade.json").read_text()).items()}
-    assert errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and errors and all(0 < error < 1 for [error] in errors.values())
+    assert (errors.pop("EventGAN") == errors.pop("EventGAN, as bright") == [0] and errors
+            and all(0 < error < 1 for [error] in errors.values()))
 
 
 def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
-    """As bright, without noise, frames: what predictions.json is of, from the stored volumes, which stay as they are."""
+    """As bright, without noise, frames: what predictions.json is of, from the stored volumes,
+    which stay as they are."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
     monkeypatch.chdir(tmp_path)
     import cv2
     import training
 
     def tested(shards, train_shards=None, **options):
-        args = argparse.Namespace(**{"test": None, "data": "data", "as_bright": False, "without_noise": False, **options})
+        args = argparse.Namespace(**{"test": None, "data": "data", "as_bright": False, "without_noise": False,
+                                     **options})
         return training.tested(args, train_shards, shards, None)
 
     shards, before = Shards(folder), {path: path.read_bytes() for path in folder.iterdir()}
@@ -259,7 +283,8 @@ def test_volumes_are_changed_as_they_are_read(folder, tmp_path, monkeypatch):
 
 
 def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
-    """A step takes 10 seconds, a check 1000: 6 steps are a minute, however long the checks and wherever it is broken off."""
+    """A step takes 10 seconds, a check 1000: 6 steps are a minute, however long the checks and wherever it is broken
+    off."""
     monkeypatch.syspath_prepend(str(EXAMPLES))
     import training
 
@@ -276,8 +301,10 @@ def test_minutes_are_those_of_the_steps(tmp_path, monkeypatch):
         return {"score": 0.5}
 
     def fit(minutes):
-        args = argparse.Namespace(out=str(tmp_path), device="cpu", seed=0, every=1, epochs=None, steps=None, minutes=minutes)
-        training.fit(args, model, torch.optim.SGD(model.parameters(), 0.1), 4 * [torch.ones(1, 1)], loss_of, check, "score")
+        args = argparse.Namespace(out=str(tmp_path), device="cpu", seed=0, every=1, epochs=None, steps=None,
+                                  minutes=minutes)
+        training.fit(args, model, torch.optim.SGD(model.parameters(), 0.1), 4 * [torch.ones(1, 1)], loss_of, check,
+                     "score")
         return [(row["step"], row["minutes"]) for row in history(tmp_path)]
 
     assert fit(1.0) == [(0, 0), (4, 0.67), (6, 1)]
@@ -289,15 +316,18 @@ def test_what_is_to_be_run_can_be_run():
         text = path.read_text()
         runs = '__name__ == "__main__"' in text
         assert os.access(path, os.X_OK) == text.startswith("#!/usr/bin/python3\n") == runs, path
-    assert "USE_SOURCE_PERMISSIONS" in (SOURCE / "docker" / "CMakeLists.txt").read_text().partition("manifests/python/examples ")[2].partition(")")[0]
+    assert "USE_SOURCE_PERMISSIONS" in (SOURCE / "docker" / "CMakeLists.txt").read_text().partition(
+        "manifests/python/examples ")[2].partition(")")[0]
 
 
 def test_what_cannot_be_trained_with_is_named(data, tmp_path):
     said = train("train_torchvision", tmp_path, tmp_path / "out", expect=1)
     assert f"got no {tmp_path / 'dataset.json'}" in said and "Traceback" not in said
     said = train("train_torchvision", data, tmp_path / "out", "--dataset", "kitti_raw", expect=1)
-    assert "('human36m', 'kitti_object', 'mpii'), got 1 that it does not have ('kitti_raw')" in said and "Traceback" not in said
-    said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "kitti_object", expect=1)
+    assert ("('human36m', 'kitti_object', 'mpii'), got 1 that it does not have ('kitti_raw')" in said
+            and "Traceback" not in said)
+    said = train("train_torchvision", data, tmp_path / "out", "--task", "keypoints", "--dataset", "kitti_object",
+                 expect=1)
     assert f"got 0 and 0, in {data} (--dataset kitti_object; it has samples of " in said
     for limit in ("--epochs", "--steps", "--minutes", "--every"):
         said = train("train_torchvision", data, tmp_path / "out", limit, "0", expect=1)

@@ -11,14 +11,14 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
-from torch.utils.data import DataLoader, Subset  # noqa: E402
+from torch.utils.data import DataLoader, Subset
 
-from eventgan.torch import EventAugmentation, FrameAugmentation, FramePairs, collate_torchvision, collate_yolo  # noqa: E402
+from eventgan.torch import (EventAugmentation, FrameAugmentation, FramePairs, collate_torchvision, collate_yolo)
 
 
 class StandIn:
-    """In place of a Generator: one bin, what became brighter, then what became darker, in grey levels; laid with a border of (left, top)
-    into zeros of `size`, or as large as the images. Counts its calls."""
+    """In place of a Generator: one bin, what became brighter, then what became darker, in grey levels; laid with a
+    border of (left, top) into zeros of `size`, or as large as the images. Counts its calls."""
 
     bins = 1
 
@@ -56,7 +56,8 @@ def image(*values, height=4, width=6):
 
 def clips(count, frames=8):
     """Frame t of clip i has the value 10 t + i % 8, the target is i: the difference tells which frames were taken."""
-    return [(np.stack([np.full((2, 3), 10 * t + i % 8, np.uint8) for t in range(frames)]), "sound", i) for i in range(count)]
+    return [(np.stack([np.full((2, 3), 10 * t + i % 8, np.uint8) for t in range(frames)]), "sound", i)
+            for i in range(count)]
 
 
 VARIED = FrameAugmentation(reverse=0.5, gain=(0.5, 2), gamma=(0.7, 1.4))
@@ -64,7 +65,8 @@ VARIED = FrameAugmentation(reverse=0.5, gain=(0.5, 2), gamma=(0.7, 1.4))
 
 def varied(**more):
     """Pairs of which everything is drawn."""
-    settings = {"gap": (1, 3), "frame_augmentation": VARIED, "augmentation": EventAugmentation(drop=0.5, shift=0.5), "seed": 5}
+    settings = {"gap": (1, 3), "frame_augmentation": VARIED, "augmentation": EventAugmentation(drop=0.5, shift=0.5),
+                "seed": 5}
     return FramePairs([StandIn(), StandIn(factor=0.5)], clips(12), **{**settings, **more})
 
 
@@ -83,7 +85,8 @@ def same(one, other):
 def test_pairs_and_their_targets():
     first, second = image((1, 2, 10)), image((4, 2, 30))
     colour = np.stack([first, 2 * first, first], -1)
-    pairs = FramePairs(StandIn(), [(first, second, 7), (first / np.float32(255), second / np.float32(255), "b"), (colour, 0 * colour, None)])
+    pairs = FramePairs(StandIn(), [(first, second, 7), (first / np.float32(255), second / np.float32(255), "b"),
+                                   (colour, 0 * colour, None)])
     assert len(pairs) == 3
     volume, target = pairs[0]
     assert target == 7 and volume.dtype == torch.float32 and volume.shape == (2, 4, 6)
@@ -103,7 +106,8 @@ def test_images_with_channels_first_or_last(of):
     assert torch.equal(FramePairs(StandIn(), [(of(other), of(0 * other), 0)])[0][0], expected)
     grey = colour[..., 0]
     for one in (grey[None], grey[..., None]):
-        assert torch.equal(FramePairs(StandIn(), [(of(one), of(0 * one), 0)])[0][0], FramePairs(StandIn(), [(grey, 0 * grey, 0)])[0][0])
+        assert torch.equal(FramePairs(StandIn(), [(of(one), of(0 * one), 0)])[0][0],
+                           FramePairs(StandIn(), [(grey, 0 * grey, 0)])[0][0])
 
 
 @pytest.mark.parametrize("reader", ["cv2", "PIL"])
@@ -126,8 +130,9 @@ def test_files(tmp_path, monkeypatch, reader):
     (tmp_path / "broken.png").write_bytes((tmp_path / "colour.png").read_bytes()[:50])
     (tmp_path / "none.png").write_text("none")
     at = tmp_path.joinpath
-    source = [(at("black.png"), str(at("colour.png")), 0), (at("grey.png"), np.zeros((4, 5), np.uint8), 0), (at("turned.jpg"), at("turned.jpg"), 0),
-              (at("black.png"), at("gone.png"), 0), (at("none.png"), at("black.png"), 0), (at("broken.png"), at("black.png"), 0)]
+    source = [(at("black.png"), str(at("colour.png")), 0), (at("grey.png"), np.zeros((4, 5), np.uint8), 0),
+              (at("turned.jpg"), at("turned.jpg"), 0), (at("black.png"), at("gone.png"), 0),
+              (at("none.png"), at("black.png"), 0), (at("broken.png"), at("black.png"), 0)]
     pairs = FramePairs(StandIn(), source)
     assert pairs[0][0].nonzero().tolist() == [[0, 1, 2]] and pairs[0][0][0, 1, 2] == 52
     assert pairs[1][0][1, 1, 2] == 40
@@ -135,7 +140,8 @@ def test_files(tmp_path, monkeypatch, reader):
     with pytest.raises(FileNotFoundError, match=r"no such file, in .*gone.png, in item 3"):
         pairs[3]
     for index in (4, 5):
-        with pytest.raises(ValueError, match=rf"expected an image, got none.*, in .*(none|broken).png, in item {index}"):
+        with pytest.raises(ValueError,
+                           match=rf"expected an image, got none.*, in .*(none|broken).png, in item {index}"):
             pairs[index]
 
 
@@ -168,21 +174,25 @@ def test_video_layouts():
     expected = StandIn()(colour[1], colour[2])
     for clip in (colour, torch.from_numpy(colour), torch.from_numpy(colour.transpose(0, 3, 1, 2)), list(colour)):
         assert torch.equal(FramePairs(StandIn(), [(clip, 0)], gap=1)[0][0], torch.from_numpy(expected))
-    assert torch.equal(FramePairs(StandIn(), [(colour[..., 0], 0)], gap=2)[0][0], torch.from_numpy(StandIn()(colour[0, ..., 0], colour[2, ..., 0])))
+    assert torch.equal(FramePairs(StandIn(), [(colour[..., 0], 0)], gap=2)[0][0],
+                       torch.from_numpy(StandIn()(colour[0, ..., 0], colour[2, ..., 0])))
 
 
 def test_reversed_time():
     first, second, third = (image((x, 1, 9)) for x in (1, 2, 3))
     generator, backwards = StandIn(), {"frame_augmentation": FrameAugmentation(reverse=1)}
     boxes = {"boxes": [[1, 1, 2, 2]], "labels": [0]}
-    assert torch.equal(FramePairs(generator, [(first, second, 0)], **backwards)[0][0], torch.from_numpy(generator(second, first)))
+    assert torch.equal(FramePairs(generator, [(first, second, 0)], **backwards)[0][0],
+                       torch.from_numpy(generator(second, first)))
     for clip, label_frame, images, position in [
             ([first, second], -1, (second, first), 0.0),  # the target's frame is the second, now at the start
             ([first, second, third], 1, (third, second), 1.0),  # of one after it to it: it stays at the end
             ([first, second, third], -1, (third, second), 0.0)]:
         pairs = FramePairs(generator, [(clip, boxes)], gap=1, label_frame=label_frame, **backwards)
-        assert torch.equal(pairs[0]["volume"], torch.from_numpy(generator(*images))) and pairs[0]["label_position"] == position
-    assert [FramePairs(generator, [(first, second, boxes)], **settings)[0]["label_position"] for settings in ({}, backwards)] == [1, 0]
+        assert torch.equal(pairs[0]["volume"],
+                           torch.from_numpy(generator(*images))) and pairs[0]["label_position"] == position
+    assert [FramePairs(generator, [(first, second, boxes)], **settings)[0]["label_position"]
+            for settings in ({}, backwards)] == [1, 0]
     half = FramePairs(generator, clips(400), gap=1, frame_augmentation=FrameAugmentation(reverse=0.5))
     drawn = [half.drawn(i).reversed for i in range(400)]
     assert 160 <= sum(drawn) <= 240  # four deviations of sqrt(400) / 2
@@ -197,16 +207,19 @@ def test_gain_and_gamma():
     # 255/2 (v/255)^2: 64 -> 8.03, 128 -> 32.1, 255 -> 127.5, and numpy rounds halves to even
     assert FramePairs(StandIn(), [(black, pixels, 0)], **squared)[0][0][0, 0].tolist() == [8, 32, 128, 0, 0, 0]
     floats = [each / np.float32(255) for each in (black, pixels)]
-    np.testing.assert_allclose(FramePairs(StandIn(), [(*floats, 0)], **squared)[0][0][0, 0], [64**2 / 510, 128**2 / 510, 127.5, 0, 0, 0], rtol=1e-5)
+    np.testing.assert_allclose(FramePairs(StandIn(), [(*floats, 0)], **squared)[0][0][0, 0],
+                               [64**2 / 510, 128**2 / 510, 127.5, 0, 0, 0], rtol=1e-5)
     both = FramePairs(StandIn(), [(pixels, pixels, 0)], frame_augmentation=VARIED)
     for epoch in range(5):  # one exposure for both images: no events where nothing changes
         both.set_epoch(epoch)
         assert not both[0][0].any()
     pairs = FramePairs(StandIn(), clips(400), frame_augmentation=VARIED)
     drawn = [pairs.drawn(i) for i in range(400)]
-    for values, (low, high) in (([each.gain for each in drawn], VARIED.gain), ([each.gamma for each in drawn], VARIED.gamma)):
+    for values, (low, high) in (([each.gain for each in drawn], VARIED.gain),
+                                ([each.gamma for each in drawn], VARIED.gamma)):
         assert low <= min(values) < max(values) <= high
-        # uniform in the logarithm: a mean of zero here (0.5 x 2 = 1; 0.7 x 1.4 = 0.98), whose deviation is width / sqrt(12 x 400)
+        # uniform in the logarithm: a mean of zero here (0.5 x 2 = 1; 0.7 x 1.4 = 0.98), whose deviation is width /
+        # sqrt(12 x 400)
         assert abs(np.mean(np.log(values)) - np.log(low * high) / 2) < 4 * np.log(high / low) / np.sqrt(12 * 400)
 
 
@@ -270,8 +283,8 @@ SIZED = {"size": (8, 10), "border": (2, 3)}  # into which an image of 4x6 is lai
 
 
 def test_items_with_boxes():
-    target = {"boxes": [[1, 0, 3, 2], [-4, 1, 1, 3], [0, 0, 6, 4], [4, 4, 5, 5.5]], "labels": ["car", "dog", "DontCare", "van"],
-              "ignore": [False, False, False, True], "id": "street"}
+    target = {"boxes": [[1, 0, 3, 2], [-4, 1, 1, 3], [0, 0, 6, 4], [4, 4, 5, 5.5]],
+              "labels": ["car", "dog", "DontCare", "van"], "ignore": [False, False, False, True], "id": "street"}
     generator = StandIn(**SIZED)
     source = [(image(), image((1, 0, 9)), target), (image(), image(), {"boxes": [], "labels": []})]
     pairs = FramePairs(generator, source, classes={"car": 0, "van": 0})
@@ -279,9 +292,11 @@ def test_items_with_boxes():
     assert item["volume"].shape == (2, 8, 10) and item["volume"].nonzero().tolist() == [[0, 3, 3]]
     assert item["boxes"].tolist() == [[3, 3, 5, 5], [2, 3, 8, 7], [6, 7, 7, 8]] and item["boxes"].dtype == torch.float32
     assert item["labels"].tolist() == [0, -1, 0] and item["ignore"].tolist() == [False, True, True]
-    assert (item["id"], item["index"], item["label_position"]) == ("street", 0, 1.0) and pairs.classes == {"car": 0, "van": 0}
+    assert (item["id"], item["index"],
+            item["label_position"]) == ("street", 0, 1.0) and pairs.classes == {"car": 0, "van": 0}
     empty = pairs[1]
-    assert empty["boxes"].shape == (0, 4) and empty["labels"].dtype == torch.int64 and empty["ignore"].dtype == torch.bool and empty["id"] == "1"
+    assert (empty["boxes"].shape == (0, 4) and empty["labels"].dtype == torch.int64
+            and empty["ignore"].dtype == torch.bool and empty["id"] == "1")
     imgs, targets, ids = collate_yolo([item, empty])
     assert imgs.shape == (2, 2, 8, 10) and ids == ["street", "1"]
     np.testing.assert_allclose(targets, [[0, 0, 4 / 10, 4 / 8, 2 / 10, 2 / 8]])
@@ -290,7 +305,8 @@ def test_items_with_boxes():
     assert generator.gaps == [1, 1]
     numbered = {"boxes": torch.tensor([[0.0, 0, 1, 1], [1, 1, 2, 2]]), "labels": torch.tensor([3, -1])}
     clip = FramePairs(generator, [([image(), image(), image()], numbered)], gap=2)
-    assert clip[0]["labels"].tolist() == [3, -1] and clip[0]["ignore"].tolist() == [False, True] and generator.gaps[-1] == 2
+    assert (clip[0]["labels"].tolist() == [3, -1] and clip[0]["ignore"].tolist() == [False, True]
+            and generator.gaps[-1] == 2)
 
 
 def test_boxes_that_the_volume_cuts_are_ignored_by_what_is_left():
@@ -316,10 +332,13 @@ def test_boxes_move_with_the_volume():
         events = item["volume"][0]
         for left, top, right, bottom in item["boxes"].tolist():
             rows, columns = (events.sum(axis).nonzero().flatten().tolist() for axis in (1, 0))
-            assert left - 1 < columns[0] and columns[-1] < right and top - 1 < rows[0] and rows[-1] < bottom  # whose pixels the box touches
-            if (right - left, bottom - top) == pytest.approx((3, 2), abs=1e-5) and 0.5 < left and right < 9.5 and 0.5 < top and bottom < 7.5:
+            # whose pixels the box touches
+            assert left - 1 < columns[0] and columns[-1] < right and top - 1 < rows[0] and rows[-1] < bottom
+            if ((right - left, bottom - top) == pytest.approx((3, 2), abs=1e-5) and 0.5 < left and right < 9.5
+                and 0.5 < top and bottom < 7.5):
                 whole += 1
-                middle = [float((events.sum(axis) * torch.arange(events.shape[1 - axis])).sum() / events.sum()) + 0.5 for axis in (0, 1)]
+                middle = [float((events.sum(axis) * torch.arange(events.shape[1 - axis])).sum() / events.sum()) + 0.5
+                          for axis in (0, 1)]
                 assert middle == pytest.approx([(left + right) / 2, (top + bottom) / 2], abs=1e-4)
             else:
                 cut += 1
@@ -381,21 +400,29 @@ BOX = [[0, 0, 1, 1]]
     ((np.zeros((4, 5, 2), np.uint8), image(), 0), {}, r"expected an image .*, got uint8 \[4, 5, 2\]"),
     ((np.zeros(4, np.uint8), image(), 0), {}, r"expected an image .*, got uint8 \[4\]"),
     ((image(width=5), image(), 0), {}, r"expected images of one size, got \(4, 5\) and \(4, 6\)"),
-    ((np.full((4, 6), np.nan), image(), 0), {"frame_augmentation": VARIED}, r"numbers from 0 to 1, got float64 \[4, 6\]"),
-    ((image().astype(int), image(), 0), {"frame_augmentation": VARIED}, r"expected an image of uint8 or of numbers from 0 to 1, got int64 \[4, 6\]"),
+    ((np.full((4, 6), np.nan), image(), 0), {"frame_augmentation": VARIED},
+     r"numbers from 0 to 1, got float64 \[4, 6\]"),
+    ((image().astype(int), image(), 0), {"frame_augmentation": VARIED},
+     r"expected an image of uint8 or of numbers from 0 to 1, got int64 \[4, 6\]"),
     ((image(), image(), {"boxes": [[0, 0, 1]], "labels": [0]}), {}, r"expected boxes \[n, 4\].*got \(1, 3\)"),
-    ((image(), image(), {"boxes": BOX, "labels": [0, 1]}), {}, r"expected boxes \[n, 4\].*, got \(1, 4\), \(2,\), \(1,\)"),
+    ((image(), image(), {"boxes": BOX, "labels": [0, 1]}), {},
+     r"expected boxes \[n, 4\].*, got \(1, 4\), \(2,\), \(1,\)"),
     ((image(), image(), {"boxes": BOX}), {}, r"expected boxes \[n, 4\].*, got \(1, 4\), \(0,\)"),
-    ((image(), image(), {"boxes": [[0, 0, np.inf, 1]], "labels": [0]}), {}, r"expected boxes \[n, 4\] of finite numbers"),
-    ((image(), image(), {"boxes": BOX, "labels": ["car"]}), {}, r"expected whole numbers as labels, got <U3 \(names need `classes`\)"),
-    ((image(), image(), {"boxes": BOX, "labels": [1]}), {"classes": ["car"]}, r"expected names of classes as labels, got \[1\]"),
+    ((image(), image(), {"boxes": [[0, 0, np.inf, 1]], "labels": [0]}), {},
+     r"expected boxes \[n, 4\] of finite numbers"),
+    ((image(), image(), {"boxes": BOX, "labels": ["car"]}), {},
+     r"expected whole numbers as labels, got <U3 \(names need `classes`\)"),
+    ((image(), image(), {"boxes": BOX, "labels": [1]}), {"classes": ["car"]},
+     r"expected names of classes as labels, got \[1\]"),
     ((image(), 0), {"gap": 6}, r"expected a clip whose frame -1 is at least 6 behind the first, got 4 frames"),
-    (([image()] * 4, 0), {"gap": 1, "label_frame": 4}, r"expected a clip whose frame 4 is at least 1 behind the first, got 4 frames"),
+    (([image()] * 4, 0), {"gap": 1, "label_frame": 4},
+     r"expected a clip whose frame 4 is at least 1 behind the first, got 4 frames"),
     (("clip.mp4", 0), {"gap": 1}, r"expected \(frames, ..., target\), got a tuple of 2"),
 ])
 def test_wrong_items_are_named(item, settings, expected):
     good = {"boxes": BOX, "labels": ["car"]} if "classes" in settings else 0
-    pairs = FramePairs(StandIn(), [([image()] * 9, good) if "gap" in settings else (image(), image(), good), item], **settings)
+    pairs = FramePairs(StandIn(), [([image()] * 9, good) if "gap" in settings else (image(), image(), good), item],
+                       **settings)
     pairs[0]
     with pytest.raises(ValueError, match=expected + ".*, in item 1$"):
         pairs[1]
@@ -409,8 +436,9 @@ def test_settings_that_cannot_be(settings):
         FramePairs(StandIn(), clips(1)).set_epoch(-1)
 
 
-@pytest.mark.parametrize("settings", [{"reverse": 1.5}, {"reverse": -1}, {"gain": (0, 1)}, {"gain": (2, 1)}, {"gamma": (1, np.inf)},
-                                      {"gamma": (np.nan, 1)}])
+@pytest.mark.parametrize("settings",
+                         [{"reverse": 1.5}, {"reverse": -1}, {"gain": (0, 1)}, {"gain": (2, 1)}, {"gamma": (1, np.inf)},
+                          {"gamma": (np.nan, 1)}])
 def test_augmentations_that_cannot_be(settings):
     with pytest.raises(ValueError, match="expected "):
         FrameAugmentation(**settings)
@@ -424,10 +452,11 @@ def test_errors_of_the_source_are_its_own():
         FramePairs(StandIn(), source, length=1)[0]
 
 
-@pytest.mark.parametrize(("fit", "size", "scale", "border"), [("letterbox", (24, 40), 1, (4, 0)), ("crop", (40, 64), 2, (0, -4))])
+@pytest.mark.parametrize(("fit", "size", "scale", "border"),
+                         [("letterbox", (24, 40), 1, (4, 0)), ("crop", (40, 64), 2, (0, -4))])
 def test_boxes_of_the_generator_are_exact(fit, size, scale, border):
-    """A bright block in an image of 24x32: into 24x40 letterboxed it stays as it is, 4 columns to the right; cropped to 40x64 it is
-    doubled, and 4 rows are lost at the top."""
+    """A bright block in an image of 24x32: into 24x40 letterboxed it stays as it is, 4 columns to the right; cropped to
+    40x64 it is doubled, and 4 rows are lost at the top."""
     pytest.importorskip("eventgan._engine")
     from eventgan import Generator
 
@@ -445,11 +474,13 @@ def test_boxes_of_the_generator_are_exact(fit, size, scale, border):
         rows, columns = np.nonzero(item["volume"].sum(0).numpy())
         # Doubled by bilinear interpolation, the block's edge is blurred over one pixel to the outside.
         blurred = scale - 1
-        assert (columns.min(), rows.min(), columns.max() + 1, rows.max() + 1) == (left - blurred, top - blurred, right + blurred, bottom + blurred)
+        assert (columns.min(), rows.min(),
+                columns.max() + 1, rows.max() + 1) == (left - blurred, top - blurred, right + blurred, bottom + blurred)
 
 
 def test_items_are_those_of_shards(tmp_path, monkeypatch):
-    """What `convert` makes of the same images with the same settings, to the bit; boxes and what is to be ignored, too."""
+    """What `convert` makes of the same images with the same settings, to the bit; boxes and what is to be ignored,
+    too."""
     pytest.importorskip("eventgan._engine")
     program = os.environ.get("EVENTGAN_PROGRAM") or pytest.skip("no EVENTGAN_PROGRAM")
     from eventgan import Generator, Shards
@@ -459,9 +490,10 @@ def test_items_are_those_of_shards(tmp_path, monkeypatch):
     subprocess.run([program, "make-demo", "."], check=True, capture_output=True)
     (tmp_path / "manifest.json").write_text(json.dumps({
         "format": "eventgan-manifest", "version": 1, "name": "demo", "seed": 7,
-        "sources": [{"dataset": "kitti_object", "root": "kitti/training", "pairs": {"gaps": [1, 2], "side": "before", "choose": "one"}}],
-        "image": {"height": 50, "width": 130, "fit": "crop", "preset": "kitti"}, "generator": {"weights": "untrained:4"},
-        "output": {"directory": "out", "dtype": "float32"}}))
+        "sources": [{"dataset": "kitti_object", "root": "kitti/training",
+                     "pairs": {"gaps": [1, 2], "side": "before", "choose": "one"}}],
+        "image": {"height": 50, "width": 130, "fit": "crop", "preset": "kitti"},
+        "generator": {"weights": "untrained:4"}, "output": {"directory": "out", "dtype": "float32"}}))
     subprocess.run([program, "convert", "manifest.json", "--progress", "none"], check=True, capture_output=True)
     shards = Shards("out")
     expected = DetectionDataset(shards)
@@ -471,8 +503,10 @@ def test_items_are_those_of_shards(tmp_path, monkeypatch):
         boxes, pair = sample["boxes"], sample["pair"]
         labels = [names[each] for each in boxes["class_id"]]
         source.append((pair["prev_path"], pair["next_path"],
-                       {"boxes": boxes["xyxy_source"], "labels": labels, "ignore": boxes["ignore"], "id": pair["sample_id"]}))
-    pairs = FramePairs(Generator("untrained:4", size=(50, 130), fit="crop", preset="kitti", seed=7), source, classes=expected.classes)
+                       {"boxes": boxes["xyxy_source"], "labels": labels, "ignore": boxes["ignore"],
+                        "id": pair["sample_id"]}))
+    pairs = FramePairs(Generator("untrained:4", size=(50, 130), fit="crop", preset="kitti", seed=7), source,
+                       classes=expected.classes)
     assert len(pairs) == 12 and sum(len(item["boxes"]) for item in map(expected.__getitem__, range(12))) > 50
     for i in range(12):
         made, stored = pairs[i], expected[i]

@@ -1,7 +1,9 @@
 #!/usr/bin/python3
-"""Calls eventgan.Generator with what nobody should pass, and with what is just right: python3 fuzz_calls.py [CALLS] [SEED].
+"""Calls eventgan.Generator with what nobody should pass, and with what is just right: python3 fuzz_calls.py [CALLS]
+[SEED].
 
-A call ends with a sound volume or with one of the documented errors; under the address sanitizer it also touches no memory that is not its own.
+A call ends with a sound volume or with one of the documented errors; under the address sanitizer it also touches no
+memory that is not its own.
 """
 
 import collections
@@ -14,10 +16,12 @@ import eventgan
 
 DOCUMENTED = (ValueError, FileNotFoundError, MemoryError)
 SETTINGS = {
-    "weights": ["untrained:1", "untrained:2", "shipped:8", "untrained:0", "shipped:3", "nowhere", "", "a\0b", __file__, 5],
+    "weights": ["untrained:1", "untrained:2", "shipped:8", "untrained:0", "shipped:3", "nowhere", "", "a\0b", __file__,
+                5],
     "kind": ["network", "esim", "difference", "events", "", None],
     "precision": ["float32", "bfloat16", "int8", "double", 8],
-    "size": [None, (16, 16), (17, 40), (64, 33), (15, 16), (16,), "16", (16, 1e9), (-16, 16), (np.int64(20), np.int64(30))],
+    "size": [None, (16, 16), (17, 40), (64, 33), (15, 16), (16,), "16", (16, 1e9), (-16, 16),
+             (np.int64(20), np.int64(30))],
     "fit": ["stretch", "letterbox", "crop", "wide", 0],
     "preset": [None, "demo", "kitti", "mpii", "x"],
     "grey": [None, None, "before_resize", "after_resize", "x"],
@@ -30,18 +34,21 @@ SETTINGS = {
     "motion_margin_px": [4, 0, 64, 65],
     "label_margin_px": [0, 1024, -1],
     "motion_threshold": [8, 0, 255, np.nan, "8"],
-    "sensor": [{}, {"positive_threshold": 0.01}, {"shot_noise_rate_hz": 50}, {"hot_pixel_fraction": 1, "hot_pixel_rate_hz": 20}, {"x": 1}, []],
+    "sensor": [{}, {"positive_threshold": 0.01}, {"shot_noise_rate_hz": 50},
+               {"hot_pixel_fraction": 1, "hot_pixel_rate_hz": 20}, {"x": 1}, []],
     "duration_s": [0.1, 1e-4, 0, np.inf],
     "nothing": [1],
 }
 SIDES = [0] + [1, 2, 3, 5, 16, 17, 31, 64] * 3
-DTYPES = [np.uint8] * 24 + [np.float32] * 9 + [np.float64, np.float16, ">f8", np.longdouble, np.int8, np.uint16, np.int64, bool, complex, object, "U3", "M8[s]"]
+DTYPES = [np.uint8] * 24 + [np.float32] * 9 + [np.float64, np.float16, ">f8", np.longdouble, np.int8, np.uint16,
+                                               np.int64, bool, complex, object, "U3", "M8[s]"]
 
 
 class Calls:
     def __init__(self, seed):
         self.random = np.random.default_rng(seed)
-        self.generators = [eventgan.Generator("untrained:1"), eventgan.Generator("untrained:2", size=(24, 40), fit="letterbox", scope="motion")]
+        self.generators = [eventgan.Generator("untrained:1"),
+                           eventgan.Generator("untrained:2", size=(24, 40), fit="letterbox", scope="motion")]
 
     def pick(self, values):
         return values[self.random.integers(len(values))]
@@ -80,7 +87,8 @@ class Calls:
             moved[...] = image
             image = moved
         elif how == 7 and self.random.random() < 0.2:
-            image = self.pick([None, 3, "image", [], [[1, 2], [3, 4]], {}, image.tolist(), np.ma.masked_array(image), b"12"])
+            image = self.pick([None, 3, "image", [], [[1, 2], [3, 4]], {}, image.tolist(), np.ma.masked_array(image),
+                               b"12"])
         return image
 
     def partner(self, image):
@@ -91,7 +99,8 @@ class Calls:
 
     def labels(self):
         numbers = self.random.normal(20, 20, (self.pick([0, 1, 3]), 4))
-        return self.pick([None, numbers, np.sort(numbers), numbers.tolist(), numbers[:, :3], np.full((2, 4), np.nan), np.full((1, 4), 1e308), "boxes", {}])
+        return self.pick([None, numbers, np.sort(numbers), numbers.tolist(), numbers[:, :3], np.full((2, 4), np.nan),
+                          np.full((1, 4), 1e308), "boxes", {}])
 
     def settings(self):
         """Few of them wrong, so that some generators come to be."""
@@ -106,8 +115,10 @@ class Calls:
             self.generators = [*self.generators[:2], *self.generators[2:][-4:], made]
             return
         if kind == 1:
-            volume = self.pick([self.random.random((self.pick([0, 2, 4, 3, 18]), self.pick(SIDES), self.pick(SIDES))), self.image()])
-            eventgan.sample_events(volume, duration_s=self.pick([1, 0.1, 0, -1, np.nan, 1e-300]), seed=self.pick([0, 1, 2**31, -1, "x"]),
+            volume = self.pick([self.random.random((self.pick([0, 2, 4, 3, 18]), self.pick(SIDES), self.pick(SIDES))),
+                                self.image()])
+            eventgan.sample_events(volume, duration_s=self.pick([1, 0.1, 0, -1, np.nan, 1e-300]),
+                                   seed=self.pick([0, 1, 2**31, -1, "x"]),
                                    counts=self.pick(["poisson", "rounded", "x"]))
             return
         if kind == 2:
@@ -121,7 +132,8 @@ class Calls:
             volume = generator.many(previous, self.partner(previous), threads=self.pick([1, 2, 5, 0, -1, "2", 10**9]))
         elif kind in (5, 6):
             previous = self.image()
-            joints = self.pick([None, self.random.normal(20, 20, (2, 3, 2)), np.full((1, 4, 2), np.nan), [[1, 2]], "joints"])
+            joints = self.pick([None, self.random.normal(20, 20, (2, 3, 2)), np.full((1, 4, 2), np.nan), [[1, 2]],
+                                "joints"])
             volume = generator.sample(previous, self.partner(previous), boxes=self.labels(), joints=joints,
                                       gap=self.pick([1, 6, 100, 0, 2**40, None]))["volume"]
         else:

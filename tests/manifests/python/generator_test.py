@@ -1,4 +1,5 @@
-"""eventgan.Generator: volumes bit for bit those of the program's shards, from threads and workers of all kinds; and what it refuses."""
+"""eventgan.Generator: volumes bit for bit those of the program's shards, from threads and workers of all kinds;
+and what it refuses."""
 
 import concurrent.futures
 import json
@@ -37,7 +38,8 @@ def scene(height, width, colour, seed=5):
 
 def boxes_of(height, width):
     """Two boxes of whole and half pixels: their edges survive COCO's left and width."""
-    return [[width // 8, height // 8, width // 2 + 0.5, height // 2], [width // 2, height // 3, width - 0.5, height - 1]]
+    return [[width // 8, height // 8, width // 2 + 0.5, height // 2],
+            [width // 2, height // 3, width - 0.5, height - 1]]
 
 
 def write_job(folder, images, image, generator, volume, seed):
@@ -46,11 +48,13 @@ def write_job(folder, images, image, generator, volume, seed):
     for k, frame in enumerate(images):
         PIL.Image.fromarray(frame).save(folder / "clip" / f"{k:04d}.png")
     height, width = images[0].shape[:2]
-    coco = {"images": [{"id": k, "file_name": f"{k:04d}.png", "height": height, "width": width} for k in range(len(images))],
+    coco = {"images": [{"id": k, "file_name": f"{k:04d}.png", "height": height, "width": width}
+                       for k in range(len(images))],
             "categories": [{"id": 1, "name": "thing"}],
             "annotations": [{"id": 10 * k + n, "image_id": k, "category_id": 1, "iscrowd": 0,
                              "bbox": [left, top, right - left, bottom - top]}
-                            for k in range(len(images)) for n, (left, top, right, bottom) in enumerate(boxes_of(height, width))]}
+                            for k in range(len(images))
+                            for n, (left, top, right, bottom) in enumerate(boxes_of(height, width))]}
     (folder / "coco.json").write_text(json.dumps(coco))
     manifest = {"format": "eventgan-manifest", "version": 1, "name": "same", "seed": seed,
                 "sources": [{"dataset": "frames", "root": "clip", "labels": {"format": "coco", "path": "coco.json"},
@@ -58,7 +62,8 @@ def write_job(folder, images, image, generator, volume, seed):
                 "image": image, "generator": generator, "volume": volume,
                 "output": {"directory": "out", "dtype": "float32"}}
     (folder / "manifest.json").write_text(json.dumps(manifest))
-    subprocess.run([PROGRAM, "convert", folder / "manifest.json", "--progress", "none"], check=True, capture_output=True)
+    subprocess.run([PROGRAM, "convert", folder / "manifest.json", "--progress", "none"], check=True,
+                   capture_output=True)
     return eventgan.Shards(folder / "out")
 
 
@@ -84,8 +89,9 @@ CASES = {
     "crop": ((48, 90), {"size": (40, 40), "fit": "crop"}, {}, {}),
     "steps": ((48, 64), {"grey": "after_resize", "blur": 5, "size": (33, 47)}, {}, {}),
     "motion": ((64, 96), {}, {"scope": "motion", "motion_threshold": 60, "motion_margin_px": 0, "tile_px": 8}, {}),
-    "labels": ((64, 96), {"size": (80, 80), "fit": "letterbox"}, {"scope": "labels", "motion_threshold": 100, "motion_margin_px": 0,
-                                                                        "label_margin_px": 2, "tile_px": 8}, {}),
+    "labels": ((64, 96), {"size": (80, 80), "fit": "letterbox"},
+               {"scope": "labels", "motion_threshold": 100, "motion_margin_px": 0,
+                "label_margin_px": 2, "tile_px": 8}, {}),
     "labels only": ((64, 96), {}, {"scope": "labels_only", "label_margin_px": 0, "tile_px": 8}, {"normalize": "eta98"}),
 }
 MODELS = {
@@ -128,8 +134,8 @@ def test_volumes_are_those_of_shards(tmp_path, case):
     size, image, generator, volume = CASES[case]
     for precision in precisions():
         for colour in (False, True):
-            check_same(tmp_path / f"{precision}{colour}", size, image, {"weights": "shipped:8", "precision": precision, **generator}, volume,
-                       colour)
+            check_same(tmp_path / f"{precision}{colour}", size, image,
+                       {"weights": "shipped:8", "precision": precision, **generator}, volume, colour)
 
 
 @pytest.mark.parametrize("weights", ["shipped:16", "untrained:5"])
@@ -160,7 +166,8 @@ def test_floating_point_images_are_rounded_to_levels(generator, images):
     for dtype in (np.float16, np.float32, np.float64, ">f4"):
         levels = np.round(np.asarray(images[0] / 255, dtype).astype(float) * 255)
         np.testing.assert_array_equal(levels, images[0])  # else the next line would not have to hold
-        np.testing.assert_array_equal(generator((images[0] / 255).astype(dtype), (images[1] / 255).astype(dtype)), expected)
+        np.testing.assert_array_equal(generator((images[0] / 255).astype(dtype), (images[1] / 255).astype(dtype)),
+                                      expected)
 
 
 def test_memory_of_all_layouts(generator, images):
@@ -168,9 +175,10 @@ def test_memory_of_all_layouts(generator, images):
     expected = generator(first, second)
     wide = np.zeros((40, 120, 4), np.uint8)
     wide[2:39, 10:116:2, :3] = first
-    unaligned = np.frombuffer(b"x" + (second / 255).tobytes(), np.uint8, offset=1).view(np.float64).reshape(second.shape)
-    for previous in (first[::-1][::-1], np.asfortranarray(first), first[..., ::-1].copy()[..., ::-1], wide[2:39, 10:116:2, :3],
-                     PIL.Image.fromarray(first), memoryview(first)):
+    unaligned = np.frombuffer(b"x" + (second / 255).tobytes(),
+                              np.uint8, offset=1).view(np.float64).reshape(second.shape)
+    for previous in (first[::-1][::-1], np.asfortranarray(first), first[..., ::-1].copy()[..., ::-1],
+                     wide[2:39, 10:116:2, :3], PIL.Image.fromarray(first), memoryview(first)):
         for following in (second, unaligned):
             np.testing.assert_array_equal(generator(previous, following), expected)
     read_only = first.copy()
@@ -217,7 +225,8 @@ def test_static_black_and_saturated_pairs(generator):
         flat = np.full((40, 30), level, np.uint8)
         volume = generator(flat, flat)
         assert np.isfinite(volume).all() and (volume >= 0).all()
-    assert generator.sample(flat, flat)["statistics"]["nonzero_fraction"] == np.count_nonzero(volume) / np.float32(volume.size)
+    assert (generator.sample(flat, flat)["statistics"]["nonzero_fraction"]
+            == np.count_nonzero(volume) / np.float32(volume.size))
 
 
 def test_one_pixel_and_very_wide(generator):
@@ -258,7 +267,8 @@ def test_a_threshold_is_drawn_for_each_pair(images):
 
 
 def test_rates_are_given_where_no_events_are_drawn_of_them(images):
-    drawn, rates = (eventgan.Generator("shipped:sensor", sensor={"threshold": 0.3}, sample=sample)(*images[:2]).reshape(2, 9, -1).sum(1)
+    drawn, rates = (eventgan.Generator("shipped:sensor",
+                                       sensor={"threshold": 0.3}, sample=sample)(*images[:2]).reshape(2, 9, -1).sum(1)
                     for sample in (True, False))
     np.testing.assert_allclose(drawn, drawn.round(), atol=1e-4)
     assert (np.abs(rates - rates.round()) > 0.01).mean() > 0.1
@@ -269,7 +279,8 @@ def test_rates_are_given_where_no_events_are_drawn_of_them(images):
 
 
 def test_labels_and_gap(images):
-    generator = eventgan.Generator("shipped:8", size=(80, 106), fit="letterbox")  # twice as large: 74 x 106, 3 rows above
+    # twice as large: 74 x 106, 3 rows above
+    generator = eventgan.Generator("shipped:8", size=(80, 106), fit="letterbox")
     joints = [[[0, 0], [10, 5.5], [np.nan, 1]]]
     sample = generator.sample(images[0], images[1], boxes=[[0, 0, 53, 37], [-5, 2, 20, 30]], joints=joints, gap=9)
     np.testing.assert_array_equal(sample["source_to_volume"], [[2, 0, 0.5], [0, 2, 3.5]])
@@ -293,7 +304,8 @@ def test_labels_and_gap(images):
 def test_a_scope_of_labels_needs_them(images, scope):
     generator = eventgan.Generator("shipped:8", scope=scope)
     batches = np.stack(images[:1]), np.stack(images[1:2])
-    for call in (lambda: generator(*images[:2]), lambda: generator.sample(*images[:2]), lambda: generator.many(*batches)):
+    for call in (lambda: generator(*images[:2]), lambda: generator.sample(*images[:2]),
+                 lambda: generator.many(*batches)):
         with pytest.raises(ValueError, match=f'expected boxes or joints, .*scope is "{scope}", got none'):
             call()
     still = generator.sample(images[0], images[0], boxes=np.empty((0, 4)))  # an image without objects has labels
@@ -326,9 +338,11 @@ def test_threads(generator, images):
 
 def test_pickling_keeps_settings(images, tmp_path, monkeypatch):
     weights = tmp_path / "own.safetensors"
-    weights.write_bytes(next((pathlib.Path(__file__).parents[3] / "manifests" / "weights").glob("eventgan-*.safetensors")).read_bytes())
+    weights.write_bytes(
+        next((pathlib.Path(__file__).parents[3] / "manifests" / "weights").glob("eventgan-*.safetensors")).read_bytes())
     monkeypatch.chdir(tmp_path)
-    generator = eventgan.Generator("own.safetensors", size=(32, 48), fit="crop", preset="kitti", scope="motion", normalize="eta98", seed=4)
+    generator = eventgan.Generator("own.safetensors", size=(32, 48), fit="crop", preset="kitti", scope="motion",
+                                   normalize="eta98", seed=4)
     monkeypatch.chdir("/")
     again = pickle.loads(pickle.dumps(generator))
     np.testing.assert_array_equal(again(images[0], images[1]), generator(images[0], images[1]))
@@ -373,7 +387,8 @@ def test_workers(tmp_path, start):
     script.write_text(WORKERS)
     environment = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
     environment["PYTHONPATH"] = os.pathsep.join(sys.path)
-    done = subprocess.run([sys.executable, "-W", "ignore", script, start], env=environment, capture_output=True, text=True, timeout=200)
+    done = subprocess.run([sys.executable, "-W", "ignore", script, start], env=environment, capture_output=True,
+                          text=True, timeout=200)
     assert done.returncode == 0, done.stderr
 
 
@@ -382,7 +397,8 @@ def test_workers(tmp_path, start):
 
 def test_sampled_events():
     volume = np.zeros((6, 4, 5), np.float32)
-    volume[0, 1, 2], volume[2, 1, 2], volume[4, 3, 0] = 2, 1, 3  # positive at the start and the end, negative in the middle
+    # positive at the start and the end, negative in the middle
+    volume[0, 1, 2], volume[2, 1, 2], volume[4, 3, 0] = 2, 1, 3
     events = eventgan.sample_events(volume, duration_s=0.5, counts="rounded")
     assert events.dtype.names == ("t", "x", "y", "p")
     assert events.tolist() == [(0.0, 2, 1, 1)] * 2 + [(0.25, 0, 3, 0)] * 3 + [(0.5, 2, 1, 1)]
@@ -391,8 +407,10 @@ def test_sampled_events():
     assert abs(len(drawn) - 0.5 * 18 * 60 * 80) < 5 * np.sqrt(0.5 * 18 * 60 * 80)  # Poisson's deviation
     assert (np.diff(drawn["t"]) >= 0).all()
     np.testing.assert_array_equal(drawn, eventgan.sample_events(np.full((18, 60, 80), 0.5, np.float32), seed=3))
-    assert not np.array_equal(drawn, eventgan.sample_events(np.full((18, 60, 80), 0.5, np.float32), seed=4)[: len(drawn)])
-    for bad in (np.zeros((3, 4, 4)), np.zeros((2, 4)), np.full((2, 1, 1), np.nan), np.full((2, 1, 1), -1.0), np.full((2, 1, 1), np.inf), "volume"):
+    assert not np.array_equal(drawn,
+                              eventgan.sample_events(np.full((18, 60, 80), 0.5, np.float32), seed=4)[: len(drawn)])
+    for bad in (np.zeros((3, 4, 4)), np.zeros((2, 4)), np.full((2, 1, 1), np.nan), np.full((2, 1, 1), -1.0),
+                np.full((2, 1, 1), np.inf), "volume"):
         with pytest.raises(ValueError, match="expected"):
             eventgan.sample_events(bad)
     for settings in ({"duration_s": 0}, {"duration_s": np.nan}, {"seed": -1}, {"seed": 1.5}, {"counts": "exact"}):
@@ -424,7 +442,8 @@ IMAGE = np.zeros((20, 30), np.uint8)
     (np.full((4, 4), None), IMAGE, "object for previous"),
     ("image.png", IMAGE, "for previous"),
     ([[1, 2], [3]], IMAGE, "list for previous"),
-    (np.broadcast_to(np.uint8(1), (1 << 14, 1 << 14)), np.broadcast_to(np.uint8(1), (1 << 14, 1 << 14)), "16384, 16384"),
+    (np.broadcast_to(np.uint8(1), (1 << 14, 1 << 14)), np.broadcast_to(np.uint8(1), (1 << 14, 1 << 14)),
+     "16384, 16384"),
 ])
 def test_wrong_images(generator, previous, following, got):
     with pytest.raises(ValueError, match=f"expected .*{got}"):

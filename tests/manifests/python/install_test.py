@@ -1,4 +1,5 @@
-"""The package as users get it, without a network: with pip from a checkout, from its folder alone, under its old name; what it loads and what it does not."""
+"""The package as users get it, without a network: with pip from a checkout, from its folder alone, under its old name;
+what it loads and what it does not."""
 
 import os
 import pathlib
@@ -8,26 +9,27 @@ import subprocess
 import sys
 import sysconfig
 
-import numpy as np
 import pytest
 from conftest import PACKAGE, SOURCE
 
 BUILD = pathlib.Path(os.environ["EVENTGAN_BUILD"])
-HERE = {name: value for name, value in os.environ.items() if name not in ("EVENTGAN_BUILD", "PYTHONPATH", "OMP_NUM_THREADS")}
+HERE = {name: value for name, value in os.environ.items()
+        if name not in ("EVENTGAN_BUILD", "PYTHONPATH", "OMP_NUM_THREADS")}
 MADE = {**HERE, "PYTHONPATH": str(PACKAGE)}
 ENGINE = f"_engine{sysconfig.get_config_var('EXT_SUFFIX')}"
 HEAVY = {"torch", "h5py", "cv2", "matplotlib", "tqdm"}
 VOLUME = """
-import numpy as np
 import eventgan
 random = np.random.default_rng(7)
 volume = eventgan.Generator("untrained:2")(*random.integers(0, 256, (2, 16, 24), np.uint8))
 """
-needs_engine = pytest.mark.skipif(not (PACKAGE / "eventgan" / ENGINE).exists(), reason="no compiled module, or it is built with sanitizers")
+needs_engine = pytest.mark.skipif(not (PACKAGE / "eventgan" / ENGINE).exists(),
+                                  reason="no compiled module, or it is built with sanitizers")
 
 
 def run(*command, environment=HERE, stderr=subprocess.PIPE):
-    done = subprocess.run(list(map(str, command)), cwd="/", env=environment, stdout=subprocess.PIPE, stderr=stderr, text=True)
+    done = subprocess.run(list(map(str, command)), cwd="/", env=environment, stdout=subprocess.PIPE, stderr=stderr,
+                          text=True)
     assert done.returncode == 0, f"{done.stdout}{done.stderr}"
     return done.stdout
 
@@ -63,8 +65,10 @@ def test_pip_installs_the_rest_where_the_module_cannot_be_built(tmp_path, exampl
     alone, site = tmp_path / "alone", tmp_path / "site"
     shutil.copytree(SOURCE / "manifests" / "python", alone)
     # Beside what is installed pip would ask the network for NumPy, too.
-    said = run(sys.executable, "-m", "pip", "install", "-v", "--no-index", "--no-deps", "--no-build-isolation", "--target", site, alone, stderr=subprocess.STDOUT)
-    assert "installed without its compiled module" in said and f"expected the sources of the program, got none in {alone.parents[1]}\n" in said
+    said = run(sys.executable, "-m", "pip", "install", "-v", "--no-index", "--no-deps", "--no-build-isolation",
+               "--target", site, alone, stderr=subprocess.STDOUT)
+    assert ("installed without its compiled module" in said
+            and f"expected the sources of the program, got none in {alone.parents[1]}\n" in said)
     assert (site / "eventgan" / "py.typed").exists()
     code = f"""
 import sys
@@ -81,8 +85,10 @@ for name in ("Generator", "sample_events"):
     assert file == f"{site / 'eventgan' / '__init__.py'} 4"
     assert len(errors) == 2
     for error in errors:
-        assert re.fullmatch(r"expected the compiled module eventgan\._engine, got none \(.*_engine.*\): install the Debian package python3-eventgan, "
-                            r"or run `pip install -v \./manifests/python` in a checkout, which builds it or says what is missing", error)
+        assert re.fullmatch(r"expected the compiled module eventgan\._engine, got none \(.*_engine.*\): install the "
+                            r"Debian package python3-eventgan, "
+                            r"or run `pip install -v \./manifests/python` in a checkout, which builds it or says what "
+                            r"is missing", error)
 
 
 class Checkout:
@@ -100,8 +106,10 @@ class Checkout:
     def build(self, **environment):
         """Exit code, what is said, how CMake was called."""
         self.log.write_text("")
-        done = subprocess.run([sys.executable, "setup.py", "build_ext", "--build-lib", self.root / "lib"], cwd=self.root / "manifests" / "python",
-                              env={**HERE, "PATH": str(self.programs), **environment}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+        done = subprocess.run([sys.executable, "setup.py", "build_ext", "--build-lib", self.root / "lib"],
+                              cwd=self.root / "manifests" / "python",
+                              env={**HERE, "PATH": str(self.programs), **environment}, stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True)
         return done.returncode, done.stdout, self.log.read_text().splitlines()
 
 
@@ -123,12 +131,14 @@ def test_what_is_missing_is_said_and_is_no_failure_unless_a_build_is_named(tmp_p
 
 def test_a_build_that_is_there_is_used_as_it_is(tmp_path):
     checkout = Checkout(tmp_path, "exit 0")
-    for build, environment in [(checkout.root / "build" / "release", {}), (tmp_path / "other", {"EVENTGAN_BUILD": str(tmp_path / "other")})]:
+    for build, environment in [(checkout.root / "build" / "release", {}),
+                               (tmp_path / "other", {"EVENTGAN_BUILD": str(tmp_path / "other")})]:
         (build / "python" / "eventgan").mkdir(parents=True)
         (build / "python" / "eventgan" / ENGINE).write_text("an engine")
         if not environment:
             code, said, calls = checkout.build()
-            assert calls == [f"--preset release -S {checkout.root} -B {build} -DPython_EXECUTABLE={os.path.realpath(sys.executable)} -DEVENTGAN_TESTS=OFF",
+            assert calls == [f"--preset release -S {checkout.root} -B {build} "
+                             f"-DPython_EXECUTABLE={os.path.realpath(sys.executable)} -DEVENTGAN_TESTS=OFF",
                              f"--build {build} --target eventgan_python"]
             (build / "build.ninja").touch()
         shutil.rmtree(checkout.root / "lib", ignore_errors=True)
@@ -143,7 +153,8 @@ def test_another_pybind11_has_a_build_of_its_own(tmp_path):
     (tmp_path / "site" / "pybind11" / "__init__.py").write_text("def get_cmake_dir(): return '/of/pip'\n")
     build = checkout.root / "build" / f"release-{sysconfig.get_config_var('SOABI')}"
     _, _, calls = checkout.build(PYTHONPATH=str(tmp_path / "site"))
-    assert calls == [f"--preset release -S {checkout.root} -B {build} -DPython_EXECUTABLE={os.path.realpath(sys.executable)} -DEVENTGAN_TESTS=OFF "
+    assert calls == [f"--preset release -S {checkout.root} -B {build} "
+                     f"-DPython_EXECUTABLE={os.path.realpath(sys.executable)} -DEVENTGAN_TESTS=OFF "
                      "-Dpybind11_DIR=/of/pip", f"--build {build} --target eventgan_python"]
 
 
@@ -156,14 +167,16 @@ def test_it_loads_no_library_that_it_does_not_need():
     assert "numpy" in after and not after & HEAVY
     needed = re.findall(r"\(NEEDED\).*\[(.+)\]", run("readelf", "--dynamic", PACKAGE / "eventgan" / ENGINE))
     assert [name for name in needed if name.startswith("libopencv_core.")]
-    assert [name for name in needed if re.match(r"lib(torch|c10|hdf5|av|sw|tbb|matio|python|opencv_(?!core|imgproc))", name)] == []
+    assert [name for name in needed
+            if re.match(r"lib(torch|c10|hdf5|av|sw|tbb|matio|python|opencv_(?!core|imgproc))", name)] == []
 
 
 @needs_engine
 def test_a_numpy_that_the_build_does_not_know_is_refused():
     """pybind11 before 2.12 reads NumPy 2's arrays wrongly."""
     folder = re.search(r"(?m)^pybind11_DIR:PATH=(.+)", (BUILD / "CMakeCache.txt").read_text())[1]
-    major, minor = re.search(r'PACKAGE_VERSION "(\d+)\.(\d+)', (pathlib.Path(folder) / "pybind11ConfigVersion.cmake").read_text()).groups()
+    major, minor = re.search(r'PACKAGE_VERSION "(\d+)\.(\d+)',
+                             (pathlib.Path(folder) / "pybind11ConfigVersion.cmake").read_text()).groups()
     if (int(major), int(minor)) >= (2, 12):
         pytest.skip("this build knows NumPy 2")
     said = python("""
@@ -188,9 +201,11 @@ def forward():
     torch.manual_seed(7)
     return torch.nn.Conv2d(3, 8, 3, padding=1)(torch.rand(1, 3, 33, 45)).detach().numpy().tobytes()
 """
-    alone = [python(network + "print(torch.get_num_threads(), forward().hex())").split(), python(VOLUME + "print(volume.tobytes().hex())").split()]
+    alone = [python(network + "print(torch.get_num_threads(), forward().hex())").split(),
+             python(VOLUME + "print(volume.tobytes().hex())").split()]
     parts = [network + "of_torch = forward()\n", VOLUME]
     if first == "eventgan":
         parts.reverse()
-    together = python("".join(parts) + "print(torch.get_num_threads(), forward().hex(), volume.tobytes().hex(), of_torch == forward())").split()
+    together = python("".join(parts) + "print(torch.get_num_threads(), forward().hex(), volume.tobytes().hex(), "
+                      "of_torch == forward())").split()
     assert together == [*alone[0], *alone[1], "True"]

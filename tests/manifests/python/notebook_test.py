@@ -25,10 +25,12 @@ def test_a_notebook_is_one_and_has_no_outputs(path):
         assert not cell["outputs"] and cell["execution_count"] is None
     assert code and len({cell["id"] for cell in notebook["cells"]}) == len(notebook["cells"])
     pages = (SOURCE / "manifests" / "guides" / "python.md").read_text()
-    for link in (part.partition(")")[0] for cell in notebook["cells"] for part in "".join(cell["source"]).split("](")[1:]):
+    for link in (part.partition(")")[0] for cell in notebook["cells"]
+                 for part in "".join(cell["source"]).split("](")[1:]):
         page, _, heading = link.partition("#")
         assert (path.parent / page).resolve() == SOURCE / "manifests" / "guides" / "python.md"
-        assert heading in {line.lstrip("# ").lower().replace(" ", "-") for line in pages.splitlines() if line.startswith("#")}
+        assert heading in {line.lstrip("# ").lower().replace(" ", "-") for line in pages.splitlines()
+                           if line.startswith("#")}
     try:
         import nbformat
     except ImportError:
@@ -40,12 +42,14 @@ def test_the_quickstart_runs_in_a_minute(tmp_path, monkeypatch):
     nbformat, preprocessors = pytest.importorskip("nbformat"), pytest.importorskip("nbconvert.preprocessors")
     for module in ("ipykernel", "matplotlib", "eventgan._engine"):
         pytest.importorskip(module)
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(pathlib.Path(eventgan.__file__).parent.parent), os.environ.get("PYTHONPATH", "")]))
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(pathlib.Path(eventgan.__file__).parent.parent),
+                                                      os.environ.get("PYTHONPATH", "")]))
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.delenv("MPLBACKEND", raising=False)
     notebook, = (nbformat.read(path, as_version=4) for path in NOTEBOOKS if path.name == "quickstart.ipynb")
     start = time.monotonic()
-    preprocessors.ExecutePreprocessor(timeout=120, kernel_name="python3").preprocess(notebook, {"metadata": {"path": str(tmp_path)}})
+    preprocessors.ExecutePreprocessor(timeout=120,
+                                      kernel_name="python3").preprocess(notebook, {"metadata": {"path": str(tmp_path)}})
     assert time.monotonic() - start < 60
     shown = [output for cell in notebook.cells if cell.cell_type == "code" for output in cell.outputs]
     data = [output.data for output in shown if "data" in output]
@@ -53,5 +57,6 @@ def test_the_quickstart_runs_in_a_minute(tmp_path, monkeypatch):
     table, = (each["text/html"] for each in data if each.get("text/html", "").startswith("<table>"))
     assert "<td style=\"text-align:left\">41</td>" in table
     assert any("(18, 188, 621) float32" in output.get("text", "") for output in shown)
-    for number, each in enumerate(each["image/png"] for each in data if "image/png" in each):  # for eyes: kept by pytest
+    # for eyes: kept by pytest
+    for number, each in enumerate(each["image/png"] for each in data if "image/png" in each):
         (tmp_path / f"{number}.png").write_bytes(base64.b64decode(each))

@@ -1,4 +1,5 @@
-"""eventgan.init, convert and open: the program called, its messages as exceptions, its progress, and its end when it is interrupted."""
+"""eventgan.init, convert and open: the program called, its messages as exceptions, its progress,
+and its end when it is interrupted."""
 
 import json
 import os
@@ -36,7 +37,8 @@ def job(demo, tmp_path, monkeypatch):
     (tmp_path / "demo").symlink_to(demo)
     monkeypatch.chdir(tmp_path)
     return {"format": "eventgan-manifest", "version": 1, "name": "job", "seed": 7,
-            "sources": [{"dataset": "kitti_object", "root": pathlib.Path("demo/kitti/training"), "pairs": {"gaps": [1, 2], "side": "before", "choose": "all"}}],
+            "sources": [{"dataset": "kitti_object", "root": pathlib.Path("demo/kitti/training"),
+                         "pairs": {"gaps": [1, 2], "side": "before", "choose": "all"}}],
             "image": {"width": 64, "height": 24, "preset": "mpii"}, "generator": {"kind": "difference"},
             "output": {"directory": "out", "samples_per_shard": PAIRS // SHARDS}}
 
@@ -66,11 +68,13 @@ def test_a_drafted_manifest_is_converted(demo, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     manifest = eventgan.init("kitti_object", demo / "kitti" / "training")
     assert manifest == pathlib.Path("manifest.json") and "// KITTI object: 12 labelled frames" in manifest.read_text()
-    manifest.write_text(manifest.read_text().replace("// \"generator\": { \"weights\": \"my.safetensors\" }", '"generator": { "kind": "difference" }'))
+    manifest.write_text(manifest.read_text().replace("// \"generator\": { \"weights\": \"my.safetensors\" }",
+                                                     '"generator": { "kind": "difference" }'))
     shards = eventgan.convert(manifest, progress=False)
     assert len(shards) == 12 and {path.parent for path in shards.paths} == {tmp_path / "out" / "kitti-events"}
     assert pathlib.Path("out/kitti-events/dataset.json").exists()
-    with pytest.raises(eventgan.ProgramError, match="expected the name of a new file, got an existing one, in manifest.json") as caught:
+    with pytest.raises(eventgan.ProgramError,
+                       match="expected the name of a new file, got an existing one, in manifest.json") as caught:
         eventgan.init(demo / "kitti" / "training")
     assert caught.value.exit_code == 64
     assert eventgan.init(demo / "kitti" / "training", demo / "mpii", out="two.json").read_text().count('"dataset"') == 2
@@ -82,7 +86,8 @@ def test_a_dictionary_is_converted_as_a_file_of_the_current_folder(job):
     assert len(shards) == PAIRS and len(shards.paths) == SHARDS
     assert files() == sorted([*before, "out"])  # no manifest is left
     assert shards[0]["volume"].shape == (18, 24, 64) and pathlib.Path(shards[0]["pair"]["next_path"]).is_file()
-    pathlib.Path("manifest.json").write_text(json.dumps({**job, "sources": [{**job["sources"][0], "root": "demo/kitti/training"}]}))
+    pathlib.Path("manifest.json").write_text(
+        json.dumps({**job, "sources": [{**job["sources"][0], "root": "demo/kitti/training"}]}))
     same = eventgan.convert("manifest.json", "same", threads=1)
     for i in range(PAIRS):
         np.testing.assert_array_equal(shards[i]["volume"], same[i]["volume"])
@@ -115,12 +120,14 @@ def test_a_folder_is_converted_as_init_proposes(demo, tmp_path):
     assert len(eventgan.convert(labelled, out, progress=False)) == 12 and (out / "manifest.json").exists()
 
 
-@pytest.mark.parametrize("change", [{"sources": []}, {"image": {"width": 0, "height": 24}}, {"nobody": 1}, {"generator": {"weights": "absent.safetensors"}}])
+@pytest.mark.parametrize("change", [{"sources": []}, {"image": {"width": 0, "height": 24}}, {"nobody": 1},
+                                    {"generator": {"weights": "absent.safetensors"}}])
 def test_what_is_wrong_with_a_manifest_is_told_in_the_programs_words(job, change):
     job["sources"][0]["root"] = "demo/kitti/training"
     pathlib.Path("manifest.json").write_text(json.dumps({**job, **change}))
     exit_code, text = said_of("convert", "manifest.json")
-    assert (exit_code, "absent.safetensors" in text) == (66, True) or (exit_code, text[:17]) == (64, "manifest.json: $.")
+    assert (exit_code,
+            "absent.safetensors" in text) == (66, True) or (exit_code, text[:17]) == (64, "manifest.json: $.")
     for manifest in ("manifest.json", {**job, **change}):
         with pytest.raises(eventgan.ProgramError) as caught:
             eventgan.convert(manifest)
@@ -147,7 +154,8 @@ def test_too_many_samples_in_quarantine(job, demo):
 def test_a_program_that_is_not_there(job, monkeypatch, tmp_path):
     monkeypatch.setenv("EVENTGAN_PROGRAM", str(tmp_path / "nowhere"))
     for call in (lambda: eventgan.init("demo"), lambda: eventgan.convert(job)):
-        with pytest.raises(FileNotFoundError, match=r"expected the program eventgan, got none, in .*/nowhere \(EVENTGAN_PROGRAM\)"):
+        with pytest.raises(FileNotFoundError,
+                           match=r"expected the program eventgan, got none, in .*/nowhere \(EVENTGAN_PROGRAM\)"):
             call()
     (tmp_path / "nowhere").write_text("no program")
     with pytest.raises(FileNotFoundError, match="nowhere"):  # not executable
@@ -206,7 +214,8 @@ def test_a_bar_where_tqdm_is(job, monkeypatch, in_the_programs_place):
     eventgan.convert(job)
     assert (bars[-1].n, bars[-1].total, bars[-1].made_with) == (PAIRS, PAIRS, (None, " pairs", True))
     assert [bar.closed for bar in bars] == [1] * len(bars)
-    in_the_programs_place("for event in ({'phase': 'planning', 'done': 2, 'total': 9, 'files_per_s': 1}, {'done': 3, 'total': 5, 'mb_per_s': 1, 'pairs_per_s': 1},",
+    in_the_programs_place("for event in ({'phase': 'planning', 'done': 2, 'total': 9, 'files_per_s': 1}, {'done': 3, "
+                          "'total': 5, 'mb_per_s': 1, 'pairs_per_s': 1},",
                           "              {'done': 4, 'total': 6, 'mb_per_s': 1, 'pairs_per_s': 1}):",
                           "    print(json.dumps({'event': 'progress', **event}))", "sys.exit(1)")
     bars.clear()
@@ -224,15 +233,18 @@ def test_a_bar_where_tqdm_is(job, monkeypatch, in_the_programs_place):
 
 
 def test_warnings_and_what_is_no_json(job, in_the_programs_place):
-    in_the_programs_place("print('a library says so', flush=True)", "print(json.dumps({'event': 'warning', 'text': 'beware'}), flush=True)",
+    in_the_programs_place("print('a library says so', flush=True)",
+                          "print(json.dumps({'event': 'warning', 'text': 'beware'}), flush=True)",
                           "print('[1, 2]', flush=True)", "os.kill(os.getpid(), signal.SIGKILL)")
-    with pytest.warns(UserWarning, match="beware") as warned, pytest.raises(eventgan.ProgramError, match="ended with exit code -9") as caught:
+    with pytest.warns(UserWarning, match="beware") as warned, pytest.raises(eventgan.ProgramError,
+                                                                            match="ended with exit code -9") as caught:
         eventgan.convert(job)
     assert warned[0].filename == __file__ and caught.value.exit_code == -9
     events = []
     with pytest.raises(eventgan.ProgramError):
         eventgan.convert(job, progress=events.append)
-    assert events == [{"event": "note", "text": "a library says so"}, {"event": "warning", "text": "beware"}, {"event": "note", "text": "[1, 2]"}]
+    assert events == [{"event": "note", "text": "a library says so"}, {"event": "warning", "text": "beware"},
+                      {"event": "note", "text": "[1, 2]"}]
 
 
 def test_a_report_longer_than_a_pipe(job, in_the_programs_place):
@@ -243,17 +255,21 @@ def test_a_report_longer_than_a_pipe(job, in_the_programs_place):
 
 
 COUNTS_INTERRUPTS = ["def interrupted(*_):", "    with open('interrupts', 'a') as file:", "        file.write('.')",
-                     "signal.signal(signal.SIGINT, interrupted)", "print(json.dumps({'event': 'note', 'text': 'ready'}), flush=True)"]
+                     "signal.signal(signal.SIGINT, interrupted)",
+                     "print(json.dumps({'event': 'note', 'text': 'ready'}), flush=True)"]
 
 
 @pytest.mark.parametrize("interrupts", [1, 2])
 def test_an_interrupt_reaches_the_program_once_and_it_is_awaited(job, in_the_programs_place, interrupts):
     """A terminal interrupts all processes of a group, and the program would drop its shard at the second time."""
-    in_the_programs_place(*COUNTS_INTERRUPTS, f"while not os.path.exists('interrupts') or os.path.getsize('interrupts') < {interrupts}:", "    time.sleep(0.01)",
-                          "print('y' * 300000, flush=True)", "time.sleep(0.3)", "open('ended', 'w').close()", "sys.exit(75)")
-    code = f"import eventgan, json; eventgan.convert({json.dumps(job, default=str)}, progress=lambda event: print('ready', flush=True))"
-    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
-                          env={**os.environ, "PYTHONPATH": PACKAGE}) as python:
+    in_the_programs_place(*COUNTS_INTERRUPTS,
+                          f"while not os.path.exists('interrupts') or os.path.getsize('interrupts') < {interrupts}:",
+                          "    time.sleep(0.01)", "print('y' * 300000, flush=True)", "time.sleep(0.3)",
+                          "open('ended', 'w').close()", "sys.exit(75)")
+    code = (f"import eventgan, json; eventgan.convert({json.dumps(job, default=str)}, progress=lambda event: "
+            "print('ready', flush=True))")
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          start_new_session=True, env={**os.environ, "PYTHONPATH": PACKAGE}) as python:
         assert python.stdout.readline() == "ready\n"
         for count in range(1, interrupts + 1):
             os.killpg(python.pid, signal.SIGINT)
@@ -265,7 +281,8 @@ def test_an_interrupt_reaches_the_program_once_and_it_is_awaited(job, in_the_pro
 
 
 def test_what_goes_wrong_in_ones_own_progress_ends_the_program(job, in_the_programs_place):
-    in_the_programs_place(*COUNTS_INTERRUPTS, "while not os.path.exists('interrupts'): time.sleep(0.01)", "open('ended', 'w').close()")
+    in_the_programs_place(*COUNTS_INTERRUPTS, "while not os.path.exists('interrupts'): time.sleep(0.01)",
+                          "open('ended', 'w').close()")
     with pytest.raises(ZeroDivisionError):
         eventgan.convert(job, progress=lambda event: 1 / 0)
     assert os.path.exists("ended") and os.path.getsize("interrupts") == 1
@@ -273,7 +290,8 @@ def test_what_goes_wrong_in_ones_own_progress_ends_the_program(job, in_the_progr
 
 def test_an_interrupted_job_leaves_whole_shards_and_goes_on(job):
     job["output"]["samples_per_shard"] = 1
-    job["generator"], job["image"] = {"weights": "untrained:32"}, {"width": 1242, "height": 375, "preset": "mpii"}  # half a second each
+    # half a second each
+    job["generator"], job["image"] = {"weights": "untrained:32"}, {"width": 1242, "height": 375, "preset": "mpii"}
     job["sources"][0]["root"] = "demo/kitti/training"
 
     def interrupt(event):
@@ -285,7 +303,8 @@ def test_an_interrupted_job_leaves_whole_shards_and_goes_on(job):
     assert not [name for name in os.listdir("out") if name.endswith(".tmp")]
     done = len(list(pathlib.Path("out").glob("*-of-*.h5")))
     assert 0 < done < PAIRS
-    with pytest.raises(ValueError, match=rf"expected {PAIRS} finished shards.*: {done} of {PAIRS} shards are done, 0 in work; `eventgan convert`"):
+    with pytest.raises(ValueError, match=rf"expected {PAIRS} finished shards.*: {done} of {PAIRS} shards are done, 0 "
+                       r"in work; `eventgan convert`"):
         eventgan.open("out")
     assert len(eventgan.open("out", partial=True)) == done
 
@@ -302,7 +321,8 @@ def test_open(job, monkeypatch):
         eventgan.open("empty")
     pathlib.Path("out/dataset.json").unlink()
     sorted(pathlib.Path("out").glob("*-of-*.json"))[0].unlink()
-    with pytest.raises(ValueError, match=r"got 1 unfinished .*: 3 of 4 shards are done, 0 in work; `eventgan convert`, or eventgan.convert, of the same"):
+    with pytest.raises(ValueError, match=r"got 1 unfinished .*: 3 of 4 shards are done, 0 in work; `eventgan convert`, "
+                       r"or eventgan.convert, of the same"):
         eventgan.open("out")
     monkeypatch.setenv("EVENTGAN_PROGRAM", "nowhere")
     with pytest.raises(ValueError, match=r"got 1 unfinished .* uses the others\)$"):

@@ -1,5 +1,5 @@
-"""manifests/python/examples/{labelled_events,real_cameras}.py: boxes and events against what they are made of, and `experiment.py real --quick` where
-there is data."""
+"""manifests/python/examples/{labelled_events,real_cameras}.py: boxes and events against what they are made of, and
+`experiment.py real --quick` where there is data."""
 
 import argparse
 import csv
@@ -18,10 +18,10 @@ cv2 = pytest.importorskip("cv2")
 pytest.importorskip("eventgan._engine")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
-import labelled_events  # noqa: E402
-import real_cameras  # noqa: E402
+import labelled_events
+import real_cameras
 
-from eventgan import Generator, signed_channel  # noqa: E402
+from eventgan import Generator, signed_channel
 
 DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 
@@ -50,7 +50,8 @@ def write_window(folder, name, left, top, right, bottom):
     y, x = (np.tile(each.ravel(), 5) for each in np.mgrid[top:bottom, left:right])
     t = np.linspace(1.6e15, 1.6e15 + 40_000, len(x)).astype(np.int64)
     np.savez(folder / f"{name}.npz", t_us=t, x=x.astype(np.int16), y=y.astype(np.int16), p=np.ones(len(x), np.int8))
-    (folder / f"{name}.txt").write_text(f"0 {(left + right) / 2 / 346:.12f} {(top + bottom) / 2 / 260:.12f} {(right - left) / 346:.12f} {(bottom - top) / 260:.12f}\n")
+    (folder / f"{name}.txt").write_text(f"0 {(left + right) / 2 / 346:.12f} {(top + bottom) / 2 / 260:.12f} "
+                                        f"{(right - left) / 346:.12f} {(bottom - top) / 260:.12f}\n")
 
 
 @pytest.fixture
@@ -78,8 +79,8 @@ def args(tmp_path, monkeypatch):
 
 
 def test_pairs_are_those_of_the_program(args):
-    """Log differences of the frames that are put together here have events where those of the program have them. The program resamples a still once, here
-    it is done twice; another motion has no more than chance in common."""
+    """Log differences of the frames that are put together here have events where those of the program have them. The
+    program resamples a still once, here it is done twice; another motion has no more than chance in common."""
     args.out.mkdir()
     shards = labelled_events.shards_of(args, "difference")
     assert len(shards) == 3 + 3 + 2  # every third frame of a clip, of which the first has none before it
@@ -120,17 +121,22 @@ def test_windows_and_drawings_have_their_boxes_around_their_events(args):
     np.testing.assert_allclose(a["boxes"][0], expected, atol=0.5)
     left, top, right, bottom = (round(edge) for edge in expected)
     channel = a["volume"][0].float()
-    assert (channel[top + 1:bottom - 1, left + 1:right - 1] > 0).all() and not channel[:, :left - 1].any() and not channel[bottom + 1:].any()
+    assert ((channel[top + 1:bottom - 1, left + 1:right - 1] > 0).all() and not channel[:, :left - 1].any()
+            and not channel[bottom + 1:].any())
     np.testing.assert_allclose(b["boxes"][0], [32, 0, 288, 192], atol=0.5)
     assert (b["volume"][0, :, 32:288] > 0.99).all()  # as many events everywhere make no pattern of lines
     [c] = labelled_events.test_items(args, drawn, (192, 320))
-    np.testing.assert_allclose(c["boxes"][0], [100, 56, 140, 156], atol=1e-4)  # 640x360: half of it, 6 lines below the top
+    # 640x360: half of it, 6 lines below the top
+    np.testing.assert_allclose(c["boxes"][0], [100, 56, 140, 156], atol=1e-4)
     channel = c["volume"][0].float()
-    assert (channel[57:155, 101:119] == 1).all() and (channel[57:155, 121:139] < -0.5).all() and not channel[:, :99].any()
-    assert channel[:55, :190].abs().max() == channel[12:50, 202:298].abs().max() == 0  # all pixels count in a smaller one, not some
+    assert ((channel[57:155, 101:119] == 1).all() and (channel[57:155, 121:139] < -0.5).all()
+            and not channel[:, :99].any())
+    # all pixels count in a smaller one, not some
+    assert channel[:55, :190].abs().max() == channel[12:50, 202:298].abs().max() == 0
     assert labelled_events.test_items(args, drawn, (192, 320), signed=False) == []
     volume = labelled_events.test_items(args, windows, (192, 320), signed=False)[0]["volume"]
-    assert volume.shape == (18, 192, 320) and volume.max() == 1 and volume.min() == 0 and not volume[9:].any()  # no negative events
+    # no negative events
+    assert volume.shape == (18, 192, 320) and volume.max() == 1 and volume.min() == 0 and not volume[9:].any()
     with pytest.raises(SystemExit, match="expected folders with windows .* got none"):
         labelled_events.recordings_in(args.frames)
 
@@ -139,7 +145,8 @@ def test_events_of_a_finer_sensor_are_averaged(args):
     """Each pixel that the detector sees is the mean of four of the sensor's; boxes keep their place."""
     args.out.mkdir()
     name = "difference, drawn sensor"
-    items, shards, coarse = labelled_events.items_of(args, name), labelled_events.shards_of(args, name), labelled_events.items_of(args, "difference")
+    items, shards, coarse = (labelled_events.items_of(args, name), labelled_events.shards_of(args, name),
+                             labelled_events.items_of(args, "difference"))
     assert len(items) == len(shards) == len(coarse) and shards[0]["volume"].shape == (18, 384, 640)
     for item, sample, other in zip(items, shards, coarse):
         averaged = sample["volume"].astype(np.float32).reshape(18, 192, 2, 320, 2).mean((2, 4))
@@ -168,9 +175,11 @@ def test_tables_compare_seed_by_seed():
     def score(value):
         return {"camera": dict.fromkeys(real_cameras.COLUMNS, value), "camera, development": {}}
 
-    text = real_cameras.tables({"EventGAN 16": [score(0.5), score(0.7)], "other": [score(0.4), score(0.9)]}, ["EventGAN 16", "other", "none"], "Plain", "EventGAN 16")
+    text = real_cameras.tables({"EventGAN 16": [score(0.5), score(0.7)], "other": [score(0.4), score(0.9)]},
+                               ["EventGAN 16", "other", "none"], "Plain", "EventGAN 16")
     head, _, first, second = text.strip().splitlines()
-    assert head.startswith("| Plain: camera | seeds | AP@0.5 |") and first.startswith("| EventGAN 16 | 2 | 0.60 ± 0.10 |") and first.endswith(" |  |")
+    assert (head.startswith("| Plain: camera | seeds | AP@0.5 |")
+            and first.startswith("| EventGAN 16 | 2 | 0.60 ± 0.10 |") and first.endswith(" |  |"))
     assert second.startswith("| other | 2 | 0.65 ± 0.25 |") and second.endswith("| +0.05 (-0.10 to +0.20) |")
 
 
@@ -185,10 +194,11 @@ def test_rows_are_those_of_one_thing_each():
 def test_a_detector_that_learnt_from_photographs_finds_persons_in_real_events(tmp_path):
     if not (DATA / "labelled_frames").is_dir() or not (DATA / "real_labels").is_dir():
         pytest.skip("no ../shared/data")
-    line = [sys.executable, EXAMPLES / "experiment.py", "real", "--program", os.environ["EVENTGAN_PROGRAM"], "--frames", DATA / "labelled_frames",
-            "--real", DATA / "real_labels", "--out", tmp_path, "--quick"]
+    line = [sys.executable, EXAMPLES / "experiment.py", "real", "--program", os.environ["EVENTGAN_PROGRAM"], "--frames",
+            DATA / "labelled_frames", "--real", DATA / "real_labels", "--out", tmp_path, "--quick"]
     done = subprocess.run(line, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     shutil.copytree(DATA / "real_labels" / "pedro", tmp_path / "other" / "pedro")
     again = subprocess.run([*line, "--test", tmp_path / "other"], capture_output=True, text=True)
-    assert again.returncode == 0 and "epoch" not in again.stdout and "pedro, development" not in again.stdout, again.stdout + again.stderr
+    assert (again.returncode == 0 and "epoch" not in again.stdout
+            and "pedro, development" not in again.stdout), again.stdout + again.stderr

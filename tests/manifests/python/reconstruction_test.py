@@ -13,8 +13,8 @@ from conftest import SOURCE
 
 torch = pytest.importorskip("torch")
 
-from eventgan import program, reconstruction  # noqa: E402
-from eventgan.reconstruction import FireNet, load_firenet, reconstruct, robust_normalized, signed_grid, ssim, ssim_map  # noqa: E402
+from eventgan import program, reconstruction
+from eventgan.reconstruction import (FireNet, load_firenet, reconstruct, robust_normalized, signed_grid, ssim, ssim_map)
 
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
@@ -32,7 +32,8 @@ def random_events(count, size=(7, 9)):
     """[count, 4] t, x, y, polarity, in order of time from 0 to 1."""
     random = np.random.default_rng(0)
     t = np.sort(np.concatenate([[0, 1], random.random(count - 2)]))
-    return np.stack([t, random.integers(0, size[1], count), random.integers(0, size[0], count), random.choice([-1, 1], count)], 1)
+    return np.stack([t, random.integers(0, size[1], count), random.integers(0, size[0], count),
+                     random.choice([-1, 1], count)], 1)
 
 
 def hats(events, bins, size):
@@ -103,7 +104,8 @@ def test_robust_normalisation_is_by_the_first_and_the_99th_percentile():
 
 
 def remembering():
-    """FireNet of which every state goes half the way to 1 at each step, whatever the events, and the image is their mean."""
+    """FireNet of which every state goes half the way to 1 at each step, whatever the events,
+    and the image is their mean."""
     state = {name: torch.zeros_like(tensor) for name, tensor in FireNet().state_dict().items()}
     state["G2.out_gate.bias"] += 20  # its tanh is 1; update gates are sigmoid(0)
     state["pred.conv2d.weight"] += 1 / 16
@@ -134,7 +136,8 @@ def test_a_checkpoint_is_read_and_nothing_of_it_is_run(tmp_path, monkeypatch, zi
     monkeypatch.chdir(tmp_path)
     torch.manual_seed(0)
     state = FireNet().state_dict()
-    torch.save({"epoch": 3, "config": Harmful(), "state_dict": state} if whole else state, "model.pth", _use_new_zipfile_serialization=zipped)
+    torch.save({"epoch": 3, "config": Harmful(), "state_dict": state} if whole else state, "model.pth",
+               _use_new_zipfile_serialization=zipped)
     network = load_firenet("model.pth")
     assert not pathlib.Path("ran").exists()
     assert not network.training and not any(parameter.requires_grad for parameter in network.parameters())
@@ -147,10 +150,12 @@ def test_what_is_no_checkpoint_of_firenet_is_named(tmp_path):
         load_firenet(path)
     for content in (b"", b"no checkpoint", b"PK\x05\x06" + bytes(18)):
         path.write_bytes(content)
-        with pytest.raises(ValueError, match="expected a checkpoint of PyTorch with tensors of float32, got .*, in .*model.pth"):
+        with pytest.raises(ValueError,
+                           match="expected a checkpoint of PyTorch with tensors of float32, got .*, in .*model.pth"):
             load_firenet(path)
     state = FireNet().state_dict()
-    for changed, message in (({"head.conv2d.weight": torch.zeros(16, 9, 3, 3)}, r"head.conv2d.weight \[16, 5, 3, 3\] of FireNet, got \[16, 9, "),
+    for changed, message in (({"head.conv2d.weight": torch.zeros(16, 9, 3, 3)},
+                              r"head.conv2d.weight \[16, 5, 3, 3\] of FireNet, got \[16, 9, "),
                              ({"more": torch.zeros(2)}, r"more not at all of FireNet, got \[2\]"),
                              ({"pred.conv2d.bias": 1}, "pred.conv2d.bias.*got none")):
         torch.save({**state, **changed}, path)
@@ -173,7 +178,8 @@ def test_firenet_plus_sees_the_scene_in_a_cameras_events(recordings):
         events = file["davis/left/events"][:][:, [2, 0, 1, 3]]
     windows = [events[(events[:, 0] > start) & (events[:, 0] <= end)] for start, end in itertools.pairwise(times_s)]
     images = reconstruct(network, [recordings.volume_of(window, frames.shape[1:]) for window in windows])
-    scores = [ssim(robust_normalized(images[-1]), robust_normalized(frame)) for frame in (frames[-1], frames[-1, :, ::-1], 255 - frames[-1])]
+    scores = [ssim(robust_normalized(images[-1]), robust_normalized(frame))
+              for frame in (frames[-1], frames[-1, :, ::-1], 255 - frames[-1])]
     assert scores[0] > 0.25 > 0.1 > max(scores[1:])
 
 
@@ -203,14 +209,16 @@ def test_a_threshold_is_fitted_to_the_cameras_events_of_some_pairs(recordings):
 def make_recording(path):
     """Bright squares that move, with one event where a pixel changes: frames and events in MVSEC's layout."""
     rows, columns = np.mgrid[:24, :32]
-    frames = np.stack([np.where((columns - 2 * t) // 6 % 2 == rows // 6 % 2, 200, 50) for t in range(WINDOWS + 1)]).astype(np.uint8)
+    frames = np.stack([np.where((columns - 2 * t) // 6 % 2 == rows // 6 % 2, 200, 50)
+                       for t in range(WINDOWS + 1)]).astype(np.uint8)
     events = []
     for t, (previous, following) in enumerate(itertools.pairwise(frames.astype(int))):
         y, x = np.nonzero(previous != following)
         events.append(np.stack([x, y, np.linspace(t + 0.1, t + 1, len(x)), np.sign(following - previous)[y, x]], 1))
     with h5py.File(path, "w") as file:
         camera = file.create_group("davis/left")
-        camera["image_raw"], camera["image_raw_ts"], camera["events"] = frames, np.arange(WINDOWS + 1.0), np.concatenate(events)
+        camera["image_raw"], camera["image_raw_ts"], camera["events"] = (frames, np.arange(WINDOWS + 1.0),
+                                                                         np.concatenate(events))
 
 
 def test_frames_are_refused_where_there_are_none(tmp_path, recordings):
@@ -235,7 +243,8 @@ def test_the_judge_compares_methods_and_resumes(tmp_path, monkeypatch, capsys, r
     out = tmp_path / "out"
 
     def judge(*methods):
-        arguments = ["--program", found, "--recordings", tmp_path, "--judge", tmp_path / "model.pth", "--out", out, "--with", *methods]
+        arguments = ["--program", found, "--recordings", tmp_path, "--judge", tmp_path / "model.pth", "--out", out,
+                     "--with", *methods]
         monkeypatch.setattr(sys, "argv", ["judge_reconstruction.py", *map(str, arguments)])
         judge_reconstruction.main()
         return capsys.readouterr().out
@@ -245,14 +254,16 @@ def test_the_judge_compares_methods_and_resumes(tmp_path, monkeypatch, capsys, r
 
     assert "squares: 1 of 4 windows count" in judge("difference")
     first = rows()
-    assert first["camera"]["camera"] == pytest.approx([1] * WINDOWS) and first["camera"]["events"] == 1 and first["flat grey"]["events"] == 0
+    assert (first["camera"]["camera"] == pytest.approx([1] * WINDOWS) and first["camera"]["events"] == 1
+            and first["flat grey"]["events"] == 0)
     assert all(len(row[key]) == WINDOWS for row in first.values() for key in ("frame", "moving", "camera"))
     # ln((200 + 5.1) / (50 + 5.1)) = 6.6 thresholds of 0.2, of which six are passed, where the camera has one event.
     assert 5 < first["difference"]["events"] < 7
     image = out / "squares" / "difference.png"
     written = image.stat().st_mtime_ns
     assert "esim" in judge("difference", "esim")
-    assert {name: row for name, row in rows().items() if name != "esim"} == first and image.stat().st_mtime_ns == written
+    assert {name: row for name, row in rows().items()
+            if name != "esim"} == first and image.stat().st_mtime_ns == written
     assert "| esim |" in (out / "judge.md").read_text() and (out / "squares.png").exists()
     with pytest.raises(SystemExit, match="2"):
         judge("v2e")

@@ -7,7 +7,8 @@ from eventgan import signed_channel
 
 
 def test_of_a_volume():
-    """Positive minus negative; of 100 pixels 97 have 0 to 96 events more of one kind and three 400, so that the 99th percentile of the magnitude is 400."""
+    """Positive minus negative; of 100 pixels 97 have 0 to 96 events more of one kind and three 400,
+    so that the 99th percentile of the magnitude is 400."""
     counts = np.array([*range(97), 400, 400, 400], np.float32).reshape(10, 10)
     volume = np.zeros((6, 10, 10), np.float32)
     volume[1], volume[2] = 0.25 * counts, 0.75 * counts

@@ -1,4 +1,5 @@
-"""manifests/python/examples/self_supervised.py: its networks and losses against the published code's numbers, its scores, a small run."""
+"""manifests/python/examples/self_supervised.py: its networks and losses against the published code's numbers,
+its scores, a small run."""
 
 import json
 import os
@@ -17,7 +18,7 @@ h5py = pytest.importorskip("h5py")
 EXAMPLES = SOURCE / "manifests" / "python" / "examples"
 sys.path.append(str(EXAMPLES))
 
-import self_supervised  # noqa: E402
+import self_supervised
 
 DATA = pathlib.Path(os.environ.get("EVENTGAN_TEST_DATA", SOURCE.parent / "shared" / "data"))
 
@@ -56,7 +57,8 @@ def test_the_flow_losses_are_the_published_ones(golden):
 
 def test_the_image_loss_is_the_published_one(golden):
     first, second = (golden(f"losses/image/{name}") for name in "ab")
-    assert self_supervised.ssim(first, second).mean().item() == pytest.approx(golden("losses/image/ssim").item(), abs=1e-5)
+    assert self_supervised.ssim(first, second).mean().item() == pytest.approx(golden("losses/image/ssim").item(),
+                                                                              abs=1e-5)
     expected = golden("losses/image/l1_minus_ssim").item()
     assert self_supervised.reconstruction_loss([first], second).item() == pytest.approx(expected, abs=1e-5)
     # Two scales: the coarser one, of the same pixels, counts half.
@@ -67,7 +69,8 @@ def test_a_pixel_without_weight_adds_nothing_to_the_photometric_loss():
     frames = torch.zeros(2, 1, 8, 8), torch.full((2, 1, 8, 8), 0.5)
     mask = torch.zeros(2, 1, 8, 8)
     mask[0, 0, 3, 4] = 1
-    photometric, smoothness = self_supervised.flow_losses(*frames, [torch.zeros(2, 2, 4, 4), torch.zeros(2, 2, 8, 8)], mask)
+    photometric, smoothness = self_supervised.flow_losses(*frames, [torch.zeros(2, 2, 4, 4), torch.zeros(2, 2, 8, 8)],
+                                                          mask)
     # The first sample's error is 0.5 at its only pixel, the second one has none; the coarser scale counts half.
     assert photometric.item() == pytest.approx(1.5 * (0.25 + 1e-10) ** 0.45 / 2, rel=1e-5)
     assert smoothness.item() == pytest.approx(1.5 * 1e-10**0.45, rel=1e-4)
@@ -78,7 +81,8 @@ def test_a_frame_moved_by_whole_pixels_is_the_frame_elsewhere():
     flow = torch.tensor([3.0, -2.0])[None, :, None, None].expand(1, 2, 9, 12)  # looked up 3 to the right and 2 above
     moved = self_supervised.moved(previous, flow)
     assert torch.allclose(moved[..., 2:, :9], previous[..., :7, 3:], atol=1e-5)
-    assert torch.allclose(moved[..., 2:, 9:], previous[..., :7, 11:].expand(1, 1, 7, 3), atol=1e-5)  # beyond the edge its outermost pixels
+    # beyond the edge its outermost pixels
+    assert torch.allclose(moved[..., 2:, 9:], previous[..., :7, 11:].expand(1, 1, 7, 3), atol=1e-5)
     assert torch.allclose(self_supervised.moved(previous, 0 * flow), previous, atol=1e-5)
 
 
@@ -98,7 +102,8 @@ def test_volumes_are_reduced_by_summing_and_divided_by_their_98th_percentile():
     small = self_supervised.reduced(volume, 2)
     assert small.shape == (18, 2, 3)
     assert small[1, 1, 2] == volume[1, 2:4, 4:6].sum()
-    values = np.append(np.zeros(50, np.float32), np.arange(1, 102, dtype=np.float32))  # the zeros do not count: the percentile is 99
+    # the zeros do not count: the percentile is 99
+    values = np.append(np.zeros(50, np.float32), np.arange(1, 102, dtype=np.float32))
     normalized = self_supervised.normalized(values)
     assert normalized[-1] == 1 and normalized[50 + 9] == pytest.approx(10 / 99)
     assert not self_supervised.normalized(np.zeros(3, np.float32)).any()
@@ -109,7 +114,8 @@ def test_all_rows_learn_from_the_same_crops():
     frames = random.integers(0, 256, (3, 120, 150), np.uint8)
     with_events = [(*pair, random.random((18, 120, 150)).astype(np.float16)) for pair in zip(frames, frames[1:])]
     without = [(previous, following, 0 * volume) for previous, following, volume in with_events]
-    first, second, other = (next(self_supervised.batches(pairs, seed)) for pairs, seed in ((with_events, 1), (without, 1), (with_events, 2)))
+    first, second, other = (next(self_supervised.batches(pairs, seed))
+                            for pairs, seed in ((with_events, 1), (without, 1), (with_events, 2)))
     assert torch.equal(first[0], second[0]) and torch.equal(first[1], second[1]) and not torch.equal(first[0], other[0])
     assert first[0].shape == (4, 1, 96, 96) and first[2].shape == (4, 18, 96, 96)
 
@@ -125,7 +131,8 @@ def test_no_scene_is_learnt_from_and_tested_on(tmp_path):
 
 @pytest.fixture
 def recording_folder(tmp_path):
-    """Two recordings of a pattern that moves to the right by a pixel a frame; at each pixel that changes there is an event of the change's sign."""
+    """Two recordings of a pattern that moves to the right by a pixel a frame;
+    at each pixel that changes there is an event of the change's sign."""
     pattern = np.kron(np.random.default_rng(5).integers(20, 230, (14, 60)), np.ones((8, 8), int)).astype(np.uint8)
     (tmp_path / "recordings").mkdir()
     for name, start in (("one_scene", 100), ("other_scene", 300)):
@@ -145,8 +152,9 @@ def recording_folder(tmp_path):
 
 def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     def run(*more, expect=0):
-        done = subprocess.run([sys.executable, EXAMPLES / "self_supervised.py", "--program", os.environ["EVENTGAN_PROGRAM"], "--recordings",
-                               recording_folder, "--out", tmp_path / "out", "--steps", "2", "--with", "difference", "real", *more],
+        done = subprocess.run([sys.executable, EXAMPLES / "self_supervised.py", "--program",
+                               os.environ["EVENTGAN_PROGRAM"], "--recordings", recording_folder, "--out",
+                               tmp_path / "out", "--steps", "2", "--with", "difference", "real", *more],
                               capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
         assert done.returncode == expect, done.stdout + done.stderr
         return done.stdout + done.stderr
@@ -158,5 +166,6 @@ def test_a_small_run_fills_the_table_and_goes_on(recording_folder, tmp_path):
     assert "| difference | " in first and (tmp_path / "out" / "one_scene.png").exists()
     second = run("--seeds", "2")
     assert "real 0 0" not in second and "real 0 1" in second
-    assert json.loads((tmp_path / "out" / "results.json").read_text())["runs"]["real 0 0"] == results["runs"]["real 0 0"]
+    assert (json.loads((tmp_path / "out" / "results.json").read_text())["runs"]["real 0 0"]
+            == results["runs"]["real 0 0"])
     assert "expected the settings" in run("--steps", "3", expect=1)

@@ -82,13 +82,15 @@ def test_changed_volumes(folder):
     changed = shards.changed(half).changed(lambda sample: sample["volume"] + sample["pair"]["gap_frames"])
     for stored, sample in zip(shards, changed):
         if sample["valid"]:
-            np.testing.assert_allclose(sample["volume"], stored["volume"] * stored["scale"] / 2 + sample["pair"]["gap_frames"], rtol=1e-6)
+            np.testing.assert_allclose(sample["volume"],
+                                       stored["volume"] * stored["scale"] / 2 + sample["pair"]["gap_frames"], rtol=1e-6)
             assert sample["volume"].dtype == np.float32 and "scale" not in sample
         else:
             assert not sample["volume"].any()
     assert changed[1:].sample(0, {"volume"})["volume"].tolist() == changed[1]["volume"].tolist()
     assert "pair" not in changed.sample(0, {"boxes"})
-    assert pickle.loads(pickle.dumps(shards.changed(half)))[0]["volume"].tolist() == shards.changed(half)[0]["volume"].tolist()
+    assert (pickle.loads(pickle.dumps(shards.changed(half)))[0]["volume"].tolist()
+            == shards.changed(half)[0]["volume"].tolist())
 
 
 def test_labels(folder):
@@ -130,14 +132,16 @@ def test_what_a_notebook_shows(two_shards, monkeypatch):
     assert table(Shards(two_shards, invalid="keep"))["samples"] == "10"
     part = table(shards[[0]])
     assert part["volumes"] == "4 x 6 x 8, uint8: 1" and part["quarantined"] == shown["quarantined"]
-    assert part["boxes"] == (", ".join(f"{name}: {count}" for name, count in sorted(shards[[0]].class_counts().items()) if count) or "none")
+    assert part["boxes"] == (", ".join(f"{name}: {count}" for name, count in sorted(shards[[0]].class_counts().items())
+                                       if count) or "none")
     assert table(shards[:0]) == {"samples": "0", "quarantined": "2 in these shards"}
 
 
 def test_what_a_notebook_shows_opens_a_shard_once(two_shards, monkeypatch):
     shards, opened = Shards(two_shards, open_files=1), []
     shards.close()
-    monkeypatch.setattr(shards_module, "open_shard", lambda path, open_shard=shards_module.open_shard: opened.append(path) or open_shard(path))
+    monkeypatch.setattr(shards_module, "open_shard",
+                        lambda path, open_shard=shards_module.open_shard: opened.append(path) or open_shard(path))
     shards._repr_html_()
     assert opened == shards.paths
 
@@ -196,7 +200,8 @@ def test_ids_from_a_list_or_a_file(two_shards, tmp_path):
     assert len(Shards(two_shards, ids=[])) == 0
     listed.write_text("000004\n", encoding="utf-8-sig")  # as Windows' editors begin a file
     assert ids_of(Shards(two_shards, ids=listed)) == ["000004"] * 2
-    with pytest.raises(ValueError, match=r"expected sample ids of .* \('000000', '000001', .*\), got 1 that it does not have .'7'., in ids"):
+    with pytest.raises(ValueError, match=r"expected sample ids of .* \('000000', '000001', .*\), got 1 that it does "
+                       r"not have .'7'., in ids"):
         Shards(two_shards, ids=["7", "000000", "000002"])  # 000002 is in quarantine
 
 
@@ -225,7 +230,8 @@ def test_a_frame_s_id_stands_for_all_its_samples(folder):
 def test_many_ids_are_found_at_once(folder):
     shards = Shards(folder)
     shards.column = lambda name: np.array([f"{i}@before1" for i in range(100_000)], object)
-    chosen = shards._with_ids([str(i) for i in range(0, 100_000, 2)], np.ones(100_000, bool))  # pair by pair it would not end
+    # pair by pair it would not end
+    chosen = shards._with_ids([str(i) for i in range(0, 100_000, 2)], np.ones(100_000, bool))
     assert chosen.tolist() == [True, False] * 50_000
 
 
@@ -234,16 +240,20 @@ def test_where(two_shards):
     assert ids_of(Shards(two_shards, where={"class": "Car"})) == ["000000", "000003"] * 2
     assert ids_of(Shards(two_shards, where={"class": ["Car"], "sequence": ["drive_1"]})) == ["000003"] * 2
     assert len(Shards(two_shards, where={"gap": 2})) == 8
-    for where in ({"gap": [1, 2]}, {"sequence": "drive_7"}, {"class": "Bus"}, {"class": "DontCare"}):  # a box to be ignored is none
+    # a box to be ignored is none
+    for where in ({"gap": [1, 2]}, {"sequence": "drive_7"}, {"class": "Bus"}, {"class": "DontCare"}):
         with pytest.raises(ValueError, match="that it does not have"):
             Shards(two_shards, where=where)
     with pytest.raises(ValueError, match=f"expected a split of train, got 'val', in {two_shards}"):
         Shards(two_shards, split="val")
-    with pytest.raises(ValueError, match=r"expected classes of .* \('Car'\), got 1 that it does not have \('Bus'\), in where"):
+    with pytest.raises(ValueError,
+                       match=r"expected classes of .* \('Car'\), got 1 that it does not have \('Bus'\), in where"):
         Shards(two_shards, where={"class": ["Car", "Bus"]})
-    with pytest.raises(ValueError, match=r"expected values of sequence of .* \('drive_0', 'drive_1', 'drive_2'\), got 1 that it does not have \('drive_7'\)"):
+    with pytest.raises(ValueError, match=r"expected values of sequence of .* \('drive_0', 'drive_1', 'drive_2'\), got "
+                       r"1 that it does not have \('drive_7'\)"):
         Shards(two_shards, where={"sequence": "drive_7"})
-    with pytest.raises(ValueError, match=f"expected values of gap of {two_shards}, split train .2., got 1 that it does not have .1., in where"):
+    with pytest.raises(ValueError, match=f"expected values of gap of {two_shards}, split train .2., got 1 that it does "
+                       "not have .1., in where"):
         Shards(two_shards, split="train", where={"gap": 1})
     with pytest.raises(ValueError, match="expected a column of action, camera, .*, got 'weather', in "):
         Shards(two_shards, where={"weather": "rain"})
@@ -269,7 +279,8 @@ def test_the_order_of_where_does_not_matter(two_shards):
         assert ids_of(Shards(two_shards, where=where)) == ["000003"] * 2
     one, other = {"ids": ["000001"]}, {"sequence": "drive_1"}
     assert len(Shards(two_shards, where=other, **one)) == 0  # both exist, but in no sample together
-    assert len(Shards(two_shards, where={**other, "sample_id": "000001"})) == len(Shards(two_shards, where={"sample_id": "000001", **other})) == 0
+    assert (len(Shards(two_shards, where={**other, "sample_id": "000001"}))
+            == len(Shards(two_shards, where={"sample_id": "000001", **other})) == 0)
 
 
 def test_divided_parts_share_no_sequence(two_shards):
@@ -322,7 +333,8 @@ def test_what_images_cover(folder):
         del file["pairs/source_to_volume"]
         file["pairs/source_to_volume"] = [[[0.25, 0, 1.625], [0, 0.25, 0.625]]] * 5
     assert Shards(folder / NAME).image_area().tolist() == [2, 1, 6, 4]
-    with h5py.File(folder / NAME, "r+") as file:  # stills of 16x8, of which the letterbox shows the middle 8x4 in 8x4 of its 8x6 pixels
+    # stills of 16x8, of which the letterbox shows the middle 8x4 in 8x4 of its 8x6 pixels
+    with h5py.File(folder / NAME, "r+") as file:
         file["pairs/motion"][:] = [[1, 0, 0, 1]] * 5
         file["pairs/source_size"][:] = [[8, 16]] * 4 + [[0, 0]]
         file["pairs/source_to_volume"][:] = [[[1, 0, -4], [0, 1, -1]]] * 4 + [[[np.nan] * 3] * 2]
@@ -339,7 +351,8 @@ def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
     assert len(Shards(two_shards, partial=True)) == 4
     (two_shards / SECOND).unlink()
     assert len(Shards(two_shards)) == 4
-    (two_shards / "plan.json").write_text(json.dumps({"shards": [{"name": NAME}, {"name": "demo-train-00001-of-00003.h5"}]}))
+    (two_shards / "plan.json").write_text(
+        json.dumps({"shards": [{"name": NAME}, {"name": "demo-train-00001-of-00003.h5"}]}))
     with pytest.raises(ValueError, match="expected 2 finished shards, got 1 unfinished .demo-train-00001-of-00003.h5."):
         Shards(two_shards)
     (two_shards / "plan.json").unlink()
@@ -353,22 +366,26 @@ def test_shards_that_are_not_done_are_named_or_left_out(two_shards):
 
 def test_a_description_that_misses_shards(folder):
     record = json.loads((folder / NAME).with_suffix(".json").read_text())
-    entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
+    entry = {"name": NAME, "split": "train", "samples": 5, "size_bytes": record["size_bytes"],
+             "sha256": record["sha256"]}
     quarantined = [{"shard": NAME, "slot": 2}]
-    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry], "missing": [SECOND],
-                                                     "quarantined": quarantined}))
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry],
+                                                     "missing": [SECOND], "quarantined": quarantined}))
     with pytest.raises(ValueError, match=f"expected 2 finished shards, got 1 unfinished .{SECOND}."):
         Shards(folder)
     assert len(Shards(folder, partial=True)) == 4
 
 
-@pytest.mark.parametrize("name", [f"../out/{NAME}", "{folder}/" + NAME, f"./{NAME}", "other.h5", f"{NAME}\n", f"..-train-{NAME}", 7])
+@pytest.mark.parametrize("name", [f"../out/{NAME}", "{folder}/" + NAME, f"./{NAME}", "other.h5", f"{NAME}\n",
+                                  f"..-train-{NAME}", 7])
 def test_names_in_a_description_that_are_no_shards_are_refused(folder, name):
     record = json.loads((folder / NAME).with_suffix(".json").read_text())
     name = name.format(folder=folder) if isinstance(name, str) else name
     (folder / "other.h5").write_bytes((folder / NAME).read_bytes())
-    entry = {"name": name, "split": "train", "samples": 5, "size_bytes": record["size_bytes"], "sha256": record["sha256"]}
-    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry], "quarantined": []}))
+    entry = {"name": name, "split": "train", "samples": 5, "size_bytes": record["size_bytes"],
+             "sha256": record["sha256"]}
+    (folder / "dataset.json").write_text(json.dumps({"format": "eventgan-dataset", "version": "1.0", "shards": [entry],
+                                                     "quarantined": []}))
     with pytest.raises(ValueError, match="expected the name of a shard beside it, got .*dataset.json"):
         Shards(folder)
 

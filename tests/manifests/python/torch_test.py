@@ -11,12 +11,12 @@ import pytest
 from conftest import NAME, SOURCE
 
 torch = pytest.importorskip("torch")
-from torch.utils.data import DataLoader  # noqa: E402
+from torch.utils.data import DataLoader
 
-from eventgan import Shards  # noqa: E402
-from eventgan.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,  # noqa: E402
-                                   PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
-                                   flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
+from eventgan import Shards
+from eventgan.torch import (DetectionDataset, EventAugmentation, KeypointDataset, PoseAugmentation,
+                            PoseDataset, collate_torchvision, collate_yolo, exchange_first_convolution, fitted,
+                            flip_pairs, heatmaps, inverse, mixture, move_boxes, move_points, warp)
 
 JOINTS = ["nose", "left hand", "right hand"]
 TRAINERS = pathlib.Path(os.environ.get("EVENTGAN_TEST_TRAINERS", SOURCE.parent / "shared" / "trainers"))
@@ -95,8 +95,9 @@ def test_time_runs_backwards_only_where_labels_stay_in_place(shards, folder):
     assert torch.equal(backwards(item)["volume"], plain)
 
 
-@pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)}, {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2},
-                                   {"threshold": (0.2, 0.1)}, {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
+@pytest.mark.parametrize("wrong", [{"flip": 1.5}, {"drop": -0.1}, {"reverse": 2}, {"scale": (0, 1)},
+                                   {"scale": (1.2, 0.8)}, {"shift": -1}, {"invert": 2}, {"threshold": (0.2, 0.1)},
+                                   {"lost": (0, 1.1)}, {"isolated": (-0.1, 0)}, {"lost": (float("nan"), 1)}])
 def test_augmentations_that_cannot_be(wrong):
     with pytest.raises(ValueError, match="expected "):
         EventAugmentation(**wrong)
@@ -104,15 +105,18 @@ def test_augmentations_that_cannot_be(wrong):
 
 def test_events_in_one_signed_channel():
     signed = torch.tensor([[[0.5, -1.0, 0.0]]])
-    assert EventAugmentation(reverse=1).events(signed).tolist() == EventAugmentation(invert=1).events(signed).tolist() == [[[-0.5, 1, 0]]]
+    assert (EventAugmentation(reverse=1).events(signed).tolist() == EventAugmentation(invert=1).events(signed).tolist()
+            == [[[-0.5, 1, 0]]])
     torch.manual_seed(0)
-    assert {tuple(EventAugmentation(drop=1).events(signed).flatten().tolist()) for _ in range(20)} == {(0.5, 0, 0), (0, -1, 0)}
+    assert {tuple(EventAugmentation(drop=1).events(signed).flatten().tolist())
+            for _ in range(20)} == {(0.5, 0, 0), (0, -1, 0)}
     volume = torch.arange(1.0, 7).reshape(6, 1, 1)  # three bins: positive 1, 2, 3, negative 4, 5, 6
     assert EventAugmentation(invert=1).events(volume).flatten().tolist() == [4, 5, 6, 1, 2, 3]
 
 
 def test_another_sensor_s_threshold():
-    """98 of 100 pixels with events have 1 to 98 of them, in two channels, and two have 200: the 98th percentile is 98 + 0.02 (200 - 98) of them."""
+    """98 of 100 pixels with events have 1 to 98 of them, in two channels, and two have 200:
+    the 98th percentile is 98 + 0.02 (200 - 98) of them."""
     counts = torch.tensor([*range(1, 99), 200, 200, *[0] * 28]).float().reshape(1, 8, 16)
     for volume in (torch.cat([0.25 * counts, 0.75 * counts]), counts, -counts):
         left = EventAugmentation(threshold=(0.5, 0.5)).sensor(volume)
@@ -135,7 +139,8 @@ def test_another_sensor_s_lost_and_isolated_events():
     volume[0, 0, :50] = 2.0
     added = EventAugmentation(isolated=(0.02, 0.02)).sensor(volume) - volume
     places = added[:, 1:].nonzero()
-    assert 180 < len(places) <= 200 and set(places[:, 0].tolist()) == {0, 1, 2, 3}  # 200 of 10,000, some at one place or in the first line
+    # 200 of 10,000, some at one place or in the first line
+    assert 180 < len(places) <= 200 and set(places[:, 0].tolist()) == {0, 1, 2, 3}
     assert 0.6 <= added[:, 1:][added[:, 1:] != 0].min() and added.max() <= 2.0
     signed = EventAugmentation(isolated=(0.02, 0.02)).sensor(volume[:1])[:, 1:]
     assert 60 < (signed > 0).sum() < 140 and 60 < (signed < 0).sum() < 140
@@ -151,7 +156,8 @@ def test_a_sensor_that_is_left_alone_draws_nothing():
 
 
 def test_an_item_in_memory_is_changed_as_one_that_is_read(shards):
-    augmentation = EventAugmentation(flip=0.5, scale=(0.5, 2), shift=0.2, threshold=(0, 0.3), lost=(0, 0.4), isolated=(0, 0.1))
+    augmentation = EventAugmentation(flip=0.5, scale=(0.5, 2), shift=0.2, threshold=(0, 0.3), lost=(0, 0.4),
+                                     isolated=(0, 0.1))
     plain, changed = DetectionDataset(shards), DetectionDataset(shards, augmentation=augmentation)
     for i in range(len(shards)):
         item = plain[i]
@@ -211,7 +217,8 @@ def test_classes_are_numbered_alike_in_all_parts(folder):
     with h5py.File(folder / NAME, "r+") as file:
         file["labels/boxes/class_id"].attrs["class_names"] = ["Van", "Car", "DontCare"]
         file["labels/boxes/class_id"][...] += 1
-    assert [DetectionDataset(part).classes for part in (Shards(folder / NAME), Shards(folder / NAME)[1:2])] == [{"Van": 0, "Car": 1}] * 2
+    assert [DetectionDataset(part).classes
+            for part in (Shards(folder / NAME), Shards(folder / NAME)[1:2])] == [{"Van": 0, "Car": 1}] * 2
 
 
 def test_volumes_that_the_shards_leave_stored_are_decoded(folder):
@@ -243,7 +250,9 @@ def test_an_area_of_the_volume_fills_the_item(shards):
 def test_what_a_yolo_trainer_takes(shards):
     imgs, targets, ids = next(iter(DataLoader(DetectionDataset(shards), batch_size=4, collate_fn=collate_yolo)))
     assert imgs.shape == (4, 4, 6, 8) and imgs.dtype == torch.float32
-    np.testing.assert_allclose(targets, [[0, 0, 2.625 / 8, 2.75 / 6, 3.25 / 8, 3.5 / 6], [2, 0, 6.5 / 8, 1.5 / 6, 3 / 8, 3 / 6]], rtol=1e-6)
+    np.testing.assert_allclose(targets,
+                               [[0, 0, 2.625 / 8, 2.75 / 6, 3.25 / 8, 3.5 / 6], [2, 0, 6.5 / 8, 1.5 / 6, 3 / 8, 3 / 6]],
+                               rtol=1e-6)
     assert ids == ["000000", "000001", "000003", "000004"]
     assert collate_yolo([DetectionDataset(shards)[1]])[1].shape == (0, 6)
 
@@ -257,7 +266,8 @@ def test_what_torchvision_takes(shards):
 
 def test_keypoint_items(shards):
     item = KeypointDataset(shards, JOINTS, margin=0)[0]
-    # 1.5, 1.75 and 2.25, 2.875; the second person also has 3.25, 3.25. The centre of a pixel is 0.5 right of its left edge.
+    # 1.5, 1.75 and 2.25, 2.875; the second person also has 3.25, 3.25. The centre of a pixel is 0.5 right of its left
+    # edge.
     np.testing.assert_allclose(item["boxes"], [[1.5, 1.75, 3.25, 3.875], [1.5, 1.75, 4.25, 4.25]])
     assert item["keypoints"][0].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [0, 0, 0]]
     assert item["keypoints"][1].tolist() == [[1.5, 1.75, 2], [2.25, 2.875, 1], [3.25, 3.25, 2]]
@@ -281,20 +291,27 @@ def words_of(path, begin, end):
 
 
 HUMAN36M = "stages/frames/human36m/human36m_dataset.cc"
-LISTS = {  # every one that the program names itself: path, text before it, text behind it, its joints on the left, and on the right
+# every one that the program names itself: path, text before it, text behind it, its joints on the left, and on the
+# right
+LISTS = {
     "MPII": ("stages/frames/mpii/mpii_annotations.cc", "schema{", "}};",
              ["l_" + name for name in ("ankle", "knee", "hip", "wrist", "elbow", "shoulder")],
              ["r_" + name for name in ("ankle", "knee", "hip", "wrist", "elbow", "shoulder")]),
-    "MPII's short names": ("stages/exports/pose_list.cc", 'kNames[] = {', "};", ["lank", "lkne", "lhip", "lwri", "lelb", "lsho"],
+    "MPII's short names": ("stages/exports/pose_list.cc", 'kNames[] = {', "};",
+                           ["lank", "lkne", "lhip", "lwri", "lelb", "lsho"],
                            ["rank", "rkne", "rhip", "rwri", "relb", "rsho"]),
-    "Human3.6M, 17": (HUMAN36M, "count == 17", "};", ["left_" + name for name in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")],
+    "Human3.6M, 17": (HUMAN36M, "count == 17", "};",
+                      ["left_" + name for name in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")],
                       ["right_" + name for name in ("hip", "knee", "foot", "shoulder", "elbow", "wrist")]),
     "Human3.6M, 32": (HUMAN36M, "count == 32", "};",
-                      ["LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", "LeftToeBase_Site", "LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand",
+                      ["LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToeBase", "LeftToeBase_Site", "LeftShoulder", "LeftArm",
+                       "LeftForeArm", "LeftHand",
                        "LeftHandThumb", "LeftHandThumb_Site", "L_Wrist_End", "L_Wrist_End_Site"],
-                      ["RightUpLeg", "RightLeg", "RightFoot", "RightToeBase", "RightToeBase_Site", "RightShoulder", "RightArm", "RightForeArm", "RightHand",
+                      ["RightUpLeg", "RightLeg", "RightFoot", "RightToeBase", "RightToeBase_Site", "RightShoulder",
+                       "RightArm", "RightForeArm", "RightHand",
                        "RightHandThumb", "RightHandThumb_Site", "R_Wrist_End", "R_Wrist_End_Site"]),
-    "DHP19": ("stages/frames/events/dhp19_dataset.cc", "kJoints = {", "};", ["shoulderL", "elbowL", "hipL", "handL", "kneeL", "footL"],
+    "DHP19": ("stages/frames/events/dhp19_dataset.cc", "kJoints = {", "};",
+              ["shoulderL", "elbowL", "hipL", "handL", "kneeL", "footL"],
               ["shoulderR", "elbowR", "hipR", "handR", "kneeR", "footR"])}
 
 
@@ -303,8 +320,10 @@ def test_a_mirror_exchanges_the_sides_of_every_list_that_the_program_writes(name
     path, begin, end, left, right = LISTS[name]
     names = words_of(path, begin, end)
     names = list(dict.fromkeys(names[1::2])) if name == "MPII's short names" else names
-    assert len(names) == {"MPII": 16, "MPII's short names": 16, "Human3.6M, 17": 17, "Human3.6M, 32": 32, "DHP19": 13}[name]
-    assert {(names[i], names[j]) for i, j in flip_pairs(names)} == set(zip(left, right)) and len(flip_pairs(names)) == len(left)
+    assert len(names) == {"MPII": 16, "MPII's short names": 16, "Human3.6M, 17": 17,
+                          "Human3.6M, 32": 32, "DHP19": 13}[name]
+    assert ({(names[i], names[j]) for i, j in flip_pairs(names)} == set(zip(left, right))
+            and len(flip_pairs(names)) == len(left))
     for i in range(len(names)):  # and nothing is left where it is if one is missing
         if names[i] in left and name != "MPII's short names":
             with pytest.raises(ValueError, match=f"got {right[left.index(names[i])]} without a counterpart"):
@@ -312,9 +331,10 @@ def test_a_mirror_exchanges_the_sides_of_every_list_that_the_program_writes(name
 
 
 @pytest.mark.parametrize(("left", "right"), [
-    ("lShoulder", "rShoulder"), ("LShoulder", "RShoulder"), ("LBigToe", "RBigToe"), ("ShoulderLeft", "ShoulderRight"), ("LEFT_HIP", "RIGHT_HIP"),
-    ("hip_l", "hip_r"), ("Hip_L", "Hip_R"), ("hip.L", "hip.R"), ("hip_left", "hip_right"), ("handL_end", "handR_end"), ("hip (l)", "hip (r)"),
-    ("body_l_hip", "body_r_hip"), ("l", "r"), ("toe1L", "toe1R")])
+    ("lShoulder", "rShoulder"), ("LShoulder", "RShoulder"), ("LBigToe", "RBigToe"), ("ShoulderLeft", "ShoulderRight"),
+    ("LEFT_HIP", "RIGHT_HIP"),
+    ("hip_l", "hip_r"), ("Hip_L", "Hip_R"), ("hip.L", "hip.R"), ("hip_left", "hip_right"), ("handL_end", "handR_end"),
+    ("hip (l)", "hip (r)"), ("body_l_hip", "body_r_hip"), ("l", "r"), ("toe1L", "toe1R")])
 def test_sides_in_names_of_one_s_own(left, right):
     assert flip_pairs([right, "nose", left]) == [(2, 0)]
     for alone in (left, right):
@@ -323,7 +343,8 @@ def test_sides_in_names_of_one_s_own(left, right):
 
 
 def test_names_that_suggest_no_side():
-    middle = ["root (pelvis)", "Spine1", "neck_base", "ROOT", "L5", "Head_Site", "lower back", "rib", "tail", "C7", "nostril"]
+    middle = ["root (pelvis)", "Spine1", "neck_base", "ROOT", "L5", "Head_Site", "lower back", "rib", "tail", "C7",
+              "nostril"]
     assert flip_pairs(middle) == []
     with pytest.raises(ValueError, match="got joint_0, joint_1 without a counterpart"):  # of which nothing is known
         flip_pairs(["joint_0", "joint_1"])
@@ -336,9 +357,11 @@ def test_persons_of_dhp19_s_names_are_mirrored(folder):
         file["labels/poses"].attrs["joint_names"] = ["head", "handL", "handR"]
         file["labels/poses"].attrs["joint_aliases"] = ["", "", ""]
     shards = Shards(folder / NAME)
-    keypoints = [KeypointDataset(shards, augmentation=EventAugmentation(flip=flip))[0]["keypoints"][1] for flip in (0, 1)]
+    keypoints = [KeypointDataset(shards, augmentation=EventAugmentation(flip=flip))[0]["keypoints"][1]
+                 for flip in (0, 1)]
     np.testing.assert_allclose(keypoints[1][:, 0], 7 - keypoints[0][[0, 2, 1], 0])  # of 8 columns
-    persons = [PoseDataset(shards, size=(64, 64), augmentation=PoseAugmentation(scale=0, rotated=0, flip=flip))[1] for flip in (0, 1)]
+    persons = [PoseDataset(shards, size=(64, 64), augmentation=PoseAugmentation(scale=0, rotated=0, flip=flip))[1]
+               for flip in (0, 1)]
     np.testing.assert_allclose(persons[1][3]["joints"][:, 0], 63 - persons[0][3]["joints"][[0, 2, 1], 0])
     assert PoseDataset(shards).flip_pairs == [(1, 2)]
     lost = PoseAugmentation(scale=0, rotated=0, flip=0, events=EventAugmentation(flip=0, lost=(1, 1)))
@@ -350,7 +373,8 @@ def test_persons_of_dhp19_s_names_are_mirrored(folder):
         dataset(shards, joints=["head", "handL"])[0]
 
 
-@pytest.mark.parametrize(("moved", "center", "scale"), [(False, [2.75, 2.25 + 15 * 0.875], 1.25 * 0.875), (True, [2.75, 2.25], 0.875)])
+@pytest.mark.parametrize(("moved", "center", "scale"),
+                         [(False, [2.75, 2.25 + 15 * 0.875], 1.25 * 0.875), (True, [2.75, 2.25], 0.875)])
 def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
     with h5py.File(folder / NAME, "r+") as file:
         file["pairs/dataset"][...] = "mpii_list"
@@ -360,9 +384,11 @@ def test_mpii_s_centres_are_moved_once(folder, moved, center, scale):
 
 
 def test_joints_by_the_names_in_common_use(shards):
-    assert PoseDataset(shards, joints=["right_wrist", "nose"], size=(64, 64))[1][3]["joints_vis"].tolist() == [[1, 1, 0]] * 2
+    assert PoseDataset(shards,
+                       joints=["right_wrist", "nose"], size=(64, 64))[1][3]["joints_vis"].tolist() == [[1, 1, 0]] * 2
     for dataset in (PoseDataset, KeypointDataset):
-        with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand or left_wrist, right_wrist, got tail, in .*'dataset'"):
+        with pytest.raises(ValueError, match="expected joints of nose, left hand, right hand or left_wrist, "
+                           "right_wrist, got tail, in .*'dataset'"):
             dataset(shards, joints=["tail"])
 
 
@@ -373,21 +399,26 @@ def test_pose_items(shards):
     assert input.shape == (4, 64, 64) and target.shape == (3, 16, 16) and weight.tolist() == [[1], [1], [1]]
     zoom = 64 / 175
     np.testing.assert_allclose(meta["joints"][0], [32 + (1.5 - 2.75) * zoom, 32 + (1.75 - 2.25) * zoom, 0])
-    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_volume"]), [[1.5, 1.75], [2.25, 2.875], [3.25, 3.25]], atol=1e-9)
-    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"]), [[3.5, 4], [5, 6.25], [7, 7]], atol=1e-9)
+    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_volume"]),
+                               [[1.5, 1.75], [2.25, 2.875], [3.25, 3.25]], atol=1e-9)
+    np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"]), [[3.5, 4], [5, 6.25], [7, 7]],
+                               atol=1e-9)
     assert (meta["image"], meta["index"], meta["person"]) == ("000000", 0, 1)
 
 
 def test_joints_in_common_use_are_taken_unless_told_otherwise(shards):
-    assert PoseDataset(shards, size=(64, 64)).joint_names == KeypointDataset(shards).joint_names == ["left_wrist", "right_wrist"]
+    assert (PoseDataset(shards, size=(64, 64)).joint_names == KeypointDataset(shards).joint_names
+            == ["left_wrist", "right_wrist"])
     sources = [shards.labels(index)["persons"]["joints_source"][row, 2].tolist() for index, row in shards.persons]
     annotated = [source != [-1, -1] for source in sources]
     assert shards.annotated(["right hand"]).tolist() == annotated and len(set(annotated)) == 2
-    assert PoseDataset(shards, joints=["right hand"], size=(64, 64)).persons.tolist() == shards.persons[annotated].tolist()
+    assert PoseDataset(shards,
+                       joints=["right hand"], size=(64, 64)).persons.tolist() == shards.persons[annotated].tolist()
 
 
 def test_datasets_without_anything_to_learn_say_so(shards, example, folder):
-    with pytest.raises(ValueError, match=f"expected persons of whom one of left_wrist, right_wrist is annotated, got none, in {folder}"):
+    with pytest.raises(ValueError, match="expected persons of whom one of left_wrist, right_wrist is annotated, got "
+                       f"none, in {folder}"):
         PoseDataset(shards[1:2])
     unlabelled = Shards(example.path("unlabelled"))
     for dataset, what in ((PoseDataset, "joints"), (KeypointDataset, "joints"), (DetectionDataset, "boxes")):
@@ -439,12 +470,14 @@ def test_varied_poses_still_lead_back(shards):
         meta = persons[1][3]
         flips.add(meta["flipped"])
         order = [0, 2, 1] if meta["flipped"] else [0, 1, 2]
-        np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"])[order], [[3.5, 4], [5, 6.25], [7, 7]], atol=1e-6)
+        np.testing.assert_allclose(move_points(meta["joints"][:, :2], meta["to_source"])[order],
+                                   [[3.5, 4], [5, 6.25], [7, 7]], atol=1e-6)
     assert flips == {False, True}
 
 
 def test_heatmaps():
-    maps, weight = heatmaps(np.array([[5.4, 3.6], [-1, 2], [4, 4], [-9, 2]]), np.array([True, True, False, True]), 12, 10, 1.0)
+    maps, weight = heatmaps(np.array([[5.4, 3.6], [-1, 2], [4, 4], [-9, 2]]), np.array([True, True, False, True]), 12,
+                            10, 1.0)
     assert weight.tolist() == [[1], [1], [0], [0]]
     assert np.unravel_index(maps[0].argmax(), (12, 10)) == (4, 5) and maps[0].max() == 1
     np.testing.assert_allclose(maps[0, 4, 3:9], np.exp(-np.array([4, 1, 0, 1, 4, 9]) / 2), rtol=1e-6)
@@ -457,8 +490,11 @@ def test_crops_and_heatmaps_are_those_of_simple_baselines(monkeypatch):
     transforms = pytest.importorskip("utils.transforms")
     from eventgan.torch import _crop
     joints_dataset = pytest.importorskip("dataset.JointsDataset")
-    for center, scale, rotation, (width, height) in (((100, 80), 0.7, 0, (256, 256)), ((31.5, 47.25), 1.3, -40, (192, 256)), ((0, 0), 2.0, 75, (256, 192))):
-        expected = transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation, [width, height])
+    for center, scale, rotation, (width, height) in (((100, 80), 0.7, 0, (256, 256)),
+                                                     ((31.5, 47.25), 1.3, -40, (192, 256)),
+                                                     ((0, 0), 2.0, 75, (256, 192))):
+        expected = transforms.get_affine_transform(np.array(center, float), np.array([scale, scale]), rotation,
+                                                   [width, height])
         np.testing.assert_allclose(_crop(np.array(center, float), scale, rotation, height, width), expected, atol=1e-3)
     theirs = joints_dataset.JointsDataset.__new__(joints_dataset.JointsDataset)
     theirs.num_joints, theirs.target_type, theirs.sigma = 4, "gaussian", 2
@@ -481,7 +517,8 @@ def test_datasets_are_mixed_by_share():
 
 
 def test_the_first_convolution_is_exchanged():
-    model = torch.nn.Sequential(torch.nn.Sequential(torch.nn.Conv2d(3, 8, 7, 2, 3, bias=False), torch.nn.ReLU()), torch.nn.Conv2d(8, 4, 1))
+    model = torch.nn.Sequential(torch.nn.Sequential(torch.nn.Conv2d(3, 8, 7, 2, 3, bias=False), torch.nn.ReLU()),
+                                torch.nn.Conv2d(8, 4, 1))
     kept = model[1].weight.clone()
     assert exchange_first_convolution(model, 18) is model
     assert model(torch.zeros(1, 18, 16, 16)).shape == (1, 4, 8, 8)
@@ -495,9 +532,12 @@ def test_the_first_convolution_is_exchanged():
 
 @pytest.mark.parametrize("start", ["fork", "spawn"])
 def test_loaders_with_workers(shards, start):
-    loader = DataLoader(DetectionDataset(shards), batch_size=2, num_workers=2, multiprocessing_context=start, collate_fn=collate_yolo)
+    loader = DataLoader(DetectionDataset(shards), batch_size=2, num_workers=2, multiprocessing_context=start,
+                        collate_fn=collate_yolo)
     assert [ids for _, _, ids in loader] == [["000000", "000001"], ["000003", "000004"]]
-    poses = DataLoader(PoseDataset(shards, size=(32, 32), joints=JOINTS), batch_size=3, num_workers=1, multiprocessing_context=start)
+    poses = DataLoader(PoseDataset(shards, size=(32, 32), joints=JOINTS), batch_size=3, num_workers=1,
+                       multiprocessing_context=start)
     input, target, weight, meta = next(iter(poses))
-    assert input.shape == (3, 4, 32, 32) and target.shape == (3, 3, 8, 8) and meta["image"] == ["000000", "000000", "000004"]
+    assert (input.shape == (3, 4, 32, 32) and target.shape == (3, 3, 8, 8)
+            and meta["image"] == ["000000", "000000", "000004"])
     assert meta["to_source"].shape == (3, 2, 3)

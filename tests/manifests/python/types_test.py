@@ -17,16 +17,19 @@ MODULES = sorted((PACKAGE / "eventgan").glob("*.py"))
 def test_every_function_says_what_it_takes_and_gives(path):
     for function in ast.walk(ast.parse(path.read_text())):
         if isinstance(function, ast.FunctionDef):
-            given = [each for each in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs, function.args.vararg, function.args.kwarg)
+            given = [each for each in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs,
+                                       function.args.vararg, function.args.kwarg)
                      if each and each.arg not in ("self", "cls")]
-            assert function.returns and all(each.annotation for each in given), f"{path}:{function.lineno}: {function.name}"
+            assert function.returns and all(each.annotation
+                                            for each in given), f"{path}:{function.lineno}: {function.name}"
 
 
 def test_mypy_agrees(tmp_path):
     pytest.importorskip("mypy")
     if int(np.__version__.split(".")[0]) > 1:
         pytest.skip("NumPy 1, whose types the hints were written against")
-    done = subprocess.run([sys.executable, "-m", "mypy", "--config-file", PACKAGE / "pyproject.toml", "--cache-dir", tmp_path, PACKAGE / "eventgan"],
+    done = subprocess.run([sys.executable, "-m", "mypy", "--config-file", PACKAGE / "pyproject.toml", "--cache-dir",
+                           tmp_path, PACKAGE / "eventgan"],
                           capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
 
@@ -51,10 +54,13 @@ def test_public_names_are_described_with_the_parameters_that_they_have(path):
             function = node
             if isinstance(node, ast.ClassDef):
                 check(node.body, f"{node.name}.")
-                function = next((each for each in node.body if isinstance(each, ast.FunctionDef) and each.name == "__init__"), None)
+                function = next((each for each in node.body if isinstance(each, ast.FunctionDef)
+                                 and each.name == "__init__"), None)
             if function and documented(docstring) is not None:
                 arguments = function.args
-                given = [*arguments.posonlyargs, *arguments.args, arguments.vararg, *arguments.kwonlyargs, arguments.kwarg]
-                assert sorted(documented(docstring)) == sorted(each.arg for each in given if each and each.arg not in ("self", "cls")), name
+                given = [*arguments.posonlyargs, *arguments.args, arguments.vararg, *arguments.kwonlyargs,
+                         arguments.kwarg]
+                assert sorted(documented(docstring)) == sorted(each.arg for each in given if each
+                                                               and each.arg not in ("self", "cls")), name
 
     check(ast.parse(path.read_text()).body, "")

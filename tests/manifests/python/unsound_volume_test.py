@@ -1,4 +1,5 @@
-"""A volume with an infinite value is an error, whoever looks for it: the engine while it stores a volume, or the statistics behind it."""
+"""A volume with an infinite value is an error, whoever looks for it: the engine while it stores a volume,
+or the statistics behind it."""
 
 import json
 import pathlib
@@ -25,7 +26,9 @@ def overflowing(width, folder):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("settings", [{}, {"normalize": "eta98"}, {"scope": "motion"}, {"size": (80, 100), "fit": "letterbox"}], ids=str)
+@pytest.mark.parametrize("settings",
+                         [{}, {"normalize": "eta98"}, {"scope": "motion"}, {"size": (80, 100), "fit": "letterbox"}],
+                         ids=str)
 @pytest.mark.parametrize("precision", ["float32", "bfloat16"])
 @pytest.mark.parametrize("width", [8, 16])
 def test_infinity_is_an_error_of_every_call(width, precision, settings, tmp_path):
@@ -34,6 +37,7 @@ def test_infinity_is_an_error_of_every_call(width, precision, settings, tmp_path
     except ValueError as error:
         pytest.skip(str(error))  # bfloat16 without AVX-512
     previous, following = FRAMES
-    for call in (lambda: generator(previous, following), lambda: generator.many(FRAMES[:1], FRAMES[1:]), lambda: generator.sample(previous, following)):
+    for call in (lambda: generator(previous, following), lambda: generator.many(FRAMES[:1], FRAMES[1:]),
+                 lambda: generator.sample(previous, following)):
         with pytest.raises(RuntimeError, match="expected finite values >= 0, got (inf|-?nan) in the generated volume"):
             call()
