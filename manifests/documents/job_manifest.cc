@@ -406,7 +406,7 @@ void check_chunk(const JobManifest& manifest, const StrictValue& image) {
               std::to_string(bytes) + " bytes");
 }
 
-JobManifest read_document(const StrictValue& document) {
+JobManifest read_job_document(const StrictValue& document) {
   JobManifest manifest;
   StrictObject object = document.object();
   if (!object.has_format(kFormat, kVersion)) return manifest;
@@ -456,7 +456,7 @@ JobManifest read_pair_document(const StrictValue& document) {
 JobManifest parse_job_manifest(std::string_view text, const std::filesystem::path& directory,
                                const std::string& name) {
   return parse_manifest<JobManifest>(with_sensor_document(text, directory), directory, name,
-                                     read_document);
+                                     read_job_document);
 }
 
 JobManifest parse_pair_manifest(std::string_view text, const std::filesystem::path& directory,

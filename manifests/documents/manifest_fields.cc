@@ -3,6 +3,7 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "manifests/documents/detail/document_tables.h"
 #include "manifests/documents/detail/json_text.h"
 
 namespace eventgan {
@@ -34,16 +35,7 @@ std::map<std::string, std::string> manifest_fields(std::string_view text) {
 }
 
 std::string to_json(const SensorSpec& spec) {
-  const nlohmann::json json = {{"positive_threshold", spec.positive_threshold},
-                               {"negative_threshold", spec.negative_threshold},
-                               {"threshold_spread", spec.threshold_spread},
-                               {"refractory_s", spec.refractory_s},
-                               {"leak_rate_hz", spec.leak_rate_hz},
-                               {"shot_noise_rate_hz", spec.shot_noise_rate_hz},
-                               {"hot_pixel_fraction", spec.hot_pixel_fraction},
-                               {"hot_pixel_rate_hz", spec.hot_pixel_rate_hz},
-                               {"log_epsilon", spec.log_epsilon}};
-  return json.dump();
+  return nlohmann::json(objects(list_sensor).json(spec)).dump();  // keys in the order of letters
 }
 
 }  // namespace eventgan

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/document_tables.h"
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/documents/detail/sensor_document.h"
@@ -14,8 +14,7 @@
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kSensorFormat = "eventgan-sensor";
-constexpr int kSensorVersion = 1;
+constexpr double kLeastContrast = 0.01, kMostContrast = 5;
 
 /// The text of a document, and what messages call it; none if the name is neither.
 struct SensorText {
@@ -35,20 +34,74 @@ std::optional<SensorText> find_document(const std::string& path_or_name,
 
 }  // namespace
 
+void list_sensor(Fields& fields, SensorSpec& spec) {
+  const Numbers thresholds = numbers(kLeastContrast, kMostContrast);
+  const Numbers rates = numbers(0, 1e6);
+  fields.find("positive_threshold", spec.positive_threshold, thresholds,
+              "Mean contrast threshold of positive events.");
+  fields.find("negative_threshold", spec.negative_threshold, thresholds,
+              "The same of negative events, as a positive number.");
+  fields.find("threshold_spread", spec.threshold_spread, numbers(0, 1),
+              "Standard deviation of the thresholds over the pixels, drawn per polarity.");
+  fields.find("refractory_s", spec.refractory_s, numbers(0, 1),
+              "A pixel is silent so long after an event.");
+  fields.find("leak_rate_hz", spec.leak_rate_hz, rates,
+              "Positive events per pixel and second without any motion.");
+  fields.find("shot_noise_rate_hz", spec.shot_noise_rate_hz, rates,
+              "Random events of either polarity per pixel and second.");
+  fields.find("hot_pixel_fraction", spec.hot_pixel_fraction, numbers(0, 1),
+              "Share of pixels that fire on their own.");
+  fields.find("hot_pixel_rate_hz", spec.hot_pixel_rate_hz, rates,
+              "Events of a hot pixel per second.");
+  fields.find("log_epsilon", spec.log_epsilon, numbers(1e-6, 1),
+              "Added to the intensity, so that the logarithm of black is finite.");
+}
+
+void list_threshold(Fields& fields, std::optional<ThresholdSpec>& threshold,
+                    std::string_view what) {
+  std::optional<std::array<double, 2>> range;
+  ThresholdSpec spec = threshold.value_or(ThresholdSpec());
+  if (threshold) range = spec.range;
+  fields.find("threshold", range, ranges(kLeastContrast, kMostContrast), what);
+  if (range || !fields.is_writing()) {
+    fields.find("threshold_ratio", spec.ratio,
+                numbers(ThresholdSpec::kRatios[0], ThresholdSpec::kRatios[1]),
+                "Of the negative threshold to the positive one; beside threshold only.");
+    fields.needs("threshold_ratio", "threshold");
+  }
+  if (range) {
+    spec.range = *range;
+    threshold = spec;
+  }
+}
+
+void list_noise(Fields& fields, NoiseSpec& spec) {
+  fields.find("shot_hz", spec.shot_hz, ranges(0, kMostNoise_hz),
+              "Events per pixel and second, half of them of either polarity.");
+  fields.find("leak_hz", spec.leak_hz, ranges(0, kMostNoise_hz),
+              "Positive events per pixel and second.");
+  fields.find("hot_pixels", spec.hot_pixels, ranges(0, 1),
+              "Share of the pixels that are hot: the same ones for all samples of a kind of "
+              "dataset and a size, each of one polarity and of a rate of 5 to 100 Hz.");
+}
+
+void list_camera_sensor(Fields& fields, CameraSensor& sensor) {
+  if (!fields.has_format("eventgan-sensor", 1)) return;
+  fields.at("name", sensor.name, names(), "Name of the camera.");
+  list_threshold(fields, sensor.threshold,
+                 "Contrast threshold of ln(u/255 + 0.02), u the frames' grey level, or [least, "
+                 "most], from which it is drawn log-uniformly for each pair: the geometric mean of "
+                 "both polarities'.");
+  fields.find("noise", sensor.noise, objects(list_noise),
+              "Noise events that are added to finished volumes, +1 in one voxel each: a Poisson "
+              "process of each pixel over the pair's gap_s, or where that is unknown over "
+              "duration_s. A range is drawn from uniformly for each pair.");
+  fields.find("origin", sensor.origin, texts(), "How the numbers were found, for people.");
+}
+
 CameraSensor read_camera_sensor(const StrictValue& value) {
   CameraSensor sensor;
-  StrictObject object = value.object();
-  if (!object.has_format(kSensorFormat, kSensorVersion)) return sensor;
-  sensor.name = read_name(object.at("name"));
-  const auto ratio = object.find("threshold_ratio");
-  if (const auto threshold = object.find("threshold")) {
-    sensor.threshold = read_threshold(*threshold, ratio);
-  } else if (ratio) {
-    ratio->fault("threshold beside it", "none");
-  }
-  if (const auto noise = object.find("noise")) sensor.noise = read_noise(*noise);
-  if (const auto origin = object.find("origin")) sensor.origin = origin->text();
-  object.finish();
+  objects(list_camera_sensor).read(value, sensor);
   return sensor;
 }
 
@@ -90,29 +143,8 @@ std::string with_sensor_document(std::string_view text, const std::filesystem::p
   return dump_json(*manifest, JsonLayout::kIndented) + "\n";
 }
 
-namespace {
-
-nlohmann::ordered_json range_json(const std::array<double, 2>& range) {
-  if (range[0] == range[1]) return range[0];
-  return range;
-}
-
-}  // namespace
-
 std::string to_document(const CameraSensor& sensor) {
-  nlohmann::ordered_json json = {
-      {"format", kSensorFormat}, {"version", kSensorVersion}, {"name", sensor.name}};
-  if (sensor.threshold) {
-    json["threshold"] = range_json(sensor.threshold->range);
-    json["threshold_ratio"] = sensor.threshold->ratio;
-  }
-  if (const auto& noise = sensor.noise) {
-    json["noise"] = {{"shot_hz", range_json(noise->shot_hz)},
-                     {"leak_hz", range_json(noise->leak_hz)},
-                     {"hot_pixels", range_json(noise->hot_pixels)}};
-  }
-  if (!sensor.origin.empty()) json["origin"] = sensor.origin;
-  return dump_json(json, JsonLayout::kIndented) + "\n";
+  return dump_json(objects(list_camera_sensor).json(sensor), JsonLayout::kIndented) + "\n";
 }
 
 }  // namespace eventgan

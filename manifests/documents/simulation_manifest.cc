@@ -2,74 +2,54 @@
 
 #include <set>
 
-#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/document_tables.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
 namespace {
 
-constexpr std::string_view kSimulationFormat = "eventgan-simulation";
-constexpr int kSimulationVersion = 1;
 constexpr std::int64_t kMostClipFrames = 1'000'000'000;
 constexpr int kSmallestSensorSide = 16;
 constexpr int kLargestSensorSide = 8192;
 
-/// The name, or else the path's stem where that can be part of a file name.
-std::string read_recording_name(StrictObject& source, const std::string& path) {
-  if (const auto name = source.find("name")) return read_name(*name);
-  const std::string stem = std::filesystem::path(path).stem().string();
-  if (!path.empty() && !is_name(stem)) return read_name(source.at("name"));
-  return stem;
-}
-
-void read_affine(StrictObject& source, std::optional<SimulationMethod> method,
-                 SimulationSource& spec) {
-  const auto find = [&](std::string_view key) {
-    auto value = source.find(key);
-    if (value && method && *method != SimulationMethod::kAffine) {
-      value->fault("no such key for method \"" + std::string(to_string(*method)) +
-                   "\" (only for affine)");
-      value.reset();
-    }
-    return value;
-  };
-  if (const auto frames = find("frames_per_image")) {
-    spec.frames_per_image = frames->integer(2, 100);
+void list_clip(Fields& fields, SimulationSource& source) {
+  using enum SimulationMethod;
+  fields.at("path", source.path, paths(),
+            "A video, or a folder of images, taken in the order of their names.");
+  // Without a name it is the path's stem, where that can be part of a file name.
+  source.name = std::filesystem::path(source.path).stem().string();
+  constexpr char kName[] =
+      "Name of the recording, NAME.hdf5; with method affine NAME-000.hdf5 and so on, one for each "
+      "image. Default: the path's last part without extension.";
+  if (source.path.empty() || is_name(source.name)) {
+    fields.find("name", source.name, names(), kName);
+  } else {
+    fields.at("name", source.name, names(), kName);
   }
-  if (const auto displacement = find("max_displacement_px")) {
-    spec.max_displacement_px = displacement->number(0.1, 100);
+  fields.kind("method", source.method, words(kSimulationMethodWords),
+              "clip: things move between frames along the dense optical flow. affine: each image "
+              "moves by one random affine motion. difference: each pixel's log intensity moves on "
+              "a line from frame to frame.");
+  fields.find("frames_per_second", source.frames_per_second, numbers(1e-6, 1e6),
+              "Frame rate of the whole clip. Default: the video's own times; 30 for images.");
+  fields.find("first_frame", source.first_frame, integers(0, kMostClipFrames),
+              "The first frame that is used, counted from 0.");
+  const auto count =
+      fields.find("frame_count", source.frame_count, integers(0, kMostClipFrames),
+                  "How many frames are used, with method affine how many images; 0 = to the end.");
+  if (count && source.frame_count == 1 && fields.is_sound("method") && source.method != kAffine) {
+    count->fault("0 (to the end) or at least 2 frames, since events lie between frames");
   }
-}
-
-SimulationSource read_simulation_source(const StrictValue& value) {
-  SimulationSource spec;
-  StrictObject object = value.object();
-  spec.path = read_path(object.at("path"));
-  spec.name = read_recording_name(object, spec.path);
-  std::optional<SimulationMethod> method = spec.method;
-  if (const auto found = object.find("method")) {
-    method = found->sound_choice(kSimulationMethodWords);
-  }
-  spec.method = method.value_or(spec.method);
-  if (const auto rate = object.find("frames_per_second")) {
-    spec.frames_per_second = rate->number(1e-6, 1e6);
-  }
-  if (const auto first = object.find("first_frame")) {
-    spec.first_frame = first->integer<std::int64_t>(0, kMostClipFrames);
-  }
-  if (const auto count = object.find("frame_count")) {
-    spec.frame_count = count->integer<std::int64_t>(0, kMostClipFrames);
-    if (spec.frame_count == 1 && method && *method != SimulationMethod::kAffine) {
-      count->fault("0 (to the end) or at least 2 frames, since events lie between frames");
-    }
-  }
-  if (const auto step = object.find("frame_step")) {
-    spec.frame_step = step->integer<std::int64_t>(1, 100);
-  }
-  read_affine(object, method, spec);
-  object.finish();
-  return spec;
+  fields.rule(R"({"if": {"required": ["method"], "properties": {"method": {"const": "affine"}}},
+                  "else": {"properties": {"frame_count": {"not": {"const": 1}}}}})");
+  fields.find("frame_step", source.frame_step, integers(1, 100), "Uses each n-th frame.");
+  fields.only_for({kAffine}).find("frames_per_image", source.frames_per_image, integers(2, 100),
+                                  "frames of the motion of one image.");
+  fields.only_for({kAffine}).find("max_displacement_px", source.max_displacement_px,
+                                  numbers(0.1, 100),
+                                  "how far an image moves from one of its frames to the next is "
+                                  "drawn uniformly from 0 to this, for each image.");
 }
 
 /// "a" for "a-000": the affine source that could have a recording of this name.
@@ -97,37 +77,33 @@ void check_names(const std::vector<StrictValue>& elements,
   }
 }
 
-std::vector<SimulationSource> read_simulation_sources(const StrictValue& value) {
-  const std::vector<StrictValue> elements = value.elements(1);
-  std::vector<SimulationSource> sources;
-  for (const StrictValue& element : elements) sources.push_back(read_simulation_source(element));
-  check_names(elements, sources);
-  return sources;
-}
-
-SimulationManifest read_simulation_document(const StrictValue& document) {
-  SimulationManifest manifest;
-  StrictObject object = document.object();
-  if (!object.has_format(kSimulationFormat, kSimulationVersion)) return manifest;
-  manifest.name = read_name(object.at("name"));
-  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
-  manifest.sources = read_simulation_sources(object.at("sources"));
-  if (const auto size = object.find("size"))
-    manifest.size = read_size(*size, kSmallestSensorSide, kLargestSensorSide);
-  if (const auto sensor = object.find("sensor")) manifest.sensor = read_sensor(*sensor);
-  StrictObject output = object.at("output").object();
-  manifest.output_directory = read_path(output.at("directory"));
-  output.finish();
-  object.finish();
-  return manifest;
+void list_simulation_output(Fields& fields, SimulationManifest& manifest) {
+  fields.at("directory", manifest.output_directory, paths(),
+            "Folder of the recordings; made if it is absent.");
 }
 
 }  // namespace
 
+void list_simulation(Fields& fields, SimulationManifest& manifest) {
+  if (!fields.has_format("eventgan-simulation", 1)) return;
+  fields.at("name", manifest.name, names(), "Name of the job.");
+  fields.find("seed", manifest.seed, seeds(), kSeedField);
+  const auto sources = fields.at("sources", manifest.sources, lists(objects(list_clip), 1),
+                                 "The clips, each a recording or, with method affine, several.");
+  if (sources && sources->is_array()) check_names(sources->elements(), manifest.sources);
+  fields.find("size", manifest.size, sizes(kSmallestSensorSide, kLargestSensorSide),
+              "Size of the sensor in pixels: frames are scaled to cover it and cut around the "
+              "centre. Without it, the frames' own size.");
+  fields.find("sensor", manifest.sensor, objects(list_sensor),
+              "The simulated sensor: a pixel signals when the natural logarithm of its intensity "
+              "u/255 has moved by a threshold since its last event.");
+  fields.at("output", manifest, objects(list_simulation_output), "The files that are made.");
+}
+
 SimulationManifest parse_simulation_manifest(std::string_view text,
                                              const std::filesystem::path& directory,
                                              const std::string& name) {
-  return parse_manifest<SimulationManifest>(text, directory, name, read_simulation_document);
+  return parse_manifest<SimulationManifest>(text, directory, name, list_simulation);
 }
 
 SimulationManifest read_simulation_manifest(const std::filesystem::path& file) {

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 
-#include "manifests/documents/detail/job_manifest.h"
+#include "manifests/documents/detail/document_tables.h"
+#include "manifests/documents/detail/fields.h"
 #include "manifests/documents/detail/manifest_file.h"
 #include "manifests/values/words.h"
 
 namespace eventgan {
 namespace {
-
-constexpr std::string_view kTrainingFormat = "eventgan-training";
-constexpr int kTrainingVersion = 1;
 
 // As for conversion: below 16 pixels the generator's four halvings leave nothing of the image.
 constexpr int kSmallestCrop = 16;
@@ -18,13 +16,14 @@ constexpr int kLargestCrop = 2048;
 // The discriminator halves an image four times and then takes a pixel off twice.
 constexpr int kSmallestAdversarialCrop = 48;
 
-constexpr double kMostMinutes = 1e6;
 constexpr std::int64_t kMostFrames = 1'000'000'000;
 constexpr std::int64_t kMostSteps = 1'000'000'000;
+
+Numbers minutes() { return numbers(0, 1e6); }
 // Rates and factors beyond these are slips of the pen.
-constexpr double kLeastRate = 1e-9;
-constexpr double kLargestRate = 1;
-constexpr double kLargestFactor = 1e6;
+Numbers rates() { return numbers(1e-9, 1); }
+Numbers factors() { return numbers(0, 1e6); }
+Numbers shares() { return numbers(0, 1); }
 
 /// Recordings that may have frames: the first of all formats.
 constexpr std::array kFormatWords{kRecordingFormatWords[0], kRecordingFormatWords[1],
@@ -32,187 +31,143 @@ constexpr std::array kFormatWords{kRecordingFormatWords[0], kRecordingFormatWord
                                   kRecordingFormatWords[4]};
 static_assert(kFormatWords.back().value == RecordingFormat::kDsec);
 
-/// Reads the keys that only some formats have.
-void read_options(StrictObject& object, RecordingSpec& spec) {
+void list_recording(Fields& fields, RecordingSpec& spec) {
   using enum RecordingFormat;
-  SpecialKeys keys(object, "format", std::optional(spec.format));
-  if (const auto camera = keys.find("camera", {kMvsec})) {
-    spec.options.camera = read_stereo_camera(*camera);
+  fields.at("path", spec.path, paths(), "The file; for ecd a folder.");
+  fields.kind_at("format", spec.format, words(kFormatWords),
+                 "mvsec: HDF5 as MVSEC and `eventgan simulate` write it. eventgan: HDF5 of the "
+                 "EventGAN authors. ecd: a folder with images.txt and events.txt. aedat4: of a "
+                 "DAVIS, with frames. dsec: DSEC's events.h5, with images of the events' view.");
+  fields.only_for({kMvsec}).find("camera", spec.options.camera, stereo_cameras(),
+                                 "which of the two cameras.");
+  fields.only_for({kDsec}).find("rectify", spec.options.rectify, booleans(),
+                                "moves events by its rectify_map.h5.");
+  fields.find("weight", spec.weight, numbers(1e-6, 1e6),
+              "Relative chance of a sample to come from here.");
+  fields.find("first_frame", spec.first_frame, integers(0, kMostFrames),
+              "Frames before this one are not used, counted from 0.");
+  const auto last = fields.find("last_frame", spec.last_frame, integers(1, kMostFrames),
+                                "Frames after this one are not used. Default: the last one.");
+  if (last && fields.is_sound("last_frame") && *spec.last_frame <= spec.first_frame) {
+    last->fault("a frame after first_frame (" + std::to_string(spec.first_frame) + ")");
   }
-  if (const auto rectify = keys.find("rectify", {kDsec})) spec.options.rectify = rectify->boolean();
+  std::optional<double> threshold;
+  double ratio = ContrastThreshold().ratio;
+  fields.find("threshold", threshold, numbers(0.01, 5),
+              "The camera's contrast threshold in the frames' log intensity ln(u/255 + 0.02), the "
+              "geometric mean of both polarities'. With network.sensor, and then of each "
+              "recording.");
+  fields.find("threshold_ratio", ratio, numbers(0.2, 5),
+              "Of the threshold of negative events to that of positive ones.");
+  fields.needs("threshold_ratio", "threshold");
+  if (threshold) spec.threshold = ContrastThreshold{*threshold, ratio};
 }
 
-std::array<double, 2> read_betas(const StrictValue& value) {
-  constexpr double kLargestBeta = 0.999999;
-  const auto elements = value.elements(2);
-  if (elements.empty()) return {};
-  if (elements.size() != 2) value.fault("an array of 2");
-  return {elements[0].number(0, kLargestBeta), elements[1].number(0, kLargestBeta)};
+void list_simulated(Fields& fields, SimulatedSpec& spec) {
+  fields.at("textures", spec.textures, lists(paths(), 1),
+            "Folders of images, searched with their subfolders; of more than 256 images these many "
+            "are used, evenly spread.");
+  fields.find("fraction", spec.fraction, shares(), "Share of samples that are simulated.");
 }
 
-RecordingSpec read_recording(const StrictValue& value) {
-  RecordingSpec spec;
-  StrictObject object = value.object();
-  spec.path = read_path(object.at("path"));
-  const auto format = object.at("format").sound_choice(kFormatWords);
-  spec.format = format.value_or(spec.format);
-  read_options(object, spec);
-  if (const auto weight = object.find("weight")) spec.weight = weight->number(1e-6, 1e6);
-  if (const auto first = object.find("first_frame")) {
-    spec.first_frame = first->integer<std::int64_t>(0, kMostFrames);
-  }
-  if (const auto last = object.find("last_frame")) {
-    spec.last_frame = last->sound_integer(1, kMostFrames);
-    if (spec.last_frame && *spec.last_frame <= spec.first_frame) {
-      last->fault("a frame after first_frame (" + std::to_string(spec.first_frame) + ")");
-    }
-  }
-  if (const auto threshold = object.find("threshold")) {
-    spec.threshold = ContrastThreshold{threshold->number(0.01, 5)};
-  }
-  if (const auto ratio = object.find("threshold_ratio")) {
-    if (spec.threshold) {
-      spec.threshold->ratio = ratio->number(0.2, 5);
-    } else {
-      ratio->fault("threshold beside it", "none");
-    }
-  }
-  object.finish();
-  return spec;
+void list_network(Fields& fields, NetworkSpec& spec) {
+  fields.find("generator_channels", spec.generator_channels, integers(1, 64),
+              "Base width of the generator.");
+  fields.find("discriminator_channels", spec.discriminator_channels, integers(1, 128),
+              "First width of the discriminator.");
+  fields.find("cycle_channels", spec.cycle_channels, integers(1, 64),
+              "Base width of flow and reconstruction network.");
+  fields.find("spectral_norm", spec.spectral_norm, words(kSpectralNormWords),
+              "Where the generator has spectral norm. decoders: on residual blocks and decoders, "
+              "as the published code. encoders: as the paper says.");
+  fields.find("output_slope", spec.output_slope, numbers(0, 1),
+              "Slope of the generator's last layer below zero as its phase begins, falling to 0 "
+              "until half of it. 0: as published; a channel that gives nothing gets no gradient "
+              "then and stays dead.");
+  fields.find("difference_gain", spec.difference_gain, numbers(0, 1000),
+              "Above 0 the generator's first layer learns weights of (previous + next) / 2 and of "
+              "this many times next - previous, for those of previous and next: the same networks, "
+              "learned sooner. 0: as published.");
+  fields.find("sensor", spec.sensor, booleans(),
+              "The generator is told the sensor's contrast threshold: it sees the change of log "
+              "intensity in thresholds beside the two frames, and learns the number of events to "
+              "be expected, by losses.likelihood. false: as published, normalised volumes of the "
+              "frames.");
+  fields.find("bins", spec.bins, integers(1, 64), "Time bins per polarity.");
 }
 
-SimulatedSpec read_simulated(const StrictValue& value) {
-  SimulatedSpec spec;
-  StrictObject object = value.object();
-  for (const StrictValue& folder : object.at("textures").elements(1)) {
-    spec.textures.push_back(read_path(folder));
+void list_losses(Fields& fields, LossWeights& losses) {
+  for (const LossTerm& term : kLossTerms) {
+    fields.find(term.word, losses.*term.weight, factors(), term.what);
   }
-  if (const auto fraction = object.find("fraction")) spec.fraction = fraction->number(0, 1);
-  object.finish();
-  return spec;
+  fields.find("quantile", losses.quantile, numbers(0.01, 0.99),
+              "Of the losses volume and count: 0.5 is the mean absolute difference, more asks for "
+              "events where they are less likely.");
+  fields.find("smoothness", losses.smoothness, factors(),
+              "Of the flow's smoothness within the flow loss.");
 }
 
-NetworkSpec read_network(const StrictValue& value) {
-  NetworkSpec spec;
-  StrictObject object = value.object();
-  if (const auto channels = object.find("generator_channels")) {
-    spec.generator_channels = channels->integer(1, 64);
-  }
-  if (const auto channels = object.find("discriminator_channels")) {
-    spec.discriminator_channels = channels->integer(1, 128);
-  }
-  if (const auto channels = object.find("cycle_channels")) {
-    spec.cycle_channels = channels->integer(1, 64);
-  }
-  if (const auto place = object.find("spectral_norm")) {
-    spec.spectral_norm = place->choice(kSpectralNormWords);
-  }
-  if (const auto slope = object.find("output_slope")) spec.output_slope = slope->number(0, 1);
-  if (const auto gain = object.find("difference_gain")) {
-    spec.difference_gain = gain->number(0, 1000);
-  }
-  if (const auto sensor = object.find("sensor")) spec.sensor = sensor->boolean();
-  if (const auto bins = object.find("bins")) spec.bins = bins->integer(1, 64);
-  object.finish();
-  return spec;
+void list_augmentation(Fields& fields, AugmentationSpec& spec) {
+  fields.find("flip", spec.flip, booleans(),
+              "Left-right and up-down, each for half of the samples.");
+  fields.find("reverse", spec.reverse, booleans(),
+              "Time runs backwards for half of the samples: frames and polarities change places, "
+              "the first bin is the last; not in the paper.");
+  fields.find("gain", spec.gain, pairs_of(0.1, 10),
+              "Range of a factor on the images that the networks see.");
+  fields.find("gamma", spec.gamma, pairs_of(0.1, 10),
+              "Range of an exponent on the images that the networks see.");
+  fields.find("static_fraction", spec.static_fraction, shares(),
+              "Share of samples that are one frame twice and have an empty volume; not in the "
+              "paper.");
+  fields.find("event_fraction", spec.event_fraction, shares(),
+              "Share of samples whose crop holds an event drawn from all of the pair's, so that it "
+              "lies where much happens; not in the paper.");
 }
 
-LossWeights read_losses(const StrictValue& value) {
-  LossWeights losses;
-  StrictObject object = value.object();
-  const auto read = [&](const char* key, double& factor) {
-    if (const auto found = object.find(key)) factor = found->number(0, kLargestFactor);
-  };
-  read("adversarial", losses.adversarial);
-  read("flow", losses.flow);
-  read("reconstruction", losses.reconstruction);
-  read("volume", losses.volume);
-  read("count", losses.count);
-  read("overlap", losses.overlap);
-  read("likelihood", losses.likelihood);
-  read("block_likelihood", losses.block_likelihood);
-  if (const auto quantile = object.find("quantile")) losses.quantile = quantile->number(0.01, 0.99);
-  read("smoothness", losses.smoothness);
-  object.finish();
-  return losses;
+void list_optimizer(Fields& fields, OptimizerSpec& spec) {
+  fields.find("generator_rate", spec.generator_rate, rates(), "Learning rate of the generator.");
+  fields.find("cycle_rate", spec.cycle_rate, rates(),
+              "Learning rate of flow and reconstruction network.");
+  fields.find("discriminator_rate", spec.discriminator_rate, rates(),
+              "Learning rate of the discriminator.");
+  fields.find("betas", spec.betas, pairs_of(0, 0.999999, Ends::kAnyOrder),
+              "Decay of the two moments.");
+  fields.find("final_rate_fraction", spec.final_rate_fraction, shares(),
+              "Rates fall to this share over each phase, by half a cosine; 1 = constant.");
 }
 
-AugmentationSpec read_augmentation(const StrictValue& value) {
-  AugmentationSpec spec;
-  StrictObject object = value.object();
-  if (const auto flip = object.find("flip")) spec.flip = flip->boolean();
-  if (const auto reverse = object.find("reverse")) spec.reverse = reverse->boolean();
-  if (const auto gain = object.find("gain")) spec.gain = read_ends(*gain, 0.1, 10);
-  if (const auto gamma = object.find("gamma")) spec.gamma = read_ends(*gamma, 0.1, 10);
-  if (const auto fraction = object.find("static_fraction")) {
-    spec.static_fraction = fraction->number(0, 1);
+void list_steps(Fields& fields, PhaseSteps& steps) {
+  fields.find("flow", steps.flow, integers(0, kMostSteps), "Of the flow network.");
+  fields.find("reconstruction", steps.reconstruction, integers(0, kMostSteps),
+              "Of the reconstruction network.");
+  fields.find("generator", steps.generator, integers(0, kMostSteps),
+              "Of discriminator and generator together.");
+}
+
+void list_training_output(Fields& fields, TrainingManifest& manifest) {
+  fields.at("directory", manifest.output_directory, paths(),
+            "Folder of checkpoints, curves, images and the weights; made if it is absent.");
+  fields.find("checkpoint_minutes", manifest.checkpoint_minutes, minutes(),
+              "Time between checkpoints; 0: after each step.");
+  fields.find("image_minutes", manifest.image_minutes, minutes(),
+              "Time between images of generated and real volumes; one more is drawn after the last "
+              "step. 0: after each step.");
+}
+
+std::vector<std::string_view> loss_words(std::initializer_list<LossKind> kinds) {
+  std::vector<std::string_view> found;
+  for (const LossTerm& term : kLossTerms) {
+    if (std::ranges::find(kinds, term.kind) != kinds.end()) found.push_back(term.word);
   }
-  if (const auto fraction = object.find("event_fraction")) {
-    spec.event_fraction = fraction->number(0, 1);
-  }
-  object.finish();
-  return spec;
-}
-
-OptimizerSpec read_optimizer(const StrictValue& value) {
-  OptimizerSpec spec;
-  StrictObject object = value.object();
-  const auto read_rate = [&](const char* key, double& rate) {
-    if (const auto found = object.find(key)) rate = found->number(kLeastRate, kLargestRate);
-  };
-  read_rate("generator_rate", spec.generator_rate);
-  read_rate("cycle_rate", spec.cycle_rate);
-  read_rate("discriminator_rate", spec.discriminator_rate);
-  if (const auto betas = object.find("betas")) spec.betas = read_betas(*betas);
-  if (const auto fraction = object.find("final_rate_fraction")) {
-    spec.final_rate_fraction = fraction->number(0, 1);
-  }
-  object.finish();
-  return spec;
-}
-
-PhaseSteps read_steps(const StrictValue& value) {
-  PhaseSteps steps;
-  StrictObject object = value.object();
-  const auto read = [&](const char* key, std::int64_t& count) {
-    if (const auto found = object.find(key)) count = found->integer<std::int64_t>(0, kMostSteps);
-  };
-  read("flow", steps.flow);
-  read("reconstruction", steps.reconstruction);
-  read("generator", steps.generator);
-  object.finish();
-  return steps;
-}
-
-std::vector<RecordingSpec> read_recordings(const StrictValue& value, std::size_t least) {
-  std::vector<RecordingSpec> recordings;
-  for (const StrictValue& element : value.elements(least)) {
-    recordings.push_back(read_recording(element));
-  }
-  return recordings;
-}
-
-ImageSize read_crop(const StrictValue& value, bool adversarial) {
-  StrictObject object = value.object();
-  const int smallest = adversarial ? kSmallestAdversarialCrop : kSmallestCrop;
-  const ImageSize crop{object.at("height").integer(smallest, kLargestCrop),
-                       object.at("width").integer(smallest, kLargestCrop)};
-  object.finish();
-  return crop;
-}
-
-int read_batch(const StrictValue& value, bool adversarial) {
-  const auto batch = value.sound_integer(1, 512);
-  if (adversarial && batch && *batch % 2 != 0) {
-    value.fault("an even batch, since losses.adversarial > 0");
-  }
-  return static_cast<int>(batch.value_or(2));
+  return found;
 }
 
 /// The generator learns through the frozen flow and reconstruction network, so they must have been
 /// trained; and from something at all.
 void check_phases(const StrictValue& steps, const StrictValue& losses,
                   const TrainingManifest& manifest) {
+  using enum LossKind;
   const PhaseSteps& count = manifest.steps;
   const LossWeights& factor = manifest.losses;
   if (count.flow == 0 && count.reconstruction == 0 && count.generator == 0) {
@@ -226,98 +181,143 @@ void check_phases(const StrictValue& steps, const StrictValue& losses,
   };
   check(count.flow, factor.flow, "flow");
   check(count.reconstruction, factor.reconstruction, "reconstruction");
-  const bool published = factor.adversarial != 0 || factor.flow != 0 || factor.reconstruction != 0;
-  const bool direct = factor.volume != 0 || factor.count != 0 || factor.overlap != 0;
-  if (manifest.network.sensor && (published || factor.likelihood == 0)) {
-    losses.fault("likelihood above 0 and adversarial, flow, reconstruction 0, since network.sensor",
+  const bool sensor = manifest.network.sensor;
+  if (sensor && (has_loss(factor, kPaper) || factor.likelihood == 0)) {
+    losses.fault(fmt::format("likelihood above 0 and {} 0, since network.sensor",
+                             fmt::join(loss_words({kPaper}), ", ")),
                  "others");
-  } else if (!manifest.network.sensor && (factor.likelihood != 0 || factor.block_likelihood != 0)) {
-    losses.fault("likelihood and block_likelihood 0, unless network.sensor", "others");
-  } else if (!published && !direct && !manifest.network.sensor) {
-    losses.fault("one of adversarial, flow, reconstruction, volume, count, overlap above 0",
+  } else if (!sensor && has_loss(factor, kRates)) {
+    losses.fault(
+        fmt::format("{} 0, unless network.sensor", fmt::join(loss_words({kRates}), " and ")),
+        "others");
+  } else if (!sensor && !has_loss(factor, kPaper) && !has_loss(factor, kDirect)) {
+    losses.fault(fmt::format("one of {} above 0", fmt::join(loss_words({kPaper, kDirect}), ", ")),
                  "all 0");
   }
 }
 
 /// A sensor's threshold must be known where the network is to learn it, and is of no use elsewhere.
-void check_sensor(StrictObject& object, const TrainingManifest& manifest) {
-  const bool wanted = manifest.network.sensor;
-  const auto check = [&](const char* key, const std::vector<RecordingSpec>& specs) {
-    const auto wrong = std::ranges::find_if(
-        specs, [&](const RecordingSpec& spec) { return spec.threshold.has_value() != wanted; });
-    if (wrong == specs.end()) return;
-    object.at(key).fault(wanted ? "a threshold of each recording, since network.sensor"
-                                : "no threshold, unless network.sensor",
-                         (wanted ? "none of " : "that of ") + wrong->path);
+void check_thresholds(const StrictValue& recordings, const std::vector<RecordingSpec>& specs,
+                      bool wanted) {
+  const auto wrong = std::ranges::find_if(
+      specs, [&](const RecordingSpec& spec) { return spec.threshold.has_value() != wanted; });
+  if (wrong == specs.end()) return;
+  recordings.fault(wanted ? "a threshold of each recording, since network.sensor"
+                          : "no threshold, unless network.sensor",
+                   (wanted ? "none of " : "that of ") + wrong->path);
+}
+
+/// What a schema can say of the rules above.
+Fields::Schema sensor_rule() {
+  const auto each = [](const std::vector<std::string_view>& words, const Schema& schema) {
+    Schema properties = Schema::object();
+    for (const std::string_view word : words) properties[std::string(word)] = schema;
+    return properties;
   };
-  check("recordings", manifest.recordings);
-  if (!manifest.validation.empty()) check("validation", manifest.validation);
-}
-
-void read_training_output(const StrictValue& value, TrainingManifest& manifest) {
-  StrictObject object = value.object();
-  manifest.output_directory = read_path(object.at("directory"));
-  if (const auto minutes = object.find("checkpoint_minutes")) {
-    manifest.checkpoint_minutes = minutes->number(0, kMostMinutes);
-  }
-  if (const auto minutes = object.find("image_minutes")) {
-    manifest.image_minutes = minutes->number(0, kMostMinutes);
-  }
-  object.finish();
-}
-
-TrainingManifest read_training_document(const StrictValue& document) {
-  TrainingManifest manifest;
-  StrictObject object = document.object();
-  if (!object.has_format(kTrainingFormat, kTrainingVersion)) return manifest;
-  manifest.name = read_name(object.at("name"));
-  if (const auto seed = object.find("seed")) manifest.seed = read_seed(*seed);
-  manifest.recordings = read_recordings(object.at("recordings"), 1);
-  if (const auto validation = object.find("validation")) {
-    manifest.validation = read_recordings(*validation, 0);
-  }
-  const auto simulated = object.find("simulated");
-  if (simulated) manifest.simulated = read_simulated(*simulated);
-  const auto teacher = object.find("teacher");
-  if (teacher) manifest.teacher = read_path(*teacher);
-  if (const auto gaps = object.find("gaps")) manifest.gaps = read_gaps(*gaps, PairSide::kBefore);
-  const auto losses = object.find("losses");
-  if (losses) manifest.losses = read_losses(*losses);
-  const bool adversarial = manifest.losses.adversarial > 0;
-  if (const auto crop = object.find("crop")) manifest.crop = read_crop(*crop, adversarial);
-  if (const auto batch = object.find("batch")) manifest.batch = read_batch(*batch, adversarial);
-  if (const auto network = object.find("network")) manifest.network = read_network(*network);
-  if (const auto flip = object.find("label_flip")) manifest.label_flip = flip->number(0, 1);
-  if (const auto steps = object.find("discriminator_steps")) {
-    manifest.discriminator_steps = steps->integer(1, 10);
-  }
-  if (const auto augmentation = object.find("augmentation")) {
-    manifest.augmentation = read_augmentation(*augmentation);
-  }
-  if (const auto optimizer = object.find("optimizer")) {
-    manifest.optimizer = read_optimizer(*optimizer);
-  }
-  if (const auto precision = object.find("precision")) {
-    manifest.precision = precision->choice(kTrainingPrecisionWords);
-  }
-  const StrictValue steps = object.at("steps");
-  manifest.steps = read_steps(steps);
-  read_training_output(object.at("output"), manifest);
-  check_sensor(object, manifest);
-  object.finish();
-  check_phases(steps, losses.value_or(steps), manifest);
-  for (const auto& key : {simulated, teacher}) {
-    if (key && !manifest.network.sensor) key->fault("network.sensor with it", "none");
-  }
-  return manifest;
+  const Schema zero = {{"maximum", 0}}, above = {{"exclusiveMinimum", 0}};
+  const Schema trains_generator = {
+      {"properties",
+       {{"steps",
+         {{"required", Schema::array({"generator"})}, {"properties", {{"generator", above}}}}}}}};
+  Schema with_sensor = each(loss_words({LossKind::kPaper}), zero);
+  Schema needed = Schema::array({"likelihood"});
+  for (const std::string_view word : loss_words({LossKind::kPaper})) needed.push_back(word);
+  with_sensor["likelihood"] = above;
+  const auto recordings = [&](const Schema& items) {
+    return each({"recordings", "validation"}, {{"items", items}});
+  };
+  Schema without = recordings({{"properties", {{"threshold", false}}}});
+  without["simulated"] = false;
+  without["teacher"] = false;
+  return {{"if",
+           {{"required", Schema::array({"network"})},
+            {"properties",
+             {{"network",
+               {{"required", Schema::array({"sensor"})},
+                {"properties", {{"sensor", {{"const", true}}}}}}}}}}},
+          {"then",
+           {{"properties", recordings({{"required", Schema::array({"threshold"})}})},
+            {"if", trains_generator},
+            {"then",
+             {{"required", Schema::array({"losses"})},
+              {"properties", {{"losses", {{"required", needed}, {"properties", with_sensor}}}}}}}}},
+          {"else",
+           {{"properties", without},
+            {"if", trains_generator},
+            {"then",
+             {{"properties",
+               {{"losses", {{"properties", each(loss_words({LossKind::kRates}), zero)}}}}}}}}}};
 }
 
 }  // namespace
 
+void list_training(Fields& fields, TrainingManifest& manifest) {
+  if (!fields.has_format("eventgan-training", 1)) return;
+  fields.at("name", manifest.name, names(),
+            "Name of the training, the first part of its weights' file name.");
+  fields.find("seed", manifest.seed, seeds(), kSeedField);
+  const auto recordings =
+      fields.at("recordings", manifest.recordings, lists(objects(list_recording), 1),
+                "What samples are drawn from.");
+  const auto validation =
+      fields.find("validation", manifest.validation, lists(objects(list_recording), 0),
+                  "What is never trained on: the images during training show it.");
+  const auto simulated =
+      fields.find("simulated", manifest.simulated, objects(list_simulated),
+                  "Samples of scenes that no camera saw, each made when it is needed: planes with "
+                  "the images' textures move before a simulated sensor, whose threshold is drawn "
+                  "from 0.0675 to 0.88. With network.sensor only.");
+  const auto teacher =
+      fields.find("teacher", manifest.teacher, paths(),
+                  "Weights of a network that has learnt the same, often a wider one: likelihood "
+                  "and block_likelihood are of its rates in place of the recorded events. With "
+                  "network.sensor only.");
+  fields.find("gaps", manifest.gaps, Gaps(),
+              "Distances between the two frames of a sample, counted in frames, drawn alike.");
+  const auto losses = fields.find(
+      "losses", manifest.losses, objects(list_losses),
+      "Factors of the generator's losses; 0 switches one off. At least one of the first six is "
+      "above 0. With network.sensor the first three are 0 and likelihood is above 0; volume, count "
+      "and overlap fade to 0 over the steps.");
+  const bool adversarial = fields.is_reading() && manifest.losses.adversarial > 0;
+  fields.find("crop", manifest.crop,
+              sizes(adversarial ? kSmallestAdversarialCrop : kSmallestCrop, kLargestCrop),
+              "Size of the random crops in pixels. With adversarial loss at least 48 a side, for "
+              "the discriminator.");
+  const auto batch = fields.find("batch", manifest.batch, integers(1, 512),
+                                 "Samples of a step; even with adversarial loss.");
+  if (batch && adversarial && fields.is_sound("batch") && manifest.batch % 2 != 0) {
+    batch->fault("an even batch, since losses.adversarial > 0");
+  }
+  fields.find("network", manifest.network, objects(list_network), "The networks' sizes.");
+  fields.find("label_flip", manifest.label_flip, shares(),
+              "Probability that a label of the discriminator is flipped.");
+  fields.find("discriminator_steps", manifest.discriminator_steps, integers(1, 10),
+              "Updates of the discriminator before each of the generator.");
+  fields.find("augmentation", manifest.augmentation, objects(list_augmentation),
+              "What is done to samples at random beside the crop.");
+  fields.find("optimizer", manifest.optimizer, objects(list_optimizer), "Settings of RAdam.");
+  fields.find("precision", manifest.precision, words(kTrainingPrecisionWords),
+              "Arithmetic of the networks; weights and losses are always float32.");
+  const auto steps = fields.at(
+      "steps", manifest.steps, objects(list_steps),
+      "Updates in each phase, in this order. A generator that learns from the flow or the "
+      "reconstruction loss needs steps of that phase; some phase has more than 0.");
+  fields.at("output", manifest, objects(list_training_output), "The files that are made.");
+  if (!fields.is_reading()) return fields.rule(sensor_rule());
+  check_thresholds(*recordings, manifest.recordings, manifest.network.sensor);
+  if (validation) check_thresholds(*validation, manifest.validation, manifest.network.sensor);
+  fields.finish();
+  check_phases(*steps, losses.value_or(*steps), manifest);
+  for (const auto& key : {simulated, teacher}) {
+    if (key && !manifest.network.sensor) key->fault("network.sensor with it", "none");
+  }
+}
+
 TrainingManifest parse_training_manifest(std::string_view text,
                                          const std::filesystem::path& directory,
                                          const std::string& name) {
-  return parse_manifest<TrainingManifest>(text, directory, name, read_training_document);
+  return parse_manifest<TrainingManifest>(text, directory, name, list_training);
 }
 
 TrainingManifest read_training_manifest(const std::filesystem::path& file) {

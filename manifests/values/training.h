@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <compare>
 #include <cstdint>
@@ -71,11 +72,8 @@ struct SimulatedSpec {
   double fraction = 0.5;              ///< share of samples, 0..1
 };
 
-/// Factors of the generator's loss; 0 switches a term off. The paper's ablations set one of the
-/// first three to 0. The others are not in the paper: the difference to the real volume, voxel by
-/// voxel (`volume`), summed over time (`count`), and in where events are (`overlap`), for short
-/// trainings. With NetworkSpec::sensor these three fade to 0 over the generator's steps: they
-/// teach it sooner where and when events happen, but their best volumes are not the rates.
+/// Factors of the generator's losses, kLossTerms; 0 switches one off. The paper's ablations set one
+/// of the first three to 0.
 struct LossWeights {
   double adversarial = 1;
   double flow = 1;
@@ -83,11 +81,56 @@ struct LossWeights {
   double volume = 0;
   double count = 0;
   double overlap = 0;
-  double likelihood = 0;        ///< of NetworkSpec::sensor
-  double block_likelihood = 0;  ///< of NetworkSpec::sensor, of sums over blocks of 8x8 pixels
-  double quantile = 0.5;        ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
-  double smoothness = 0.5;      ///< of the flow loss
+  double likelihood = 0;
+  double block_likelihood = 0;
+  double quantile = 0.5;    ///< of volume and count, 0.01..0.99; 0.5: mean |generated - real|
+  double smoothness = 0.5;  ///< of the flow loss
 };
+
+/// What a loss compares the generated volume with.
+enum class LossKind {
+  kPaper,   ///< nothing: what the paper's other networks say of it; not with NetworkSpec::sensor
+  kDirect,  ///< the real volume, for short trainings. With NetworkSpec::sensor these fade to 0 over
+            ///< the generator's steps: they teach it sooner where and when events happen, but their
+            ///< best volumes are not the rates
+  kRates    ///< the events that happened, of which it says the rates; with NetworkSpec::sensor
+};
+
+/// A loss of the generator. Its function is in stages/training/update_loss.cc.
+struct LossTerm {
+  std::string_view word;  ///< in manifests and in reports
+  double LossWeights::*weight;
+  LossKind kind;
+  std::string_view what;  ///< in a line, for people
+};
+
+inline constexpr std::array kLossTerms{
+    LossTerm{"adversarial", &LossWeights::adversarial, LossKind::kPaper,
+             "Of the discriminator's judgement."},
+    LossTerm{"flow", &LossWeights::flow, LossKind::kPaper,
+             "Of the flow that the frozen flow network sees in the generated volume."},
+    LossTerm{"reconstruction", &LossWeights::reconstruction, LossKind::kPaper,
+             "Of the next frame that the frozen reconstruction network makes with it."},
+    LossTerm{"volume", &LossWeights::volume, LossKind::kDirect,
+             "Of the difference to the real volume, voxel by voxel; not in the paper."},
+    LossTerm{"count", &LossWeights::count, LossKind::kDirect,
+             "Of the difference to the real volume, both summed over time; not in the paper."},
+    LossTerm{"overlap", &LossWeights::overlap, LossKind::kDirect,
+             "Of where events are, voxel by voxel and summed over time: 1 - F1 with the real "
+             "volume's, made smooth; not in the paper."},
+    LossTerm{"likelihood", &LossWeights::likelihood, LossKind::kRates,
+             "With network.sensor: of how unlikely the real volume is where the generated one is "
+             "the number of events to be expected; not in the paper."},
+    LossTerm{"block_likelihood", &LossWeights::block_likelihood, LossKind::kRates,
+             "With network.sensor: the same of the sums over blocks of 8x8 pixels. It keeps the "
+             "number of events right beside volume, count and overlap."}};
+
+/// Whether a loss of this kind is switched on.
+constexpr bool has_loss(const LossWeights& weights, LossKind kind) {
+  return std::ranges::any_of(kLossTerms, [&](const LossTerm& term) {
+    return term.kind == kind && weights.*term.weight != 0;
+  });
+}
 
 struct AugmentationSpec {
   bool flip = true;                      ///< left-right and up-down, each with probability 1/2

@@ -50,6 +50,7 @@ class FaultList {
   const std::set<std::string>& unknown_keys() const { return unknown_keys_; }
 
   bool empty() const { return lines_.empty(); }
+  std::size_t count() const { return lines_.size() + left_out_; }
 
   /// One fault a line, no newline at the end. Beyond a thousand they are only counted.
   std::string text() const;

@@ -10,6 +10,7 @@
 #include <string>
 #include <string_view>
 
+#include "manifests/documents/detail/fields.h"
 #include "manifests/documents/detail/json_text.h"
 #include "manifests/documents/detail/strict_json.h"
 #include "manifests/values/faults.h"
@@ -84,6 +85,17 @@ T parse_manifest(std::string_view text, const std::filesystem::path& directory,
   manifest.directory =
       directory.empty() ? std::filesystem::current_path() : std::filesystem::absolute(directory);
   return manifest;
+}
+
+/// The same by the table of the manifest's fields.
+template <class T>
+T parse_manifest(std::string_view text, const std::filesystem::path& directory,
+                 const std::string& name, void (*list)(Fields&, T&)) {
+  return parse_manifest<T>(text, directory, name, [list](const StrictValue& document) {
+    T manifest;
+    objects(list).read(document, manifest);
+    return manifest;
+  });
 }
 
 }  // namespace eventgan

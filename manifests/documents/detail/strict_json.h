@@ -90,6 +90,7 @@ class StrictValue {
   /// Adds a fault about this value, for rules beyond type and range; `got` if not the value itself.
   void fault(std::string_view expected) const;
   void fault(std::string_view expected, std::string_view got) const;
+  const FaultList& faults() const { return *faults_; }
 
  private:
   friend class StrictObject;

@@ -594,7 +594,7 @@ std::vector<ManifestCase> generator_cases() {
        {{"/generator/sensor", R"({"format": "eventgan-sensor", "version": 1, "refractory_s": 0})"}},
        {"$.generator.sensor.name: " + kNameRule + "nothing",
         "$.generator.sensor.refractory_s: expected one of the keys format, version, name, "
-        "threshold_ratio, threshold, noise, origin, got an unknown key"}},
+        "threshold, threshold_ratio, noise, origin, got an unknown key"}},
       {"the duration of a sensor's document without noise",
        {{"/generator", R"({"sensor": {"format": "eventgan-sensor", "version": 1, "name": "n"},
            "duration_s": 1})"}},

@@ -136,10 +136,9 @@ TEST(ManifestSchema, EveryObjectIsClosedAndEveryPropertyDescribed) {
   EXPECT_EQ(testing::open_or_undescribed(kSchema), "");
 }
 
-TEST(SensorSchema, IsTheSameInBothManifestsAndStatesTheDefaults) {
-  const json& sensor = testing::schema_document(kSchema).at("definitions").at("sensor");
-  EXPECT_EQ(sensor,
-            testing::schema_document("simulation.schema.json").at("definitions").at("sensor"));
+TEST(SensorSchema, StatesTheDefaults) {
+  const json& sensor =
+      testing::schema_document("simulation.schema.json").at("properties").at("sensor");
   json defaults;
   for (const auto& [key, property] : sensor.at("properties").items()) {
     defaults[key] = property.at("default").get<double>();

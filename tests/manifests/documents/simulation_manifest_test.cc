@@ -145,7 +145,8 @@ TEST(SimulationSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(testing::open_or_undescribed(kSimulationSchema), "");
   const SimulationSource source;
   const auto stated = [](const std::string& key) {
-    return testing::stated_default(kSimulationSchema, "/definitions/source/properties/" + key);
+    return testing::stated_default(kSimulationSchema,
+                                   "/properties/sources/items/properties/" + key);
   };
   EXPECT_EQ(stated("method"), to_string(source.method));
   EXPECT_EQ(stated("first_frame"), source.first_frame);

@@ -390,8 +390,9 @@ TEST(TrainingSchema, IsClosedDescribedAndStatesTheDefaults) {
   EXPECT_EQ(section("optimizer", "final_rate_fraction"), manifest.optimizer.final_rate_fraction);
   EXPECT_EQ(section("output", "checkpoint_minutes"), manifest.checkpoint_minutes);
   EXPECT_EQ(section("output", "image_minutes"), manifest.image_minutes);
-  EXPECT_EQ(stated("/definitions/recording/properties/weight"), RecordingSpec().weight);
-  EXPECT_EQ(stated("/definitions/recording/properties/threshold_ratio"), ContrastThreshold().ratio);
+  EXPECT_EQ(stated("/properties/recordings/items/properties/weight"), RecordingSpec().weight);
+  EXPECT_EQ(stated("/properties/recordings/items/properties/threshold_ratio"),
+            ContrastThreshold().ratio);
 }
 
 }  // namespace
