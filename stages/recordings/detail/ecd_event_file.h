@@ -9,31 +9,24 @@
 #include <vector>
 
 #include "manifests/values/events.h"
+#include "stages/base/files/input_file.h"
 #include "stages/recordings/detail/event_check.h"
 
 namespace eventgan {
 
-/// A file of which parts are read, too large to be held whole. Thread safe.
-///
-/// Why not mapped into memory: a read error or a file that shrinks would end the process.
+/// An InputFile by places in it that are counted with a sign, and reach from a begin to an end.
 class RandomAccessFile {
  public:
-  /// Throws InputError if it is no readable file.
-  explicit RandomAccessFile(const std::filesystem::path& path);
-  ~RandomAccessFile();
-  RandomAccessFile(const RandomAccessFile&) = delete;
-  RandomAccessFile& operator=(const RandomAccessFile&) = delete;
+  explicit RandomAccessFile(const std::filesystem::path& path) : file_(path) {}
 
-  const std::string& name() const { return name_; }
-  std::int64_t size_bytes() const { return size_bytes_; }
-
-  /// The bytes begin..end, which must lie in the file. Throws InputError if they cannot be read.
-  std::string read(std::int64_t begin, std::int64_t end) const;
+  const std::string& name() const { return file_.name(); }
+  std::int64_t size_bytes() const { return static_cast<std::int64_t>(file_.size_bytes()); }
+  std::string read(std::int64_t begin, std::int64_t end) const {
+    return file_.read(static_cast<std::uint64_t>(begin), static_cast<std::uint64_t>(end - begin));
+  }
 
  private:
-  std::string name_;
-  int descriptor_;
-  std::int64_t size_bytes_ = 0;
+  InputFile file_;
 };
 
 /// Parses a line "t x y p" of an ECD `events.txt`: t in seconds, the others whole numbers,
