@@ -97,7 +97,7 @@ TEST_F(Convert, OpensAnImageOnceToPlanAndOnceToDecode) {
   }
   // Stills, each of which is both frames of its pair.
   change(R"("gaps": [1], "side": "before", "choose": "one")",
-         R"("from": "stills", "side": "before")");
+         R"("from": "stills", "motion": {"translation_px": [0, 2]}, "side": "before")");
   const InputCounter counter;
   EXPECT_EQ(run("stills", 1).written, 12);
   EXPECT_EQ(opens(counter), std::vector<std::uint64_t>(12, 2));
