@@ -21,24 +21,6 @@
 
 namespace eventgan {
 
-ShardCounts count_shard(const ShardReader& reader) {
-  const std::vector<std::string>& class_names = reader.header().label_schema.class_names;
-  ShardCounts counts;
-  for (int slot = 0; slot < reader.header().sample_count; ++slot) {
-    const ShardSample sample = reader.sample(slot);
-    counts.valid += sample.valid;
-    counts.empty_volumes += sample.valid && (sample.statistics.flags & kFlagEmpty) != 0;
-    if (!sample.valid) counts.quarantined.push_back(sample.sample_id);
-    ++counts.gaps[sample.pair.gap_frames];
-    counts.boxes += static_cast<std::int64_t>(sample.annotation.boxes.size());
-    counts.persons += static_cast<std::int64_t>(sample.annotation.persons.size());
-    for (const Box& box : sample.annotation.boxes) {
-      ++counts.classes[class_names.at(static_cast<std::size_t>(box.class_id))];
-    }
-  }
-  return counts;
-}
-
 std::vector<std::string> flag_names(std::uint32_t flags) {
   std::vector<std::string> names;
   if (flags & kFlagEmpty) names.emplace_back("empty");
@@ -143,14 +125,42 @@ void describe_persons(const ShardHeader& header, const ShardSample& sample, Line
 
 }  // namespace
 
+namespace {
+
+/// Sums over a shard's samples. Boxes and persons count in quarantined samples too.
+struct ShardCounts {
+  int empty_volumes = 0;  ///< valid samples with kFlagEmpty
+  std::int64_t boxes = 0;
+  std::int64_t persons = 0;
+  std::map<std::string, std::int64_t> classes;
+  std::map<int, std::int64_t> gaps;
+  std::vector<std::string> quarantined;  ///< sample ids in slot order
+
+  explicit ShardCounts(const ShardReader& reader) {
+    const ShardTables& tables = reader.tables();
+    ShardContents contents = reader.contents();
+    boxes = tables.boxes.offsets.back();
+    persons = tables.poses.offsets.back();
+    classes = std::move(contents.classes);
+    gaps = std::move(contents.gaps);
+    for (std::size_t i = 0; i < tables.valid.size(); ++i) {
+      if (tables.valid[i] == 0) quarantined.push_back(tables.pairs.sample_id[i]);
+      empty_volumes += tables.valid[i] != 0 && (tables.events.flags[i] & kFlagEmpty) != 0;
+    }
+  }
+};
+
+}  // namespace
+
 std::string describe_shard(const ShardReader& reader) {
   const ShardHeader& header = reader.header();
-  const ShardCounts counts = count_shard(reader);
+  const ShardCounts counts(reader);
+  const std::int64_t valid = header.sample_count - std::ssize(counts.quarantined);
   Lines line(header.name);
   line("format", "{} {}, written by {}", kShardFormat, header.format_version,
        header.program_version);
   line("dataset", "{}, split {}", header.dataset, header.split);
-  line("samples", "{}, valid {}, without any event {}", header.sample_count, counts.valid,
+  line("samples", "{}, valid {}, without any event {}", header.sample_count, valid,
        counts.empty_volumes);
   if (!counts.quarantined.empty()) line("quarantined", "{}", fmt::join(counts.quarantined, ", "));
   line("volume", "2 polarities x {} bins, {} pixels, {}, deflate {}, normalization {}",
@@ -258,14 +268,14 @@ std::string text(const Json& json) { return dump_json(json, JsonLayout::kIndente
 
 std::string shard_json(const ShardReader& reader) {
   const ShardHeader& header = reader.header();
-  const ShardCounts counts = count_shard(reader);
+  const ShardCounts counts(reader);
   return text({{"name", header.name},
                {"format", kShardFormat},
                {"format_version", header.format_version},
                {"dataset", header.dataset},
                {"split", header.split},
                {"samples", header.sample_count},
-               {"valid", counts.valid},
+               {"valid", header.sample_count - std::ssize(counts.quarantined)},
                {"empty_volumes", counts.empty_volumes},
                {"quarantined", counts.quarantined},
                {"bins", header.volume.bins},

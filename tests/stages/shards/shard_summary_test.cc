@@ -15,7 +15,6 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::Pair;
 
 TEST(ShardContents, AreWhatTheWriterHasStored) {
   const testing::TemporaryFolder folder;
@@ -107,14 +106,15 @@ class ShardSummary : public ::testing::Test {
 };
 
 TEST_F(ShardSummary, Counts) {
-  const ShardCounts counts = count_shard(reader_);
-  EXPECT_EQ(counts.valid, 4);
-  EXPECT_EQ(counts.empty_volumes, 1);
-  EXPECT_EQ(counts.boxes, 3);
-  EXPECT_EQ(counts.persons, 3);
-  EXPECT_THAT(counts.classes, ElementsAre(Pair("Car", 2), Pair("DontCare", 1)));
-  EXPECT_THAT(counts.gaps, ElementsAre(Pair(2, 5)));
-  EXPECT_THAT(counts.quarantined, ElementsAre("000002"));
+  const auto shard = nlohmann::json::parse(shard_json(reader_));
+  EXPECT_EQ(shard["samples"], 5);
+  EXPECT_EQ(shard["valid"], 4);
+  EXPECT_EQ(shard["empty_volumes"], 1);
+  EXPECT_EQ(shard["boxes"], 3);
+  EXPECT_EQ(shard["persons"], 3);
+  EXPECT_EQ(shard["classes"], (nlohmann::json{{"Car", 2}, {"DontCare", 1}}));
+  EXPECT_EQ(shard["gaps"], (nlohmann::json{{"2", 5}}));
+  EXPECT_EQ(shard["quarantined"], nlohmann::json::array({"000002"}));
 }
 
 TEST_F(ShardSummary, FlagsHaveNames) {
@@ -172,8 +172,6 @@ TEST(ShardText, HasNoControlCharactersOfTheShard) {
 
 TEST_F(ShardSummary, JsonHoldsTheSame) {
   const auto shard = nlohmann::json::parse(shard_json(reader_));
-  EXPECT_EQ(shard["samples"], 5);
-  EXPECT_EQ(shard["classes"], (nlohmann::json{{"Car", 2}, {"DontCare", 1}}));
   EXPECT_EQ(shard["size"], (nlohmann::json{{"height", 6}, {"width", 8}}));
   EXPECT_EQ(shard["dtype"], "float16");
 
