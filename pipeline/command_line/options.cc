@@ -14,7 +14,6 @@
 #include "pipeline/command_line/detail/usage.h"
 #include "pipeline/command_line/standard_streams.h"
 #include "pipeline/planning/fingerprint.h"
-#include "pipeline/runtime/trace_watch.h"
 
 namespace eventgan {
 namespace {

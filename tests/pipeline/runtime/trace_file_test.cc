@@ -7,7 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "manifests/values/faults.h"
-#include "pipeline/runtime/trace_watch.h"
+#include "pipeline/runtime/trace.h"
 #include "tests/pipeline/runtime/trace_reading.h"
 #include "tests/testing/full_disk.h"
 #include "tests/testing/temporary_folder.h"
