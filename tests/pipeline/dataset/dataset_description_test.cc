@@ -119,7 +119,10 @@ TEST(DatasetDescription, SaysWhatTheDatasetIs) {
   const ConvertedFolder folder;
   const nlohmann::json text = description_of(folder);
   EXPECT_EQ(text["format"], "eventgan-dataset");
-  EXPECT_EQ(text["version"], 1);
+  EXPECT_EQ(text["version"], "1.0");
+  EXPECT_THAT(text["features"],
+              ElementsAre("camera", "difficulty", "joint_aliases", "joints3d", "motion", "origin",
+                          "person_boxes", "projection", "threshold", "tiles", "times"));
   EXPECT_EQ(text["name"], "demo");
   EXPECT_EQ(text["complete"], true);
   EXPECT_EQ(text["missing"], nlohmann::json::array());

@@ -88,11 +88,16 @@ TEST_F(RowDifferences, AnotherNumberOfLabelsIsTold) {
                                             "expected 0 persons, as in labels/0.txt, got 2"));
 }
 
-TEST_F(RowDifferences, AreNotOfColumnsThatAnOlderShardLacks) {
+TEST_F(RowDifferences, AreOfColumnsThatTheShardLacksToo) {
   stored_.projection.clear();
   stored_.pairs.subject.clear();
   stored_.poses.box.clear();
-  EXPECT_THAT(found(expected_), IsEmpty());
+  EXPECT_THAT(
+      found(expected_),
+      ElementsAre(
+          "expected \"S1\" in /pairs/subject according to the plan, got \"\"",
+          "expected 350 in /labels/projection according to labels/0.txt, got nan",
+          "expected 1.75 in /labels/poses/box of person 1 according to labels/0.txt, got nan"));
 }
 
 void change(std::string& text) { text += "x"; }
