@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What all engines are compared with: the generator (stages/generator/weights.h) as a plain PyTorch program, float32, eager, one thread.
+"""What all engines are compared with: the generator (stages/generator/weights.h) as a plain PyTorch program, float32,
+eager, one thread.
 
 The modules are those of the published code: a convolution, its batch normalisation and its activation run one after the
 other, in PyTorch's own layout. Spectral norm is folded, as it is after a checkpoint's first forward pass.
@@ -128,7 +129,8 @@ def main():
     torch.set_num_threads(1)
     with torch.no_grad():
         network = random_generator(arguments.base_width, arguments.seed)
-        print(json.dumps({"description": f"PyTorch {torch.__version__} eager float32, 1 thread", "native": True}), flush=True)
+        print(json.dumps({"description": f"PyTorch {torch.__version__} eager float32, 1 thread", "native": True}),
+              flush=True)
         for answer in answers(network, sys.stdin):
             print(json.dumps(answer), flush=True)
 

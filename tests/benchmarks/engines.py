@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """The inference engines side by side with the plain PyTorch program: one core, the same for all, taking turns.
 
-In every round each contender makes one forward pass, in an order that rotates; a ratio is that of two passes of one round.
+In every round each contender makes one forward pass, in an order that rotates; a ratio is that of two passes of one
+round.
 """
 
 import contextlib
@@ -18,7 +19,8 @@ from measuring.report import Curves, Section, Table, number
 from measuring.spread import rotated, spread
 
 BASELINE = "eager PyTorch float32"
-ENGINES = [("torch", "float32"), ("torch", "bfloat16"), ("onednn", "float32"), ("onednn", "bfloat16"), ("onednn", "int8")]
+ENGINES = [("torch", "float32"), ("torch", "bfloat16"), ("onednn", "float32"), ("onednn", "bfloat16"),
+           ("onednn", "int8")]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -37,7 +39,8 @@ SETTINGS = {
 
 
 def engine_command(bench, engine, precision, weights, *more):
-    return [bench.benchmark_program("eventgan_engine_benchmark"), "--engine", engine, "--precision", precision, "--weights", weights, *more]
+    return [bench.benchmark_program("eventgan_engine_benchmark"), "--engine", engine, "--precision", precision,
+            "--weights", weights, *more]
 
 
 def start_contenders(bench, width, sizes, stack):
@@ -48,7 +51,8 @@ def start_contenders(bench, width, sizes, stack):
     for engine, precision in ENGINES:
         name = f"{engine} {precision}"
         try:
-            contenders[name] = stack.enter_context(start_engine(bench, engine, precision, f"untrained:{width}", sizes[0]))
+            contenders[name] = stack.enter_context(start_engine(bench, engine, precision, f"untrained:{width}",
+                                                                sizes[0]))
         except (ContenderFailed, NotCalibrated) as fault:
             missing[name] = str(fault)
     return contenders, missing
@@ -88,25 +92,30 @@ def add_rows(table, size, contenders, passes):
         if name != BASELINE:
             error = contender.error()
             errors = number(error["relative_l2"], 2), number(error["relative_largest"], 2)
-        table.add(shown, cpu.median_and_quartiles(), number(cpu.least), number(wall.median), ratio.median_and_quartiles(), *errors)
+        table.add(shown, cpu.median_and_quartiles(), number(cpu.least), number(wall.median),
+                  ratio.median_and_quartiles(), *errors)
     return ratios
 
 
 def trained_errors(bench, size):
-    """Errors on weights that are not random: the shipped ones, and those of the golden checkpoint where it is at hand."""
-    table = Table(["weights and engine", "error L2", "largest error"], caption=f"Errors on other weights, {size[0]}x{size[1]}")
+    """Errors on weights that are not random: the shipped ones, and those of the golden checkpoint where it is at
+    hand."""
+    table = Table(["weights and engine", "error L2", "largest error"],
+                  caption=f"Errors on other weights, {size[0]}x{size[1]}")
     weights = {"shipped": "shipped"}
     checkpoint = DATA / "golden" / "checkpoint_zip.pt"
     if checkpoint.exists():
         weights["golden"] = str(bench.scratch / "golden.safetensors")
-        subprocess.run([bench.program, "import-weights", checkpoint, weights["golden"]], check=True, capture_output=True)
+        subprocess.run([bench.program, "import-weights", checkpoint, weights["golden"]], check=True,
+                       capture_output=True)
     for name, value in weights.items():
         for engine, precision in ENGINES:
             with contextlib.suppress(ContenderFailed, NotCalibrated):  # told of above
                 with start_engine(bench, engine, precision, value, size) as contender:
                     contender.set_input(size, write_input(bench, size))
                     error = contender.error()
-                    table.add(f"{name}, {engine} {precision}", number(error["relative_l2"], 2), number(error["relative_largest"], 2))
+                    table.add(f"{name}, {engine} {precision}", number(error["relative_l2"], 2),
+                              number(error["relative_largest"], 2))
     return table
 
 
@@ -129,11 +138,12 @@ def measure(bench):
                     lines[name].append((size[0] * size[1], ratio))
         tables.append(table)
         curves.append(Curves(f"Engines, base width {width}, one core", "pixels", "times the speed of eager PyTorch",
-                             {name: sorted(points) for name, points in lines.items()}, ideal=BASELINE, logarithmic=True))
+                             {name: sorted(points) for name, points in lines.items()}, ideal=BASELINE,
+                             logarithmic=True))
     tables.append(trained_errors(bench, settings.shipped_size))
-    text = (f"One core, {settings.rounds} rounds. ms: processor time of a forward pass, median (middle half of the rounds); sizes are "
-            "height x width. Errors are against LibTorch in float32 on the same input: of the whole volume, and the largest "
-            "difference as a share of the largest value.")
+    text = (f"One core, {settings.rounds} rounds. ms: processor time of a forward pass, median (middle half of the "
+            "rounds); sizes are height x width. Errors are against LibTorch in float32 on the same input: of the whole "
+            "volume, and the largest difference as a share of the largest value.")
     text += "".join(f"\n\nNot taking part: {name} ({why})." for name, why in missing.items())
     return Section("Engines", text, tables, curves[:1], described)
 

@@ -29,7 +29,8 @@ SETTINGS = {
 def measure(bench):
     settings = SETTINGS[bench.effort]
     originals, what = original_frames(bench)
-    folders = [link_frames(bench.scratch / f"sizes-{pairs}", originals, pairs + 1) for pairs in (settings.few, settings.many)]
+    folders = [link_frames(bench.scratch / f"sizes-{pairs}", originals, pairs + 1)
+               for pairs in (settings.few, settings.many)]
     costs = {size: [] for size in settings.sizes}
     peaks = {size: [] for size in settings.sizes}
     for turn in range(settings.rounds):
@@ -44,14 +45,15 @@ def measure(bench):
         pixels = size[0] * size[1]
         whole = spread([1e3 * cost.cpu_s for cost in costs[size]])
         generator = spread([1e3 * cost.stage_s["generate"] for cost in costs[size]])
-        table.add(f"{size[0]}x{size[1]}", whole.median_and_quartiles(), number(generator.median), number(1e6 * whole.median / pixels),
-                  number(max(peaks[size])))
+        table.add(f"{size[0]}x{size[1]}", whole.median_and_quartiles(), number(generator.median),
+                  number(1e6 * whole.median / pixels), number(max(peaks[size])))
         lines["whole"].append((pixels, whole.median))
         lines["generator"].append((pixels, generator.median))
-    text = (f"{what}, {settings.weights} in float32, uint8, deflate level 1, one thread; {settings.many} pairs less {settings.few}, "
-            f"{settings.rounds} rounds. Processor milliseconds.")
+    text = (f"{what}, {settings.weights} in float32, uint8, deflate level 1, one thread; {settings.many} pairs less "
+            f"{settings.few}, {settings.rounds} rounds. Processor milliseconds.")
     return Section("Against the image's size", text, [table],
-                   [Curves(f"Cost of a pair, {settings.weights}, float32", "pixels", "processor ms", lines, logarithmic=True)])
+                   [Curves(f"Cost of a pair, {settings.weights}, float32", "pixels", "processor ms", lines,
+                           logarithmic=True)])
 
 
 if __name__ == "__main__":

@@ -1,8 +1,8 @@
 #!/usr/bin/python3
 """One generator a core with a thread each, against fewer generators with more threads: what a pair takes on all cores.
 
-The program always does the former, since the last bits of a convolution depend on the number of threads within it. Only LibTorch's
-engine can be asked for more: oneDNN's keeps to one thread whatever OpenMP would give it.
+The program always does the former, since the last bits of a convolution depend on the number of threads within it. Only
+LibTorch's engine can be asked for more: oneDNN's keeps to one thread whatever OpenMP would give it.
 """
 
 import contextlib
@@ -42,7 +42,8 @@ def start(bench, width, cores, stack):
     contenders = {}
     for engine, precision in ENGINES:
         for generators, threads in divisions(cores):
-            command = engine_command(bench, engine, precision, f"untrained:{width}", "--instances", str(generators), "--intra-op", str(threads))
+            command = engine_command(bench, engine, precision, f"untrained:{width}", "--instances", str(generators),
+                                     "--intra-op", str(threads))
             with contextlib.suppress(ContenderFailed):  # engines.py says why
                 contender = stack.enter_context(Contender(command, cores, {"OMP_NUM_THREADS": str(threads)}))
                 if contender.native:
@@ -53,7 +54,8 @@ def start(bench, width, cores, stack):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     cores = len(usable())
-    table = Table(["size and engine", "generators", "threads of each", "wall ms a pair", "times one generator a core", "busy cores"])
+    table = Table(["size and engine", "generators", "threads of each", "wall ms a pair", "times one generator a core",
+                   "busy cores"])
     with contextlib.ExitStack() as stack:
         contenders = start(bench, settings.width, cores, stack)
         for size in settings.sizes:
@@ -64,12 +66,13 @@ def measure(bench):
             for (engine, precision, generators, threads), rounds in passes.items():
                 wall = spread([one["wall_ms"] / generators for one in rounds])
                 whole = passes[engine, precision, cores, 1]
-                ratio = spread([(base["wall_ms"] / cores) / (one["wall_ms"] / generators) for base, one in zip(whole, rounds)])
+                ratio = spread([(base["wall_ms"] / cores) / (one["wall_ms"] / generators)
+                                for base, one in zip(whole, rounds)])
                 busy = spread([one["cpu_ms"] / one["wall_ms"] for one in rounds])
                 table.add(f"{size[0]}x{size[1]} {engine} {precision}", generators, threads, wall.median_and_quartiles(),
                           ratio.median_and_quartiles(), number(busy.median, 2))
-    text = (f"All {cores} cores, base width {settings.width}, {settings.rounds} rounds. busy cores: processor time over wall time; near 1 where "
-            "several threads were allowed, the engine did not take them.")
+    text = (f"All {cores} cores, base width {settings.width}, {settings.rounds} rounds. busy cores: processor time "
+            "over wall time; near 1 where several threads were allowed, the engine did not take them.")
     return Section("Generators against threads within one", text, [table])
 
 

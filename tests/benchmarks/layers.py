@@ -1,7 +1,9 @@
 #!/usr/bin/python3
-"""Where the `onednn` engine's time goes: by kind of layer, and what is left for the engine's own loops, at several widths.
+"""Where the `onednn` engine's time goes: by kind of layer, and what is left for the engine's own loops, at several
+widths.
 
-Multiply-adds a second against what the processor can (float32 with AVX-512: 32 a cycle and core) tell which layers are far from it.
+Multiply-adds a second against what the processor can (float32 with AVX-512: 32 a cycle and core) tell which layers are
+far from it.
 """
 
 import dataclasses
@@ -35,8 +37,8 @@ SETTINGS = {
 }
 KINDS = ["head", "encoders", "residual blocks", "decoders: doubled part", "decoders: skip part", "prediction"]
 OWN = "the engine's own code"
-# oneDNN's line of a convolution that was run (since version 3 with the kind of line) ends in its shape and milliseconds:
-# [ic, oc, ih, oh, kernel h, stride h, iw, ow].
+# oneDNN's line of a convolution that was run (since version 3 with the kind of line) ends in its shape and
+# milliseconds: [ic, oc, ih, oh, kernel h, stride h, iw, ow].
 LINE = re.compile(r"^onednn_verbose,(?:v1,primitive,)?exec,cpu,convolution,"
                   r".*_?ic(\d+)oc(\d+)_ih(\d+)oh(\d+)kh(\d+)sh(\d+).*_iw(\d+)ow(\d+)kw\d+.*,([\d.e-]+)$")
 
@@ -51,7 +53,8 @@ def kind_of(inputs, outputs, kernel, stride, widest):
     if kernel == 2:
         return "decoders: doubled part"
     # Of an odd size the last row and column of the doubled part are convolutions of their own.
-    return "decoders: doubled part" if inputs != outputs else "residual blocks" if outputs == widest else "decoders: skip part"
+    return ("decoders: doubled part" if inputs != outputs else "residual blocks" if outputs == widest
+            else "decoders: skip part")
 
 
 def pass_of(lines):
@@ -68,9 +71,11 @@ def pass_of(lines):
 
 def measure_passes(bench, settings, weights, precision):
     """Processor milliseconds of each pass, and of each what pass_of finds."""
-    requests = f"input {settings.size[0]} {settings.size[1]} {write_input(bench, settings.size)}\n" + "run\n" * settings.passes
-    done = subprocess.run(list(map(str, engine_command(bench, "onednn", precision, weights))), input=requests, text=True, check=True,
-                          stdout=subprocess.PIPE, preexec_fn=pin_to(1), env={**os.environ, **ENVIRONMENT, "ONEDNN_VERBOSE": "1"})
+    requests = (f"input {settings.size[0]} {settings.size[1]} {write_input(bench, settings.size)}\n"
+                + "run\n" * settings.passes)
+    done = subprocess.run(list(map(str, engine_command(bench, "onednn", precision, weights))), input=requests,
+                          text=True, check=True, stdout=subprocess.PIPE, preexec_fn=pin_to(1),
+                          env={**os.environ, **ENVIRONMENT, "ONEDNN_VERBOSE": "1"})
     totals, passes, lines = [], [], []
     for line in done.stdout.splitlines():
         if line.startswith('{"') and "cpu_ms" in line:
@@ -96,7 +101,8 @@ def measure(bench):
             columns += [f"{precision}: ms", "10^9 multiply-adds a second"]
             for kind in KINDS:
                 milliseconds = statistics.median(one[kind][0] for one in passes)
-                cells[kind] += [number(milliseconds), number(passes[0][kind][1] / milliseconds / 1e6) if milliseconds else ""]
+                cells[kind] += [number(milliseconds), number(passes[0][kind][1] / milliseconds / 1e6) if milliseconds
+                                else ""]
             convolutions = [sum(sums[0] for sums in one.values()) for one in passes]
             cells[OWN] += [number(statistics.median(total - part for total, part in zip(totals, convolutions))), ""]
             cells["all"] += [number(statistics.median(totals)), ""]
@@ -104,9 +110,9 @@ def measure(bench):
         for name, values in cells.items():
             table.add(name, *values)
         tables.append(table)
-    text = (f"{settings.size[0]}x{settings.size[1]}, one core, medians of {settings.passes} passes. oneDNN's own times of its "
-            "convolutions (ONEDNN_VERBOSE), the rest by difference: combining phases, rounding and planes, and of width 8 all "
-            "that happens at full resolution.")
+    text = (f"{settings.size[0]}x{settings.size[1]}, one core, medians of {settings.passes} passes. oneDNN's own times "
+            "of its convolutions (ONEDNN_VERBOSE), the rest by difference: combining phases, rounding and planes, and "
+            "of width 8 all that happens at full resolution.")
     return Section("Layers", text, tables)
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""How much small changes of the frames change the volume, what int8 loses beyond its calibration, and the time of subnormal numbers.
+"""How much small changes of the frames change the volume, what int8 loses beyond its calibration, and the time of
+subnormal numbers.
 
 The tables of manifests/guides/numerics.md:
 
@@ -29,16 +30,18 @@ class Settings:
 
 
 SETTINGS = {
-    "full": Settings(["shipped:8", "shipped:16"], (260, 861), 20, [1, 0.7, 0.5, 0.3, 0.2, 0.1], [0, 100, 126, 135, 140], 10),
+    "full": Settings(["shipped:8", "shipped:16"], (260, 861), 20, [1, 0.7, 0.5, 0.3, 0.2, 0.1], [0, 100, 126, 135, 140],
+                     10),
     "quick": Settings(["shipped:8"], (128, 424), 20, [1, 0.5, 0.2], [0, 126, 135], 5),
     "trial": Settings(["shipped:8"], (32, 32), 1, [1, 0.5], [0, 126], 1),
 }
 
 
 def stability(bench, settings):
-    table = Table(["weights and engine", "one level: amplification", "one level: largest change", "noise: amplification",
-                   "noise: largest change", "noise: change L2"],
-                  caption=f"Stability, {settings.size[0]}x{settings.size[1]}, the largest of {settings.tries} changes of each kind")
+    table = Table(["weights and engine", "one level: amplification", "one level: largest change",
+                   "noise: amplification", "noise: largest change", "noise: change L2"],
+                  caption=f"Stability, {settings.size[0]}x{settings.size[1]}, the largest of {settings.tries} changes "
+                  "of each kind")
     for weights in settings.weights:
         for engine, precision in ENGINES:
             with contextlib.suppress(ContenderFailed, NotCalibrated):  # engines.py says why
@@ -61,19 +64,21 @@ def saturation(bench, settings):
                 with Contender(engine_command(bench, "onednn", "int8", file)) as contender:
                     contender.set_input(settings.size, write_input(bench, settings.size))
                     error = contender.error()
-                    table.add(f"{weights}, {contrast}", number(contender.saturation()["share"], 2), number(error["relative_l2"], 2),
-                              number(error["relative_largest"], 2))
+                    table.add(f"{weights}, {contrast}", number(contender.saturation()["share"], 2),
+                              number(error["relative_l2"], 2), number(error["relative_largest"], 2))
     return table
 
 
 def subnormals(bench, settings):
-    table = Table(["engine, activations divided by 2^N", "ms", "times that of N = 0"], caption=f"Time of a pair, {settings.weights[0]}")
+    table = Table(["engine, activations divided by 2^N", "ms", "times that of N = 0"],
+                  caption=f"Time of a pair, {settings.weights[0]}")
     for engine, precision in ENGINES:
         if precision == "int8":  # stores whole numbers
             continue
         with contextlib.ExitStack() as stack, contextlib.suppress(ContenderFailed):
-            contenders = {shrink: stack.enter_context(Contender(engine_command(bench, engine, precision, settings.weights[0], "--shrink",
-                                                                               str(shrink)))) for shrink in settings.shrinks}
+            contenders = {shrink: stack.enter_context(
+                Contender(engine_command(bench, engine, precision, settings.weights[0], "--shrink",
+                                         str(shrink)))) for shrink in settings.shrinks}
             for contender in contenders.values():
                 contender.set_input(settings.size, write_input(bench, settings.size))
             passes = play_rounds(contenders, settings.rounds)
@@ -86,9 +91,9 @@ def subnormals(bench, settings):
 
 def measure(bench):
     settings = SETTINGS[bench.effort]
-    text = ("One core. A change is of one grey level in one pixel, or noise of up to 1e-6 on every value, as other rounding would be. "
-            "Amplification: length of the volume's change over that of the frames', as vectors; largest change: of a value, as a share of "
-            "the volume's largest; errors are against LibTorch in float32.")
+    text = ("One core. A change is of one grey level in one pixel, or noise of up to 1e-6 on every value, as other "
+            "rounding would be. Amplification: length of the volume's change over that of the frames', as vectors; "
+            "largest change: of a value, as a share of the volume's largest; errors are against LibTorch in float32.")
     return Section("Numbers at the extremes", text,
                    [stability(bench, settings), saturation(bench, settings), subnormals(bench, settings)])
 

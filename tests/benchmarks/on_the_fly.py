@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""What a training gets of volumes: made on the fly by FramePairs, or read from shards, by one and by two workers of a DataLoader."""
+"""What a training gets of volumes: made on the fly by FramePairs, or read from shards,
+by one and by two workers of a DataLoader."""
 
 import dataclasses
 import os
@@ -84,14 +85,17 @@ def measure(bench):
             refused += f"\n\nNot measured: {precision} ({fault})."
             continue
         generator = Generator(weights, precision=precision, size=settings.size, preset="kitti")
-        datasets |= {f"FramePairs, {precision}, images {name}": FramePairs(generator, source) for name, source in sources.items()}
-        jobs[f"`convert` into shards, {precision}, images as they are"] = Job(folders["as they are"], *settings.size, weights, precision)
+        datasets |= {f"FramePairs, {precision}, images {name}": FramePairs(generator, source)
+                     for name, source in sources.items()}
+        jobs[f"`convert` into shards, {precision}, images as they are"] = Job(folders["as they are"], *settings.size,
+                                                                              weights, precision)
     stored = bench.scratch / "shards"
     convert(bench.program, next(iter(jobs.values())), lambda folder: shutil.copytree(folder, stored))
     datasets["Shards, uint8, deflate level 1"] = Stored(Shards(stored, fields=["volume"], partial=True))
 
     os.environ.pop("OMP_NUM_THREADS", None)  # for the workers
-    contenders = {name: lambda workers, dataset=dataset: pairs_a_second(dataset, settings.batch, workers) for name, dataset in datasets.items()}
+    contenders = {name: lambda workers, dataset=dataset: pairs_a_second(dataset, settings.batch, workers)
+                  for name, dataset in datasets.items()}
 
     def conversion(job, threads):
         done = convert(bench.program, dataclasses.replace(job, threads=threads))
@@ -108,10 +112,11 @@ def measure(bench):
         one, two = found[name, 1], found[name, 2]
         table.add(name, spread(one).median_and_quartiles(), spread(two).median_and_quartiles(),
                   spread([b / a for a, b in zip(one, two)]).median_and_quartiles())
-    text = (f"Volumes of {settings.size[0]}x{settings.size[1]}, weights {WEIGHTS}, batches of {settings.batch} from a DataLoader, {settings.pairs} "
-            f"pairs in each of {settings.rounds} rounds, on {len(os.sched_getaffinity(0))} cores; OMP_NUM_THREADS is not set. Images: {what}. Wall-clock "
-            f"time of an epoch with workers that are running already; of `convert`, of the whole program with as many threads. Both images of a pair are decoded "
-            f"from files in memory, both by OpenCV and by the program.{refused}")
+    text = (f"Volumes of {settings.size[0]}x{settings.size[1]}, weights {WEIGHTS}, batches "
+            f"of {settings.batch} from a DataLoader, {settings.pairs} pairs in each of {settings.rounds} rounds, "
+            f"on {len(os.sched_getaffinity(0))} cores; OMP_NUM_THREADS is not set. Images: {what}. Wall-clock time of "
+            "an epoch with workers that are running already; of `convert`, of the whole program with as many threads. "
+            f"Both images of a pair are decoded from files in memory, both by OpenCV and by the program.{refused}")
     return Section("On the fly", text, [table])
 
 

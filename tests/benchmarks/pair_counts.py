@@ -47,9 +47,10 @@ def measure(bench):
                   number(max(peaks[count]) / max(peaks[settings.counts[0]])))
         lines["pairs/s"].append((count, spread(rates[count]).median))
         lines["peak MB"].append((count, max(peaks[count])))
-    text = (f"Frames and volumes of {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, all {threads} cores, "
-            f"{settings.rounds} rounds.")
-    return Section("Against the number of pairs", text, [table], [Curves("A run's length", "pairs", "pairs/s, MB", lines)])
+    text = (f"Frames and volumes of {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, all "
+            f"{threads} cores, {settings.rounds} rounds.")
+    return Section("Against the number of pairs", text, [table],
+                   [Curves("A run's length", "pairs", "pairs/s, MB", lines)])
 
 
 if __name__ == "__main__":

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""The generator in Python: a call against the engine alone, what importing it takes, many() and a DataLoader by one and by two."""
+"""The generator in Python: a call against the engine alone, what importing it takes, many()
+and a DataLoader by one and by two."""
 
 import contextlib
 import dataclasses
@@ -64,12 +65,14 @@ def environment(bench):
 
 def start_caller(bench, weights, precision, cores=1):
     caller = pathlib.Path(__file__).with_name("python_caller.py")
-    return Contender([sys.executable, caller, "--weights", weights, "--precision", precision], cores, environment(bench))
+    return Contender([sys.executable, caller, "--weights", weights, "--precision", precision], cores,
+                     environment(bench))
 
 
 def call_table(bench, settings, refused):
     table = Table(["weights", "the engine, ms", "the call, ms", "call / engine", "medians' difference, ms"],
-                  caption=f"`generator(previous, following)`, {settings.size[0]}x{settings.size[1]}, {settings.rounds} rounds")
+                  caption=f"`generator(previous, following)`, {settings.size[0]}x{settings.size[1]}, "
+                  f"{settings.rounds} rounds")
     frames = write_input(bench, settings.size)
     for weights, precision in itertools.product(settings.weights, native_precisions()):
         try:
@@ -86,8 +89,8 @@ def call_table(bench, settings, refused):
         times = {name: [one["cpu_ms"] for one in each] for name, each in passes.items()}
         engine, call = (spread(each) for each in times.values())
         ratio = spread([b / a for a, b in zip(*times.values())])
-        table.add(f"{weights} {precision}", engine.median_and_quartiles(), call.median_and_quartiles(), ratio.median_and_quartiles(4),
-                  number(call.median - engine.median, 2))
+        table.add(f"{weights} {precision}", engine.median_and_quartiles(), call.median_and_quartiles(),
+                  ratio.median_and_quartiles(4), number(call.median - engine.median, 2))
     return table
 
 
@@ -95,10 +98,12 @@ def starting_table(bench, settings, precision):
     steps = ("import eventgan", f"Generator({LOADED[0]!r})", "the first call")
     rounds = []
     for _ in range(settings.few):
-        done = subprocess.run([sys.executable, "-c", STARTING, LOADED[0], precision, *map(str, settings.size)], stdout=subprocess.PIPE, text=True,
+        done = subprocess.run([sys.executable, "-c", STARTING, LOADED[0], precision, *map(str, settings.size)],
+                              stdout=subprocess.PIPE, text=True,
                               check=True, env={**os.environ, **environment(bench)}, preexec_fn=pin_to(1))
         rounds.append(json.loads(done.stdout))
-    table = Table(["step", "ms"], caption=f"Of a fresh process, behind NumPy's import, {settings.few} rounds, {precision}")
+    table = Table(["step", "ms"],
+                  caption=f"Of a fresh process, behind NumPy's import, {settings.few} rounds, {precision}")
     for step, times in zip(steps, zip(*rounds)):
         table.add(step, spread(times).median_and_quartiles())
     return table
@@ -110,8 +115,9 @@ def rate_table(bench, settings, precision):
     with start_caller(bench, LOADED[0], precision, 2) as caller:
         caller.set_input(settings.size, write_input(bench, settings.size))
         pairs = {"many(), threads": few, "DataLoader, forked workers": many, "DataLoader, spawned workers": many}
-        contenders = dict(zip(pairs, (lambda threads: caller.many(few, threads), lambda workers: caller.epoch(many, workers, "fork"),
-                                      lambda workers: caller.epoch(many, workers, "spawn"))))
+        contenders = dict(
+            zip(pairs, (lambda threads: caller.many(few, threads), lambda workers: caller.epoch(many, workers, "fork"),
+                        lambda workers: caller.epoch(many, workers, "spawn"))))
         answers = {(name, count): [] for name in contenders for count in (1, 2)}
         for turn in range(settings.few):
             for name, count in rotated(list(answers), turn):
@@ -120,8 +126,10 @@ def rate_table(bench, settings, precision):
     def ms_a_pair(name, count, key):
         return [answer[key] / pairs[name] for answer in answers[name, count]]
 
-    table = Table(["volumes by", "one, wall ms a pair", "two", "times as fast", "the best rounds", "one, processor ms a pair", "two", "times by that"],
-                  caption=f"{LOADED[0]} {precision}, {settings.size[0]}x{settings.size[1]}, {settings.few} rounds, of {few} pairs and {many} of a DataLoader")
+    table = Table(["volumes by", "one, wall ms a pair", "two", "times as fast", "the best rounds",
+                   "one, processor ms a pair", "two", "times by that"],
+                  caption=f"{LOADED[0]} {precision}, {settings.size[0]}x{settings.size[1]}, {settings.few} rounds, of "
+                  f"{few} pairs and {many} of a DataLoader")
     for name in contenders:
         one, two = (ms_a_pair(name, count, "wall_ms") for count in (1, 2))
         own, both = (spread(ms_a_pair(name, count, "cpu_ms")).median for count in (1, 2))
@@ -142,12 +150,13 @@ def measure(bench):
     tables = [call_table(bench, settings, refused)]
     precision = LOADED[1] if LOADED[1] in native_precisions() else "float32"
     tables += [starting_table(bench, settings, precision), rate_table(bench, settings, precision)]
-    text = ("The engine is timed in a C++ program of its own, in turns with the call; both get the same two images on one core, and processor time is "
-            "compared. The call also has what comes before the engine: the images' preparation, and the memory of the volume. The images are NumPy's, "
-            "uint8, of the volume's size.\n\n"
-            "A DataLoader's workers give batches of four, which go through shared memory; they run already, and OMP_NUM_THREADS is not set. Processor "
-            "time is that of the threads or workers, and of the process that gets the batches. The last column is what two cores that do nothing else "
-            "could reach at most: it holds where other work disturbs wall time.")
+    text = ("The engine is timed in a C++ program of its own, in turns with the call; both get the same "
+            "two images on one core, and processor time is compared. The call also has what comes before the engine: "
+            "the images' preparation, and the memory of the volume. The images are NumPy's, uint8, of the volume's "
+            "size.\n\nA DataLoader's workers give batches of four, which go through shared memory; they run already, "
+            "and OMP_NUM_THREADS is not set. Processor time is that of the threads or workers, and of the process that "
+            "gets the batches. The last column is what two cores that do nothing else could reach at most: it holds "
+            "where other work disturbs wall time.")
     text += "".join(f"\n\nNot taking part: {name} ({why})." for name, why in refused.items())
     return Section(title, text, tables)
 

@@ -1,12 +1,13 @@
 #!/usr/bin/python3
-"""eventgan.Generator as a server for python_call.py, which alternates it with the engine alone: it reads requests from stdin, a line each, and
-answers with a line of JSON. The compiled module must be on PYTHONPATH.
+"""eventgan.Generator as a server for python_call.py, which alternates it with the engine alone: it reads requests from
+stdin, a line each, and answers with a line of JSON. The compiled module must be on PYTHONPATH.
 
     input HEIGHT WIDTH FILE   the images as the engine gets them: [2, y, x], float32 in [-1, 1], raw; warms up
     run                       one call: {"wall_ms": ..., "cpu_ms": ...}
     many PAIRS THREADS        one call of many(), the same pair so many times: as above, and {"caller_ms": 0}
-    epoch PAIRS WORKERS METHOD   of a DataLoader whose workers, started by "fork" or "spawn", run already and give batches of four volumes:
-                              {"wall_ms": ..., "cpu_ms": ..., "caller_ms": ...}, processor time of the workers and of this process
+    epoch PAIRS WORKERS METHOD   of a DataLoader whose workers, started by "fork" or "spawn", run already and give
+                              batches of four volumes: {"wall_ms": ..., "cpu_ms": ..., "caller_ms": ...}, processor
+                              time of the workers and of this process
 """
 
 import argparse
@@ -53,7 +54,8 @@ class Volumes:
 
 def processor_ms(process):
     """Of all threads that a process has now."""
-    return sum(int(path.read_text().split()[0]) for path in pathlib.Path(f"/proc/{process}/task").glob("*/schedstat")) / 1e6
+    return sum(int(path.read_text().split()[0])
+               for path in pathlib.Path(f"/proc/{process}/task").glob("*/schedstat")) / 1e6
 
 
 def epoch(volumes, workers, method):
@@ -68,8 +70,9 @@ def epoch(volumes, workers, method):
     processes = [worker.pid for worker in loader._iterator._workers]
     before = [processor_ms(process) for process in processes]
     answer = timed(run)
-    answer |= {"caller_ms": answer["cpu_ms"], "cpu_ms": sum(processor_ms(process) for process in processes) - sum(before)}
-    del loader
+    answer |= {"caller_ms": answer["cpu_ms"],
+               "cpu_ms": sum(processor_ms(process) for process in processes) - sum(before)}
+    loader = None
     gc.collect()  # ends them
     return answer
 

@@ -37,11 +37,13 @@ def demo_shards(bench, settings, dtype):
     if not demo.exists():
         subprocess.run([bench.program, "make-demo", demo], check=True, stdout=subprocess.DEVNULL)
     manifest = {"format": "eventgan-manifest", "version": 1, "name": "reading", "seed": 7,
-                "sources": [{"dataset": "kitti_object", "root": "kitti/training", "pairs": {"gaps": [1, 2, 3], "side": "before", "choose": "one"}}],
+                "sources": [{"dataset": "kitti_object", "root": "kitti/training",
+                             "pairs": {"gaps": [1, 2, 3], "side": "before", "choose": "one"}}],
                 "image": {"height": settings.size[0], "width": settings.size[1], "fit": "stretch", "preset": "kitti"},
                 "output": {"directory": dtype, "samples_per_shard": 8, "dtype": dtype, "deflate_level": 1}}
     (demo / "reading.json").write_text(json.dumps(manifest))
-    subprocess.run([bench.program, "convert", demo / "reading.json", "--progress", "none"], check=True, capture_output=True)
+    subprocess.run([bench.program, "convert", demo / "reading.json", "--progress", "none"], check=True,
+                   capture_output=True)
     first = min((demo / dtype).glob("*.h5"))
     return [shutil.copy(first, demo / f"{dtype}-{number:02}.h5") for number in range(settings.shards)]
 
@@ -51,7 +53,8 @@ class PlainVolumes:
 
     def __init__(self, paths):
         self._files = [h5py.File(path) for path in paths]
-        self._places = [(file["events/volume"], file["events/scale"], slot) for file in self._files for slot in np.flatnonzero(file["valid"][:])]
+        self._places = [(file["events/volume"], file["events/scale"], slot) for file in self._files
+                        for slot in np.flatnonzero(file["valid"][:])]
 
     def __len__(self):
         return len(self._places)
@@ -92,8 +95,9 @@ def measure(bench):
                     reader.close()
             table.add(f"{dtype}, {name}", spread(plain).median_and_quartiles(), spread(ours).median_and_quartiles(),
                       number(spread([o / p for o, p in zip(ours, plain)]).median))
-    text = (f"{settings.shards} shards of {settings.size[0]}x{settings.size[1]}, eight samples each, deflate level 1, from files in memory; processor "
-            f"time a sample, {settings.rounds} rounds. The first reading of each shard's labels is in it, not the opening of files.")
+    text = (f"{settings.shards} shards of {settings.size[0]}x{settings.size[1]}, eight samples each, deflate level "
+            f"1, from files in memory; processor time a sample, {settings.rounds} rounds. The first reading of each "
+            "shard's labels is in it, not the opening of files.")
     return Section("Reading", text, [table])
 
 

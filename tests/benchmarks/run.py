@@ -5,8 +5,8 @@
     docker/bootstrap.sh packages benchmark
     tests/benchmarks/run.py [--quick] [--out OUT] [--v2e V2E]
 
-Leave the machine alone meanwhile. What takes turns in a round meets the same noise, so ratios can be trusted further than
-times. Each part can also be run by itself, for instance tests/benchmarks/engines.py.
+Leave the machine alone meanwhile. What takes turns in a round meets the same noise, so ratios can be trusted further
+than times. Each part can also be run by itself, for instance tests/benchmarks/engines.py.
 """
 
 import argparse
@@ -38,10 +38,10 @@ from measuring.machine import description, processor_name
 from measuring.curves import draw
 from measuring.report import markdown, wrapped
 
-PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages, "whole_conversion": whole_conversion, "image_sizes": image_sizes,
-         "pair_counts": pair_counts, "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly,
-         "python_call": python_call, "slow_disk": slow_disk,
-         "scopes": scopes, "v2e": v2e}
+PARTS = {"engines": engines, "intra_op": intra_op, "layers": layers, "numerics": numerics, "stages": stages,
+         "whole_conversion": whole_conversion, "image_sizes": image_sizes, "pair_counts": pair_counts,
+         "threads": threads, "storage": storage, "reading": reading, "on_the_fly": on_the_fly,
+         "python_call": python_call, "slow_disk": slow_disk, "scopes": scopes, "v2e": v2e}
 
 
 def measure_parts(bench, names):
@@ -55,7 +55,8 @@ def measure_parts(bench, names):
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     add_arguments(parser)
-    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("."), help="folder of the results; default: this one")
+    parser.add_argument("--out", type=pathlib.Path, default=pathlib.Path("."),
+                        help="folder of the results; default: this one")
     parser.add_argument("--parts", nargs="+", choices=PARTS, default=list(PARTS), help="default: all")
     arguments = parser.parse_args()
     check_programs(arguments.build)

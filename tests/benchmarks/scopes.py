@@ -52,12 +52,15 @@ def trade(bench, settings, folder, job, threshold, side):
     manifest = folder / "job.json"
     manifest.write_text(json.dumps({
         "format": "eventgan-manifest", "version": 1, "name": "job",
-        "sources": [{"dataset": dataset, "root": str(root), "pairs": {"gaps": gaps, "side": "before", "choose": "one"}}],
+        "sources": [{"dataset": dataset, "root": str(root),
+                     "pairs": {"gaps": gaps, "side": "before", "choose": "one"}}],
         "image": {"width": width, "height": height, "preset": preset}, "output": {"directory": "out"},
         "generator": {"weights": settings.weights, "motion_threshold": threshold, "tile_px": side}}))
-    subprocess.run([bench.program, "tradeoff", manifest, "--pairs", str(settings.pairs), "--rounds", str(settings.rounds), "--widths",
-                    settings.weights, "--precisions", "float32", "--methods", "network", "--sizes", "1", "--dtypes", "float32", "--scopes",
-                    "whole,motion", "--threads", "1", "--progress", "none", "--out", folder / "trade"], check=True, capture_output=True)
+    subprocess.run([bench.program, "tradeoff", manifest, "--pairs", str(settings.pairs), "--rounds",
+                    str(settings.rounds), "--widths", settings.weights, "--precisions", "float32", "--methods",
+                    "network", "--sizes", "1", "--dtypes", "float32", "--scopes", "whole,motion", "--threads", "1",
+                    "--progress", "none", "--out", folder / "trade"], check=True,
+                   capture_output=True)
     by_scope = {one["scope"]: one for one in json.loads((folder / "trade/tradeoff.json").read_text())["configurations"]}
     return by_scope["whole"], by_scope["motion"]
 
@@ -66,14 +69,16 @@ def measure(bench):
     settings = SETTINGS[bench.effort]
     tables = []
     for name, job in jobs(bench).items():
-        table = Table(["threshold, side of a tile", "generator: whole / motion", "error L2", "F1 over time"], caption=name)
+        table = Table(["threshold, side of a tile", "generator: whole / motion", "error L2", "F1 over time"],
+                      caption=name)
         for threshold, side in itertools.product(settings.thresholds, settings.sides):
-            whole, motion = trade(bench, settings, bench.folder(f"{len(tables)}-{threshold}-{side}"), job, threshold, side)
+            whole, motion = trade(bench, settings, bench.folder(f"{len(tables)}-{threshold}-{side}"), job, threshold,
+                                  side)
             table.add(f"{threshold}, {side}", number(whole["generator_s"]["median"] / motion["generator_s"]["median"]),
                       number(motion["relative_l2"], 2), number(motion["f1_time"], 4))
         tables.append(table)
-    text = (f"{settings.weights}, onednn in float32, one thread, {settings.pairs} pairs, medians of {settings.rounds} rounds. Errors "
-            "are against the whole volume.")
+    text = (f"{settings.weights}, onednn in float32, one thread, {settings.pairs} pairs, medians of {settings.rounds} "
+            "rounds. Errors are against the whole volume.")
     return Section("Scope", text, tables)
 
 

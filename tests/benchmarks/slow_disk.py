@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 """What reading images ahead is worth: conversions from a disk on which every read waits, as on one behind a network.
 
-The disk is a FUSE file system (python3-fusepy; /dev/fuse) that passes through to files in memory; its own work takes processor time, too.
+The disk is a FUSE file system (python3-fusepy; /dev/fuse) that passes through to files in memory; its own work takes
+processor time, too.
 """
 
 import contextlib
@@ -50,7 +51,8 @@ def serve(root, mount, delay_s, reads):
                 status = os.stat(root + path)
             except OSError as error:
                 raise fusepy.FuseOSError(error.errno or errno.EIO) from error
-            return {key: getattr(status, key) for key in ("st_mode", "st_nlink", "st_size", "st_uid", "st_gid", "st_atime", "st_mtime", "st_ctime")}
+            return {key: getattr(status, key) for key in ("st_mode", "st_nlink", "st_size", "st_uid", "st_gid",
+                                                          "st_atime", "st_mtime", "st_ctime")}
 
         def readdir(self, path, fh):
             return [".", "..", *os.listdir(root + path)]
@@ -109,9 +111,10 @@ def measure(bench):
     for delay, runs in on_disk.items():
         times = [run.wall_s for run in runs]
         ratio = spread([slow / fast for slow, fast in zip(times, seconds)]).median
-        table.add(f"each read waits {delay} ms", str(reads_of[delay]), number(delay / 1000 * reads_of[delay]), spread(times).median_and_quartiles(),
-                  number(ratio))
-    text = (f"{settings.frames} frames ({kind}), {settings.size[0]}x{settings.size[1]}, {settings.weights}, {settings.precision}, {THREADS} threads; "
+        table.add(f"each read waits {delay} ms", str(reads_of[delay]), number(delay / 1000 * reads_of[delay]),
+                  spread(times).median_and_quartiles(), number(ratio))
+    text = (f"{settings.frames} frames ({kind}), {settings.size[0]}x{settings.size[1]}, {settings.weights}, "
+            f"{settings.precision}, {THREADS} threads; "
             f"{settings.rounds} rounds, each from a freshly mounted disk. A read is at most 128 KiB.")
     return Section(title, text, [table])
 

@@ -21,8 +21,10 @@ MS = {"ns": 1e-6, "us": 1e-3, "ms": 1.0, "s": 1e3}
 
 def run_program(program, arguments):
     """Repetitions by benchmark's name."""
-    done = subprocess.run([program, "--benchmark_format=json", "--benchmark_enable_random_interleaving=true", *arguments],
-                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=True, preexec_fn=pin_to(1))
+    done = subprocess.run([program, "--benchmark_format=json", "--benchmark_enable_random_interleaving=true",
+                           *arguments],
+                          stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, check=True,
+                          preexec_fn=pin_to(1))
     runs = {}
     for run in sorted(json.loads(done.stdout)["benchmarks"], key=place_in_source):
         if run["run_type"] == "iteration":
@@ -52,7 +54,8 @@ def measure(bench):
             bytes_per_second = middle.get("bytes_per_second")
             items_per_second = middle.get("items_per_second")
             table.add(f"{stage}: {name}", number(sorted(times)[len(times) // 2]), number(max(times) - min(times), 2),
-                      number(middle["real_time"] * MS[middle["time_unit"]]), number(bytes_per_second / 1e6) if bytes_per_second else "",
+                      number(middle["real_time"] * MS[middle["time_unit"]]),
+                      number(bytes_per_second / 1e6) if bytes_per_second else "",
                       number(items_per_second) if items_per_second else "")
     return Section("Stages", "One core, processor time, medians over interleaved repetitions.", [table])
 

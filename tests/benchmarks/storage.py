@@ -62,22 +62,24 @@ def measure(bench):
     for _ in range(settings.rounds):
         for choice in choices:
             read = Read()
-            runs[choice].append(convert(bench.program, Job(frames, *settings.size, "shipped", dtype=choice[0], deflate_level=choice[1]), read))
+            runs[choice].append(convert(bench.program, Job(frames, *settings.size, "shipped", dtype=choice[0],
+                                                           deflate_level=choice[1]), read))
             exact = read.volumes if choice == EXACT else exact
             reading[choice].append(1e3 * read.seconds / settings.pairs)
             errors[choice].append(relative_error(read.volumes, exact))
 
-    table = Table(["type, deflate level", "kB a pair", "times smaller than float32, 0", "finish ms", "write ms", "h5py reads in ms", "error L2"])
+    table = Table(["type, deflate level", "kB a pair", "times smaller than float32, 0", "finish ms", "write ms",
+                   "h5py reads in ms", "error L2"])
     largest = runs[EXACT][0].stored_bytes
     for choice in choices:
         stored = runs[choice][0].stored_bytes
         stages = [[1e3 * run.stage_s[stage] / run.pairs for run in runs[choice]] for stage in ("finish", "write")]
         table.add(f"{choice[0]}, {choice[1]}", number(stored / settings.pairs / 1e3), number(largest / stored),
-                  spread(stages[0]).median_and_quartiles(), number(spread(stages[1]).median), number(spread(reading[choice]).median),
-                  number(max(errors[choice]), 2))
-    text = (f"Volumes of the shipped weights from {settings.pairs} pairs of {what}, {settings.size[0]}x{settings.size[1]}; "
-            f"{settings.rounds} rounds. Processor milliseconds a pair; finish: statistics, quantisation and compression. The error is that of "
-            "what a reader gets, against float32.")
+                  spread(stages[0]).median_and_quartiles(), number(spread(stages[1]).median),
+                  number(spread(reading[choice]).median), number(max(errors[choice]), 2))
+    text = (f"Volumes of the shipped weights from {settings.pairs} pairs of {what}, "
+            f"{settings.size[0]}x{settings.size[1]}; {settings.rounds} rounds. Processor milliseconds a pair; finish: "
+            "statistics, quantisation and compression. The error is that of what a reader gets, against float32.")
     return Section("Storage", text, [table])
 
 

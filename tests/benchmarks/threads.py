@@ -41,13 +41,15 @@ def measure(bench):
     originals, what = original_frames(bench)
     # The same pairs for every number of threads: the shards are compared.
     most = counts[-1]
-    folders = [link_frames(bench.scratch / f"threads-{pairs}", originals, pairs * most + 1) for pairs in (settings.few, settings.many)]
+    folders = [link_frames(bench.scratch / f"threads-{pairs}", originals, pairs * most + 1)
+               for pairs in (settings.few, settings.many)]
     rates = {count: [] for count in counts}
     peaks = {count: [] for count in counts}
     digests = {count: set() for count in counts}
     for turn in range(settings.rounds):
         for count in rotated(counts, turn):
-            few, many = (convert(bench.program, Job(folder, *settings.size, settings.weights, threads=count)) for folder in folders)
+            few, many = (convert(bench.program, Job(folder, *settings.size, settings.weights, threads=count))
+                         for folder in folders)
             rates[count].append(1 / pair_cost(few, many).wall_s)
             peaks[count].append(many.peak_mb)
             digests[count].add(many.digest)
@@ -57,13 +59,14 @@ def measure(bench):
     for count in counts:
         ratio = spread([rate / one for rate, one in zip(rates[count], rates[1])])
         same = digests[count] == digests[1] and len(digests[1]) == 1
-        table.add(count, spread(rates[count]).median_and_quartiles(), ratio.median_and_quartiles(), number(max(peaks[count])),
-                  "equal" if same else "DIFFERENT")
+        table.add(count, spread(rates[count]).median_and_quartiles(), ratio.median_and_quartiles(),
+                  number(max(peaks[count])), "equal" if same else "DIFFERENT")
         ratios.append((count, ratio.median))
-    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, uint8, deflate level 1, pinned to as many cores "
-            f"as threads; {settings.many * most} pairs less {settings.few * most}, {settings.rounds} rounds. Wall time.")
-    curves = Curves("Threads", "threads", "times one thread's pairs/s", {"measured": ratios, "ideal": [(n, n) for n in counts]},
-                    ideal="ideal")
+    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, {settings.weights} in float32, uint8, deflate "
+            f"level 1, pinned to as many cores as threads; {settings.many * most} pairs less {settings.few * most}, "
+            f"{settings.rounds} rounds. Wall time.")
+    curves = Curves("Threads", "threads", "times one thread's pairs/s",
+                    {"measured": ratios, "ideal": [(n, n) for n in counts]}, ideal="ideal")
     return Section("Against threads", text, [table], [curves])
 
 

@@ -1,5 +1,6 @@
 #!/usr/bin/python3
-"""v2e's emulator beside the project's models and network: time from two frames to a volume, and the scores of `eventgan realism`.
+"""v2e's emulator beside the project's models and network: time from two frames to a volume, and the scores of `eventgan
+realism`.
 
     tests/benchmarks/v2e.py --v2e V2E > tests/benchmarks/measured/v2e.md
 
@@ -82,15 +83,16 @@ class Emulated:
 
 
 def emulate(frames, times_s, threshold, video=False, steps=1):
-    """Emulated of each pair of neighbours. `video`: the levels of one pair are where the one before left them; `steps`: frames that a pair is given
-    in, all but the last blended from both."""
+    """Emulated of each pair of neighbours. `video`: the levels of one pair are where the one before left them; `steps`:
+    frames that a pair is given in, all but the last blended from both."""
     from v2ecore.emulator import EventEmulator
     torch.manual_seed(0)
     emulator = None
     for previous, following in itertools.pairwise(range(len(frames))):
         start = time.process_time()
         if emulator is None or not video:
-            emulator = EventEmulator(pos_thres=threshold, neg_thres=threshold, sigma_thres=SPREAD_SHARE * threshold, leak_rate_hz=0,
+            emulator = EventEmulator(pos_thres=threshold, neg_thres=threshold, sigma_thres=SPREAD_SHARE * threshold,
+                                     leak_rate_hz=0,
                                      device="cpu", output_height=frames.shape[1], output_width=frames.shape[2])
             atexit.unregister(emulator.cleanup)  # it would keep every emulator in memory
             emulator.generate_events(frames[previous], 0)  # it takes its first frame for one at 0, whatever it is told
@@ -98,7 +100,8 @@ def emulate(frames, times_s, threshold, video=False, steps=1):
         parts = []
         for share in np.linspace(0, 1, steps + 1, dtype=np.float32)[1:]:
             frame = frames[following] if share == 1 else (1 - share) * frames[previous] + share * frames[following]
-            made = emulator.generate_events(frame, (1 - share) * times_s[previous] + share * times_s[following] - start_s)
+            made = emulator.generate_events(frame,
+                                            (1 - share) * times_s[previous] + share * times_s[following] - start_s)
             if made is not None:
                 parts.append(made)
         events = parts[0] if len(parts) == 1 else np.concatenate([np.empty((0, 4), np.float32), *parts])
@@ -108,8 +111,8 @@ def emulate(frames, times_s, threshold, video=False, steps=1):
 
 
 def fitted(frames, times_s, wanted, video=False, steps=1):
-    """The threshold with which v2e makes as many events as the camera, by bisection, as `realism` fits its models. `steps` do not change it:
-    how often a level is crossed depends on the frames of the pair alone."""
+    """The threshold with which v2e makes as many events as the camera, by bisection, as `realism` fits its models.
+    `steps` do not change it: how often a level is crossed depends on the frames of the pair alone."""
     low, high = LOWEST_THRESHOLD, HIGHEST_THRESHOLD
     for _ in range(FIT_STEPS):
         middle = math.sqrt(low * high)
@@ -129,8 +132,8 @@ def save_images(folder, frames):
 
 
 def simulated_job(folder, size, kind, threshold):
-    sensor = {"positive_threshold": threshold, "negative_threshold": threshold, "threshold_spread": SPREAD_SHARE * threshold,
-              "log_epsilon": LOG_EPSILON}
+    sensor = {"positive_threshold": threshold, "negative_threshold": threshold,
+              "threshold_spread": SPREAD_SHARE * threshold, "log_epsilon": LOG_EPSILON}
     motion = {"max_displacement_px": ESIM_DISPLACEMENT_PX} if kind == "esim" else {}
     return Job(folder, *size, preset=PRESET, generator={"kind": kind, "sensor": sensor} | motion)
 
@@ -158,9 +161,11 @@ class Cost:
 def cost_of_v2e(settings, folders, threshold, mode):
     frames = np.stack([np.asarray(PIL.Image.open(path), np.float32) for path in sorted(folders[1].iterdir())])
     each = emulate(frames, FRAME_S * np.arange(len(frames)), threshold, **mode)
-    made = [dataclasses.replace(one, volume=None) for one in each][settings.few:]  # kept, each volume would need new pages
+    # kept, each volume would need new pages
+    made = [dataclasses.replace(one, volume=None) for one in each][settings.few:]
     volume_s = statistics.fmean(one.volume_s for one in made)
-    return Cost(volume_s + statistics.fmean(one.emulation_s for one in made), volume_s, statistics.fmean(one.events for one in made))
+    return Cost(volume_s + statistics.fmean(one.emulation_s for one in made), volume_s,
+                statistics.fmean(one.events for one in made))
 
 
 def cost_of_job(bench, folders, job):
@@ -169,7 +174,8 @@ def cost_of_job(bench, folders, job):
     def count(output):
         shard, = pathlib.Path(output).glob("*.h5")
         with h5py.File(shard) as file:
-            counted.append(sum(file[f"events/statistics/sum_{polarity}"][:].mean() for polarity in ("positive", "negative")))
+            counted.append(sum(file[f"events/statistics/sum_{polarity}"][:].mean()
+                               for polarity in ("positive", "negative")))
 
     few, many = (convert(bench.program, dataclasses.replace(job, frames=folder), count) for folder in folders)
     return Cost(pair_cost(few, many).stage_s["generate"], None, counted[-1] if job.generator else None)
@@ -210,7 +216,8 @@ def time_table(bench, settings, what, images, refused):
     for name, job in jobs.items():
         contenders[name] = functools.partial(cost_of_job, bench, folders, job)
         if generator := call_of(job):
-            contenders[f"{name}, by eventgan.Generator"] = functools.partial(cost_of_call, settings, folders, generator, job)
+            contenders[f"{name}, by eventgan.Generator"] = functools.partial(cost_of_call, settings, folders, generator,
+                                                                             job)
 
     costs = {name: [] for name in contenders}
     for turn in range(settings.rounds):
@@ -218,7 +225,7 @@ def time_table(bench, settings, what, images, refused):
             costs[name].append(contenders[name]())
     table = Table(["made by", "ms a pair", "of it the volume", "events a pair", "times the first row's speed"],
                   caption=f"Time: {what}, {size[0]}x{size[1]}, {settings.rounds} rounds of "
-                          f"{settings.many - settings.few} pairs")
+                  f"{settings.many - settings.few} pairs")
     first = next(iter(costs.values()))
     for name, rounds in costs.items():
         table.add(name, spread([1e3 * one.whole_s for one in rounds]).median_and_quartiles(),
@@ -234,7 +241,8 @@ def time_tables(bench, settings, refused):
     slider = DATA / SLIDER["slider_depth"][0]
     if slider.exists():
         with h5py.File(slider) as file:
-            yield time_table(bench, settings, "slider_depth", save_images(bench.folder("slider"), file["davis/left/image_raw"]), refused)
+            yield time_table(bench, settings, "slider_depth",
+                             save_images(bench.folder("slider"), file["davis/left/image_raw"]), refused)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -258,22 +266,26 @@ def read_recording(path, part):
 
 
 def mean_scores(volumes, recorded):
-    each = [scores(*one) for one in zip(volumes, recorded.volumes, recorded.frames[:-1], recorded.frames[1:], strict=True)]
+    each = [scores(*one)
+            for one in zip(volumes, recorded.volumes, recorded.frames[:-1], recorded.frames[1:], strict=True)]
     return {key: np.nanmean([one[key] for one in each]) for key in each[0]}
 
 
 def realism(bench, path, part, *more):
     """(means of the scores, its settings) by method, and of the real volumes."""
-    done = subprocess.run([bench.program, "realism", path, "--frames", part, "--threads", "1", "--json", "--progress", "none", *more],
+    done = subprocess.run([bench.program, "realism", path, "--frames", part, "--threads", "1", "--json", "--progress",
+                           "none", *more],
                           capture_output=True, text=True, check=True)
     recording, = json.loads(done.stdout)["recordings"]
-    return {one["name"]: (one["mean"], one["settings"]) for one in [recording["real"] | {"name": "real"}, *recording["methods"]]}
+    return {one["name"]: (one["mean"], one["settings"])
+            for one in [recording["real"] | {"name": "real"}, *recording["methods"]]}
 
 
 def check_agreement(numpys, program, what):
     for key, value in numpys.items():
         if not abs(value - program[key]) <= AGREEMENT:
-            raise SystemExit(f"expected {key} {program[key]} as `eventgan realism` has it, got {value} from NumPy, of {what}")
+            raise SystemExit(f"expected {key} {program[key]} as `eventgan realism` has it, got {value} from NumPy, "
+                             f"of {what}")
 
 
 def recording_scores(bench, settings, name, refused):
@@ -305,14 +317,16 @@ def recording_scores(bench, settings, name, refused):
 
 
 SCORES = {"f1_raw": "F1 voxels", "f1_time": "F1 over time", "f1_time_polarity": "F1 over time and polarity",
-          "pool_mse_2": "PoolMSE 2", "pool_mse_4": "PoolMSE 4", "time_correlation": "mean times", "polarity_correlation": "polarity",
+          "pool_mse_2": "PoolMSE 2", "pool_mse_4": "PoolMSE 4", "time_correlation": "mean times",
+          "polarity_correlation": "polarity",
           "events_per_pixel": "events per pixel", "positive_share": "positive share"}
 
 
 def score_tables(bench, settings, refused):
     """A table a recording, one of means over them, and what is missing."""
     at_hand = [name for name, (path, _) in settings.recordings.items() if (DATA / path).exists()]
-    refused |= {f"scores on {name}": f"no {DATA / settings.recordings[name][0]}" for name in settings.recordings if name not in at_hand}
+    refused |= {f"scores on {name}": f"no {DATA / settings.recordings[name][0]}" for name in settings.recordings
+                if name not in at_hand}
     found = {name: recording_scores(bench, settings, name, refused) for name in at_hand}
     for name, contenders in found.items():
         table = Table(["made by", "threshold", *SCORES.values()],
@@ -323,7 +337,8 @@ def score_tables(bench, settings, refused):
     if len(found) > 1:
         table = Table(["made by", *SCORES.values()], caption=f"Scores: means over the {len(found)} recordings")
         for contender in next(iter(found.values())):
-            table.add(contender, *(number(np.mean([one[contender][0][key] for one in found.values()])) for key in SCORES))
+            table.add(contender,
+                      *(number(np.mean([one[contender][0][key] for one in found.values()])) for key in SCORES))
         yield table
 
 
@@ -333,29 +348,36 @@ def measure(bench):
     if bench.v2e is None:
         return Section(title, "Skipped: no --v2e.", [])
     if not (bench.v2e / "v2ecore").is_dir():
-        return Section(title, f"Skipped: expected a checkout of SensorsINI/v2e with v2ecore, got none, in {bench.v2e}.", [])
-    sys.path += [str(bench.build / "python"), str(bench.v2e), str(bench.v2e / "stubs")]  # at the end: installed packages come first
+        return Section(title, f"Skipped: expected a checkout of SensorsINI/v2e with v2ecore, got none, in {bench.v2e}.",
+                       [])
+    # at the end: installed packages come first
+    sys.path += [str(bench.build / "python"), str(bench.v2e), str(bench.v2e / "stubs")]
     torch.set_num_threads(1)
     refused = {}
     tables = [*time_tables(bench, settings, refused), *score_tables(bench, settings, refused)]
-    text = f"""One core; processor time from two decoded frames of the volume's size to a volume of 2 x {BINS} channels: neither reading nor storing counts
-for anybody. Of the project's own it is the stage `generate` of `eventgan convert`, a long run less a short one, and, where a row says so, the call of
-`eventgan.Generator` in the process in which v2e runs, too, on the same frames, which it prepares itself; of v2e `EventEmulator.generate_events` and
-the events' way into the volume, by PyTorch {torch.__version__} in one thread, the first pairs left out. Pair by pair v2e is given both frames of each
-pair, as a dataset's pairs are drawn; as one video it goes on from frame to frame and keeps its levels; blended, seven frames between those of a pair are
-mixed from both and given to it too. The times of v2e and of the models depend on the number of events. 0.2 is the default threshold of all three, 0.5 about what slider_depth's camera has; v2e's logarithm is linear below 20 grey levels,
-the models have 0.02 added to u/255, so at one threshold v2e makes more events. esim moves by up to 5 px.
+    text = f"""One core; processor time from two decoded frames of the volume's size to a volume of 2 x {BINS} channels:
+neither reading nor storing counts for anybody. Of the project's own it is the stage `generate` of `eventgan convert`, a
+long run less a short one, and, where a row says so, the call of `eventgan.Generator` in the process in which v2e runs,
+too, on the same frames, which it prepares itself; of v2e `EventEmulator.generate_events` and the events' way into the
+volume, by PyTorch {torch.__version__} in one thread, the first pairs left out. Pair by pair v2e is given both frames of
+each pair, as a dataset's pairs are drawn; as one video it goes on from frame to frame and keeps its levels; blended,
+seven frames between those of a pair are mixed from both and given to it too. The times of v2e and of the models depend
+on the number of events. 0.2 is the default threshold of all three, 0.5 about what slider_depth's camera has; v2e's
+logarithm is linear below 20 grey levels, the models have 0.02 added to u/255, so at one threshold v2e makes more
+events. esim moves by up to 5 px.
 
-v2e has its emulator's defaults, but thresholds as told (spread over the pixels 15 % of them, as by default) and no leak events: it runs without noise, as
-the models do. numba does not matter: the emulator does not use it. SuperSloMo, with which v2e would make frames in between, is
-not run: its time would be added. Without such frames the events of a pair have only as many different times as the pixel with most events has events; blended ones mend that, as `difference` does, but nothing moves in them.
+v2e has its emulator's defaults, but thresholds as told (spread over the pixels 15 % of them, as by default) and no leak
+events: it runs without noise, as the models do. numba does not matter: the emulator does not use it. SuperSloMo, with
+which v2e would make frames in between, is not run: its time would be added. Without such frames the events of a pair
+have only as many different times as the pixel with most events has events; blended ones mend that, as `difference`
+does, but nothing moves in them.
 
-Scores are those of manifests/guides/realism.md, means over the pairs, on parts of recordings that the shipped weights have not seen;
-from earlier parts of all but emlb_demo01 they were learned. v2e's threshold is
-fitted as realism fits those of difference and esim: one for both polarities, by bisection, until all pairs together have the camera's number of events
-within {100 * FIT_TOLERANCE} %. The network is not told that number. difference and esim are scored by `eventgan realism`, the others by the same
-equations in NumPy, which agreed with it within {AGREEMENT:g} on the camera's volumes and the network's in float32. int8 was calibrated on the frames of the
-first table, at each recording's size."""
+Scores are those of manifests/guides/realism.md, means over the pairs, on parts of recordings that the shipped weights
+have not seen; from earlier parts of all but emlb_demo01 they were learned. v2e's threshold is fitted as realism fits
+those of difference and esim: one for both polarities, by bisection, until all pairs together have the camera's number
+of events within {100 * FIT_TOLERANCE} %. The network is not told that number. difference and esim are scored by
+`eventgan realism`, the others by the same equations in NumPy, which agreed with it within {AGREEMENT:g} on the camera's
+volumes and the network's in float32. int8 was calibrated on the frames of the first table, at each recording's size."""
     text += "".join(f"\n\nNot measured: {name} ({why})." for name, why in refused.items())
     return Section(title, text, tables)
 

@@ -48,7 +48,8 @@ def make_jobs(bench, settings, folders):
 
 
 def measure_costs(bench, jobs, rounds, refused):
-    """Costs of a pair by job's name, a round each, and the libraries; adds to `refused` what the program will not do."""
+    """Costs of a pair by job's name, a round each, and the libraries;
+    adds to `refused` what the program will not do."""
     costs, libraries = {name: [] for name in jobs}, set()
     for turn in range(rounds):
         for name in rotated(list(jobs), turn):
@@ -70,7 +71,8 @@ def milliseconds(values):
 def measure(bench):
     settings = SETTINGS[bench.effort]
     originals, what = original_frames(bench)
-    folders = [link_frames(bench.scratch / f"frames-{pairs}", originals, pairs + 1) for pairs in (settings.few, settings.many)]
+    folders = [link_frames(bench.scratch / f"frames-{pairs}", originals, pairs + 1)
+               for pairs in (settings.few, settings.many)]
     jobs, refused = make_jobs(bench, settings, folders)
     costs, libraries = measure_costs(bench, jobs, settings.rounds, refused)
 
@@ -81,8 +83,9 @@ def measure(bench):
         ratio = spread([cost.cpu_s / cost.stage_s["generate"] for cost in rounds])
         table.add(name, milliseconds([cost.cpu_s for cost in rounds]), *map(milliseconds, stages), milliseconds(other),
                   ratio.median_and_quartiles())
-    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, uint8, deflate level 1, one thread; {settings.many} pairs less "
-            f"{settings.few}, {settings.rounds} rounds. Processor milliseconds a pair; other: the process's but no stage's.")
+    text = (f"{what}, {settings.size[0]}x{settings.size[1]}, uint8, deflate level 1, one thread; {settings.many} pairs "
+            f"less {settings.few}, {settings.rounds} rounds. Processor milliseconds a pair; other: the process's but "
+            "no stage's.")
     text += "".join(f"\n\nNot measured: {name} ({why})." for name, why in refused.items())
     return Section("The whole conversion", text, [table], libraries=libraries)
 

@@ -86,7 +86,8 @@ def dump(value, legacy):
 def legacy_checkpoint(value, little_endian=True):
     data, storages = dump(value, legacy=True)
     keys = sorted(storages)
-    machine = {"protocol_version": 1001, "little_endian": little_endian, "type_sizes": {"short": 2, "int": 4, "long": 4}}
+    machine = {"protocol_version": 1001, "little_endian": little_endian,
+               "type_sizes": {"short": 2, "int": 4, "long": 4}}
     result = b"".join(pickle.dumps(part, protocol=2) for part in (MAGIC, 1001, machine)) + data
     result += pickle.dumps(keys, protocol=2)
     for key in keys:
@@ -138,17 +139,20 @@ class Mat:
         return self.numbers(kind, len(data)) + data + bytes(-len(data) % 8)
 
     def array(self, kind, dims, content, name=b"", flags=0):
-        header = self.element(6, self.numbers(kind | flags, 0)) + self.element(5, self.numbers(*dims)) + self.element(1, name)
+        header = (self.element(6, self.numbers(kind | flags, 0)) + self.element(5, self.numbers(*dims))
+                  + self.element(1, name))
         return self.element(14, header + content)
 
     def text(self, value):
         return self.array(4, [1, len(value)], self.element(16, value.encode()))
 
     def doubles(self, *values):
-        return self.array(6, [len(values) and 1, len(values)], self.element(9, struct.pack(f"{self.order}{len(values)}d", *values)))
+        return self.array(6, [len(values) and 1, len(values)],
+                          self.element(9, struct.pack(f"{self.order}{len(values)}d", *values)))
 
     def structs(self, names, rows, name=b""):
-        fields = self.element(5, self.numbers(16)) + self.element(1, b"".join(field.encode().ljust(16, b"\0") for field in names))
+        fields = (self.element(5, self.numbers(16))
+                  + self.element(1, b"".join(field.encode().ljust(16, b"\0") for field in names)))
         return self.array(2, [1, len(rows)], fields + b"".join(b"".join(row) for row in rows), name)
 
     def file(self, *arrays):
@@ -156,7 +160,8 @@ class Mat:
         return b"MATLAB 5.0 MAT-file".ljust(124) + version + b"".join(arrays)
 
     def release(self):
-        images = self.structs(["name", "x"], [[self.text("a.jpg"), self.doubles(1, 2.5)], [self.text("b"), self.doubles()]])
+        images = self.structs(["name", "x"],
+                              [[self.text("a.jpg"), self.doubles(1, 2.5)], [self.text("b"), self.doubles()]])
         train = self.array(9, [1, 2], self.element(2, b"\1\0"), flags=0x200)
         return self.structs(["annolist", "img_train"], [[images, train]], b"RELEASE")
 
@@ -171,7 +176,8 @@ class Cdf:
     VARIABLE, VALUES = 432, 792
 
     def __init__(self, encoding=6, row_major=True, packs_values=False, packs_file=False):
-        self.encoding, self.row_major, self.packs_values, self.packs_file = encoding, row_major, packs_values, packs_file
+        self.encoding, self.row_major, self.packs_values, self.packs_file = (encoding, row_major, packs_values,
+                                                                             packs_file)
 
     @staticmethod
     def record(kind, fields, *values, tail=b""):
@@ -179,17 +185,19 @@ class Cdf:
         return struct.pack(">QI", 12 + len(body), kind) + body
 
     def file(self, rows=2, columns=3, following=0, numbers=b""):
-        numbers = numbers or struct.pack("<6f" if self.encoding == 6 else ">6f", *(range(6) if self.row_major else (0, 3, 1, 4, 2, 5)))
+        numbers = numbers or struct.pack("<6f" if self.encoding == 6 else ">6f",
+                                         *(range(6) if self.row_major else (0, 3, 1, 4, 2, 5)))
         packed = gzip.compress(numbers, mtime=0)
-        values = self.record(13, "IQ", 0, len(packed), tail=packed) if self.packs_values else self.record(7, "", tail=numbers)
+        values = self.record(13, "IQ", 0,
+                             len(packed), tail=packed) if self.packs_values else self.record(7, "", tail=numbers)
         index = self.VALUES + len(values)
         compression = self.record(11, "4I", 5, 0, 1, 6)
         records = b"".join([
             self.record(1, "QIIIIIIIIi256x", 320, 3, 9, self.encoding, 2 + self.row_major, 0, 0, 0, 2, -1),
             self.record(2, "QQQQIIiIIQIIi", 0, self.VARIABLE, 0, index + 44, 0, 0, -1, 0, 1, 0, 0, 20170101, -1),
             compression,
-            self.record(8, "QIIQQIIIiiIIQI256sIIIii", following, 21, 0, index, index, 5 if self.packs_values else 1, 0, 0, -1, -1, 1,
-                        0, 404, 1, b"Pose", 2, rows, columns, -1, -1),
+            self.record(8, "QIIQQIIIiiIIQI256sIIIii", following, 21, 0, index, index, 5 if self.packs_values else 1, 0,
+                        0, -1, -1, 1, 0, 404, 1, b"Pose", 2, rows, columns, -1, -1),
             values, self.record(6, "QIIIIQ", 0, 1, 1, 0, 0, self.VALUES)])
         if not self.packs_file:
             return struct.pack(">II", 0xCDF30001, 0xFFFF) + records
@@ -205,22 +213,26 @@ VOC_OBJECT = """<object><name>%s</name><truncated>1</truncated><difficult>0</dif
 
 def voc(*objects, before=""):
     content = "".join(VOC_OBJECT % pair for pair in objects)
-    return (before + "<annotation><filename>a.jpg</filename><size><width>40</width><height>20</height></size>\n" + content +
+    return (before + "<annotation><filename>a.jpg</filename><size><width>40</width><height>20</height></size>\n"
+            + content +
             "</annotation>\n").encode()
 
 
 def coco(annotation, category=None):
     box = {"id": 4, "image_id": 9, "category_id": 3, "bbox": [1, 2.5, 30, 4]}
     return json.dumps({"info": {"year": 2026}, "images": [{"id": 9, "file_name": "a.jpg", "width": 40, "height": 30}],
-                       "annotations": [{**box, **annotation}], "categories": [{"id": 3, "name": "person", **(category or {})}]}).encode()
+                       "annotations": [{**box, **annotation}],
+                       "categories": [{"id": 3, "name": "person", **(category or {})}]}).encode()
 
 
 class Aedat4:
-    """Recordings in AEDAT 4.0. Its FlatBuffers have their length in front; of a field there is None, its bytes, or, for a
-    string or vector, the bytes with a count in front, as one in a tuple."""
+    """Recordings in AEDAT 4.0. Its FlatBuffers have their length in front; of a field there is None, its bytes, or, for
+    a string or vector, the bytes with a count in front, as one in a tuple."""
 
-    INFO = b"""<dv version="2.0"><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr><node name="info">
-<attr key="sizeX">4</attr><attr key="sizeY">3</attr></node></node><node name="1"><attr key="typeIdentifier">FRME</attr></node>
+    INFO = b"""<dv version="2.0"><node name="outInfo"><node name="0"><attr key="typeIdentifier">EVTS</attr>\
+<node name="info">
+<attr key="sizeX">4</attr><attr key="sizeY">3</attr></node></node><node name="1">\
+<attr key="typeIdentifier">FRME</attr></node>
 <node name="2"><attr key="typeIdentifier">IMUS</attr></node></node></dv>"""
 
     def __init__(self, compression=0):
@@ -228,7 +240,8 @@ class Aedat4:
 
     @staticmethod
     def table(fields):
-        """A table with its list of places in front, where the table begins in it, and where its vectors are to be told."""
+        """A table with its list of places in front, where the table begins in it,
+        and where its vectors are to be told."""
         places, body, vectors = b"", bytes(8), []
         for field in fields:
             places += struct.pack("<H", 0 if field is None else len(body))
@@ -253,15 +266,18 @@ class Aedat4:
         if self.compression in (1, 2):  # one LZ4 block, as it is
             return bytes.fromhex("04224d18604082") + struct.pack("<I", len(content) | 1 << 31) + content + bytes(4)
         if self.compression in (3, 4):  # one Zstandard block, as it is
-            return bytes.fromhex("28b52ffda0") + struct.pack("<I", len(content)) + struct.pack("<I", len(content) << 3 | 1)[:3] + content
+            return (bytes.fromhex("28b52ffda0") + struct.pack("<I", len(content))
+                    + struct.pack("<I", len(content) << 3 | 1)[:3] + content)
         return content
 
     def header(self, table_byte):
-        return b"#!AER-DAT4.0\r\n" + self.root(b"IOHE", struct.pack("<i", self.compression), struct.pack("<q", table_byte),
+        return b"#!AER-DAT4.0\r\n" + self.root(b"IOHE", struct.pack("<i", self.compression),
+                                               struct.pack("<q", table_byte),
                                                (struct.pack("<I", len(self.INFO)) + self.INFO + b"\0",))
 
     def events(self, *events):
-        return self.root(b"EVTS", (struct.pack("<I", len(events)) + b"".join(struct.pack("<qhhB3x", *event) for event in events),))
+        return self.root(b"EVTS", (struct.pack("<I", len(events))
+                                   + b"".join(struct.pack("<qhhB3x", *event) for event in events),))
 
     def frame(self, time, channels=1):
         numbers = [struct.pack("<q", value) for value in (time, 0, 0, time - 1, time + 1)]
@@ -269,7 +285,8 @@ class Aedat4:
         return self.root(b"FRME", *numbers, (struct.pack("<I", 12 * channels) + bytes(range(12 * channels)),))
 
     def file(self, has_table=True):
-        packets = [(0, self.events((5, 0, 0, 1), (6, 3, 2, 0)), 2, 5, 6), (1, self.frame(6), 1, 6, 6), (2, b"other", 1, 0, 0),
+        packets = [(0, self.events((5, 0, 0, 1), (6, 3, 2, 0)), 2, 5, 6), (1, self.frame(6), 1, 6, 6),
+                   (2, b"other", 1, 0, 0),
                    (0, self.events((6, 1, 1, 1), (9, 2, 2, 0)), 2, 6, 9), (1, self.frame(10, 3), 1, 10, 10)]
         result, entries = self.header(-1), []
         for stream, content, count, begin, end in packets:
@@ -312,11 +329,13 @@ def tables():
     rows = [(5, 0, 2, 1), (7, 3, 0, 0)]
     return {"fields": npy(fields, (2,), b"".join(struct.pack("<QHxhB", *row) for row in rows)),
             "rows": npy("<f4", (2, 4), b"".join(struct.pack("<4f", *row) for row in rows)),
-            "arrays": npz({name: npy("<i4", (2,), struct.pack("<2i", *column)) for name, column in zip("txyp", zip(*rows))}),
+            "arrays": npz({name: npy("<i4", (2,), struct.pack("<2i", *column))
+                           for name, column in zip("txyp", zip(*rows))}),
             "lines": b"x,t,y,p\n0,5,2,1\n3,7,0,0\n",
             "boxes": npy(boxes, (1,), struct.pack("<Q4fB", 5, 1, 2, 3, 4, 0)),
             "nothing": npy([("t", "|V0"), ("x", "<u2")], (1 << 40,), b""),
-            "huge": npy(fields, (1 << 60,), bytes(28)), "bomb": npz({name: npy("|u1", (1 << 20,), bytes(1 << 20)) for name in "txyp"})}
+            "huge": npy(fields, (1 << 60,), bytes(28)),
+            "bomb": npz({name: npy("|u1", (1 << 20,), bytes(1 << 20)) for name in "txyp"})}
 
 
 def main(folder):
@@ -351,7 +370,8 @@ def main(folder):
         "mat/cells": mat.file(mat.array(1, [2, 2], 3 * mat.text("x") + mat.element(14, b""), b"annolist_keyframes")),
         "mat/types": mat.file(mat.array(1, [1, 5], mat.array(10, [1, 1], mat.element(3, b"\1\2")) + mat.array(
             7, [1, 1], mat.element(7, bytes(4))) + mat.array(15, [1, 1], mat.element(13, b"\xff" * 8)) + mat.array(
-                4, [2, 2], mat.element(17, "abcd".encode("utf-16-le"))) + mat.array(5, [1, 1], b""), b"annolist_keyframes")),
+                4, [2, 2], mat.element(17, "abcd".encode("utf-16-le"))) + mat.array(5, [1, 1], b""),
+                                        b"annolist_keyframes")),
         "mat/huge": mat.file(mat.array(6, [0x7fffffff, 1], mat.numbers(9, 0xfffffff8), b"RELEASE")),
         "cdf/plain": Cdf().file(),
         "cdf/big_endian": Cdf(encoding=1, row_major=False).file(),
@@ -368,8 +388,10 @@ def main(folder):
         "mot/two": b"2,1,10,20,30.5,40,1,1,0.5\r\n1,1,9,20,30,40,0,7,1\r\n",
         "mot/2015": b"1,1,10,20,30,40,1,-1,-1,-1\n1,2,10,20,30,40,0,5.5,0,1e3",
         "mot/faults": b"1,1,1,1,1,1\n2,1,nan,1,1,1,1\n3,1,1,1,1,1,1,14\n4,1,1,1,1,1,1\n4,1,1,1,1,1,1\n",
-        "mot/seqinfo": b"[Sequence]\nname=a\nimDir=img1\nframeRate=30\nseqLength=9\nimWidth=40\nimHeight=20\nimExt=.jpg\n",
-        "csv/three": b'\xef\xbb\xbfimage,class,left,top,right,bottom,track\r\na.png,car,1,2,3.5,4,7\r\n"b ""1"", c.png","x,y",0,0,1,1,\r\n'
+        "mot/seqinfo": b"[Sequence]\nname=a\nimDir=img1\nframeRate=30\n"
+                       b"seqLength=9\nimWidth=40\nimHeight=20\nimExt=.jpg\n",
+        "csv/three": b"\xef\xbb\xbfimage,class,left,top,right,bottom,track\r\na.png,car,1,2,3.5,4,7\r\n"
+                     b'"b ""1"", c.png","x,y",0,0,1,1,\r\n'
                      b"c.png,,,,,,\r\n",
         "csv/faults": b"class,bottom,right,top,left,image\ncar,4,3,2,1,a\ncar,4,nan,2,1,b\n,,,,,a\n,4,3,2,1,c\n",
         "csv/quotes": b'image,class,left,top,right,bottom\n"a,""b\n"c,d,1,2,3,4\n',

@@ -35,9 +35,11 @@ class Bench:
 
 
 def add_arguments(parser):
-    parser.add_argument("--build", type=pathlib.Path, default=SOURCE / "build" / "release", help="a build of the preset `release`")
+    parser.add_argument("--build", type=pathlib.Path, default=SOURCE / "build" / "release",
+                        help="a build of the preset `release`")
     effort = parser.add_mutually_exclusive_group()
-    effort.add_argument("--quick", dest="effort", action="store_const", const="quick", help="fewer rounds, sizes and pairs")
+    effort.add_argument("--quick", dest="effort", action="store_const", const="quick",
+                        help="fewer rounds, sizes and pairs")
     effort.add_argument("--trial", dest="effort", action="store_const", const="trial",
                         help="only sees that all of it runs; the numbers mean nothing")
     parser.set_defaults(effort="full")
@@ -47,7 +49,8 @@ def add_arguments(parser):
 def check_programs(build):
     for program in (build / "eventgan", build / "tests" / "eventgan_engine_benchmark"):
         if not program.exists():
-            raise SystemExit(f"expected {program}, got no such file: cmake --preset release && cmake --build --preset release")
+            raise SystemExit(f"expected {program}, got no such file: cmake --preset release && cmake --build "
+                             "--preset release")
 
 
 def run_part(documentation, measure):
@@ -57,4 +60,5 @@ def run_part(documentation, measure):
     arguments = parser.parse_args()
     check_programs(arguments.build)
     with tempfile.TemporaryDirectory(prefix="eventgan-benchmark-") as scratch:
-        print(markdown([measure(Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch), arguments.v2e))]))
+        print(markdown(
+            [measure(Bench(arguments.build.resolve(), arguments.effort, pathlib.Path(scratch), arguments.v2e))]))

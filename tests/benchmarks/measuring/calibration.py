@@ -15,7 +15,8 @@ class NotCalibrated(Exception):
 
 
 def calibrated(bench, weights, size, contrast=1):
-    """The file; calibrated once for each of these arguments. `contrast`: what the frames' distance from mid-grey is multiplied with."""
+    """The file; calibrated once for each of these arguments. `contrast`:
+    what the frames' distance from mid-grey is multiplied with."""
     name = f"{pathlib.Path(weights).stem.replace(':', '-')}-{contrast}"
     path = bench.folder("calibrated") / f"{name}-{size[0]}x{size[1]}.safetensors"
     if not path.exists():
@@ -25,7 +26,8 @@ def calibrated(bench, weights, size, contrast=1):
         frames = link_frames(path.with_suffix(".frames"), originals, len(originals))
         manifest = path.with_suffix(".json")
         manifest.write_text(json.dumps(Job(frames, *size, weights).manifest()))
-        done = subprocess.run([bench.program, "calibrate", manifest, "--pairs", str(len(originals) - 1), "--out", path, "--progress", "none"],
+        done = subprocess.run([bench.program, "calibrate", manifest, "--pairs", str(len(originals) - 1), "--out", path,
+                               "--progress", "none"],
                               capture_output=True, text=True)
         if done.returncode != 0:
             raise NotCalibrated((done.stderr.strip().splitlines() or ["no word"])[-1])

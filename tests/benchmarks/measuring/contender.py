@@ -55,7 +55,8 @@ class Contender(contextlib.AbstractContextManager):
         return self._ask("saturation")
 
     def amplification(self, change, tries):
-        """{"l2", "largest", "relative_l2"}, the largest of so many changes of one "level" of one pixel, or of "noise" of 1e-6 everywhere."""
+        """{"l2", "largest", "relative_l2"}, the largest of so many changes of one "level" of one pixel,
+        or of "noise" of 1e-6 everywhere."""
         return self._ask(f"{change} {tries}")
 
     def many(self, pairs, threads):
@@ -63,7 +64,8 @@ class Contender(contextlib.AbstractContextManager):
         return self._ask(f"many {pairs} {threads}")
 
     def epoch(self, pairs, workers, method):
-        """{"wall_ms", "cpu_ms", "caller_ms"} of a DataLoader whose workers run already, processor time of these and of their caller."""
+        """{"wall_ms", "cpu_ms", "caller_ms"} of a DataLoader whose workers run already,
+        processor time of these and of their caller."""
         return self._ask(f"epoch {pairs} {workers} {method}")
 
     def _ask(self, request):

@@ -27,7 +27,8 @@ class Job:
     def manifest(self):
         return {
             "format": "eventgan-manifest", "version": 1, "name": "benchmark", "seed": 7,
-            "sources": [{"dataset": "frames", "root": str(self.frames), "pairs": {"gaps": [1], "side": "before", "choose": "one"}}],
+            "sources": [{"dataset": "frames", "root": str(self.frames),
+                         "pairs": {"gaps": [1], "side": "before", "choose": "one"}}],
             "image": {"height": self.height, "width": self.width, "fit": "stretch", "preset": self.preset},
             "generator": self.generator or {"weights": self.weights, "precision": self.precision},
             "output": {"directory": "out", "samples_per_shard": self.samples_per_shard, "dtype": self.dtype,
@@ -59,7 +60,8 @@ def convert(program, job, keep=None):
         with open(manifest, "w") as file:
             json.dump(job.manifest(), file)
         with tempfile.TemporaryFile("w+") as errors:
-            process = subprocess.Popen([program, "convert", manifest, "--threads", str(job.threads), "--progress", "json"],
+            process = subprocess.Popen([program, "convert", manifest, "--threads", str(job.threads), "--progress",
+                                        "json"],
                                        stdout=subprocess.PIPE, stderr=errors, text=True, preexec_fn=pin_to(job.threads))
             with process.stdout:
                 said = process.stdout.read()
@@ -100,4 +102,5 @@ class PairCost:
 def pair_cost(few, many):
     pairs = many.pairs - few.pairs
     return PairCost(wall_s=(many.wall_s - few.wall_s) / pairs, cpu_s=(many.cpu_s - few.cpu_s) / pairs,
-                    stage_s={stage: (many.stage_s[stage] - few.stage_s.get(stage, 0)) / pairs for stage in many.stage_s})
+                    stage_s={stage: (many.stage_s[stage] - few.stage_s.get(stage, 0)) / pairs
+                             for stage in many.stage_s})

@@ -21,7 +21,8 @@ def original_frames(bench):
 
 
 def link_frames(folder, originals, count):
-    """`count` links to the originals, to their end, back to their start and so on, so that neighbours are neighbours in time."""
+    """`count` links to the originals, to their end, back to their start and so on,
+    so that neighbours are neighbours in time."""
     folder.mkdir(parents=True)
     there_and_back = list(originals) + list(originals[-2:0:-1])
     for index in range(count):
@@ -40,7 +41,8 @@ def write_input(bench, size):
     height, width = size
     path = bench.scratch / f"input-{height}x{width}.raw"
     originals, _ = original_frames(bench)
-    images = [PIL.Image.open(frame).convert("L").resize((width, height), PIL.Image.BILINEAR) for frame in originals[-2:]]
+    images = [PIL.Image.open(frame).convert("L").resize((width, height), PIL.Image.BILINEAR)
+              for frame in originals[-2:]]
     (np.stack(images).astype(np.float32) / 127.5 - 1).tofile(path)
     return path
 
@@ -61,5 +63,6 @@ def fainter_copies(folder, originals, contrast):
     copies = []
     for index, original in enumerate(originals):
         copies.append(folder / f"{index:06d}.png")
-        PIL.Image.open(original).convert("L").point(lambda level: round(127.5 + (level - 127.5) * contrast)).save(copies[-1])
+        PIL.Image.open(original).convert("L").point(lambda level: round(127.5 + (level - 127.5) * contrast)).save(
+            copies[-1])
     return copies

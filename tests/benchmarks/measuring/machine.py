@@ -7,8 +7,10 @@ import subprocess
 from measuring.cores import usable
 
 # Of the hundred and more that /proc/cpuinfo lists, those that engines choose their kernels by.
-TELLING_FLAGS = ["avx2", "fma", "avx512f", "avx512_vnni", "avx_vnni", "avx512_bf16", "avx512_fp16", "amx_tile", "amx_bf16", "amx_int8"]
-NATIVE_FLAGS = {"float32": None, "bfloat16": {"avx512_bf16", "amx_bf16"}, "int8": {"avx512_vnni", "avx_vnni", "amx_int8"}}
+TELLING_FLAGS = ["avx2", "fma", "avx512f", "avx512_vnni", "avx_vnni", "avx512_bf16", "avx512_fp16", "amx_tile",
+                 "amx_bf16", "amx_int8"]
+NATIVE_FLAGS = {"float32": None, "bfloat16": {"avx512_bf16", "amx_bf16"},
+                "int8": {"avx512_vnni", "avx_vnni", "amx_int8"}}
 
 
 def _processor():

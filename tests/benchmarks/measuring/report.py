@@ -43,7 +43,8 @@ def markdown(sections):
 def wrapped(text):
     """Each paragraph, and each line of a list, in lines of at most 120 characters."""
     def filled(line):
-        return textwrap.fill(line, 120, subsequent_indent="  " * line.startswith("- "), break_long_words=False, break_on_hyphens=False)
+        return textwrap.fill(line, 120, subsequent_indent="  " * line.startswith("- "), break_long_words=False,
+                             break_on_hyphens=False)
 
     return "\n\n".join("\n".join(map(filled, part.splitlines())) if part.startswith("- ") else filled(part)
                        for part in text.strip().split("\n\n"))
